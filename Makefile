@@ -1,0 +1,54 @@
+# A Python of 3.10 to 3.13 (those that requirements.lock serves), e.g. `make install PYTHON=python3.12`.
+PYTHON ?= python3
+# Passed through to the command a target runs, e.g. `make test ARGS="-k payoff"`.
+ARGS ?=
+
+CAMPAIGN := campaigns/merge.toml
+BIN := .venv/bin
+INSTALLED := .venv/installed
+
+.DEFAULT_GOAL := help
+.PHONY: help install campaign quick test check lock clean
+
+help: ## list the targets
+	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
+	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r target text; do \
+	    printf '%-12s%s\n' "$$target" "$$text"; done
+
+install: $(INSTALLED) ## set up .venv from requirements.lock (again only when it or pyproject.toml changes)
+
+campaign: install ## run the paper's campaign: harness campaign campaigns/merge.toml
+	$(BIN)/harness campaign $(CAMPAIGN) $(ARGS)
+
+quick: install ## the same campaign with a budget of minutes: every stage, fewer steps
+	$(BIN)/harness campaign $(CAMPAIGN) --quick $(ARGS)
+
+test: install ## run every test
+	$(BIN)/pytest $(ARGS)
+
+check: install ## lint, formatting and types, in under half a minute
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+lock: ## rewrite requirements.lock with the newest versions that pyproject.toml allows (needs uv)
+	grep '^#' requirements.lock > requirements.lock.new
+	uv pip compile --quiet --universal --python-version 3.10 --fork-strategy fewest --extra dev \
+	    --no-annotate --no-header --upgrade $(ARGS) pyproject.toml >> requirements.lock.new
+	mv requirements.lock.new requirements.lock
+
+clean: ## remove .venv and what the tools leave behind; run folders in reports/ stay
+	rm -rf .venv .mypy_cache .pytest_cache .ruff_cache .hypothesis build dist *.egg-info
+	find harness tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+$(INSTALLED): requirements.lock pyproject.toml
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))' || { \
+	    echo "$(PYTHON) is not a Python of 3.10 to 3.13: name one, e.g. make install PYTHON=python3.12" >&2; exit 1; }
+	@$(PYTHON) -m venv .venv || { \
+	    echo "$(PYTHON) can't make virtual environments (on Debian and Ubuntu: apt-get install python3-venv)" >&2; exit 1; }
+	$(BIN)/python -m pip install --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@$(BIN)/python -c 'import libsumo' || { \
+	    echo "SUMO lacks system libraries (on Debian and Ubuntu:" \
+	        "apt-get install libatomic1 libgl1 libx11-6 libxext6 libxrender1)" >&2; exit 1; }
+	@touch $@
