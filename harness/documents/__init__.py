@@ -1,0 +1,1 @@
+"""What a person writes: campaigns, scenes and personas, as validated, frozen records."""

@@ -1,0 +1,108 @@
+"""A campaign: which ego meets which personas on which scene, how they learn, and how they are judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, field_validator, model_validator
+
+from harness.documents.reading import Document
+from harness.documents.scene import Name
+
+LEARNED, SUMO = "learned", "sumo"  # drivers an ego can have by name
+
+Seed = Annotated[int, Field(ge=0, lt=2**31)]
+DocumentPath = Annotated[str, Field(min_length=1, max_length=500)]
+
+
+class Ego(Document):
+    """The vehicle under study."""
+
+    driver: str = LEARNED
+    """`learned` by the campaign, `sumo` for SUMO's own models, or the folder of a policy."""
+    persona: DocumentPath = "../personas/careful.toml"
+    """The ego's own payoff."""
+
+
+class Training(Document):
+    """How players learn: PPO with the paper's table 1 as defaults."""
+
+    steps: int = Field(3_000_000, ge=1_000, le=1_000_000_000)
+    """Budget of each training, in steps of its player."""
+    early_convergence: bool = True
+    """Stop when the learning curve has settled (the rule is in the manifest)."""
+    learning_rate: float = Field(1e-4, gt=0.0, le=1.0)
+    discount: float = Field(0.99, gt=0.0, le=1.0)
+    clip: float = Field(0.1, gt=0.0, le=1.0)
+    entropy_coefficient: float = Field(0.02, ge=0.0, le=1.0)
+    buffer: int = Field(2048, ge=64, le=1_000_000)
+    """Steps gathered, over all games, between two updates."""
+    games: int = Field(64, ge=1, le=1024)
+    """Games played at once."""
+    minibatch: int = Field(512, ge=8, le=1_000_000)
+    epochs: int = Field(10, ge=1, le=100)
+    """Passes over the buffer in an update."""
+    network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)
+    """Sizes of the hidden layers, of actor and critic each."""
+    initial_deviation: float = Field(0.5, gt=0.0, le=2.0)
+    """Standard deviation of a new policy's actions."""
+    segment_steps: int = Field(131_072, ge=1_024, le=100_000_000)
+    """Training is kept on disk and its learning curve judged this often."""
+
+    @model_validator(mode="after")
+    def _divides(self) -> Training:
+        if self.buffer % self.games:
+            raise ValueError(f"buffer ({self.buffer}) must be a multiple of games ({self.games})")
+        if self.minibatch > self.buffer:
+            raise ValueError(f"minibatch ({self.minibatch}) must not exceed buffer ({self.buffer})")
+        return self
+
+
+class NonEgoTraining(Document):
+    """Round 1: how the non-ego learns."""
+
+    alone_share: float = Field(0.25, ge=0.0, le=1.0)
+    """Share of games without the ego, so that it learns the road as well."""
+    warm_start: bool = True
+    """Begin from the naive ego's parameters, a driver who knows the empty road, rather than from nothing."""
+
+
+class Retraining(Document):
+    """Round 2: how the ego is retrained."""
+
+    alone_share: float = Field(0.25, ge=0.0, le=1.0)
+    """Share of games without the non-ego, so that nothing is forgotten."""
+
+
+class Assessment(Document):
+    """How players are judged."""
+
+    episodes: int = Field(100, ge=2, le=1_000_000)
+    significance: float = Field(0.01, gt=0.0, lt=1.0)
+
+
+class Campaign(Document):
+    """One document, one command, one run folder."""
+
+    name: Name
+    scene: DocumentPath
+    personas: list[DocumentPath] = Field(min_length=1, max_length=50)
+    seeds: list[Seed] = Field([1], min_length=1, max_length=100)
+    ego: Ego = Ego()
+    training: Training = Training()
+    non_ego_training: NonEgoTraining = NonEgoTraining()
+    retraining: Retraining = Retraining()
+    assessment: Assessment = Assessment()
+
+    @field_validator("seeds")
+    @classmethod
+    def _distinct(cls, seeds: list[int]) -> list[int]:
+        if len(set(seeds)) < len(seeds):
+            raise ValueError("a seed stands twice")
+        return seeds
+
+
+def resolve(campaign_file: Path, written: str) -> Path:
+    """A path in a campaign is relative to the campaign's own file."""
+    return (campaign_file.parent / written).resolve()

@@ -1,0 +1,206 @@
+"""A persona: what a kind of person wants of a drive, and how they attend to it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+
+from harness.documents.reading import NUMBER, TABLE, Document, Mistakes, nearest
+from harness.documents.scene import Interval, Name
+from harness.game.attention import Attention
+from harness.game.fuzzy import FuzzyFunction, FuzzySet
+from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
+
+Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
+
+
+class Source(Document):
+    """What is known of such people: the statistic the persona rests on, and where it is from."""
+
+    statistic: str = Field(min_length=10)
+    citation: str = Field(min_length=5)
+
+
+class Parametrised(Document):
+    """A term that takes a limit: `{ weight = 1.0, within_m = 0.5 }`."""
+
+    weight: Weight
+    within_m: float | None = Field(None, gt=0.0, le=100.0)
+    within_s: float | None = Field(None, gt=0.0, le=60.0)
+
+
+WeightOrTable = Annotated[
+    Annotated[Weight, Tag(NUMBER)] | Annotated[Parametrised, Tag(TABLE)],
+    Discriminator(lambda given: TABLE if isinstance(given, dict | Parametrised) else NUMBER),
+]
+
+
+class Group(Document):
+    """One of equation 1's three groups of terms."""
+
+    weight: Weight = 1.0
+    """Its coefficient alpha in equation 1."""
+    terms: dict[str, WeightOrTable] = Field(default_factory=dict)
+    """Each term's weight, or its weight and limit."""
+
+
+class MembershipFunction(Document):
+    """A fuzzy set: linear between points of [input, membership in 0..1], constant outside them."""
+
+    name: Name
+    points: list[tuple[float, Annotated[float, Field(ge=0.0, le=1.0)]]] = Field(min_length=1, max_length=20)
+    value: float = Field(ge=-1000.0, le=1000.0)
+    """What being wholly in this set is worth, per second."""
+
+    @field_validator("points")
+    @classmethod
+    def _rising(cls, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+        inputs = [point[0] for point in points]
+        if inputs != sorted(set(inputs)):
+            raise ValueError("the points' inputs must rise")
+        return points
+
+    @property
+    def fuzzy_set(self) -> FuzzySet:
+        """The set as the game knows it."""
+        inputs, memberships = zip(*self.points, strict=True)
+        return FuzzySet(self.name, inputs, memberships, self.value)
+
+
+class Fuzzy(Document):
+    """A human term declared by membership functions over one quantity of the game."""
+
+    name: Name
+    weight: Weight = 1.0
+    quantity: str
+    sets: list[MembershipFunction] = Field(min_length=1, max_length=20)
+
+    @field_validator("quantity")
+    @classmethod
+    def _known(cls, quantity: str) -> str:
+        if quantity not in FUZZY_QUANTITIES:
+            raise ValueError(f"unknown quantity {quantity!r}: {nearest(quantity, FUZZY_QUANTITIES)}")
+        return quantity
+
+    @field_validator("name")
+    @classmethod
+    def _free(cls, name: str) -> str:
+        if name in TERMS:
+            raise ValueError(f"{name!r} is a built-in term: give the fuzzy term another name")
+        return name
+
+    @model_validator(mode="after")
+    def _contact_is_worst(self) -> Fuzzy:
+        if self.quantity in NEARNESS:
+            inputs = {0.0, *(max(point[0], 0.0) for each in self.sets for point in each.points)}
+            some = np.array(sorted(inputs | {each + 1e-6 for each in inputs} | {max(inputs) + 1.0}))
+            worth = self.function(some)
+            if worth[0] > worth.min() + 1e-9:
+                raise ValueError(
+                    f"nobody may be paid for a crash: at contact (0) it is worth {worth[0]:g}, "
+                    f"more than the {worth.min():g} at {some[worth.argmin()]:g}"
+                )
+        return self
+
+    @property
+    def function(self) -> FuzzyFunction:
+        """The function of the quantity."""
+        return FuzzyFunction(self.quantity, tuple(each.fuzzy_set for each in self.sets))
+
+
+class Human(Group):
+    """The human group: besides named terms, any number of fuzzy ones."""
+
+    fuzzy: list[Fuzzy] = Field(default_factory=list)
+
+
+class Lapsing(Document):
+    """When attention lapses, for how long, and what the car does meanwhile."""
+
+    mean_attentive_s: float = Field(gt=0.1, le=3600.0)
+    """Mean time between lapses (exponential)."""
+    lapse_s: Interval
+    """Range of a lapse's length (uniform). In it the policy's actions are omitted: pedals released, wheel held."""
+    drift_rad: float = Field(0.0, ge=0.0, le=0.1)
+    """Standard deviation of the steering angle that road crown and bumps add in a lapse."""
+
+    @field_validator("lapse_s")
+    @classmethod
+    def _positive(cls, lapse_s: tuple[float, float]) -> tuple[float, float]:
+        if lapse_s[0] <= 0.0:
+            raise ValueError("a lapse must last longer than 0 s")
+        return lapse_s
+
+
+def _fits(parameter: str, given: float | Parametrised) -> bool:
+    """Whether a term that takes this limit (or none) was given as it has to be."""
+    if isinstance(given, Parametrised):
+        return {name for name in ("within_m", "within_s") if getattr(given, name) is not None} == {parameter}
+    return not parameter
+
+
+class Persona(Document):
+    """A kind of driver, as equation 1 and human limits."""
+
+    name: Name
+    description: str = Field(min_length=10)
+    sources: list[Source] = Field(min_length=1)
+    safety: Group = Group()
+    operational: Group = Group()
+    human: Human = Human()
+    attention: Lapsing | None = None
+    decisions: Literal["mode", "sampled"] = "mode"
+    """Whether it always takes its policy's most likely action, or varies as the policy does."""
+
+    @model_validator(mode="after")
+    def _terms_fit(self) -> Persona:
+        wrong = []
+        for group in GROUPS:
+            known = [name for name, term in TERMS.items() if term.group == group]
+            for name, given in getattr(self, group).terms.items():
+                key = f"{group}.terms.{name}"
+                if name in TERMS and name not in known:
+                    right = TERMS[name].group
+                    wrong.append((key, f"is a {right} term", f"move it to [{right}.terms]"))
+                elif name not in known:
+                    wrong.append((key, f"unknown {group} term", nearest(name, known)))
+                elif not _fits(TERMS[name].parameter, given):
+                    limit = TERMS[name].parameter
+                    remedy = f"{{ weight = ..., {limit} = ... }}" if limit else "a plain weight"
+                    wrong.append((key, "its weight is not given as it has to be", f"give {remedy}"))
+        names = [each.name for each in self.human.fuzzy]
+        for k, name in enumerate(names):
+            if name in names[:k]:
+                wrong.append((f"human.fuzzy[{k}].name", f"{name!r} stands twice", "give each a name of its own"))
+        if wrong:
+            raise Mistakes(wrong)
+        if not any(getattr(self, group).terms for group in GROUPS) and not self.human.fuzzy:
+            raise ValueError("the payoff has no terms: nothing could be learned from it")
+        return self
+
+    @property
+    def payoff(self) -> Payoff:
+        """Equation 1 of this persona."""
+        terms = []
+        for group in (self.safety, self.operational, self.human):
+            for name, given in group.terms.items():
+                if isinstance(given, Parametrised):
+                    terms.append(Weighted(name, given.weight, given.within_m or given.within_s))
+                else:
+                    terms.append(Weighted(name, given))
+        fuzzy = {each.name: (each.weight, each.function) for each in self.human.fuzzy}
+        alpha = {
+            "safety": self.safety.weight,
+            "operational": self.operational.weight,
+            "human": self.human.weight,
+        }
+        return Payoff(alpha, tuple(terms), fuzzy)
+
+    @property
+    def lapses(self) -> Attention | None:
+        """How attention lapses; None: never."""
+        if self.attention is None:
+            return None
+        return Attention(self.attention.mean_attentive_s, self.attention.lapse_s, self.attention.drift_rad)

@@ -1,0 +1,160 @@
+"""The road as the game needs it: rails to hit, and each player's route as a table of stations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from harness.game.arrays import FloatArray, IntArray
+
+SPACING_M = 0.5  # between stations of a route
+MARGIN_M = 100.0  # how far a route's table goes on, straight, before its start and beyond its end
+_CELL_M = 20.0
+_FAR_AWAY_M = 1e6
+_LEAST_STRETCH = 0.25  # nearer to a curve's centre, or beyond it, no station is nearest
+
+
+@dataclass(frozen=True)
+class Route:
+    """A way through the scene, tabled every `SPACING_M` metres, from -MARGIN_M to length + MARGIN_M.
+
+    Arrays are [N], per lane [N, L]; lateral offsets are metres to the left of the route's line. A station has as
+    many lanes as the road there; the rest of its row is NaN.
+    """
+
+    x_m: FloatArray
+    y_m: FloatArray
+    heading_rad: FloatArray
+    left_edge_m: FloatArray
+    right_edge_m: FloatArray
+    speed_limit_mps: FloatArray
+    lane_offset_m: FloatArray  # [N, L] of the lane's centre
+    lane_end_m: FloatArray  # [N, L] station where the lane ends for who follows this route; inf if it goes on
+    length_m: float
+    goal_m: float
+
+
+@dataclass(frozen=True)
+class Routes:
+    """The routes of all players in one table, so that a look-up serves them all: rows of player p begin at
+    `first_row[p]`. Columns are as in `Route`."""
+
+    x_m: FloatArray
+    y_m: FloatArray
+    heading_rad: FloatArray
+    cos: FloatArray
+    sin: FloatArray
+    curvature_per_m: FloatArray
+    left_edge_m: FloatArray
+    right_edge_m: FloatArray
+    speed_limit_mps: FloatArray
+    lane_offset_m: FloatArray
+    lane_end_m: FloatArray
+    first_row: IntArray  # [P]
+    last_row: IntArray  # [P]
+    goal_m: FloatArray  # [P]
+
+    @classmethod
+    def of(cls, routes: Sequence[Route]) -> Routes:
+        """One table of the players' routes."""
+        lanes = max(route.lane_offset_m.shape[1] for route in routes)
+
+        def column(name: str) -> FloatArray:
+            parts = [getattr(route, name) for route in routes]
+            if parts[0].ndim == 2:
+                missing = [((0, 0), (0, lanes - part.shape[1])) for part in parts]
+                parts = [np.pad(part, pad, constant_values=np.nan) for part, pad in zip(parts, missing, strict=True)]
+            return np.concatenate(parts)
+
+        columns = {each.name: column(each.name) for each in fields(Route) if each.name not in ("length_m", "goal_m")}
+        rows = np.array([len(route.x_m) for route in routes])
+        first = np.cumsum(rows) - rows
+        return cls(
+            **columns,
+            cos=np.cos(columns["heading_rad"]),
+            sin=np.sin(columns["heading_rad"]),
+            curvature_per_m=np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
+            first_row=first,
+            last_row=first + rows - 1,
+            goal_m=np.array([route.goal_m for route in routes]),
+        )
+
+    def rows(self, station_m: FloatArray) -> IntArray:
+        """[G, P] rows of the table nearest to the players' stations [G, P]."""
+        return self.clip(self.first_row + np.rint((station_m + MARGIN_M) / SPACING_M).astype(np.int64))
+
+    def clip(self, rows: IntArray) -> IntArray:
+        """[G, P] rows kept within each player's own route."""
+        return np.minimum(np.maximum(rows, self.first_row), self.last_row)
+
+    def locate(self, x_m: FloatArray, y_m: FloatArray, station_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Stations and lateral offsets (m, left positive) of the players at points [G, P], given where they were.
+
+        Newton's method on the distance to the line: a metre to the inside of a curve is more of its line, a metre to
+        the outside less.
+        """
+        for _ in range(3):
+            rows = self.rows(station_m)
+            dx, dy = x_m - self.x_m[rows], y_m - self.y_m[rows]
+            cos, sin = self.cos[rows], self.sin[rows]
+            offset = dy * cos - dx * sin
+            stretch = np.maximum(1.0 - self.curvature_per_m[rows] * offset, _LEAST_STRETCH)
+            station_m = (rows - self.first_row) * SPACING_M - MARGIN_M + (dx * cos + dy * sin) / stretch
+        return station_m, offset
+
+    def find(self, player: int, x_m: float, y_m: float) -> float:
+        """Station of a player of which nothing is known but the point."""
+        rows = slice(self.first_row[player], self.last_row[player] + 1)
+        nearest = int(((self.x_m[rows] - x_m) ** 2 + (self.y_m[rows] - y_m) ** 2).argmin())
+        return nearest * SPACING_M - MARGIN_M
+
+
+def _curvature_per_m(heading_rad: FloatArray) -> FloatArray:
+    """[N] how fast a route's line turns to the left."""
+    return np.gradient(np.unwrap(heading_rad), SPACING_M)
+
+
+@dataclass(frozen=True)
+class Rails:
+    """The edges of the drivable area as line segments, found by place."""
+
+    segments: FloatArray  # [S, 2, 2], the last one far away: it fills cells that have fewer
+    origin_m: FloatArray  # [2]
+    cells: IntArray  # [X, Y, K] rows of `segments` within reach of each cell
+
+    @classmethod
+    def of(cls, segments: FloatArray, reach_m: float) -> Rails:
+        """Rails from segments [S, 2, 2]; `near` will know all within `reach_m` of a point."""
+        segments = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
+        padded = np.concatenate((segments, np.full((1, 2, 2), _FAR_AWAY_M)))
+        if not len(segments):
+            return cls(padded, np.zeros(2), np.zeros((1, 1, 1), dtype=np.int64))
+        low = segments.min((0, 1)) - reach_m
+        counts = ((segments.max((0, 1)) + reach_m - low) // _CELL_M).astype(int) + 1
+        found: dict[tuple[int, ...], list[int]] = {}
+        first = ((segments.min(1) - reach_m - low) // _CELL_M).astype(int)
+        last = ((segments.max(1) + reach_m - low) // _CELL_M).astype(int) + 1
+        for row, (begin, end) in enumerate(zip(first, last, strict=True)):
+            for cell in np.ndindex(*(end - begin)):
+                found.setdefault((begin[0] + cell[0], begin[1] + cell[1]), []).append(row)
+        cells = np.full((*counts, max(map(len, found.values()))), len(segments), dtype=np.int64)
+        for place, rows in found.items():
+            cells[place][: len(rows)] = rows
+        return cls(padded, low, cells)
+
+    def near(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+        """[..., K, 2, 2] the segments within reach of points [...]."""
+        last_x, last_y = self.cells.shape[0] - 1, self.cells.shape[1] - 1
+        ix = np.minimum(np.maximum((x_m - self.origin_m[0]) // _CELL_M, 0), last_x).astype(np.int64)
+        iy = np.minimum(np.maximum((y_m - self.origin_m[1]) // _CELL_M, 0), last_y).astype(np.int64)
+        return self.segments[self.cells[ix, iy]]
+
+
+@dataclass(frozen=True)
+class Road:
+    """What the players drive on: the rails, and a route for each player."""
+
+    rails: Rails
+    routes: Routes
