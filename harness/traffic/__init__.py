@@ -1,0 +1,1 @@
+"""SUMO, and the only place that imports it."""

@@ -1,0 +1,138 @@
+"""From a SUMO net to the game's road: the drivable area and its rails.
+
+The drivable area is the union of the areas of all lanes a car may use and of the junctions between them; its outline
+is the rail, but for the openings where roads enter and leave the scene.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import shapely
+import sumolib
+from shapely.geometry.base import BaseGeometry
+from sumolib.net import Net
+from sumolib.net.connection import Connection
+from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
+
+from harness.documents.reading import nearest
+from harness.errors import UsageError
+from harness.game.arrays import FloatArray
+from harness.game.road import Rails
+
+_SEAM_M = 0.05  # gaps up to twice this between lanes and junctions are closed
+_OPENING_M = 0.3  # of the outline that belongs to an opening
+_SMOOTH_M = 0.01
+_CAR = "passenger"
+_TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
+
+
+def read_net(path: Path) -> Net:
+    """Read a `.net.xml` that is well-formed XML. Raises UsageError where SUMO's reader can't make a net of it."""
+    try:
+        net = sumolib.net.readNet(str(path), withInternal=True)
+    except Exception as error:  # sumolib raises whatever its parsing stumbles on
+        raise UsageError.of(path, "", f"is not a SUMO net: {error!r}", "build it with netconvert or netedit") from error
+    if not any(car_lanes(edge) for edge in net.getEdges(withInternal=False)):
+        raise UsageError.of(path, "", "has no lane that cars may use", "build it with netconvert or netedit")
+    return net
+
+
+def car_lanes(edge: Edge) -> list[Lane]:
+    """The edge's lanes that cars may use, in SUMO's order."""
+    return [lane for lane in edge.getLanes() if lane.allows(_CAR)]
+
+
+def lane_line(lane: Lane) -> FloatArray:
+    """[n, 2] the lane's centre line."""
+    return np.array([point[:2] for point in lane.getShape()], dtype=float)
+
+
+def drivable_area(net: Net) -> BaseGeometry:
+    """The area cars may use, m^2 in network coordinates."""
+    beyond = _turnarounds_beyond_the_scene(net)
+    parts = [
+        shapely.LineString(lane_line(lane)).buffer(lane.getWidth() / 2.0, cap_style="flat", join_style="mitre")
+        for edge in net.getEdges(withInternal=True)
+        for lane in car_lanes(edge)
+        if lane.getID() not in beyond and len(np.unique(lane_line(lane), axis=0)) > 1
+    ]
+    for node in net.getNodes():
+        if len(node.getShape()) > 2:
+            parts.append(shapely.Polygon([point[:2] for point in node.getShape()]).buffer(0))
+    grown = shapely.union_all([part.buffer(_SEAM_M, join_style="mitre") for part in parts])
+    return grown.buffer(-_SEAM_M, join_style="mitre").simplify(_SMOOTH_M)
+
+
+def rail_lines(net: Net) -> list[FloatArray]:
+    """The rails as polylines [n, 2]: the outline of the drivable area without its openings."""
+    openings = [
+        shapely.LineString(_cross_section(lane, at_end)).buffer(_OPENING_M, cap_style="square")
+        for edge in net.getEdges(withInternal=False)
+        for at_end in (False, True)
+        if _is_fringe(edge, at_end)
+        for lane in car_lanes(edge)
+    ]
+    outline = drivable_area(net).boundary
+    rails = shapely.difference(outline, shapely.union_all(openings)) if openings else outline
+    merged = shapely.line_merge(rails) if rails.geom_type == "MultiLineString" else rails
+    return [np.asarray(line.coords) for line in getattr(merged, "geoms", [merged]) if len(line.coords) > 1]
+
+
+def rails(net: Net, reach_m: float) -> Rails:
+    """The rails as segments found by place, up to `reach_m` away."""
+    lines = rail_lines(net)
+    segments = [np.stack((line[:-1], line[1:]), axis=1) for line in lines]
+    return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), reach_m)
+
+
+def find_edge(net: Net, path: Path, key: str, name: str) -> Edge:
+    """The edge of that name; UsageError with the nearest one otherwise."""
+    names = [edge.getID() for edge in net.getEdges(withInternal=False)]
+    if name not in names:
+        raise UsageError.of(path, key, f"the net has no edge {name!r}", nearest(name, names))
+    return net.getEdge(name)
+
+
+def find_lane(net: Net, path: Path, key: str, name: str) -> Lane:
+    """The lane of that name; UsageError with the nearest one otherwise."""
+    names = [lane.getID() for edge in net.getEdges(withInternal=False) for lane in edge.getLanes()]
+    if name not in names:
+        raise UsageError.of(path, key, f"the net has no lane {name!r}", nearest(name, names))
+    return net.getLane(name)
+
+
+def _is_fringe(edge: Edge, at_end: bool) -> bool:
+    """Whether the scene stops at that end of the edge: nothing but the way back is connected there."""
+    if at_end:
+        return all(_is_way_back(edge, other) for other in edge.getToNode().getOutgoing() if not other.isSpecial())
+    return all(_is_way_back(other, edge) for other in edge.getFromNode().getIncoming() if not other.isSpecial())
+
+
+def _is_way_back(edge: Edge, other: Edge) -> bool:
+    """Whether the other edge leads back from the edge's end to its start, and only by turning round."""
+    if other.getToNode() is not edge.getFromNode():
+        return False
+    return all(link.getDirection() in _TURNAROUNDS for link in edge.getConnections(other))
+
+
+def _turnarounds_beyond_the_scene(net: Net) -> set[str]:
+    """The lanes on which SUMO lets vehicles turn round where a road leaves the scene: they bulge over its end."""
+    return {
+        link.getViaLaneID()
+        for edge in net.getEdges(withInternal=False)
+        if _is_fringe(edge, at_end=True)
+        for links in edge.getOutgoing().values()
+        for link in links
+    }
+
+
+def _cross_section(lane: Lane, at_end: bool) -> FloatArray:
+    """[2, 2] the line across a lane's start or end."""
+    line = lane_line(lane)
+    here, there = (line[-1], line[-2]) if at_end else (line[0], line[1])
+    along = (here - there) / max(float(np.linalg.norm(here - there)), 1e-9)
+    across = 0.5 * lane.getWidth() * np.array([-along[1], along[0]])
+    return np.stack((here - across, here + across))

@@ -1,0 +1,247 @@
+"""Opening a scene: its document, net and routes, checked against one another, as the game needs them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from sumolib.net import Net
+from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
+
+from harness.documents.reading import nearest, read_document
+from harness.documents.scene import Player, Scene, scene_file
+from harness.errors import Problem, UsageError
+from harness.game.arrays import FloatArray
+from harness.game.attention import Attention
+from harness.game.bicycle import Actuators
+from harness.game.quantities import REACH_M, World
+from harness.game.road import Road, Route, Routes
+from harness.game.start import Chances, Place
+from harness.game.state import ROLES
+from harness.traffic import network
+from harness.traffic.route_file import Departure, RouteFile, VehicleType, parse_xml, read_route_file
+from harness.traffic.route_table import route_table
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class OpenScene:
+    """A scene that was read whole and found in order."""
+
+    folder: Path
+    document: Scene
+    world: World
+    routes: RouteFile
+    places: tuple[Place, ...]
+    edges: tuple[tuple[str, ...], ...]  # each player's route from the edge it starts on
+    rail_lines: tuple[FloatArray, ...]
+
+    @property
+    def net_file(self) -> Path:
+        return self.folder / self.document.net
+
+    def vehicle(self, player: int) -> Departure:
+        """The player's vehicle in the route file."""
+        return self.routes.vehicles[self.document.players[player].vehicle]
+
+    def departures(self, generator: np.random.Generator) -> list[Departure]:
+        """Who else departs during a game; flows with a probability are drawn from the generator."""
+        players = {player.vehicle for player in self.document.players}
+        return self.routes.departures(players, self.document.time_limit_s, generator)
+
+    def chances(self, attention: Sequence[Attention | None], present_share: Sequence[float]) -> Chances:
+        """What is drawn at the start of each game, for players that attend and take part like this."""
+        return Chances(self.places, self.world.length_m, attention, present_share, self.world.steps, self.world.step_s)
+
+
+def open_scene(folder: Path) -> OpenScene:
+    """Read a scene's folder. Raises UsageError with every problem found in it."""
+    document_file = scene_file(folder)
+    document = read_document(document_file, Scene)
+    net_file, route_path = folder / document.net, folder / document.routes
+    problems: list[Problem] = []
+    net, routes = (
+        _attempt(problems, lambda: _checked_net(net_file)),
+        _attempt(problems, lambda: read_route_file(route_path)),
+    )
+    if net is None or routes is None:
+        raise UsageError(problems)
+    opened = [
+        _attempt(problems, lambda k=k: _open_player(document_file, document, ROLES[k], net, routes))  # type: ignore[misc]
+        for k in range(len(ROLES))
+    ]
+    _attempt(problems, lambda: _check_traffic(document, net, routes))
+    if problems or None in opened:
+        raise UsageError(problems)
+    places, tables, edges, types = zip(*opened, strict=True)
+    world = World(
+        Road(network.rails(net, REACH_M + 10.0), Routes.of(tables)),
+        _actuators(document, types),
+        np.array([each.length_m for each in types]),
+        np.array([each.width_m for each in types]),
+        document.step_length_s,
+        document.time_limit_s,
+    )
+    return OpenScene(folder, document, world, routes, places, edges, tuple(network.rail_lines(net)))
+
+
+def _checked_net(path: Path) -> Net:
+    parse_xml(path)
+    return network.read_net(path)
+
+
+def _attempt(problems: list[Problem], action: Callable[[], T]) -> T | None:
+    """The action's result; its problems are collected, so that the rest can be looked at too."""
+    try:
+        return action()
+    except UsageError as error:
+        problems += error.problems
+        return None
+
+
+def _open_player(
+    file: Path, document: Scene, role: str, net: Net, routes: RouteFile
+) -> tuple[Place, Route, tuple[str, ...], VehicleType]:
+    player: Player = getattr(document, role)
+    problems: list[Problem] = []
+    lane = _attempt(problems, lambda: network.find_lane(net, file, f"{role}.lane", player.lane))
+    goal = _attempt(problems, lambda: _goal(file, document, net))
+    vehicle = _attempt(problems, lambda: _vehicle(file, role, player, routes))
+    edges = _attempt(problems, lambda: _edges(vehicle, net, routes)) if vehicle else None
+    place = _attempt(problems, lambda: _place(file, document, role, player, lane, net)) if lane else None
+    if lane is None or goal is None or vehicle is None or edges is None or place is None:
+        raise UsageError(problems)
+    if lane.getEdge() not in edges:
+        raise UsageError.of(
+            file,
+            f"{role}.lane",
+            f"{player.lane!r} is not on the route of vehicle {vehicle.name!r}",
+            "choose a lane of one of its edges",
+        )
+    onward = edges[edges.index(lane.getEdge()) :]
+    try:
+        table = route_table(net, onward, goal, document.goal.position_m)
+    except ValueError as error:
+        raise UsageError.of(
+            routes.path, f"vehicle {vehicle.name}", f"its route {error}", "mend the route's edges"
+        ) from None
+    return place, table, tuple(edge.getID() for edge in onward), routes.types[vehicle.vehicle_type]
+
+
+def _goal(file: Path, document: Scene, net: Net) -> Edge:
+    goal = network.find_edge(net, file, "goal.edge", document.goal.edge)
+    if document.goal.position_m > goal.getLength():
+        raise UsageError.of(
+            file,
+            "goal.position_m",
+            f"lies beyond the edge's end at {goal.getLength():g} m",
+            "choose a smaller one",
+        )
+    return goal
+
+
+def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Departure:
+    if player.vehicle not in routes.vehicles:
+        names = routes.vehicles or ["(the route file has no vehicle)"]
+        raise UsageError.of(
+            file,
+            f"{role}.vehicle",
+            f"{routes.path.name} has no vehicle {player.vehicle!r}",
+            nearest(player.vehicle, names),
+        )
+    vehicle = routes.vehicles[player.vehicle]
+    if vehicle.vehicle_type not in routes.types:
+        raise UsageError.of(
+            routes.path,
+            f"vehicle {vehicle.name}.type",
+            "a player's type can't be a distribution",
+            "name one vType",
+        )
+    fastest = routes.types[vehicle.vehicle_type].max_speed_mps
+    if player.speed_mps[1] > fastest:
+        raise UsageError.of(
+            file,
+            f"{role}.speed_mps",
+            f"reaches {player.speed_mps[1]:g} m/s, more than the vehicle's maxSpeed",
+            f"keep it to {fastest:g} m/s",
+        )
+    return vehicle
+
+
+def _edges(departure: Departure, net: Net, routes: RouteFile) -> list[Edge]:
+    key = f"vehicle {departure.name}"
+    return [network.find_edge(net, routes.path, key, name) for name in departure.edges]
+
+
+def _place(file: Path, document: Scene, role: str, player: Player, lane: Lane, net: Net) -> Place:
+    if player.beside_ego_m is None:
+        reach, key = player.position_m, "position_m"
+    else:
+        reach, key = _beside_ego(file, document, role, player.beside_ego_m, lane, net), "beside_ego_m"
+    assert reach is not None, "the document has one of the two"
+    reaches = f"reaches from {reach[0]:g} to {reach[1]:g} m,"
+    if reach[0] < 0.0 or reach[1] > lane.getLength():
+        raise UsageError.of(
+            file,
+            f"{role}.{key}",
+            f"{reaches} off lane {lane.getID()!r} of {lane.getLength():g} m",
+            f"keep it between 0 and {lane.getLength():g} m",
+        )
+    goal = document.goal
+    if lane.getEdge().getID() == goal.edge and reach[1] >= goal.position_m:
+        raise UsageError.of(
+            file, f"{role}.{key}", f"{reaches} and the goal is at {goal.position_m:g} m", "start before the goal"
+        )
+    line = network.lane_line(lane)
+    scale = float(np.hypot(*np.diff(line, axis=0).T).sum()) / lane.getLength()
+    return Place(line, player.beside_ego_m or reach, player.beside_ego_m is not None, player.speed_mps, scale)
+
+
+def _beside_ego(
+    file: Path, document: Scene, role: str, beside_m: tuple[float, float], lane: Lane, net: Net
+) -> tuple[float, float]:
+    """Where along its lane a player that starts beside the ego may come to start."""
+    ego_lane = network.find_lane(net, file, "ego.lane", document.ego.lane)
+    if ego_lane.getEdge() is not lane.getEdge():
+        raise UsageError.of(
+            file, f"{role}.beside_ego_m", "needs both to start on the same edge", "give position_m instead"
+        )
+    assert document.ego.position_m is not None, "the document says that the ego has one"
+    return document.ego.position_m[0] + beside_m[0], document.ego.position_m[1] + beside_m[1]
+
+
+def _check_traffic(document: Scene, net: Net, routes: RouteFile) -> None:
+    """Raise UsageError for what SUMO would refuse of the others in the middle of a game."""
+    players = {player.vehicle for player in document.players}
+    others = [each for name, each in routes.vehicles.items() if name not in players]
+    problems: list[Problem] = []
+    for other in [*others, *(flow.departure for flow in routes.flows)]:
+        where = (str(routes.path), f"vehicle {other.name}")
+        if other.name in ROLES:
+            problems.append(Problem(*where, "has a player's name without being it", "call it something else"))
+        edges = _attempt(problems, lambda other=other: _edges(other, net, routes)) or []  # type: ignore[misc]
+        for edge, following in pairwise(edges):
+            if not edge.getConnections(following):
+                text = f"its route has no connection from edge {edge.getID()!r} to {following.getID()!r}"
+                problems.append(Problem(*where, text, "mend the route's edges"))
+    if problems:
+        raise UsageError(problems)
+
+
+def _actuators(document: Scene, types: Sequence[VehicleType]) -> Actuators:
+    given = [player.actuators for player in document.players]
+    return Actuators(
+        np.array([each.max_acceleration_mps2 for each in given]),
+        np.array([each.max_braking_mps2 for each in given]),
+        np.array([each.max_speed_mps for each in types]),
+        np.array([each.max_steering_rad for each in given]),
+        np.array([each.max_steering_rate_radps for each in given]),
+        np.array([each.wheelbase_m for each in given]),
+        document.friction,
+    )

@@ -1,0 +1,66 @@
+"""A SUMO simulation that plays G games, as the arena knows it: a few verbs, wherever it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.start import Start
+from harness.traffic.opening import OpenScene
+from harness.traffic.route_file import Departure
+
+
+@dataclass
+class Reading:
+    """What SUMO's own vehicles did. Others are [G, M], padded; players left to SUMO are [G, P]."""
+
+    names: list[list[str]]  # by game, in the order of the arrays
+    types: list[list[str]]
+    x_m: FloatArray
+    y_m: FloatArray
+    heading_rad: FloatArray
+    speed_mps: FloatArray
+    length_m: FloatArray
+    width_m: FloatArray
+    present: BoolArray
+    players: FloatArray  # [G, P, 4] x_m, y_m, heading_rad, speed_mps; NaN where the harness drives
+
+
+class Simulation(Protocol):
+    """What the arena asks of SUMO. Every verb but `close` raises SimulationError if SUMO refuses or has died."""
+
+    def reload(self, seed: int) -> None:
+        """Start SUMO anew, with its random numbers from `seed`: every game has to be started again."""
+
+    def restart(self, game: int, start: Start, departures: list[Departure]) -> None:
+        """Clear a game's tile and put its players at their start; others depart as time goes by."""
+
+    def halt(self, game: int, player: int) -> None:
+        """Whoever drove a player, from now on it stands where `step` says."""
+
+    def remove(self, game: int, player: int) -> None:
+        """Take a player out of the traffic."""
+
+    def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
+        """Place the players that are taken over at poses [G, P] of their centres, let SUMO step, read the rest."""
+        ...
+
+    def close(self) -> None:
+        """Give SUMO back. Closing twice is closing once."""
+
+
+def open_simulation(scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int) -> Simulation:
+    """Load SUMO with a tile for each game: in this process if its libsumo is free, otherwise in a child process.
+
+    Both give the same numbers; only the second costs a message each way per verb. Raises SimulationError if SUMO
+    can't load the scene.
+    """
+    from harness.traffic.local import LocalSimulation
+
+    if not LocalSimulation.in_use():
+        return LocalSimulation(scene, games, taken_over, seed)
+    from harness.traffic.remote import RemoteSimulation
+
+    return RemoteSimulation(scene, games, taken_over, seed)

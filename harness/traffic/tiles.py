@@ -1,0 +1,82 @@
+"""G copies of a scene's net side by side in one net, so that one SUMO plays G games.
+
+Each copy has its names prefixed and its coordinates shifted by netconvert; the merged net is cached by its content.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+import platformdirs
+import sumo
+
+from harness.errors import SimulationError
+from harness.traffic.route_file import parse_xml
+
+_GAP_M = 200.0
+
+
+def tile_prefix(game: int, games: int) -> str:
+    """What stands before every name in a game's tile; nothing if it is the only one."""
+    return f"g{game}_" if games > 1 else ""
+
+
+def tile_offset_m(net_file: Path, games: int) -> float:
+    """How far each tile lies north of the one before it."""
+    location = parse_xml(net_file).find("location")
+    if games == 1 or location is None:
+        return 0.0
+    _, low, _, high = (float(each) for each in location.get("convBoundary", "0,0,0,0").split(","))
+    return float(round(high - low + _GAP_M))
+
+
+def tiled_net(net_file: Path, games: int) -> Path:
+    """A net with G tiles of the scene's net: the net itself for one game, else from the cache."""
+    if games == 1:
+        return net_file
+    digest = hashlib.sha256(net_file.read_bytes() + f"{games} {_GAP_M} {sumo.__file__}".encode()).hexdigest()[
+        :24
+    ]
+    cache = Path(platformdirs.user_cache_dir("harness")) / "tiles"
+    cache.mkdir(parents=True, exist_ok=True)
+    merged = cache / f"{digest}.net.xml"
+    if not merged.exists():
+        with tempfile.TemporaryDirectory(dir=cache) as scratch:
+            os.replace(_merge(net_file, games, Path(scratch)), merged)
+    return merged
+
+
+def _merge(net_file: Path, games: int, scratch: Path) -> Path:
+    offset = tile_offset_m(net_file, games)
+    tiles = []
+    for game in range(games):
+        tile = scratch / f"{game}.net.xml"
+        _netconvert(
+            "-s",
+            str(net_file),
+            "--prefix",
+            tile_prefix(game, games),
+            "--offset.y",
+            str(game * offset),
+            "-o",
+            str(tile),
+        )
+        tiles.append(str(tile))
+    merged = scratch / "merged.net.xml"
+    _netconvert("-s", ",".join(tiles), "--offset.disable-normalization", "-o", str(merged))
+    return merged
+
+
+def _netconvert(*arguments: str) -> None:
+    program = shutil.which("netconvert", path=os.path.join(sumo.SUMO_HOME, "bin"))
+    if program is None:
+        raise SimulationError("netconvert is missing from the installed SUMO: install eclipse-sumo again")
+    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
+    done = subprocess.run([program, *arguments], capture_output=True, text=True, env=environment, check=False)
+    if done.returncode:
+        raise SimulationError(f"netconvert failed: {done.stderr.strip()[-500:]}")
