@@ -1,0 +1,260 @@
+"""The arena: G games played together by one SUMO simulation. Its step is the only stepping loop there is.
+
+| order | what happens in a step | where |
+| --- | --- | --- |
+| 1 | drivers decide from what they saw at the end of the step before; learners' actions come from outside | `drivers` |
+| 2 | lapses of attention omit decisions | `game.attention` |
+| 3 | the players' cars move | `game.bicycle` |
+| 4 | their poses go to SUMO, SUMO moves everyone else, and is read back | `traffic.simulation` |
+| 5 | contact, goal and time decide outcomes | `game.quantities` |
+| 6 | payoffs are worked out | `game.payoff` |
+| 7 | who reached the goal leaves; who crashed stays as an obstacle | here |
+| 8 | everyone looks | `game.observation` |
+
+A game's chance is drawn when it starts (`game.start`). Training and assessment are two thin uses of this loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.drivers.protocol import Driver
+from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.bicycle import drive, requests
+from harness.game.observation import SIZE, observe
+from harness.game.payoff import Payoff
+from harness.game.quantities import Quantities
+from harness.game.start import Start
+from harness.game.state import Bodies, Outcome, State
+from harness.traffic.opening import OpenScene
+from harness.traffic.route_file import Departure
+from harness.traffic.simulation import Reading, open_simulation
+
+NEAREST = 16  # others that a game's bodies have room for
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A player's place in the arena: who drives, and on what payoff (None: nobody asks)."""
+
+    driver: Driver | None
+    """None: a learner, whose actions are given to `Arena.step`."""
+    payoff: Payoff | None = None
+
+
+@dataclass
+class Step:
+    """What a step brought. Arrays are [G, P]."""
+
+    payoff: FloatArray
+    drove: BoolArray
+    """Who was still driving when the step began."""
+    quantities: Quantities
+    """As of the end of the step, before anyone left."""
+
+
+class Arena:
+    """G games on one scene, in which the same seats are taken."""
+
+    def __init__(self, scene: OpenScene, games: int, seats: Sequence[Seat], seed: int = 0) -> None:
+        """Load SUMO. Every game has to be started with `start` before the first step.
+
+        Raises SimulationError if SUMO can't load the scene.
+        """
+        self.scene, self.world, self.games, self.seats = scene, scene.world, games, tuple(seats)
+        self._taken_over = np.array([seat.driver is None or seat.driver.takes_over for seat in seats])
+        self.simulation = open_simulation(scene, games, self._taken_over.tolist(), seed)
+        players = len(self.seats)
+        self.state = State.empty(games, players)
+        self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
+        self._noise = np.zeros((games, players, self.world.steps, 2))
+        self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
+        self._drift_rad = np.zeros((games, players, self.world.steps))
+        self._held_rad = np.zeros((games, players))
+        self._all_games = np.arange(games)
+        self.reading: Reading | None = None
+        self._players_length = np.broadcast_to(self.world.length_m, (games, players))
+        self._players_width = np.broadcast_to(self.world.width_m, (games, players))
+
+    def start(self, starts: Mapping[int, Start], departures: Mapping[int, list[Departure]] | None = None) -> None:
+        """(Re)start games, each from its `Start`, and look."""
+        for game, start in starts.items():
+            self._put(game, start)
+            self.simulation.restart(game, start, list((departures or {}).get(game, [])))
+            if self.reading is not None:
+                self.reading.present[game] = False
+        games = np.array(sorted(starts), dtype=np.int64)
+        state = self.state
+        state.station_m[games], _ = self.world.road.routes.locate(
+            state.x_m[games], state.y_m[games], state.station_m[games]
+        )
+        for seat in self.seats:
+            if seat.driver is not None:
+                seat.driver.begin(games)
+        self._look(games)
+
+    def reload(self, seed: int) -> None:
+        """Start SUMO anew from a seed, as assessment does before each game."""
+        self.simulation.reload(seed)
+        self.reading = None
+
+    def step(self, actions: FloatArray | None = None) -> Step:
+        """Play one step of every game. `actions` [G, P, 2] are the learners'; other seats' entries are ignored."""
+        state = self.state = self.state.copy()  # the quantities of the step before stay what they were
+        drove = state.running
+        acceleration, steering = self._decide(actions, drove)
+        drive(state, acceleration, steering, drove & self._taken_over, self.world.actuators, self.world.step_s)
+        reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
+        self.reading = reading
+        self._take_back(reading, drove)
+        quantities = Quantities(self.world, state, self._bodies(reading), *self._locate())
+        state.step = state.step + 1
+        self._judge(quantities, drove)
+        payoff = self._pay(quantities, drove)
+        self._settle(quantities, drove)
+        return Step(payoff, drove, quantities)
+
+    def close(self) -> None:
+        """Give SUMO back."""
+        self.simulation.close()
+
+    # --- the parts of a step -------------------------------------------------------------------------------------
+
+    def _decide(self, actions: FloatArray | None, drove: BoolArray) -> tuple[FloatArray, FloatArray]:
+        state = self.state
+        now = np.minimum(state.step, self.world.steps - 1)
+        chosen = np.zeros((*drove.shape, 2)) if actions is None else np.array(actions, dtype=float)
+        for player, seat in enumerate(self.seats):
+            if seat.driver is not None:
+                chosen[:, player] = 0.0
+                games = np.flatnonzero(drove[:, player])
+                if seat.driver.takes_over and len(games):
+                    noise = self._noise[games, player, now[games]]
+                    chosen[games, player] = seat.driver.decide(games, self.observation[games, player], noise)
+        acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)
+        lapsed = self._lapsed[self._all_games, :, now] & drove
+        begins = lapsed & ~state.lapsed
+        np.copyto(self._held_rad, state.steering_rad, where=begins)
+        state.lapsed = lapsed
+        drifting = self._held_rad + self._drift_rad[self._all_games, :, now]
+        return np.where(lapsed, 0.0, acceleration), np.where(lapsed, drifting, steering)
+
+    def _take_back(self, reading: Reading, drove: BoolArray) -> None:
+        state = self.state
+        for player in np.flatnonzero(~self._taken_over):
+            games = np.flatnonzero(drove[:, player])
+            x, y, heading, speed = reading.players[games, player].T
+            gained = np.where(state.step[games] > 0, speed - state.speed_mps[games, player], 0.0)
+            state.acceleration_mps2[games, player] = gained / self.world.step_s
+            state.x_m[games, player], state.y_m[games, player] = x, y
+            state.heading_rad[games, player], state.speed_mps[games, player] = heading, speed
+
+    def _locate(self) -> tuple[FloatArray, FloatArray]:
+        """How far each player came along its route, and where it is across it."""
+        state, before = self.state, self.state.station_m
+        state.station_m, offset = self.world.road.routes.locate(state.x_m, state.y_m, before)
+        return state.station_m - before, offset
+
+    def _judge(self, quantities: Quantities, drove: BoolArray) -> None:
+        state = self.state
+        outcome = state.outcome
+        outcome[drove & (state.step[:, None] >= self.world.steps)] = Outcome.TIMEOUT
+        outcome[drove & (quantities.goal_m <= 0.0)] = Outcome.GOAL
+        outcome[drove & quantities.touches_rail & self._taken_over] = Outcome.RAIL
+        outcome[drove & quantities.touches_vehicle] = Outcome.COLLISION
+
+    def _pay(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
+        payoff = np.zeros(drove.shape)
+        for player, seat in enumerate(self.seats):
+            if seat.payoff is not None:
+                payoff[:, player] = np.where(drove[:, player], seat.payoff.total(quantities, player), 0.0)
+        return payoff
+
+    def _settle(self, quantities: Quantities, drove: BoolArray) -> None:
+        """Who reached the goal leaves, who crashed stands; then everyone looks."""
+        self.observation = observe(quantities)
+        ended = drove & (self.state.outcome != Outcome.RUNNING)
+        if ended.any():
+            for game, player in np.argwhere(ended).tolist():
+                if self.state.outcome[game, player] == Outcome.GOAL:
+                    self.simulation.remove(game, player)
+                else:
+                    self.simulation.halt(game, player)
+            self.state = self.state.copy()  # `quantities` keeps what was true at the end of the step
+            self._stop(ended)
+            self._look(np.flatnonzero(ended.any(1)))
+
+    def _stop(self, ended: BoolArray) -> None:
+        state = self.state
+        state.present &= ~(ended & (state.outcome == Outcome.GOAL))
+        state.speed_mps[ended] = 0.0
+        state.acceleration_mps2[ended] = 0.0
+        state.lapsed[ended] = False
+
+    # --- what the players see ------------------------------------------------------------------------------------
+
+    def _put(self, game: int, start: Start) -> None:
+        state = self.state
+        state.x_m[game], state.y_m[game], state.heading_rad[game] = start.x_m, start.y_m, start.heading_rad
+        state.speed_mps[game], state.present[game] = start.speed_mps, start.present
+        state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
+        state.outcome[game], state.lapsed[game], state.step[game] = Outcome.RUNNING, False, 0
+        for player in range(len(self.seats)):
+            state.station_m[game, player] = self.world.road.routes.find(player, start.x_m[player], start.y_m[player])
+            self._lapsed[game, player] = start.lapses[player].lapsed
+            self._drift_rad[game, player] = start.lapses[player].drift_rad
+        self._noise[game] = start.noise
+
+    def _look(self, games: IntArray) -> None:
+        """Look again in games where somebody came or left."""
+        self.observation[games] = observe(self.quantities_of(games))
+
+    def quantities_of(self, games: IntArray) -> Quantities:
+        """The quantities of some games [N], as they are now."""
+        state = State(*(getattr(self.state, each.name)[games] for each in fields(State)))
+        bodies = self._bodies(self.reading)
+        some = Bodies(*(getattr(bodies, each.name)[games] for each in fields(Bodies)))
+        state.station_m, offset = self.world.road.routes.locate(state.x_m, state.y_m, state.station_m)
+        return Quantities(self.world, state, some, np.zeros_like(offset), offset)
+
+    def _bodies(self, reading: Reading | None) -> Bodies:
+        """Players first, then the others nearest to them."""
+        state = self.state
+        if reading is None or not reading.present.size:
+            return Bodies(
+                state.x_m,
+                state.y_m,
+                state.heading_rad,
+                state.speed_mps,
+                self._players_length,
+                self._players_width,
+                state.present.copy(),
+            )
+        columns = self._nearest(reading)
+
+        def beside(own: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
+            return np.concatenate((own, np.take_along_axis(others, columns, 1)), axis=1)
+
+        return Bodies(
+            beside(state.x_m, reading.x_m),
+            beside(state.y_m, reading.y_m),
+            beside(state.heading_rad, reading.heading_rad),
+            beside(state.speed_mps, reading.speed_mps),
+            beside(self._players_length, reading.length_m),
+            beside(self._players_width, reading.width_m),
+            beside(state.present, reading.present),
+        )
+
+    def _nearest(self, reading: Reading) -> IntArray:
+        if reading.x_m.shape[1] <= NEAREST:
+            return np.broadcast_to(np.arange(reading.x_m.shape[1]), reading.x_m.shape)
+        away = np.hypot(
+            reading.x_m[:, None] - self.state.x_m[..., None], reading.y_m[:, None] - self.state.y_m[..., None]
+        )
+        away = np.where(self.state.present[..., None] & reading.present[:, None], away, np.inf).min(1)
+        return np.argsort(away, axis=1, kind="stable")[:, :NEAREST]

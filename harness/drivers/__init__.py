@@ -1,0 +1,1 @@
+"""Who decides what a player does: one protocol for the ego and the non-ego alike."""
