@@ -1,0 +1,114 @@
+"""A PPO learner between two segments, as one safetensors file: parameters, optimiser state, learning curve.
+
+With it a training goes on as if it had never stopped; opening it runs no code.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from stable_baselines3 import PPO
+
+from harness.files import write_atomically
+from harness.policy_file import Policy
+
+
+@dataclass(frozen=True)
+class Window:
+    """A stretch of the learning curve, of the games that ended in it."""
+
+    steps: int
+    mean_payoff: float
+    failure_rate: float
+    games: int
+    mean_duration_s: float
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a training has come."""
+
+    segments: int
+    steps: int
+    segment_payoffs: list[float]
+    curve: list[Window]
+
+
+def write_checkpoint(model: PPO, progress: Progress, key: str, path: Path) -> None:
+    """Write a learner's checkpoint; `key` names the inputs it was trained from."""
+    tensors = {f"policy/{name}": value for name, value in model.policy.state_dict().items()}
+    for index, state in model.policy.optimizer.state_dict()["state"].items():
+        for name, value in state.items():
+            tensors[f"optimizer/{index}/{name}"] = torch.as_tensor(value)
+    write_atomically(path, save(tensors, metadata={"progress": json.dumps(asdict(progress)), "key": key}))
+
+
+def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
+    """Put a checkpoint into a freshly made learner. None if there is none, or it is from other inputs."""
+    if not path.is_file():
+        return None
+    try:
+        with safe_open(path, framework="pt") as file:
+            metadata = file.metadata()
+            if metadata.get("key") != key:
+                return None
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+    except SafetensorError:
+        return None
+    model.policy.load_state_dict({k.removeprefix("policy/"): v for k, v in tensors.items() if k.startswith("policy/")})
+    optimizer = model.policy.optimizer.state_dict()
+    optimizer["state"] = {}
+    for name, value in tensors.items():
+        if name.startswith("optimizer/"):
+            _, index, entry = name.split("/")
+            optimizer["state"].setdefault(int(index), {})[entry] = value
+    model.policy.optimizer.load_state_dict(optimizer)
+    stored: dict[str, Any] = json.loads(metadata["progress"])
+    return Progress(
+        stored["segments"],
+        stored["steps"],
+        stored["segment_payoffs"],
+        [Window(**window) for window in stored["curve"]],
+    )
+
+
+_LAYERS = {"actor": ("mlp_extractor.policy_net", "action_net"), "critic": ("mlp_extractor.value_net", "value_net")}
+
+
+def policy_of(model: PPO, card: dict[str, Any]) -> Policy:
+    """The learner's policy as plain arrays."""
+    state = model.policy.state_dict()
+    tensors = {"log_deviation": state["log_std"].numpy().copy()}
+    for part, (hidden, output) in _LAYERS.items():
+        for k, layer in enumerate([*_hidden_layers(state, hidden), output]):
+            tensors[f"{part}.{k}.weight"] = state[f"{layer}.weight"].numpy().copy()
+            tensors[f"{part}.{k}.bias"] = state[f"{layer}.bias"].numpy().copy()
+    return Policy(tensors, card)
+
+
+def put_policy(model: PPO, policy: Policy, deviation: float) -> None:
+    """Begin from a policy's networks, exploring anew with the given deviation. Raises ValueError if they don't fit."""
+    state = model.policy.state_dict()
+    for part, (hidden, output) in _LAYERS.items():
+        layers = [*_hidden_layers(state, hidden), output]
+        given = policy.layers(part)
+        if len(given) != len(layers):
+            raise ValueError(f"the {part} to begin from has {len(given)} layers, this training's has {len(layers)}")
+        for layer, (weight, bias) in zip(layers, given, strict=True):
+            if state[f"{layer}.weight"].shape != weight.shape:
+                raise ValueError(f"the {part} to begin from has other layer sizes than this training's network")
+            state[f"{layer}.weight"] = torch.from_numpy(weight.copy())
+            state[f"{layer}.bias"] = torch.from_numpy(bias.copy())
+    state["log_std"] = torch.full_like(state["log_std"], float(np.log(deviation)))
+    model.policy.load_state_dict(state)
+
+
+def _hidden_layers(state: dict[str, Any], prefix: str) -> list[str]:
+    return [name.removesuffix(".weight") for name in state if name.startswith(prefix) and name.endswith(".weight")]

@@ -1,0 +1,198 @@
+"""Training one player on an arena with Stable-Baselines3's PPO, in segments.
+
+A segment starts from parameters, optimiser state and seeds hashed from its number alone, with every game started
+anew. So a training that was interrupted and one that was not are the same training.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import configure
+from stable_baselines3.common.utils import set_random_seed
+
+from harness.arena import Arena, Seat
+from harness.checkpoint import Progress, Window, policy_of, put_policy, read_checkpoint, write_checkpoint
+from harness.convergence import has_converged
+from harness.documents.campaign import Training
+from harness.documents.persona import Persona
+from harness.drivers.protocol import Driver
+from harness.game.observation import OF_OTHERS
+from harness.game.seeding import seed_of
+from harness.game.state import Outcome
+from harness.policy_file import Policy
+from harness.traffic.opening import OpenScene
+from harness.vector_environment import ArenaVecEnv, Finished
+
+CURVE_WINDOW_STEPS = 16_384
+_GAE_LAMBDA = 0.95
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """What one training is made of: who learns, on what payoff, against whom, beginning from what."""
+
+    scene: OpenScene
+    learner: int
+    personas: tuple[Persona, Persona]  # of the ego's seat and of the non-ego's
+    opponent: Driver | None
+    """Who has the other seat; None: the learner is alone in every game."""
+    alone_share: float
+    initial: Policy | None
+    settings: Training
+    parts: tuple[str | int, ...]
+    """Names the lesson's random numbers."""
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What a training came to."""
+
+    policy: Policy
+    progress: Progress
+    stopped: str  # "converged" or "budget"
+
+
+def train(
+    lesson: Lesson,
+    checkpoint: Path,
+    key: str,
+    card: dict[str, Any],
+    tensorboard: Path | None = None,
+    report: Callable[[int, int], None] = lambda done, total: None,
+) -> Trained:
+    """Train to convergence or to the end of the budget, going on from `checkpoint` if it was made with this `key`.
+
+    `report` is told steps done and steps in all, several times a second. Raises FloatingPointError where a payoff
+    or a parameter is not finite, SimulationError where SUMO fails, ValueError where the initial policy doesn't fit.
+    """
+    torch.set_num_threads(1)
+    settings = lesson.settings
+    environment = _environment(lesson)
+    try:
+        model = _learner(lesson, environment, tensorboard)
+        progress = read_checkpoint(model, key, checkpoint) or Progress(0, 0, [], [])
+        stopped = "budget"
+        while progress.steps < settings.steps:
+            progress = _segment(lesson, model, environment, progress, report)
+            write_checkpoint(model, progress, key, checkpoint)
+            if settings.early_convergence and has_converged(progress.segment_payoffs):
+                stopped = "converged"
+                break
+        return Trained(policy_of(model, card), progress, stopped)
+    finally:
+        environment.close()
+
+
+def _environment(lesson: Lesson) -> ArenaVecEnv:
+    seats = [Seat(lesson.opponent), Seat(lesson.opponent)]
+    seats[lesson.learner] = Seat(None, lesson.personas[lesson.learner].payoff)
+    present = [0.0 if lesson.opponent is None else 1.0 - lesson.alone_share] * 2
+    present[lesson.learner] = 1.0
+    chances = lesson.scene.chances([persona.lapses for persona in lesson.personas], present)
+    seed = seed_of(*lesson.parts, "sumo") % 2**31
+    arena = Arena(lesson.scene, lesson.settings.games, seats, seed)
+    return ArenaVecEnv(arena, lesson.learner, chances, *lesson.parts)
+
+
+def _learner(lesson: Lesson, environment: ArenaVecEnv, tensorboard: Path | None) -> PPO:
+    settings = lesson.settings
+    set_random_seed(seed_of(*lesson.parts, "parameters") % 2**32)
+    model = PPO(
+        "MlpPolicy",
+        environment,
+        learning_rate=settings.learning_rate,
+        n_steps=settings.buffer // settings.games,
+        batch_size=settings.minibatch,
+        n_epochs=settings.epochs,
+        gamma=settings.discount,
+        gae_lambda=_GAE_LAMBDA,
+        clip_range=settings.clip,
+        ent_coef=settings.entropy_coefficient,
+        policy_kwargs={
+            "net_arch": list(settings.network),
+            "log_std_init": float(np.log(settings.initial_deviation)),
+        },
+        device="cpu",
+    )
+    model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else configure(None, []))
+    if lesson.initial is not None:
+        put_policy(model, lesson.initial, settings.initial_deviation)
+    else:
+        _ignore_others(model)
+    return model
+
+
+def _ignore_others(model: PPO) -> None:
+    """What a learner has never met has no say: the entries of others begin without weight, and get it as they vary."""
+    extractor: Any = model.policy.mlp_extractor
+    with torch.no_grad():
+        for network in (extractor.policy_net, extractor.value_net):
+            network[0].weight[:, torch.as_tensor(OF_OTHERS)] = 0.0
+
+
+def _segment(
+    lesson: Lesson, model: PPO, environment: ArenaVecEnv, progress: Progress, report: Callable[[int, int], None]
+) -> Progress:
+    parts = (*lesson.parts, "segment", progress.segments)
+    set_random_seed(seed_of(*parts, "learner") % 2**32)
+    environment.begin(*parts)
+    environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
+    steps = min(lesson.settings.segment_steps, lesson.settings.steps - progress.steps)
+    curve = _Curve(environment, progress, report, lesson)
+    model.num_timesteps = progress.steps
+    model._last_obs = None  # the games start anew
+    model.learn(steps, callback=curve, reset_num_timesteps=False)
+    for name, value in model.policy.state_dict().items():
+        if not torch.isfinite(value).all():
+            raise FloatingPointError(f"parameter {name} is not finite after {model.num_timesteps} steps")
+    payoffs = [game.payoff for game in curve.games]
+    mean = float(np.mean(payoffs)) if payoffs else float("-inf")
+    return Progress(progress.segments + 1, model.num_timesteps, [*progress.segment_payoffs, mean], curve.windows)
+
+
+class _Curve(BaseCallback):
+    """Gathers the learning curve of a segment and tells how far it has come."""
+
+    def __init__(
+        self, environment: ArenaVecEnv, progress: Progress, report: Callable[[int, int], None], lesson: Lesson
+    ) -> None:
+        super().__init__()
+        self._environment, self._report, self._lesson = environment, report, lesson
+        self._window: list[Finished] = []
+        self._window_start = progress.steps
+        self.windows, self.games = list(progress.curve), list[Finished]()
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        finished = self._environment.take_finished()
+        if any(not np.isfinite(game.payoff) for game in finished):
+            raise FloatingPointError(f"a game's payoff is not finite, within {self.num_timesteps} steps")
+        self._window += finished
+        self.games += finished
+        if self.num_timesteps - self._window_start >= CURVE_WINDOW_STEPS and self._window:
+            self._close_window()
+        self._report(self.num_timesteps, self._lesson.settings.steps)
+
+    def _close_window(self) -> None:
+        games = self._window
+        window = Window(
+            steps=self.num_timesteps,
+            mean_payoff=float(np.mean([game.payoff for game in games])),
+            failure_rate=float(np.mean([game.outcome != Outcome.GOAL for game in games])),
+            games=len(games),
+            mean_duration_s=float(np.mean([game.steps for game in games])) * self._lesson.scene.world.step_s,
+        )
+        for name in ("mean_payoff", "failure_rate", "mean_duration_s"):
+            self.logger.record(f"games/{name}", getattr(window, name))
+        self.windows.append(window)
+        self._window, self._window_start = [], self.num_timesteps
