@@ -1,0 +1,83 @@
+"""What is measured of a player in one game: from the recording of its steps to a value, or None if unscored.
+
+A value that can't be measured in a game (no leader to trail, no course to a collision) is unscored, never 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.game.arrays import FloatArray
+from harness.game.state import Outcome
+
+
+@dataclass(frozen=True)
+class Drive:
+    """One player's game, step by step while it drove, [T]; gaps and times are inf where there is nothing."""
+
+    outcome: Outcome
+    step_s: float
+    speed_mps: FloatArray
+    acceleration_mps2: FloatArray
+    lateral_acceleration_mps2: FloatArray
+    leader_gap_m: FloatArray
+    time_to_collision_s: FloatArray
+    payoff: FloatArray
+
+
+def _finite(values: FloatArray, statistic: Callable[[FloatArray], float]) -> float | None:
+    measured = values[np.isfinite(values)]
+    return float(statistic(measured)) if len(measured) else None
+
+
+def mean_speed_mps(drive: Drive) -> float | None:
+    """Mean speed while driving."""
+    return _finite(drive.speed_mps, np.mean)
+
+
+def trailing_distance_m(drive: Drive) -> float | None:
+    """Mean gap to the leader, bumper to bumper, over the steps in which there was one (paper, step 1c)."""
+    return _finite(drive.leader_gap_m, np.mean)
+
+
+def min_ttc_s(drive: Drive) -> float | None:
+    """Least time to collision (TTC), of oriented boxes that keep heading and speed; 0 at contact."""
+    return _finite(drive.time_to_collision_s, np.min)
+
+
+def max_deceleration_mps2(drive: Drive) -> float | None:
+    """Hardest braking; 0 if the player never slowed."""
+    return _finite(np.maximum(-drive.acceleration_mps2, 0.0), np.max)
+
+
+def max_lateral_acceleration_mps2(drive: Drive) -> float | None:
+    """Greatest lateral acceleration, to either side."""
+    return _finite(np.abs(drive.lateral_acceleration_mps2), np.max)
+
+
+def time_to_goal_s(drive: Drive) -> float | None:
+    """Time until the goal was reached."""
+    return len(drive.speed_mps) * drive.step_s if drive.outcome is Outcome.GOAL else None
+
+
+def payoff(drive: Drive) -> float | None:
+    """The player's own payoff, summed over the game (equation 1)."""
+    return float(drive.payoff.sum())
+
+
+OF_EGO: Mapping[str, Callable[[Drive], float | None]] = {
+    "ego_mean_speed_mps": mean_speed_mps,
+    "ego_trailing_distance_m": trailing_distance_m,
+    "ego_min_ttc_s": min_ttc_s,
+    "ego_max_deceleration_mps2": max_deceleration_mps2,
+    "ego_max_lateral_acceleration_mps2": max_lateral_acceleration_mps2,
+    "ego_time_to_goal_s": time_to_goal_s,
+    "ego_payoff": payoff,
+}
+OF_NON_EGO: Mapping[str, Callable[[Drive], float | None]] = {
+    "non_ego_mean_speed_mps": mean_speed_mps,
+    "non_ego_payoff": payoff,
+}
