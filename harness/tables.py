@@ -1,0 +1,256 @@
+"""The four CSV tables of a run folder: their columns, the summary, and writing and reading them exactly.
+
+An empty cell means "can't be measured", never 0. Equal tables are equal bytes: floats are written as the
+shortest text that reads back as the same number, whole numbers without a point, truth values as true/false,
+lines end in a line feed. A table is known by its columns, which are declared here and nowhere else (those of
+`comparisons.csv` beside what computes them).
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from harness.comparison import COMPARISON_COLUMNS, CONFIDENCE, mean_interval
+from harness.errors import UsageError
+
+EPISODE_COLUMNS = {
+    "arm": "object",
+    "persona": "object",
+    "seed": "int64",
+    "episode": "int64",
+    "ego_outcome": "object",
+    "ego_failed": "Int64",
+    "ego_mean_speed_mps": "float64",
+    "ego_trailing_distance_m": "float64",
+    "ego_min_ttc_s": "float64",
+    "ego_max_deceleration_mps2": "float64",
+    "ego_max_lateral_acceleration_mps2": "float64",
+    "ego_time_to_goal_s": "float64",
+    "ego_payoff": "float64",
+    "non_ego_outcome": "object",
+    "non_ego_mean_speed_mps": "float64",
+    "non_ego_payoff": "float64",
+    "duration_s": "float64",
+    "error": "object",
+}
+"""Columns of `episodes.csv` in order, each with its pandas dtype (Int64: whole numbers or empty)."""
+
+SUMMARY_COLUMNS = {
+    "arm": "object",
+    "persona": "object",
+    "seed": "int64",
+    "episodes": "int64",
+    "errors": "int64",
+    "failure_rate": "float64",
+    "failure_rate_low": "float64",
+    "failure_rate_high": "float64",
+    "collisions": "Int64",
+    "rails": "Int64",
+    "timeouts": "Int64",
+    "mean_speed_mps": "float64",
+    "mean_speed_low_mps": "float64",
+    "mean_speed_high_mps": "float64",
+    "trailing_distance_m": "float64",
+    "min_ttc_s": "float64",
+    "max_deceleration_mps2": "float64",
+    "max_lateral_acceleration_mps2": "float64",
+    "ego_payoff": "float64",
+    "non_ego_goal_rate": "float64",
+    "non_ego_goal_rate_low": "float64",
+    "non_ego_goal_rate_high": "float64",
+    "non_ego_mean_speed_mps": "float64",
+    "non_ego_payoff": "float64",
+}
+"""Columns of `summary.csv`."""
+
+TRAINING_COLUMNS = {
+    "stage": "object",
+    "persona": "object",
+    "seed": "int64",
+    "steps": "int64",
+    "mean_payoff": "float64",
+    "failure_rate": "float64",
+    "games": "int64",
+    "mean_duration_s": "float64",
+}
+"""Columns of `training.csv`."""
+
+TABLES = {
+    "episodes": EPISODE_COLUMNS,
+    "summary": SUMMARY_COLUMNS,
+    "comparisons": COMPARISON_COLUMNS,
+    "training": TRAINING_COLUMNS,
+}
+
+_TRUTH = {"true": True, "false": False}
+
+
+def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
+    """A row for each arm (in order of first appearance) and training seed, with `SUMMARY_COLUMNS`.
+
+    `episodes` counts all games of the arm and `errors` those that could not be played; every other column
+    is over the games that were played and in which the quantity was measured, and empty if there were none.
+    Rates have 95 % Clopper-Pearson intervals, the mean speed a 95 % t interval (empty without spread); the
+    other columns are means over games (min_ttc_s: the mean of each game's minimum).
+    """
+    episodes = typed(episodes)
+    rows = [
+        _summary_row(str(arm), persona, seed, games)
+        for arm in episodes["arm"].unique()
+        for (persona, seed), games in episodes[episodes["arm"] == arm].groupby(["persona", "seed"], sort=False)
+    ]
+    return typed(pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS)))
+
+
+def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict[str, object]:
+    played = games[(games["ego_outcome"] != "error") & (games["error"] == "")]
+    with_ego = played[played["ego_failed"].notna()]
+    non_ego_outcomes = played.loc[played["non_ego_outcome"] != "", "non_ego_outcome"]
+    speeds = played["ego_mean_speed_mps"].dropna()
+    speed_low, speed_high = mean_interval(speeds.to_numpy())
+
+    def times(outcome: str) -> int | None:
+        return int((with_ego["ego_outcome"] == outcome).sum()) if len(with_ego) else None
+
+    return {
+        "arm": arm,
+        "persona": persona,
+        "seed": seed,
+        "episodes": len(games),
+        "errors": len(games) - len(played),
+        **_rate("failure_rate", int(with_ego["ego_failed"].sum()), len(with_ego)),
+        "collisions": times("collision"),
+        "rails": times("rail"),
+        "timeouts": times("timeout"),
+        "mean_speed_mps": speeds.mean(),
+        "mean_speed_low_mps": speed_low,
+        "mean_speed_high_mps": speed_high,
+        "trailing_distance_m": played["ego_trailing_distance_m"].mean(),
+        "min_ttc_s": played["ego_min_ttc_s"].mean(),
+        "max_deceleration_mps2": played["ego_max_deceleration_mps2"].mean(),
+        "max_lateral_acceleration_mps2": played["ego_max_lateral_acceleration_mps2"].mean(),
+        "ego_payoff": played["ego_payoff"].mean(),
+        **_rate("non_ego_goal_rate", int((non_ego_outcomes == "goal").sum()), len(non_ego_outcomes)),
+        "non_ego_mean_speed_mps": played["non_ego_mean_speed_mps"].mean(),
+        "non_ego_payoff": played["non_ego_payoff"].mean(),
+    }
+
+
+def _rate(column: str, successes: int, games: int) -> dict[str, float]:
+    """The rate and its Clopper-Pearson interval, as three columns; empty if there were no games."""
+    if games == 0:
+        return {column: np.nan, f"{column}_low": np.nan, f"{column}_high": np.nan}
+    interval = stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
+    return {
+        column: successes / games,
+        f"{column}_low": float(interval.low),
+        f"{column}_high": float(interval.high),
+    }
+
+
+def typed(frame: pd.DataFrame) -> pd.DataFrame:
+    """The frame as one of `TABLES`: columns in its order and of its dtypes, rows counted from 0.
+
+    Missing text becomes "". Raises ValueError when the columns are no table's, a whole number has a
+    fraction, or a cell that may not be empty is.
+    """
+    columns = _columns_of(frame.columns)
+    return pd.DataFrame({name: _cast(frame[name], dtype) for name, dtype in columns.items()})
+
+
+def _columns_of(names: Iterable[str]) -> Mapping[str, str]:
+    names = list(names)
+    for columns in TABLES.values():
+        if sorted(names) == sorted(columns):
+            return columns
+    nearest, columns = max(TABLES.items(), key=lambda table: len(set(names) & set(table[1])))
+    missing, unknown = sorted(set(columns) - set(names)), sorted(set(names) - set(columns))
+    raise ValueError(f"not a table of a run; nearest is {nearest}: missing {missing}, unknown {unknown}")
+
+
+def _cast(column: pd.Series, dtype: str) -> pd.Series:
+    column = column.reset_index(drop=True)
+    try:
+        if dtype == "object":
+            text = column.astype(object).where(column.notna(), "")
+            # str.__str__: the text itself of an enum's member, and a TypeError for what is no text
+            return pd.Series([str.__str__(cell) for cell in text], dtype=object)
+        if dtype == "bool" and not all(cell in (True, False) for cell in column):
+            raise ValueError("neither true nor false")
+        if dtype == "int64":
+            column = column.astype("Int64")  # refuses a fraction, which the next cast would cut off
+        if dtype == "float64":
+            column = column.astype("Float64")  # takes every kind of missing number
+        return column.astype(dtype)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"column {column.name!r} can't be {dtype}: {error}") from error
+
+
+def write_csv(frame: pd.DataFrame, path: Path) -> None:
+    """Write one of `TABLES` so that the file is, at every moment, either the old one or the new one, whole.
+
+    Raises ValueError as `typed` does, and OSError when the folder can't be written.
+    """
+    table = typed(frame)
+    cells = [[_text(cell) for cell in table[name].tolist()] for name in table.columns]
+    lines = [list(table.columns), *zip(*cells, strict=True)]
+    text = "".join(",".join(line) + "\n" for line in lines)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        # an error message from elsewhere may hold what is no Unicode: never lose a table to it
+        with unfinished.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished, path)
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _text(cell: object) -> str:
+    if isinstance(cell, str):
+        quoted = any(character in cell for character in ',"\r\n')
+        return '"' + cell.replace('"', '""') + '"' if quoted else cell
+    if isinstance(cell, bool):
+        return "true" if cell else "false"
+    return "" if pd.isna(cell) else repr(cell)
+
+
+def read_csv(path: Path) -> pd.DataFrame:
+    """The table `write_csv` wrote, equal to it in every value and dtype (empty text is "", not NaN).
+
+    Raises UsageError when the file is missing or is no such table.
+    """
+    remedy = "run the campaign again: it writes its tables anew"
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            reader = csv.reader(file, strict=True)
+            header, lines = next(reader, []), list(reader)
+        columns = _columns_of(header)
+        cells = list(zip(*lines, strict=True)) if lines else [()] * len(header)
+        if len(cells) != len(header):
+            raise ValueError("rows are not as long as the header")
+        return typed(
+            pd.DataFrame({name: _parse(column, columns[name]) for name, column in zip(header, cells, strict=True)})
+        )
+    except OSError as error:
+        raise UsageError.of(path, "", f"can't be read: {error.strerror}", remedy) from error
+    except (ValueError, csv.Error) as error:
+        raise UsageError.of(path, "", f"is not a table of this harness: {error}", remedy) from error
+
+
+def _parse(cells: Iterable[str], dtype: str) -> pd.Series:
+    if dtype == "object":
+        return pd.Series(list(cells), dtype=object)
+    if dtype == "bool":
+        return pd.Series([_TRUTH.get(cell) for cell in cells], dtype=object)
+    if dtype == "float64":
+        return pd.Series([float(cell) if cell else np.nan for cell in cells], dtype="float64")
+    return pd.Series([int(cell) if cell else pd.NA for cell in cells], dtype="Int64")
