@@ -1,0 +1,67 @@
+"""When and where the players of a recorded game hit something."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import shapely
+from shapely.affinity import rotate, translate
+
+from harness.game.arrays import FloatArray
+from harness.replay.vehicles import VehicleType
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The step at which players came to grief, and the place."""
+
+    time_s: float
+    x_m: float
+    y_m: float
+    label: str
+
+
+def contacts(trace: pd.DataFrame, types: Mapping[str, VehicleType], rails: Sequence[FloatArray]) -> list[Contact]:
+    """Every contact of one game, in the order of time; two players that hit each other make one."""
+    hit = trace[trace["outcome"].isin(["collision", "rail"])].sort_values("step", kind="stable")
+    hit = hit.drop_duplicates("player")
+    found = []
+    for (step, outcome), rows in hit.groupby(["step", "outcome"]):
+        frame = trace[trace["step"] == step]
+        bodies = {row.player: _box(row, types[row.player]) for row in frame.itertuples()}
+        first = rows["player"].iloc[0]
+        if outcome == "collision":
+            against = [body for player, body in bodies.items() if player != first]
+        else:
+            against = [shapely.LineString(rail) for rail in rails]
+        place = _touching_point(bodies[first], against)
+        time_s = float(rows["time_s"].iloc[0])
+        found.append(Contact(time_s, place.x, place.y, f"{outcome} at {time_s:.1f} s"))
+    return found
+
+
+def _box(row: Any, drawn: VehicleType) -> shapely.Polygon:
+    """The body of a vehicle at a row of the trace."""
+    half_length, half_width = 0.5 * drawn.length_m, 0.5 * drawn.width_m
+    box = rotate(
+        shapely.box(-half_length, -half_width, half_length, half_width),
+        row.heading_rad,
+        (0, 0),
+        use_radians=True,
+    )
+    return translate(box, row.x_m, row.y_m)
+
+
+def _touching_point(body: shapely.Polygon, against: Sequence[shapely.Geometry]) -> shapely.Point:
+    """Middle of what `body` shares with the nearest of `against`; its own middle where there is nothing."""
+    if not against:
+        return body.centroid
+    nearest = against[int(np.argmin([body.distance(other) for other in against]))]
+    shared = body.intersection(nearest)
+    if not shared.is_empty:
+        return shared.centroid
+    return shapely.shortest_line(body, nearest).centroid

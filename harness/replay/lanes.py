@@ -1,0 +1,74 @@
+"""Where on the net a point is: SUMO's replay wants a lane and a position beside the coordinates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import defusedxml.ElementTree as SafeXml
+import numpy as np
+import shapely
+
+from harness.game.arrays import BoolArray, FloatArray, IntArray
+
+_NOT_FOR_VEHICLES = {"crossing", "walkingarea"}
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """The lanes of a net [L]: centre lines, lengths as SUMO counts them (m), and the lane of an edge that
+    each leads to: itself, or for a lane inside a junction the one behind it."""
+
+    ids: tuple[str, ...]
+    centre_lines: tuple[FloatArray, ...]
+    length_m: FloatArray
+    onward: IntArray
+
+    @classmethod
+    def read(cls, net_file: Path) -> Lanes:
+        root = SafeXml.parse(net_file).getroot()
+        ids, shapes, lengths = [], [], []
+        for edge in root.iter("edge"):
+            if edge.get("function") not in _NOT_FOR_VEHICLES:
+                for lane in edge.iter("lane"):
+                    ids.append(str(lane.get("id")))
+                    points = [[float(c) for c in point.split(",")[:2]] for point in lane.get("shape").split()]
+                    shapes.append(np.array(points))
+                    lengths.append(float(lane.get("length")))
+        row = {name: number for number, name in enumerate(ids)}
+        onward = np.arange(len(ids))
+        for way in root.iter("connection"):
+            inside = row.get(f"{way.get('from')}_{way.get('fromLane')}")
+            behind = row.get(f"{way.get('to')}_{way.get('toLane')}")
+            if inside is not None and behind is not None and ids[inside].startswith(":"):
+                onward[inside] = behind
+        return cls(tuple(ids), tuple(shapes), np.array(lengths), onward)
+
+    def bounds(self) -> tuple[float, float, float, float]:
+        """min x, min y, max x, max y of all centre lines (m)."""
+        points = np.concatenate(self.centre_lines)
+        (left, bottom), (right, top) = points.min(0), points.max(0)
+        return float(left), float(bottom), float(right), float(top)
+
+    def locate(self, points_m: FloatArray, starts: BoolArray) -> IntArray:
+        """Nearest lane [N] (row of `ids`) of points [N, 2].
+
+        A point off the road gets the lane it is nearest to. A vehicle can only be put into the simulation
+        on a lane outside junctions: points that are `starts` [N] get one of those.
+        """
+        lines = self._lines()
+        points = shapely.points(points_m)
+        lane = np.empty(len(points), dtype=np.int64)
+        everywhere = np.arange(len(lines))
+        for chosen, usable in ((~starts, everywhere), (starts, everywhere[self.onward == everywhere])):
+            if chosen.any():
+                lane[chosen] = usable[shapely.STRtree(lines[usable]).nearest(points[chosen])]
+        return lane
+
+    def position(self, lane: IntArray, points_m: FloatArray) -> FloatArray:
+        """How far along lanes [N] the nearest place to points [N, 2] is (m) [N]."""
+        share = shapely.line_locate_point(self._lines()[lane], shapely.points(points_m), normalized=True)
+        return np.clip(share, 0.0, 1.0) * self.length_m[lane]
+
+    def _lines(self) -> np.ndarray:
+        return np.array([shapely.LineString(line) for line in self.centre_lines], dtype=object)

@@ -1,0 +1,97 @@
+"""A game's trace as the floating-car data that SUMO's replay device plays.
+
+What the device needs to be exact (measured on SUMO 1.28):
+
+- A vehicle's first record only puts it into the simulation, at the lane's centre. So each vehicle's first
+  sample is written twice, once a step earlier, and all times are a step later than the game's.
+- The device never takes a vehicle out: after its last record SUMO drives it on, to the end of its route. So
+  who leaves before the game ends is sent off with a last speed that brings it there within the next step.
+  This is the one number of a replay that is not the trace's.
+- Who is still there when the game ends gets one record more, beyond the end of the simulation.
+- Every record names a lane: the vehicle's route is made from them. The last one must be of an edge, or the
+  route would end before the junction that the vehicle leaves in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+
+from harness.replay.lanes import Lanes
+from harness.replay.vehicles import VehicleType
+
+_SEND_OFF_MPS = 1e6
+
+
+def shown_at(time_s: float, step_length_s: float) -> float:
+    """The time of SUMO's step that shows the game's sample of `time_s`."""
+    return time_s + step_length_s
+
+
+def write_recording(
+    trace: pd.DataFrame, types: Mapping[str, VehicleType], lanes: Lanes, step_length_s: float, file: Path
+) -> None:
+    """Write one game as plain XML: a few ten kB, the same bytes on any machine, and readable by a person."""
+    records = _records(trace, types, lanes, step_length_s)
+    last_step = records["step"].max()
+    first = records.drop_duplicates("id").assign(step=lambda rows: rows["step"] - 1)
+    beyond = records[records["step"] == last_step].assign(step=last_step + 1)
+    written = pd.concat([first, records, beyond]).sort_values(["step", "id"], kind="stable")
+
+    root = ElementTree.Element("fcd-export")
+    for step, frame in written.groupby("step"):
+        # step 0 of the game is shown by SUMO's second step
+        timestep = ElementTree.SubElement(root, "timestep", time=f"{(step + 1) * step_length_s:.3f}")
+        for attributes in _rows(frame):
+            ElementTree.SubElement(timestep, "vehicle", attributes)
+    write_xml(root, file)
+
+
+def _records(trace: pd.DataFrame, types: Mapping[str, VehicleType], lanes: Lanes, step_length_s: float) -> pd.DataFrame:
+    """The trace's rows in SUMO's terms: the front bumper's middle, and degrees clockwise from north."""
+    trace = trace.sort_values(["step", "player"], kind="stable")
+    length = trace["player"].map(lambda player: types[player].length_m).to_numpy(float)
+    heading = trace["heading_rad"].to_numpy(float)
+    front = np.stack(
+        (
+            trace["x_m"].to_numpy(float) + 0.5 * length * np.cos(heading),
+            trace["y_m"].to_numpy(float) + 0.5 * length * np.sin(heading),
+        ),
+        axis=-1,
+    )
+    player, step = trace["player"], np.rint(trace["time_s"].to_numpy(float) / step_length_s).astype(int)
+    lane = lanes.locate(front, ~player.duplicated().to_numpy())
+    leaves = ~player.duplicated(keep="last").to_numpy() & (step < step.max())
+    lane = np.where(leaves, lanes.onward[lane], lane)
+    return pd.DataFrame(
+        {
+            "step": step,
+            "id": player.to_numpy(),
+            "type": player.map(lambda player: types[player].name).to_numpy(),
+            "x": front[:, 0],
+            "y": front[:, 1],
+            "angle": np.round(90.0 - np.degrees(heading), 6) % 360.0,
+            "speed": np.where(leaves, _SEND_OFF_MPS, trace["speed_mps"].to_numpy(float)),
+            "pos": lanes.position(lane, front),
+            "lane": np.array(lanes.ids, dtype=object)[lane],
+        }
+    )
+
+
+def _rows(frame: pd.DataFrame) -> Iterator[dict[str, str]]:
+    columns = [name for name in frame.columns if name != "step"]
+    for values in frame[columns].itertuples(index=False):
+        yield {
+            name: value if isinstance(value, str) else f"{value + 0.0:.6f}"
+            for name, value in zip(columns, values, strict=True)
+        }
+
+
+def write_xml(root: ElementTree.Element, file: Path) -> None:
+    """Write an XML document, indented, with the same bytes for the same content."""
+    ElementTree.indent(root)
+    file.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n")

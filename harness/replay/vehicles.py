@@ -1,0 +1,97 @@
+"""The vehicle types of a recorded game, with the colours it is watched in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import defusedxml.ElementTree as SafeXml
+import pandas as pd
+
+PLAYER_COLOURS = {"ego": "31,119,255", "non_ego": "255,127,14"}  # blue and orange, as in the paper's figure 2
+_OTHERS_COLOUR = "190,190,190"
+
+# Length and width (m) of a vType that states none: the defaults that SUMO 1.28 gives its vehicle classes.
+_DEFAULT_SIZES_M = {
+    "pedestrian": (0.215, 0.478),
+    "wheelchair": (1.2, 0.72),
+    "scooter": (1.2, 0.5),
+    "bicycle": (1.6, 0.65),
+    "moped": (2.1, 0.78),
+    "motorcycle": (2.2, 0.9),
+    "truck": (7.1, 2.4),
+    "trailer": (16.5, 2.55),
+    "bus": (12.0, 2.5),
+    "coach": (14.0, 2.6),
+    "delivery": (6.5, 2.16),
+    "emergency": (6.5, 2.16),
+    "tram": (22.0, 2.4),
+}
+_CAR_SIZE_M = (5.0, 1.8)
+_DEFAULT_CLASSES = {"DEFAULT_PEDTYPE": "pedestrian", "DEFAULT_BIKETYPE": "bicycle"}
+_SHAPES = {name: name for name in _DEFAULT_SIZES_M} | {
+    "wheelchair": "pedestrian",
+    "trailer": "truck/trailer",
+    "coach": "bus/coach",
+    "tram": "rail/railcar",
+}
+
+
+@dataclass(frozen=True)
+class VehicleType:
+    """What is drawn of a vehicle; `name` is the type's id in the replay."""
+
+    name: str
+    length_m: float
+    width_m: float
+    shape: str
+    colour: str
+
+    def attributes(self) -> dict[str, str]:
+        """Of a SUMO `<vType>`.
+
+        The class is `ignoring`, so that no lane's permissions keep a recorded vehicle from being where it
+        was, and the limits are so wide that nothing it was recorded to do is worth a warning.
+        """
+        return {
+            "id": self.name,
+            "vClass": "ignoring",
+            "length": f"{self.length_m:g}",
+            "width": f"{self.width_m:g}",
+            "guiShape": self.shape,
+            "color": self.colour,
+            "maxSpeed": "1000",
+            "emergencyDecel": "1000",
+        }
+
+
+def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, VehicleType]:
+    """The type that each vehicle of one game is drawn as, by the vehicle's id.
+
+    The players get a type of their own; the others keep theirs, grey where it has no colour. A type that the
+    route file doesn't define is SUMO's own default.
+    """
+    root = SafeXml.parse(route_file).getroot()
+    defined = {str(element.get("id")): dict(element.attrib) for element in root.iter("vType")}
+    vehicles = trace.drop_duplicates("player")
+    types = {}
+    for vehicle, type_id in sorted(zip(vehicles["player"], vehicles["vehicle_type"], strict=True)):
+        name = vehicle if vehicle in PLAYER_COLOURS else type_id
+        if vehicle not in PLAYER_COLOURS and name in PLAYER_COLOURS:
+            name = f"{name}_type"
+        builtin = {"vClass": _DEFAULT_CLASSES.get(type_id, "passenger")}
+        types[vehicle] = _drawn(name, defined.get(type_id, builtin))
+    return types
+
+
+def _drawn(name: str, attributes: Mapping[str, str]) -> VehicleType:
+    vehicle_class = attributes.get("vClass", "passenger")
+    length_m, width_m = _DEFAULT_SIZES_M.get(vehicle_class, _CAR_SIZE_M)
+    return VehicleType(
+        name=name,
+        length_m=float(attributes.get("length", length_m)),
+        width_m=float(attributes.get("width", width_m)),
+        shape=attributes.get("guiShape", _SHAPES.get(vehicle_class, "passenger/sedan")),
+        colour=PLAYER_COLOURS.get(name, attributes.get("color", _OTHERS_COLOUR)),
+    )

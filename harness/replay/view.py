@@ -1,0 +1,90 @@
+"""What SUMO-GUI shows: which part of the road at which zoom, how fast, and where it halts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import numpy as np
+import pandas as pd
+
+from harness.replay.contact import Contact
+from harness.replay.lanes import Lanes
+from harness.replay.recording import shown_at
+from harness.replay.vehicles import PLAYER_COLOURS
+
+WINDOW_PX = (1280, 640)
+_CANVAS_PX = (WINDOW_PX[0] - 10, WINDOW_PX[1] - 190)  # without SUMO-GUI's tool bars and its message window
+_NET_MARGIN_M = 6.0  # that SUMO-GUI adds around a net when it calls its zoom 100
+_AROUND_M = 12.0  # of road beyond where the players were
+_WIDEST_M = 220.0  # a car of 4.6 m is then 27 pixels long
+_WIDEST_WITH_CONTACT_M = 120.0  # 49 pixels: how they touch must be seen
+_GROUND, _ASPHALT = "214,224,206", "96,98,104"
+# "Delay in milliseconds" is per simulated second (GUIRunThread.cpp), so 1000 is the speed of life.
+_DELAY_MS = 2000
+
+
+@dataclass(frozen=True)
+class View:
+    """The piece of road to show: its centre and size (m)."""
+
+    x_m: float
+    y_m: float
+    width_m: float
+    height_m: float
+
+
+def choose_view(trace: pd.DataFrame, found: Sequence[Contact]) -> View:
+    """Where the players were; if that is too much to be legible, around a contact or the closest approach."""
+    players = trace[trace["player"].isin(PLAYER_COLOURS)]
+    places = players[["x_m", "y_m"]].to_numpy(float)
+    low, high = places.min(0) - _AROUND_M, places.max(0) + _AROUND_M
+    widest = _WIDEST_WITH_CONTACT_M if found else _WIDEST_M
+    aspect = _CANVAS_PX[1] / _CANVAS_PX[0]
+    width = float(min(max(high[0] - low[0], (high[1] - low[1]) / aspect), widest))
+    size = np.array([width, width * aspect])
+    focus = np.array([found[-1].x_m, found[-1].y_m]) if found else _closest_approach(trace)
+    fits = high - low <= size
+    centre = np.where(fits, 0.5 * (low + high), np.clip(focus, low + 0.5 * size, high - 0.5 * size))
+    return View(float(centre[0]), float(centre[1]), float(size[0]), float(size[1]))
+
+
+def _closest_approach(trace: pd.DataFrame) -> np.ndarray:
+    """Where a player was when another road user was nearest to it; halfway where it was alone."""
+    player = next(name for name in PLAYER_COLOURS if (trace["player"] == name).any())
+    own, others = trace[trace["player"] == player], trace[trace["player"] != player]
+    pairs = own.merge(others, on="step", suffixes=("", "_other"))
+    if pairs.empty:
+        return own[["x_m", "y_m"]].iloc[len(own) // 2].to_numpy(float)
+    distance = np.hypot(pairs["x_m"] - pairs["x_m_other"], pairs["y_m"] - pairs["y_m_other"])
+    return pairs.loc[distance.idxmin(), ["x_m", "y_m"]].to_numpy(float)
+
+
+def view_settings(view: View, found: Sequence[Contact], lanes: Lanes, step_length_s: float) -> ElementTree.Element:
+    """SUMO-GUI's settings file. It halts at the step that shows a contact; "play" goes on from there."""
+    left, bottom, right, top = lanes.bounds()
+    net = (right - left + 2 * _NET_MARGIN_M, top - bottom + 2 * _NET_MARGIN_M)
+    whole = min(_CANVAS_PX[0] / net[0], _CANVAS_PX[1] / net[1])  # pixels per metre at zoom 100
+    wanted = min(_CANVAS_PX[0] / view.width_m, _CANVAS_PX[1] / view.height_m)
+
+    root = ElementTree.Element("viewsettings")
+    scheme = ElementTree.SubElement(root, "scheme", name="real world")
+    ElementTree.SubElement(scheme, "background", backgroundColor=_GROUND)
+    for surface, entry, options in (("edges", "road", {"showLinkRules": "0"}), ("junctions", "", {})):
+        element = ElementTree.SubElement(scheme, surface, options)
+        colours = ElementTree.SubElement(element, "colorScheme", name="uniform")
+        ElementTree.SubElement(colours, "entry", color=_ASPHALT, name=entry)
+    ElementTree.SubElement(
+        scheme, "vehicles", vehicleQuality="2", showBlinker="0", vehicle_minSize="1", vehicle_exaggeration="1"
+    )
+    ElementTree.SubElement(
+        scheme, "pois", poiType_show="1", poiType_size="70", poiType_color="black", poiType_constantSize="1"
+    )
+    ElementTree.SubElement(
+        root, "viewport", x=f"{view.x_m:.2f}", y=f"{view.y_m:.2f}", zoom=f"{100 * wanted / whole:.2f}"
+    )
+    ElementTree.SubElement(root, "delay", value=str(_DELAY_MS))
+    for contact in found:
+        ElementTree.SubElement(root, "breakpoint", time=f"{shown_at(contact.time_s, step_length_s):.3f}")
+    return root
