@@ -1,0 +1,187 @@
+"""Running a campaign: from its document to its run folder."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from rich.console import Console
+
+from harness.comparison import compare
+from harness.files import write_atomically
+from harness.preflight import OpenCampaign
+from harness.progress import StageProgress
+from harness.replay import choose_games, replay_name, worst_first, write_replay
+from harness.reports.page import render_page
+from harness.rounds import AssessmentStage, Stage, TrainingStage, plan, questions, stage_id
+from harness.run_folder import FORMAT, RunFolder
+from harness.stages import conditions_of, stage_keys
+from harness.tables import EPISODE_COLUMNS, TRAINING_COLUMNS, read_csv, summarise, typed, write_csv
+from harness.trace_file import read_trace
+from harness.traffic.opening import open_scene
+from harness.workers import Event, run_stages
+
+_PACKAGES = (
+    *("harness", "eclipse-sumo", "libsumo", "sumolib", "numpy", "scipy", "pandas", "torch"),
+    *("stable-baselines3", "gymnasium", "pyarrow", "safetensors"),
+)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run came to."""
+
+    comparisons: pd.DataFrame
+    failed_stages: tuple[str, ...]
+    error_games: int
+
+
+def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: Console) -> Outcome:
+    """Carry out what is left of a campaign, and write its tables, replays and report.
+
+    Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
+    """
+    folder.claim(campaign.document.name)
+    scene = campaign.scene.document
+    folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
+    stages = plan(campaign.document, [persona.name for persona in campaign.personas])
+    keys = stage_keys(campaign, stages)
+    ledger = _Ledger(campaign, folder, stages, keys)
+    finished = [stage.id for stage in stages if ledger.status(stage) == "done"]
+    if len(finished) < len(stages):
+        with StageProgress(stages, len(finished), console) as progress:
+
+            def tell(event: Event) -> None:
+                ledger.note(event)
+                progress.tell(event)
+
+            run_stages(stages, finished, conditions_of(campaign, folder, keys), jobs, tell)
+    return write_results(folder, console)
+
+
+class _Ledger:
+    """Keeps the manifest true to what happens."""
+
+    def __init__(
+        self, campaign: OpenCampaign, folder: RunFolder, stages: Sequence[Stage], keys: Mapping[str, str]
+    ) -> None:
+        self._folder = folder
+        self._manifest: dict[str, Any] = {
+            "format": FORMAT,
+            "name": campaign.document.name,
+            "quick": campaign.quick,
+            "campaign": campaign.document.model_dump(mode="json"),
+            "personas": [persona.name for persona in campaign.personas],
+            "seeds": list(campaign.document.seeds),
+            "hashes": dict(campaign.hashes),
+            "versions": _versions(),
+            "stages": {stage.id: self._entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages},
+        }
+        self._folder.write_manifest(self._manifest)
+
+    def status(self, stage: Stage) -> str:
+        """done, failed or pending."""
+        return str(self._manifest["stages"][stage.id]["status"])
+
+    def note(self, event: Event) -> None:
+        """Write down what happened to a stage."""
+        entry = self._manifest["stages"][event.stage]
+        if event.kind == "done":
+            entry.update(event.info, status="done", message="")
+        elif event.kind == "failed":
+            entry.update(status="failed", message=event.message)
+        elif event.kind == "skipped":
+            entry.update(status="pending", message=event.message)
+        else:
+            return
+        self._folder.write_manifest(self._manifest)
+
+    @staticmethod
+    def _entry(stage: Stage, info: Mapping[str, Any] | None) -> dict[str, Any]:
+        kind = "training" if isinstance(stage, TrainingStage) else "assessment"
+        name = stage.arm if isinstance(stage, AssessmentStage) else stage.name
+        entry = {
+            "kind": kind,
+            "name": name,
+            "persona": stage.persona,
+            "seed": stage.seed,
+            "status": "pending",
+            "message": "",
+        }
+        return {**entry, **info, "status": "done"} if info is not None else entry
+
+
+def _versions() -> dict[str, str]:
+    versions = {"python": platform.python_version(), "platform": platform.platform()}
+    return versions | {name: importlib.metadata.version(name) for name in _PACKAGES}
+
+
+def write_results(folder: RunFolder, console: Console) -> Outcome:
+    """Tables, replays and report of what is done, from the run folder alone."""
+    manifest = folder.manifest()
+    done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
+    episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
+    training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
+    summary = summarise(episodes)
+    asked = questions_of(manifest)
+    comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
+    tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
+    for name, table in tables.items():
+        write_csv(table, folder.path / f"{name}.csv")
+    replays = _write_replays(folder, episodes, console)
+    page = render_page(manifest, episodes, summary, comparisons, training, replays)
+    write_atomically(folder.path / "report.html", page.encode())
+    failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] != "done")
+    return Outcome(comparisons, failed, int((episodes["error"] != "").sum()))
+
+
+def questions_of(manifest: Mapping[str, Any]) -> list[Any]:
+    """The questions that the finished arms of a run can answer."""
+    from harness.documents.campaign import Campaign
+
+    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    done = {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
+    return [
+        question
+        for question in questions(campaign, manifest["personas"])
+        if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= done
+    ]
+
+
+def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, columns: list[str]) -> pd.DataFrame:
+    frames = [read_csv(folder.work(name) / table) for name, entry in done.items() if entry["kind"] == kind]
+    return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))
+
+
+def _write_replays(folder: RunFolder, episodes: pd.DataFrame, console: Console) -> list[str]:
+    chosen = worst_first(choose_games(episodes))
+    scene = open_scene(folder.scene)
+    folder.replays.mkdir(exist_ok=True)
+    names = [replay_name(game.arm, game.seed, game.episode) for game in chosen.itertuples()]
+    with console.status(f"writing {len(names)} replays"):
+        for game, name in zip(chosen.itertuples(), names, strict=True):
+            trace = read_trace(folder.traces(stage_id(game.arm, game.seed)), game.episode)
+            write_replay(
+                trace,
+                scene.net_file,
+                scene.routes.path,
+                folder.replays / name,
+                title=f"{game.arm}, seed {game.seed}, episode {game.episode}",
+                step_length_s=scene.world.step_s,
+                rails=scene.rail_lines,
+            )
+    _drop_stale(folder.replays, set(names))
+    return names
+
+
+def _drop_stale(replays: Path, names: set[str]) -> None:
+    import shutil
+
+    for old in replays.iterdir():
+        if old.name not in names:
+            shutil.rmtree(old)

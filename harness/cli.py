@@ -1,0 +1,182 @@
+"""The command line. Heavy modules are imported by the command that needs them, so that help is quick."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+DONE, GAMES_ERRORED, USERS_MISTAKE, INTERRUPTED = 0, 1, 2, 130
+
+app = typer.Typer(
+    name="harness",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="""Test an automated vehicle against selfish human drivers in SUMO.
+
+A campaign trains a naive ego, trains a person against it, retrains the ego against that person, and says with paired
+statistics what changed:
+
+`harness campaign campaigns/merge.toml --quick`
+""",
+    epilog="Exit codes: 0 done, 1 done but games or stages errored, 2 your mistake, 130 interrupted (what was done "
+    "is kept).",
+)
+
+CampaignFile = Annotated[Path, typer.Argument(metavar="FILE", help="The campaign's TOML document.", show_default=False)]
+RunPath = Annotated[
+    Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
+]
+
+
+@app.command()
+def campaign(
+    file: CampaignFile,
+    quick: Annotated[
+        bool,
+        typer.Option(
+            "--quick",
+            help="The same stages with fewer training steps: about 3 minutes on two cores. Not for conclusions.",
+        ),
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]", show_default=False
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(
+            min=1, metavar="N", help="Stages carried out at once.  [default: one per core]", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Train, assess, retrain, compare: run a campaign into its run folder.
+
+    Run it again to go on where it stopped; finished stages are skipped. The run folder holds CSV tables, report.html,
+    trained policies, traces, and replays that open in SUMO-GUI.
+    """
+    from rich.console import Console
+
+    from harness.campaign_run import run_campaign
+    from harness.preflight import open_campaign
+    from harness.run_folder import RunFolder
+    from harness.workers import cores
+
+    opened = open_campaign(file, quick)
+    name = opened.document.name + ("-quick" if quick else "")
+    folder = RunFolder(out or Path("reports") / name)
+    console = Console()
+    try:
+        outcome = run_campaign(opened, folder, jobs or cores(), console)
+    except KeyboardInterrupt:
+        console.print("Interrupted. What was done is kept: run the same command again to go on.")
+        raise typer.Exit(INTERRUPTED) from None
+    _show(outcome.comparisons, console)
+    console.print(f"Report: {folder.path / 'report.html'}", highlight=False)
+    if outcome.failed_stages:
+        console.print(f"Not finished: {', '.join(outcome.failed_stages)}", style="red", highlight=False)
+    if outcome.error_games:
+        console.print(f"{outcome.error_games} games could not be played; their pairs are left out", style="red")
+    if outcome.failed_stages or outcome.error_games:
+        raise typer.Exit(GAMES_ERRORED)
+
+
+@app.command()
+def check(file: CampaignFile) -> None:
+    """Check a campaign and everything it names, and say what it would do; nothing is run or written."""
+    from rich.console import Console
+
+    from harness.preflight import open_campaign
+    from harness.rounds import TrainingStage, plan
+
+    opened = open_campaign(file)
+    stages = plan(opened.document, [persona.name for persona in opened.personas])
+    trainings = sum(isinstance(stage, TrainingStage) for stage in stages)
+    console = Console()
+    console.print(f"{file} is in order.", highlight=False)
+    console.print(
+        f"{trainings} trainings of up to {opened.document.training.steps:,} steps, {len(stages) - trainings} arms of "
+        f"{opened.document.assessment.episodes} episodes:",
+        highlight=False,
+    )
+    for stage in stages:
+        kind = "train" if isinstance(stage, TrainingStage) else "assess"
+        after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
+        console.print(f"  {kind:6s} {stage.id}{after}", highlight=False)
+
+
+@app.command()
+def report(run: RunPath) -> None:
+    """Write the tables, replays and report.html of a run anew, from its folder alone."""
+    from rich.console import Console
+
+    from harness.campaign_run import write_results
+    from harness.run_folder import RunFolder
+
+    console = Console()
+    outcome = write_results(RunFolder(run), console)
+    _show(outcome.comparisons, console)
+    console.print(f"Report: {run / 'report.html'}", highlight=False)
+
+
+@app.command()
+def replay(
+    run: RunPath,
+    arm: Annotated[str | None, typer.Argument(help="The arm, such as naive_vs_speedy.", show_default=False)] = None,
+    episode: Annotated[int | None, typer.Argument(help="The episode's number.", show_default=False)] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="The training seed.  [default: the campaign's first]", show_default=False)
+    ] = None,
+    list_games: Annotated[bool, typer.Option("--list", help="List the games there are, worst first.")] = False,
+) -> None:
+    """Watch a game in SUMO-GUI, exactly as it was played."""
+    from rich.console import Console
+
+    from harness.watching import game_table, watch
+
+    console = Console()
+    if list_games or arm is None or episode is None:
+        console.print(game_table(run, arm))
+        return
+    folder, process = watch(run, arm, episode, seed)
+    console.print(f"SUMO-GUI plays {folder}; press its play button. Closing it ends this command.", highlight=False)
+    process.wait()
+
+
+def _show(comparisons: Any, console: Any) -> None:
+    from rich.table import Table
+
+    table = Table(title="What is real", title_justify="left")
+    for name in ("question", "persona", "seed", "metric", "mean difference", "p", "p (Holm)", "verdict"):
+        table.add_column(name)
+    for row in comparisons.itertuples():
+        numbers = (f"{value:.3g}" for value in (row.mean_difference, row.p_value, row.p_holm))
+        table.add_row(row.question, row.persona, str(row.seed), row.metric, *numbers, row.verdict)
+    console.print(table)
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    print(message, file=sys.stderr)
+    raise SystemExit(code)
+
+
+def main() -> None:
+    """The `harness` command: the user's mistakes are printed without a traceback."""
+    from harness.errors import HarnessError, UsageError
+
+    try:
+        app()
+    except UsageError as error:
+        _fail("\n".join(str(problem) for problem in error.problems), USERS_MISTAKE)
+    except HarnessError as error:
+        _fail(f"{type(error).__name__}: {error}", GAMES_ERRORED)
+
+
+if __name__ == "__main__":
+    main()

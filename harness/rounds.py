@@ -1,0 +1,134 @@
+"""The plan: which trainings and which arms follow from a campaign, and what each needs first.
+
+| round | stages of each seed |
+| --- | --- |
+| 0 | train `naive`; assess `naive_alone`, `naive_vs_sumo` |
+| 1 | for each persona: train `<persona>` against the naive ego; assess `<persona>_alone`, `naive_vs_<persona>` |
+| 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
+
+An ego that the campaign does not train has no round 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from harness.comparison import Question
+from harness.documents.campaign import LEARNED, SUMO, Campaign
+from harness.game.state import EGO, NON_EGO
+
+
+@dataclass(frozen=True)
+class Drives:
+    """Who drives a player: SUMO, the campaign's given ego, or the policy that a training stage made."""
+
+    kind: Literal["sumo", "given", "policy"]
+    stage: str = ""
+    persona: str = ""
+    """Whose habits it has; empty: the ego's own."""
+
+
+@dataclass(frozen=True)
+class TrainingStage:
+    """One training: who learns, against whom, beginning from what."""
+
+    name: str  # naive, <persona>, retrained_<persona>
+    seed: int
+    persona: str
+    learner: int
+    opponent: Drives | None
+    initial: str | None
+    alone_share: float
+
+    @property
+    def id(self) -> str:
+        """What the stage and its policy are called in the run folder."""
+        return stage_id(self.name, self.seed)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The stages that have to be done before."""
+        return _stages(self.initial, self.opponent)
+
+
+@dataclass(frozen=True)
+class AssessmentStage:
+    """One arm: its pairing, assessed."""
+
+    arm: str
+    seed: int
+    persona: str
+    ego: Drives | None
+    non_ego: Drives | None
+
+    @property
+    def id(self) -> str:
+        """What the stage and its files are called in the run folder."""
+        return stage_id(self.arm, self.seed)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The stages that have to be done before."""
+        return _stages(None, self.ego, self.non_ego)
+
+
+Stage = TrainingStage | AssessmentStage
+
+
+def stage_id(name: str, seed: int) -> str:
+    """A stage's name in the run folder."""
+    return f"{name}-seed{seed}"
+
+
+def _stages(initial: str | None, *drivers: Drives | None) -> tuple[str, ...]:
+    named = [initial or "", *(each.stage for each in drivers if each is not None)]
+    return tuple(dict.fromkeys(name for name in named if name))
+
+
+def plan(campaign: Campaign, personas: Sequence[str]) -> list[Stage]:
+    """Every stage of a campaign against the personas named, each after what it needs."""
+    return [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed)]
+
+
+def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
+    learned = campaign.ego.driver == LEARNED
+    naive = stage_id("naive", seed)
+    if learned:
+        ego = Drives("policy", naive)
+    else:
+        ego = Drives("sumo" if campaign.ego.driver == SUMO else "given")
+    stages: list[Stage] = []
+    if learned:
+        stages.append(TrainingStage("naive", seed, "", EGO, None, None, 1.0))
+    for persona in personas:
+        initial = naive if learned and campaign.non_ego_training.warm_start else None
+        alone_share = campaign.non_ego_training.alone_share
+        stages.append(TrainingStage(persona, seed, persona, NON_EGO, ego, initial, alone_share))
+    stages.append(AssessmentStage("naive_alone", seed, "", ego, None))
+    stages.append(AssessmentStage("naive_vs_sumo", seed, "", ego, Drives("sumo")))
+    for persona in personas:
+        person = Drives("policy", stage_id(persona, seed), persona)
+        if learned:
+            name = f"retrained_{persona}"
+            stages.append(TrainingStage(name, seed, persona, EGO, person, naive, campaign.retraining.alone_share))
+        stages.append(AssessmentStage(f"{persona}_alone", seed, persona, None, person))
+        stages.append(AssessmentStage(f"naive_vs_{persona}", seed, persona, ego, person))
+        if learned:
+            retrained = Drives("policy", stage_id(f"retrained_{persona}", seed))
+            stages.append(AssessmentStage(f"retrained_vs_{persona}", seed, persona, retrained, person))
+            stages.append(AssessmentStage(f"retrained_alone_{persona}", seed, persona, retrained, None))
+    return stages
+
+
+def questions(campaign: Campaign, personas: Sequence[str]) -> list[Question]:
+    """The research questions of a campaign (paper, section 4.2), for each persona and seed."""
+    asked = []
+    for persona in personas:
+        for seed in campaign.seeds:
+            against, retrained = f"naive_vs_{persona}", f"retrained_vs_{persona}"
+            asked.append(Question("RQ1", persona, seed, "naive_alone", against))
+            if campaign.ego.driver == LEARNED:
+                asked.append(Question("RQ2", persona, seed, against, retrained))
+    return asked

@@ -1,0 +1,131 @@
+"""A run folder: what one run of a campaign wrote, and how far it has come.
+
+    manifest.json            campaign, versions, seeds, hashes, status of every stage
+    policies/<stage>/        policy.safetensors, policy.json
+    traces/<stage>.parquet   one file per arm
+    scene/                   a copy of the scene's files
+    .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, tables, done.json
+
+A stage is done when `done.json` is there with the key of its inputs; it is written last.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from harness.errors import UsageError
+from harness.files import write_atomically
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Where everything of a run is."""
+
+    path: Path
+
+    @property
+    def manifest_file(self) -> Path:
+        return self.path / MANIFEST
+
+    @property
+    def scene(self) -> Path:
+        return self.path / "scene"
+
+    @property
+    def replays(self) -> Path:
+        return self.path / "replays"
+
+    def policy(self, stage: str) -> Path:
+        """The folder of the policy that a stage made."""
+        return self.path / "policies" / stage
+
+    def traces(self, stage: str) -> Path:
+        """The traces of an arm."""
+        return self.path / "traces" / f"{stage}.parquet"
+
+    def tensorboard(self, stage: str) -> Path:
+        """TensorBoard's event files of a training."""
+        return self.path / "tensorboard" / stage
+
+    def work(self, stage: str) -> Path:
+        """What a stage keeps for itself."""
+        return self.path / ".stages" / stage
+
+    # --- stages --------------------------------------------------------------------------------------------------
+
+    def finished(self, stage: str, key: str) -> dict[str, Any] | None:
+        """What a stage said when it was done from these very inputs; None if it is not done."""
+        try:
+            done = json.loads((self.work(stage) / "done.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return done["info"] if isinstance(done, dict) and done.get("key") == key else None
+
+    def finish(self, stage: str, key: str, info: Mapping[str, Any]) -> None:
+        """A stage is done: everything it wrote is there."""
+        content = json.dumps({"key": key, "info": info}, indent=2)
+        write_atomically(self.work(stage) / "done.json", content.encode())
+
+    # --- the manifest --------------------------------------------------------------------------------------------
+
+    def manifest(self) -> dict[str, Any]:
+        """The manifest. Raises UsageError if the folder has none that can be read."""
+        try:
+            manifest = json.loads(self.manifest_file.read_text(encoding="utf-8"))
+            if manifest["format"] != FORMAT or not isinstance(manifest["name"], str):
+                raise ValueError(f"has format {manifest['format']!r}")
+        except FileNotFoundError:
+            raise UsageError.of(
+                self.path, "", f"is not a run folder: it has no {MANIFEST}", "name the folder a campaign wrote"
+            ) from None
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise UsageError.of(self.manifest_file, "", f"is damaged: {error}", "run the campaign again") from None
+        return manifest
+
+    def write_manifest(self, manifest: Mapping[str, Any]) -> None:
+        """Replace the manifest."""
+        write_atomically(self.manifest_file, (json.dumps(manifest, indent=2) + "\n").encode())
+
+    def claim(self, campaign: str) -> None:
+        """Make the folder this campaign's. Raises UsageError if it is another's, or no run folder and not empty."""
+        if self.path.exists() and not self.path.is_dir():
+            raise UsageError.of(self.path, "", "is a file", "choose a folder with --out")
+        if self.manifest_file.exists():
+            owner = self.manifest()["name"]
+            if owner != campaign:
+                raise UsageError.of(
+                    self.path,
+                    "",
+                    f"belongs to campaign {owner!r}, not {campaign!r}",
+                    "choose another folder with --out",
+                )
+        elif self.path.is_dir() and any(self.path.iterdir()):
+            raise UsageError.of(self.path, "", "is not empty and not a run folder", "choose another folder with --out")
+        try:
+            for name in ("policies", "traces", "tensorboard", ".stages"):
+                (self.path / name).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError.of(
+                self.path, "", f"can't be written: {error.strerror}", "choose a folder with --out"
+            ) from None
+
+    def keep_scene(self, folder: Path, files: tuple[str, ...]) -> None:
+        """Copy a scene's files, so that the run can be looked at when the scene has changed."""
+        self.scene.mkdir(exist_ok=True)
+        for name in files:
+            write_atomically(self.scene / name, (folder / name).read_bytes())
+
+    def forget(self, stage: str) -> None:
+        """Drop what a stage wrote from other inputs."""
+        shutil.rmtree(self.work(stage), ignore_errors=True)
+        shutil.rmtree(self.policy(stage), ignore_errors=True)
+        shutil.rmtree(self.tensorboard(stage), ignore_errors=True)
+        self.traces(stage).unlink(missing_ok=True)

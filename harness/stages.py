@@ -1,0 +1,188 @@
+"""Carrying out one stage of the plan: its inputs from the run folder, its outputs into it.
+
+A stage is a function of its inputs alone, and its key is the hash of them: done once, it is skipped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from harness.documents.campaign import Campaign
+from harness.documents.persona import Persona
+from harness.drivers.learned import LearnedDriver
+from harness.drivers.protocol import Driver
+from harness.drivers.sumo import SumoDriver
+from harness.errors import StageFailed
+from harness.game.state import ROLES
+from harness.policy_file import read_policy, write_policy
+from harness.preflight import OpenCampaign
+from harness.rounds import AssessmentStage, Drives, Stage, TrainingStage
+from harness.run_folder import RunFolder
+from harness.tables import EPISODE_COLUMNS, TRAINING_COLUMNS, typed, write_csv
+from harness.trace_file import TraceWriter
+from harness.traffic.opening import OpenScene, open_scene
+
+NUMBERS_FORMAT = 1  # to be raised when the same inputs give other numbers, so that no old stage is taken for a new one
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """What all stages of a run share; small enough to be sent to another process."""
+
+    folder: Path
+    scene_folder: Path
+    document: Campaign
+    ego_persona: Persona
+    personas: Mapping[str, Persona]
+    ego_policy: Path | None
+    keys: Mapping[str, str]  # of every stage
+
+    def persona(self, name: str) -> Persona:
+        """A persona of the campaign; the ego's own for the empty name."""
+        return self.personas[name] if name else self.ego_persona
+
+
+def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str]:
+    """Each stage's key: the hash of all that its numbers depend on, through the stages it needs."""
+    scene = campaign.scene.document
+    rests_on = {name: campaign.hashes[name] for name in ("scene.toml", scene.net, scene.routes)}
+    personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
+    given = _given_policy_hash(campaign.ego_policy)
+    keys: dict[str, str] = {}
+    for stage in stages:
+        inputs: dict[str, Any] = {
+            "format": NUMBERS_FORMAT,
+            "stage": asdict(stage),
+            "scene": rests_on,
+            "personas": [personas[name].model_dump(mode="json") for name in dict.fromkeys(("", stage.persona))],
+            "needs": [keys[name] for name in stage.needs],
+            "given": given,
+        }
+        if isinstance(stage, TrainingStage):
+            inputs["training"] = campaign.document.training.model_dump(mode="json")
+        else:
+            inputs["episodes"] = campaign.document.assessment.episodes
+        keys[stage.id] = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
+    return keys
+
+
+def _given_policy_hash(folder: Path | None) -> str:
+    return hashlib.sha256((folder / "policy.safetensors").read_bytes()).hexdigest() if folder else ""
+
+
+def conditions_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str]) -> Conditions:
+    """The conditions of a run of a campaign."""
+    personas = {each.name: each for each in campaign.personas}
+    return Conditions(
+        folder.path, campaign.scene.folder, campaign.document, campaign.ego_persona, personas, campaign.ego_policy, keys
+    )
+
+
+def carry_out(stage: Stage, conditions: Conditions, report: Callable[[int, int], None]) -> dict[str, Any]:
+    """Do a stage and mark it done; says what came of it. What it wrote from other inputs is dropped first."""
+    folder, key = RunFolder(conditions.folder), conditions.keys[stage.id]
+    work = folder.work(stage.id)
+    started_from = work / "key"
+    if not started_from.is_file() or started_from.read_text() != key:
+        folder.forget(stage.id)
+        work.mkdir(parents=True)
+        started_from.write_text(key)
+    scene = open_scene(conditions.scene_folder)
+    began = time.monotonic()
+    do = _train if isinstance(stage, TrainingStage) else _assess
+    info = do(stage, conditions, folder, scene, report)  # type: ignore[arg-type]
+    info["seconds"] = round(time.monotonic() - began, 1)
+    folder.finish(stage.id, key, info)
+    return info
+
+
+def _train(
+    stage: TrainingStage,
+    conditions: Conditions,
+    folder: RunFolder,
+    scene: OpenScene,
+    report: Callable[[int, int], None],
+) -> dict[str, Any]:
+    from harness.convergence import RULE
+    from harness.training import Lesson, train  # torch is slow to import, and assessment does without
+
+    settings = conditions.document.training
+    lesson = Lesson(
+        scene,
+        stage.learner,
+        (conditions.ego_persona, conditions.persona(stage.persona)),
+        _driver(stage.opponent, conditions, folder),
+        stage.alone_share,
+        read_policy(folder.policy(stage.initial)) if stage.initial else None,
+        settings,
+        ("training", stage.seed, stage.name),
+    )
+    learner = lesson.personas[stage.learner]
+    card = {
+        "stage": stage.id,
+        "player": ROLES[stage.learner],
+        "persona": learner.name,
+        "scene": scene.document.name,
+        "against": stage.opponent.stage or stage.opponent.kind if stage.opponent else None,
+        "began_from": stage.initial,
+        "training": settings.model_dump(mode="json"),
+    }
+    key = conditions.keys[stage.id]
+    checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
+    try:
+        trained = train(lesson, checkpoint, key, card, folder.tensorboard(stage.id), report)
+    except (FloatingPointError, ValueError) as error:
+        raise StageFailed(f"{stage.id}: {error}") from error
+    write_policy(trained.policy, folder.policy(stage.id))
+    curve = pd.DataFrame([asdict(window) for window in trained.progress.curve])
+    curve = curve.assign(stage=stage.name, persona=stage.persona, seed=stage.seed)
+    write_csv(typed(curve.reindex(columns=list(TRAINING_COLUMNS))), folder.work(stage.id) / "training.csv")
+    return {
+        "steps": trained.progress.steps,
+        "budget_steps": settings.steps,
+        "stopped": trained.stopped,
+        "rule": RULE if settings.early_convergence else "",
+    }
+
+
+def _assess(
+    stage: AssessmentStage,
+    conditions: Conditions,
+    folder: RunFolder,
+    scene: OpenScene,
+    report: Callable[[int, int], None],
+) -> dict[str, Any]:
+    from harness.assessment import Arm, assess
+
+    drivers = tuple(_driver(each, conditions, folder) for each in (stage.ego, stage.non_ego))
+    habits = stage.non_ego.persona if stage.non_ego else ""
+    personas = (conditions.ego_persona, conditions.persona(habits))
+    arm = Arm(stage.arm, scene, drivers, personas, stage.seed)  # type: ignore[arg-type]
+    records = []
+    with TraceWriter(folder.traces(stage.id)) as traces:
+        for game in assess(arm, conditions.document.assessment.episodes, report):
+            records.append({**game.record, "arm": stage.arm, "persona": stage.persona, "seed": stage.seed})
+            if game.trace is not None:
+                traces.add(game.trace)
+    frame = typed(pd.DataFrame(records).reindex(columns=list(EPISODE_COLUMNS)))
+    write_csv(frame, folder.work(stage.id) / "episodes.csv")
+    return {"episodes": len(records), "errors": sum(bool(record["error"]) for record in records)}
+
+
+def _driver(drives: Drives | None, conditions: Conditions, folder: RunFolder) -> Driver | None:
+    if drives is None:
+        return None
+    if drives.kind == "sumo":
+        return SumoDriver()
+    policy = conditions.ego_policy if drives.kind == "given" else folder.policy(drives.stage)
+    assert policy is not None
+    sampled = conditions.persona(drives.persona).decisions == "sampled"
+    return LearnedDriver(read_policy(policy), sampled)

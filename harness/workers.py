@@ -1,0 +1,203 @@
+"""Carrying the plan out in processes: independent stages side by side, libsumo only ever in a worker.
+
+A worker that dies takes nothing with it: its stage is begun again (a training goes on from its last segment), and
+after `TRIES` deaths the stage has failed, by name, while stages that don't need it go on. Workers end when the parent
+does, however it ends.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from typing import Any, Literal
+
+from harness.errors import HarnessError
+from harness.rounds import Stage
+from harness.stages import Conditions, carry_out
+
+TRIES = 3
+_REPORT_EVERY_S = 0.25
+_CONTEXT = multiprocessing.get_context("spawn")
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a stage."""
+
+    kind: Literal["started", "progress", "done", "failed", "died", "skipped"]
+    stage: str
+    done: int = 0
+    total: int = 0
+    message: str = ""
+    info: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass
+class _Worker:
+    process: BaseProcess
+    connection: Connection
+    stage: Stage | None = None
+
+
+def cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def run_stages(
+    stages: Sequence[Stage], finished: Iterable[str], conditions: Conditions, jobs: int, tell: Callable[[Event], None]
+) -> None:
+    """Carry out every stage that is not finished, at most `jobs` at a time, each after what it needs.
+
+    Everything that happens is told; nothing is raised for a stage that fails.
+    """
+    done, lost = set(finished), set[str]()
+    waiting = [stage for stage in stages if stage.id not in done]
+    tries: dict[str, int] = {}
+    with _workers(min(jobs, len(waiting)), conditions) as workers:
+        while waiting or any(worker.stage for worker in workers):
+            _skip_what_cannot_be(waiting, lost, tell)
+            _hand_out(waiting, workers, done, tell)
+            busy = [worker for worker in workers if worker.stage]
+            if not busy:
+                continue
+            for ready in wait([*(w.connection for w in busy), *(w.process.sentinel for w in busy)]):
+                worker = next(w for w in busy if ready in (w.connection, w.process.sentinel))
+                if worker.stage is None:
+                    continue  # its connection and its sentinel were both ready
+                event = _listen(worker, ready)
+                if event is None:
+                    continue
+                if event.kind == "died":
+                    tries[event.stage] = tries.get(event.stage, 0) + 1
+                    if tries[event.stage] < TRIES:
+                        waiting.insert(0, worker.stage)
+                    else:
+                        event = Event("failed", event.stage, message=f"{event.message}, {TRIES} times over")
+                    _replace(worker, conditions)
+                if event.kind == "done":
+                    done.add(event.stage)
+                if event.kind == "failed":
+                    lost.add(event.stage)
+                if event.kind != "progress":
+                    worker.stage = None
+                tell(event)
+
+
+def _skip_what_cannot_be(waiting: list[Stage], lost: set[str], tell: Callable[[Event], None]) -> None:
+    for stage in list(waiting):
+        missing = [name for name in stage.needs if name in lost]
+        if missing:
+            waiting.remove(stage)
+            lost.add(stage.id)
+            tell(Event("skipped", stage.id, message=f"needs {', '.join(missing)}, which failed"))
+
+
+def _hand_out(waiting: list[Stage], workers: list[_Worker], done: set[str], tell: Callable[[Event], None]) -> None:
+    for worker in workers:
+        ready = [stage for stage in waiting if set(stage.needs) <= done]
+        if worker.stage is None and ready:
+            # what others wait for goes first
+            stage = max(ready, key=lambda one: sum(one.id in other.needs for other in waiting))
+            waiting.remove(stage)
+            worker.stage = stage
+            worker.connection.send(stage)
+            tell(Event("started", stage.id))
+
+
+def _listen(worker: _Worker, ready: object) -> Event | None:
+    """What a worker has to say; its death if it died without a word."""
+    assert worker.stage is not None
+    try:
+        if ready is worker.connection or worker.connection.poll():
+            event: Event = worker.connection.recv()
+            return event
+    except (EOFError, OSError):
+        pass
+    worker.process.join(5.0)
+    if worker.process.is_alive():
+        return None
+    return Event("died", worker.stage.id, message=f"the worker died of {_cause(worker.process.exitcode)}")
+
+
+def _cause(exitcode: int | None) -> str:
+    if exitcode is not None and exitcode < 0:
+        return signal.Signals(-exitcode).name
+    return f"exit code {exitcode}"
+
+
+@contextmanager
+def _workers(count: int, conditions: Conditions) -> Iterator[list[_Worker]]:
+    workers = [_start(conditions) for _ in range(count)]
+    try:
+        yield workers
+    finally:
+        for worker in workers:
+            worker.connection.close()
+            worker.process.terminate()
+        for worker in workers:
+            worker.process.join(5.0)
+            if worker.process.is_alive():
+                worker.process.kill()
+
+
+def _start(conditions: Conditions) -> _Worker:
+    ours, theirs = _CONTEXT.Pipe()
+    process = _CONTEXT.Process(target=_work, args=(theirs, conditions), daemon=True)
+    process.start()
+    theirs.close()
+    return _Worker(process, ours)
+
+
+def _replace(worker: _Worker, conditions: Conditions) -> None:
+    worker.connection.close()
+    fresh = _start(conditions)
+    worker.process, worker.connection = fresh.process, fresh.connection
+
+
+# --- in the worker's process -----------------------------------------------------------------------------------------
+
+
+def _work(connection: Connection, conditions: Conditions) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    while True:
+        try:
+            stage: Stage = connection.recv()
+        except (EOFError, OSError):
+            return
+        connection.send(_carry_out(stage, connection, conditions))
+
+
+def _carry_out(stage: Stage, connection: Connection, conditions: Conditions) -> Event:
+    last = 0.0
+
+    def report(done: int, total: int) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last >= _REPORT_EVERY_S or done >= total:
+            last = now
+            connection.send(Event("progress", stage.id, done, total))
+
+    try:
+        return Event("done", stage.id, info=carry_out(stage, conditions, report))
+    except (HarnessError, OSError, MemoryError) as error:
+        return Event("failed", stage.id, message=str(error) or type(error).__name__)
+    except Exception:  # a bug: its traceback is the message
+        return Event("failed", stage.id, message=traceback.format_exc())
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
