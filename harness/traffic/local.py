@@ -65,10 +65,13 @@ class LocalSimulation:
         types = Path(folder.name) / "types.rou.xml"
         types.write_text(scene.routes.types_xml, encoding="utf-8")
         document = scene.document
+        # Taken-over cars that leave a junction's lanes may kill SUMO 1.28 (SIGSEGV) if lane changes take time: they
+        # do so only where there is somebody whom SUMO drives.
+        smoothly = not all(self._taken_over) or _has_others(scene)
         self._options = [
             *("--net-file", str(tiled_net(scene.net_file, games)), "--route-files", str(types)),
             *("--step-length", str(document.step_length_s), "--collision.action", "none"),
-            *("--lanechange.duration", str(document.lane_change_duration_s)),
+            *("--lanechange.duration", str(document.lane_change_duration_s if smoothly else 0.0)),
             *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
         ]
         self._release = weakref.finalize(self, _release, folder)
@@ -251,6 +254,11 @@ class LocalSimulation:
         players[..., 0] -= self._half_length * np.cos(players[..., 2])
         players[..., 1] -= self._half_length * np.sin(players[..., 2]) + self._offsets[:, None]
         return players
+
+
+def _has_others(scene: OpenScene) -> bool:
+    players = {player.vehicle for player in scene.document.players}
+    return bool(scene.routes.flows) or bool(set(scene.routes.vehicles) - players)
 
 
 def _release(folder: tempfile.TemporaryDirectory[str]) -> None:

@@ -6,6 +6,7 @@ is the rail, but for the openings where roads enter and leave the scene.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -57,7 +58,7 @@ def drivable_area(net: Net) -> BaseGeometry:
         shapely.LineString(lane_line(lane)).buffer(lane.getWidth() / 2.0, cap_style="flat", join_style="mitre")
         for edge in net.getEdges(withInternal=True)
         for lane in car_lanes(edge)
-        if lane.getID() not in beyond and len(np.unique(lane_line(lane), axis=0)) > 1
+        if lane.getID() not in beyond and np.ptp(lane_line(lane), axis=0).any()
     ]
     for node in net.getNodes():
         if len(node.getShape()) > 2:
@@ -66,8 +67,8 @@ def drivable_area(net: Net) -> BaseGeometry:
     return grown.buffer(-_SEAM_M, join_style="mitre").simplify(_SMOOTH_M)
 
 
-def rail_lines(net: Net) -> list[FloatArray]:
-    """The rails as polylines [n, 2]: the outline of the drivable area without its openings."""
+def rail_lines(net: Net, area: BaseGeometry) -> list[FloatArray]:
+    """The rails as polylines [n, 2]: the outline of the net's drivable area without its openings."""
     openings = [
         shapely.LineString(_cross_section(lane, at_end)).buffer(_OPENING_M, cap_style="square")
         for edge in net.getEdges(withInternal=False)
@@ -75,15 +76,14 @@ def rail_lines(net: Net) -> list[FloatArray]:
         if _is_fringe(edge, at_end)
         for lane in car_lanes(edge)
     ]
-    outline = drivable_area(net).boundary
+    outline = area.boundary
     rails = shapely.difference(outline, shapely.union_all(openings)) if openings else outline
     merged = shapely.line_merge(rails) if rails.geom_type == "MultiLineString" else rails
     return [np.asarray(line.coords) for line in getattr(merged, "geoms", [merged]) if len(line.coords) > 1]
 
 
-def rails(net: Net, reach_m: float) -> Rails:
-    """The rails as segments found by place, up to `reach_m` away."""
-    lines = rail_lines(net)
+def rails(lines: Sequence[FloatArray], reach_m: float) -> Rails:
+    """Rails given as polylines, as segments found by place, up to `reach_m` away."""
     segments = [np.stack((line[:-1], line[1:]), axis=1) for line in lines]
     return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), reach_m)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
+from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
@@ -72,23 +73,25 @@ def open_scene(folder: Path) -> OpenScene:
     )
     if net is None or routes is None:
         raise UsageError(problems)
+    area = network.drivable_area(net)
     opened = [
-        _attempt(problems, lambda k=k: _open_player(document_file, document, ROLES[k], net, routes))  # type: ignore[misc]
+        _attempt(problems, lambda k=k: _open_player(document_file, document, ROLES[k], net, area, routes))  # type: ignore[misc]
         for k in range(len(ROLES))
     ]
     _attempt(problems, lambda: _check_traffic(document, net, routes))
     if problems or None in opened:
         raise UsageError(problems)
     places, tables, edges, types = zip(*opened, strict=True)
+    lines = network.rail_lines(net, area)
     world = World(
-        Road(network.rails(net, REACH_M + 10.0), Routes.of(tables)),
+        Road(network.rails(lines, REACH_M + 10.0), Routes.of(tables)),
         _actuators(document, types),
         np.array([each.length_m for each in types]),
         np.array([each.width_m for each in types]),
         document.step_length_s,
         document.time_limit_s,
     )
-    return OpenScene(folder, document, world, routes, places, edges, tuple(network.rail_lines(net)))
+    return OpenScene(folder, document, world, routes, places, edges, tuple(lines))
 
 
 def _checked_net(path: Path) -> Net:
@@ -106,7 +109,7 @@ def _attempt(problems: list[Problem], action: Callable[[], T]) -> T | None:
 
 
 def _open_player(
-    file: Path, document: Scene, role: str, net: Net, routes: RouteFile
+    file: Path, document: Scene, role: str, net: Net, area: BaseGeometry, routes: RouteFile
 ) -> tuple[Place, Route, tuple[str, ...], VehicleType]:
     player: Player = getattr(document, role)
     problems: list[Problem] = []
@@ -126,7 +129,7 @@ def _open_player(
         )
     onward = edges[edges.index(lane.getEdge()) :]
     try:
-        table = route_table(net, onward, goal, document.goal.position_m)
+        table = route_table(net, area, onward, goal, document.goal.position_m)
     except ValueError as error:
         raise UsageError.of(
             routes.path, f"vehicle {vehicle.name}", f"its route {error}", "mend the route's edges"
@@ -223,7 +226,7 @@ def _check_traffic(document: Scene, net: Net, routes: RouteFile) -> None:
     problems: list[Problem] = []
     for other in [*others, *(flow.departure for flow in routes.flows)]:
         where = (str(routes.path), f"vehicle {other.name}")
-        if other.name in ROLES:
+        if other.name in ROLES and players <= routes.vehicles.keys():
             problems.append(Problem(*where, "has a player's name without being it", "call it something else"))
         edges = _attempt(problems, lambda other=other: _edges(other, net, routes)) or []  # type: ignore[misc]
         for edge, following in pairwise(edges):

@@ -19,7 +19,7 @@ from sumolib.net.lane import Lane
 
 from harness.game.arrays import FloatArray
 from harness.game.road import MARGIN_M, SPACING_M, Route
-from harness.traffic.network import car_lanes, drivable_area, lane_line
+from harness.traffic.network import car_lanes, lane_line
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
@@ -35,8 +35,8 @@ class _Piece:
     speed_mps: float
 
 
-def route_table(net: Net, edges: Sequence[Edge], goal: Edge, goal_position_m: float) -> Route:
-    """The table of a route along connected edges.
+def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], goal: Edge, goal_position_m: float) -> Route:
+    """The table of a route along connected edges, over the net's drivable area.
 
     Raises ValueError where consecutive edges are not connected, or the goal's edge is not on the route.
     """
@@ -58,7 +58,7 @@ def route_table(net: Net, edges: Sequence[Edge], goal: Edge, goal_position_m: fl
         for column, (beside, lane) in enumerate(piece.lanes):
             offsets[rows, column] = _offsets(points[rows], headings[rows], beside)
             lane_ends[rows, column] = ends[piece.edge][lane.getID()]
-    left, right = _edges_beside(drivable_area(net), points, headings)
+    left, right = _edges_beside(area, points, headings)
     inside = (stations >= 0.0) & (stations <= line.length)
     row = 2 * list(edges).index(goal)
     return Route(
@@ -219,15 +219,12 @@ def _edges_beside(area: BaseGeometry, points: FloatArray, headings: FloatArray) 
     sides = []
     for sign in (1.0, -1.0):
         rays = shapely.linestrings(np.stack((points, points + sign * _FAR_SIDE_M * left), axis=1))
-        inside = shapely.intersection(rays, area)
-        sides.append(sign * np.array([_free(*each) for each in zip(inside, shapely.points(points), strict=True)]))
+        parts, row = shapely.get_parts(shapely.intersection(rays, area), return_index=True)
+        begins_here = shapely.distance(parts, shapely.points(points)[row]) < _ON_POINT_M
+        reach = np.zeros(len(points))
+        np.maximum.at(reach, row, np.where(begins_here, shapely.length(parts), 0.0))
+        sides.append(sign * reach)
     return sides[0], sides[1]
-
-
-def _free(inside: BaseGeometry, point: shapely.Point) -> float:
-    """Length of the part of a ray's way through the drivable area that begins at its own point; 0 if none does."""
-    parts = getattr(inside, "geoms", [inside])
-    return max((part.length for part in parts if part.distance(point) < _ON_POINT_M), default=0.0)
 
 
 def _extend(values: FloatArray, inside: FloatArray) -> FloatArray:
