@@ -1,0 +1,270 @@
+"""A persona's card: the verdicts, the failure rates they rest on, and the two figures of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+from markupsafe import Markup
+
+from harness.comparison import Verdict
+from harness.reports import wording
+from harness.reports.figures import Column, Point, rate_figure, speed_figure
+from harness.reports.wording import Row, Verdicts, failures, failures_of, interval, percent, played
+
+QUESTIONS = {
+    "RQ1": "Does the persona make the ego fail?",
+    "RQ2": "Does retraining mend it?",
+}
+METRICS = {"failure": "failures", "mean_speed": "average speed"}
+LONGEST_LABEL = 12
+"""Letters of a persona's name that fit under a column of a figure."""
+SURE = "95\N{NO-BREAK SPACE}%"
+
+
+@dataclass(frozen=True)
+class Rate:
+    """One arm's failure rate: large, and each training seed's count and interval."""
+
+    label: str
+    series: str
+    headline: str
+    counts: Sequence[str]
+
+
+@dataclass(frozen=True)
+class Test:
+    """One row of `comparisons`, in words."""
+
+    question: str
+    seed: int
+    metric: str
+    effect: str
+    p_value: str
+    p_holm: str
+    mcnemar_p: str
+    verdict: str
+
+
+@dataclass(frozen=True)
+class Card:
+    """All that the page says of one persona before its tables."""
+
+    persona: str
+    anchor: str
+    verdicts: Sequence[tuple[str, Verdicts]]
+    """Each with its question in plain words."""
+    rates: Sequence[Rate]
+    facts: Sequence[tuple[str, Sequence[str]]]
+    tests: Sequence[Test]
+    rate_figure: Markup
+    speed_figure: Markup
+
+
+@dataclass(frozen=True)
+class Results:
+    """The tables as the cards look them up."""
+
+    arms: Mapping[tuple[str, int], Row]
+    """Rows of `summary` by arm and seed."""
+    comparisons: Sequence[Row]
+    speeds: Mapping[tuple[str, int], pd.Series]
+    """The ego's average speed in each game, by arm and seed."""
+    seeds: Sequence[int]
+    significance: float | None
+    planned: Container[str]
+    """Ids of the stages of the campaign, whether they are done or not."""
+
+    def of(self, arm: str) -> dict[int, Row]:
+        """The arm's rows by seed, where there are games that could be played."""
+        rows = {seed: self.arms.get((arm, seed)) for seed in self.seeds}
+        return {seed: row for seed, row in rows.items() if row is not None and played(row)}
+
+    def asked(self, question: str, persona: str) -> list[int]:
+        """The training seeds of which a question is asked: its treatment is played, or it is compared."""
+        _, treatment = wording.ARMS[question](persona)
+        compared = {row["seed"] for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)}
+        return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.planned or seed in compared]
+
+
+def results(
+    manifest: Mapping[str, Any], episodes: pd.DataFrame, summary: pd.DataFrame, comparisons: pd.DataFrame
+) -> Results:
+    """The frames, looked up by arm and seed."""
+    good = episodes[~unplayed(episodes)]
+    return Results(
+        {(row["arm"], row["seed"]): row for row in summary.to_dict("records")},
+        comparisons.to_dict("records"),
+        {key: games.dropna() for key, games in good.groupby(["arm", "seed"])["ego_mean_speed_mps"]},
+        sorted({*manifest.get("seeds", ()), *summary["seed"].tolist(), *comparisons["seed"].tolist()}),
+        manifest.get("campaign", {}).get("assessment", {}).get("significance"),
+        manifest.get("stages", {}),
+    )
+
+
+def unplayed(episodes: pd.DataFrame) -> pd.Series:
+    """Which games could not be played."""
+    return (episodes["ego_outcome"] == "error") | (episodes["error"] != "")
+
+
+def card(persona: str, place: int, found: Results) -> Card:
+    """The card of a persona; `place` tells its figures' ids from those of other cards."""
+    rows = [row for row in found.comparisons if row["persona"] == persona]
+    retrained = bool(found.asked("RQ2", persona))
+    arms = [
+        ("naive ego, alone", "alone", "naive_alone"),
+        (f"naive ego, against {persona}", "persona", f"naive_vs_{persona}"),
+    ]
+    if retrained:
+        arms.append((f"retrained ego, against {persona}", "retrained", f"retrained_vs_{persona}"))
+    columns = _columns(persona, retrained, found)
+    return Card(
+        persona,
+        f"persona-{place}",
+        [
+            (
+                words,
+                wording.verdicts(
+                    question,
+                    persona,
+                    found.asked(question, persona),
+                    [row for row in rows if row["question"] == question],
+                    found.arms,
+                    found.significance,
+                ),
+            )
+            for question, words in QUESTIONS.items()
+        ],
+        [_rate(label, series, found.of(arm)) for label, series, arm in arms],
+        _facts(persona, retrained, found),
+        [_test(row) for row in rows],
+        rate_figure(
+            [Column(label, series, _rates(found.of(arm))) for label, series, arm in columns],
+            f"rate{place}",
+            "Failure rate. " + _alternative(columns, found, "failure_rate", percent),
+        ),
+        speed_figure(
+            [Column(label, series, _speeds(arm, found)) for label, series, arm in columns],
+            f"speed{place}",
+            "Average speed of the ego. "
+            + _alternative(columns, found, "mean_speed_mps", lambda speed: f"{wording.number(speed, 1)} m/s"),
+        ),
+    )
+
+
+def _rate(label: str, series: str, rows: Mapping[int, Row]) -> Rate:
+    if not rows:
+        return Rate(label, series, "–", ["not played"])
+    shares = [row["failure_rate"] for row in rows.values()]
+    return Rate(label, series, percent(sum(shares) / len(shares)), _counts(rows))
+
+
+def _counts(rows: Mapping[int, Row], who: str = "") -> list[str]:
+    """A line per seed, e.g. "18 of 60 games (95 %: 18.8–43.2 %)"; with `who`, "The ego fails in 18 of …"."""
+    return _by_seed(
+        {
+            seed: f"{who and f'{who} fails in '}{failures_of(row)} games ({SURE}: "
+            f"{interval(row['failure_rate_low'], row['failure_rate_high'])})" + "." * bool(who)
+            for seed, row in rows.items()
+        }
+    )
+
+
+def _by_seed(lines: Mapping[int, str]) -> list[str]:
+    """The lines, each with its seed before it when there are several."""
+    return [f"Seed {seed}: {line}" if len(lines) > 1 else line[:1].upper() + line[1:] for seed, line in lines.items()]
+
+
+def _facts(persona: str, retrained: bool, found: Results) -> list[tuple[str, Sequence[str]]]:
+    naive, against = found.of("naive_alone"), found.of(f"naive_vs_{persona}")
+    ordinary, alone = found.of("naive_vs_sumo"), found.of(f"{persona}_alone")
+    facts: list[tuple[str, Sequence[str]]] = []
+
+    def say(title: str, lines: Sequence[str]) -> None:
+        facts.append((title, lines or ["not played"]))
+
+    causes = {
+        seed: f"collision in {row['collisions']}, rail contact in {row['rails']}, too late in {row['timeouts']} games."
+        for seed, row in against.items()
+        if failures(row)
+    }
+    if causes:
+        say(f"How the naive ego fails against {persona}", _by_seed(causes))
+    lines = _counts(ordinary, "the naive ego")
+    as_bad = [
+        seed
+        for seed, row in ordinary.items()
+        if seed in against and row["failure_rate"] >= against[seed]["failure_rate"] > 0
+    ]
+    if as_bad:
+        seeds = f" (seed {', '.join(map(str, as_bad))})" if len(ordinary) > 1 else ""
+        lines.append(f"That is no less often than against {persona}{seeds}: an ordinary driver does it too.")
+    say("An ordinary SUMO driver in the persona's place", lines)
+    reaches = {
+        seed: f"reaches its goal in {percent(row['non_ego_goal_rate'])} of {played(row)} games ({SURE}: "
+        f"{interval(row['non_ego_goal_rate_low'], row['non_ego_goal_rate_high'])})."
+        for seed, row in alone.items()
+    }
+    say("The persona alone on the road", _by_seed(reaches))
+    if retrained:
+        unbroken = _counts(found.of(f"retrained_alone_{persona}"), "the retrained ego")
+        say("The retrained ego alone: is what worked unbroken?", unbroken)
+    if any(failures(row) for row in naive.values()):
+        say(
+            "Caution",
+            ["The naive ego fails alone as well: part of its failures are not the persona's doing."],
+        )
+    return facts
+
+
+def _test(row: Row) -> Test:
+    return Test(
+        row["question"],
+        row["seed"],
+        METRICS.get(row["metric"], str(row["metric"])),
+        wording.effect(row),
+        wording.p_number(row["p_value"]),
+        wording.p_number(row["p_holm"]),
+        wording.p_number(row["mcnemar_p"]),
+        Verdict(row["verdict"]).value,
+    )
+
+
+def _columns(persona: str, retrained: bool, found: Results) -> list[tuple[str, str, str]]:
+    """Label, series and arm of each column of the figures; the order is the paper's story."""
+    name = persona if len(persona) <= LONGEST_LABEL else persona[: LONGEST_LABEL - 1] + "…"
+    columns = [
+        ("naive\nalone", "alone", "naive_alone"),
+        ("naive vs\nSUMO driver", "sumo", "naive_vs_sumo"),
+        (f"naive vs\n{name}", "persona", f"naive_vs_{persona}"),
+    ]
+    return columns + [(f"retrained vs\n{name}", "retrained", f"retrained_vs_{persona}")] * retrained
+
+
+def _rates(rows: Mapping[int, Row]) -> list[Point]:
+    return [
+        Point(seed, row["failure_rate"], row["failure_rate_low"], row["failure_rate_high"])
+        for seed, row in rows.items()
+    ]
+
+
+def _speeds(arm: str, found: Results) -> list[Point]:
+    points = []
+    for seed, row in found.of(arm).items():
+        games = found.speeds.get((arm, seed))
+        middle = None if games is None or games.empty else (games.quantile(0.25), games.quantile(0.75))
+        low, high = row["mean_speed_low_mps"], row["mean_speed_high_mps"]
+        points.append(Point(seed, row["mean_speed_mps"], low, high, middle))
+    return points
+
+
+def _alternative(columns: Sequence[tuple[str, str, str]], found: Results, column: str, text: wording.Number) -> str:
+    """What a figure shows, for who can't see it."""
+    return "; ".join(
+        label.replace("\n", " ")
+        + ": "
+        + (", ".join(text(row[column]) for row in found.of(arm).values()) or "not played")
+        for label, _, arm in columns
+    )

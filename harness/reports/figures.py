@@ -1,0 +1,232 @@
+"""The page's figures as inline SVG: text stays text, and every colour is one of the page's own.
+
+matplotlib draws with stand-in colours, which become `currentColor` and the custom properties of report.css, so
+that a figure reads in dark and light alike. matplotlib is imported when the first figure is drawn.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+INK, GRID = "#010101", "#010102"
+SERIES = {"alone": "#010111", "sumo": "#010112", "persona": "#010113", "retrained": "#010114"}
+_PAGE_COLOURS = {INK: "currentColor", GRID: "var(--grid)"} | {
+    stand_in: f"var(--{name})" for name, stand_in in SERIES.items()
+}
+_STYLE = {
+    "svg.fonttype": "none",
+    "font.family": "DejaVu Sans",
+    "font.size": 10,
+    "text.color": INK,
+    "axes.edgecolor": INK,
+    "axes.labelcolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.8,
+    "text.parse_math": False,
+    "axes.formatter.useoffset": False,
+    "figure.constrained_layout.use": True,
+}
+_LINES = ("-", "--", ":", "-.")
+
+
+@dataclass(frozen=True)
+class Point:
+    """One training seed's value of an arm, with its 95 % interval (NaN: none)."""
+
+    seed: int
+    value: float
+    low: float
+    high: float
+    middle_half: tuple[float, float] | None = None
+    """Quartiles over the games, where a value is a mean over games."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One arm in a figure. `series` is a key of SERIES."""
+
+    label: str
+    series: str
+    points: Sequence[Point]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One training: values [N] at `steps` [N], and the step it stopped at, if it has."""
+
+    seed: int
+    steps: Sequence[float]
+    payoffs: Sequence[float]
+    failure_rates: Sequence[float]
+    stopped_at: float | None
+    stopped_early: bool
+
+
+def rate_figure(columns: Sequence[Column], name: str, alternative: str) -> Markup:
+    """A share of games per arm: a bar for the mean over seeds, and each seed's value with its interval."""
+    with _figure(4.8, 3.3) as figure:
+        axes = _arms(figure, columns)
+        for place, column in enumerate(columns):
+            values = [point.value for point in column.points if math.isfinite(point.value)]
+            if values:
+                mean = sum(values) / len(values)
+                axes.bar(place, mean, 0.62, color=SERIES[column.series], alpha=0.35, linewidth=0)
+        tops = [max(point.value, point.high) for column in columns for point in column.points]
+        axes.set_ylim(0, max([0.05, *(top for top in tops if math.isfinite(top))]) * 1.14)
+        axes.set_ylabel("failure rate (%)")
+        axes.yaxis.set_major_formatter(lambda share, _: f"{share * 100:.3g}")
+        _points(axes, columns, lambda share: f"{share * 100:.1f}".removesuffix(".0") + " %")
+        return _svg(figure, name, alternative)
+
+
+def speed_figure(columns: Sequence[Column], name: str, alternative: str) -> Markup:
+    """Average speed per arm: a pale bar from quartile to quartile of the games, the mean and its interval."""
+    with _figure(4.8, 3.3) as figure:
+        axes = _arms(figure, columns)
+        axes.use_sticky_edges = False  # a pale bar does not stand on the axis
+        for place, column in enumerate(columns):
+            for offset, point in _beside(column.points):
+                if point.middle_half:
+                    low, high = point.middle_half
+                    axes.bar(
+                        place + offset, high - low, 0.62 / len(column.points), bottom=low,
+                        color=SERIES[column.series], alpha=0.3, linewidth=0,
+                    )  # fmt: skip
+        axes.set_ylabel("average speed of the ego (m/s)")
+        _points(axes, columns, lambda speed: f"{speed:.1f}")
+        axes.margins(y=0.14)
+        return _svg(figure, name, alternative)
+
+
+def learning_figure(curves: Sequence[Curve], series: str, name: str, alternative: str) -> Markup:
+    """Mean payoff and failure rate of the learner over its steps, a line per seed, and where each stopped."""
+    with _figure(3.7, 3.9) as figure:
+        payoff, failure = figure.subplots(2, 1, sharex=True)
+        for place, curve in enumerate(curves):
+            line = {
+                "color": SERIES[series],
+                "linestyle": _LINES[place % len(_LINES)],
+                "marker": "o" if len(curve.steps) <= 30 else "",
+                "markersize": 3,
+            }
+            payoff.plot(curve.steps, curve.payoffs, label=f"seed {curve.seed}", **line)
+            failure.plot(curve.steps, curve.failure_rates, **line)
+            if curve.stopped_at is not None:
+                for axes in (payoff, failure):
+                    axes.axvline(curve.stopped_at, color=INK, linewidth=1, linestyle=line["linestyle"])
+        if len(curves) > 1:
+            payoff.legend(frameon=False, fontsize=8)
+        elif curves[0].stopped_at is not None:
+            words = "stopped early" if curves[0].stopped_early else "budget used"
+            payoff.annotate(
+                f"{words}: {steps_text(curves[0].stopped_at)}", (curves[0].stopped_at, 1), (0, 3),
+                xycoords=("data", "axes fraction"), textcoords="offset points", ha="right", fontsize=9,
+            )  # fmt: skip
+        payoff.set_ylabel("mean payoff")
+        payoff.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
+        failure.set_ylabel("failure rate (%)")
+        failure.yaxis.set_major_formatter(lambda share, _: f"{share * 100:.3g}")
+        rates = [rate for curve in curves for rate in curve.failure_rates if math.isfinite(rate)]
+        failure.set_ylim(0, max([0.05, *rates]) * 1.08)
+        failure.set_xlim(left=0)
+        failure.xaxis.set_major_formatter(lambda steps, _: steps_text(steps))
+        failure.locator_params(axis="x", nbins=5)
+        failure.set_xlabel("training steps")
+        return _svg(figure, name, alternative)
+
+
+def steps_text(steps: float) -> str:
+    """A number of steps, e.g. "150 k" or "1.2 M"."""
+    for size, letter in ((1e6, "M"), (1e3, "k")):
+        if abs(steps) >= size:
+            return f"{steps / size:.3g} {letter}"
+    return f"{steps:.3g}"
+
+
+@contextmanager
+def _figure(width_in: float, height_in: float) -> Iterator[Figure]:
+    import matplotlib
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()  # the user's matplotlibrc has no say in the report
+        matplotlib.rcParams.update(_STYLE | {"svg.hashsalt": "harness"})
+        figure = Figure(figsize=(width_in, height_in))
+        FigureCanvasSVG(figure)
+        yield figure
+
+
+def _arms(figure: Figure, columns: Sequence[Column]) -> Axes:
+    axes = figure.subplots()
+    axes.set_xticks(range(len(columns)), [""] * len(columns))
+    for place, column in enumerate(columns):  # a text of one line is anchored by its middle in any font
+        for line, words in enumerate(column.label.split("\n")):
+            below = (0, -14 - 12 * line)
+            axes.annotate(
+                words, (place, 0), below, xycoords=("data", "axes fraction"),
+                textcoords="offset points", ha="center",
+            )  # fmt: skip
+    axes.set_xlim(-0.55, len(columns) - 0.45)
+    axes.tick_params(axis="x", length=0)
+    return axes
+
+
+def _beside(points: Sequence[Point]) -> Iterator[tuple[float, Point]]:
+    """Each seed's offset from the middle of its arm."""
+    for place, point in enumerate(points):
+        yield 0.62 * ((place + 0.5) / len(points) - 0.5), point
+
+
+def _points(axes: Axes, columns: Sequence[Column], text: Callable[[float], str]) -> None:
+    for place, column in enumerate(columns):
+        for offset, point in _beside(column.points):
+            if not math.isfinite(point.value):
+                continue
+            x, colour = place + offset, SERIES[column.series]
+            top = point.value
+            if math.isfinite(point.low) and math.isfinite(point.high):
+                reach = [[point.value - point.low], [point.high - point.value]]
+                axes.errorbar(x, point.value, yerr=reach, color=colour, linewidth=1.8, capsize=4, capthick=1.8)
+                top = point.high
+            axes.plot(x, point.value, "o", color=colour, markersize=6, clip_on=False, zorder=4)
+            if len(column.points) <= 2:
+                axes.annotate(text(point.value), (x, top), (0, 4), textcoords="offset points", ha="center", fontsize=9)
+        if not any(math.isfinite(point.value) for point in column.points):
+            axes.annotate("not played", (place, 0), (0, 6), xycoords=("data", "axes fraction"),
+                          textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
+
+
+def _svg(figure: Figure, name: str, alternative: str) -> Markup:
+    """The figure as an element of the page. `name` keeps its ids apart from those of the other figures."""
+    written = io.StringIO()
+    figure.savefig(written, format="svg", transparent=True, metadata={"Date": None})
+    svg = written.getvalue()
+    size = re.search(r'viewBox="[^"]*"', svg)
+    assert size is not None  # matplotlib always writes one
+    svg = re.sub(r"<(metadata|style)\b.*?</\1>", "", svg[svg.index(">", size.end()) + 1 :], flags=re.DOTALL)
+    svg = svg.replace('xlink:href="#', f'href="#{name}-').replace("url(#", f"url(#{name}-")
+    svg = svg.replace(' id="', f' id="{name}-')
+    svg = re.sub(r"font(?:-size)?: ([\d.]+px)(?:;? [^;\"]*'DejaVu Sans'[^;\"]*)", r"font-size: \1", svg)
+    for stand_in, colour in _PAGE_COLOURS.items():
+        svg = svg.replace(stand_in, colour)
+    return Markup('<svg {} role="img" aria-label="{}">').format(Markup(size[0]), alternative) + Markup(svg)
