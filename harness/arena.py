@@ -74,8 +74,7 @@ class Arena:
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
         self._noise = np.zeros((games, players, self.world.steps, 2))
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
-        self._drift_rad = np.zeros((games, players, self.world.steps))
-        self._held_rad = np.zeros((games, players))
+        self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._all_games = np.arange(games)
         self.reading: Reading | None = None
         self._players_length = np.broadcast_to(self.world.length_m, (games, players))
@@ -138,10 +137,8 @@ class Arena:
                     chosen[games, player] = seat.driver.decide(games, self.observation[games, player], noise)
         acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)
         lapsed = self._lapsed[self._all_games, :, now] & drove
-        begins = lapsed & ~state.lapsed
-        np.copyto(self._held_rad, state.steering_rad, where=begins)
         state.lapsed = lapsed
-        drifting = self._held_rad + self._drift_rad[self._all_games, :, now]
+        drifting = self._lapsed_steering_rad[self._all_games, :, now]
         return np.where(lapsed, 0.0, acceleration), np.where(lapsed, drifting, steering)
 
     def _take_back(self, reading: Reading, drove: BoolArray) -> None:
@@ -151,8 +148,15 @@ class Arena:
             x, y, heading, speed = reading.players[games, player].T
             gained = np.where(state.step[games] > 0, speed - state.speed_mps[games, player], 0.0)
             state.acceleration_mps2[games, player] = gained / self.world.step_s
+            state.steering_rad[games, player] = self._steered(player, games, heading, speed)
             state.x_m[games, player], state.y_m[games, player] = x, y
             state.heading_rad[games, player], state.speed_mps[games, player] = heading, speed
+
+    def _steered(self, player: int, games: IntArray, heading_rad: FloatArray, speed_mps: FloatArray) -> FloatArray:
+        """The steering angle with which a car would have turned as SUMO turned a player, which has no wheel there."""
+        turned = (heading_rad - self.state.heading_rad[games, player] + np.pi) % (2.0 * np.pi) - np.pi
+        curvature = turned / np.maximum(speed_mps * self.world.step_s, 0.1)
+        return np.arctan(self.world.actuators.wheelbase_m[player] * curvature)
 
     def _locate(self) -> tuple[FloatArray, FloatArray]:
         """How far each player came along its route, and where it is across it."""
@@ -203,11 +207,12 @@ class Arena:
         state.x_m[game], state.y_m[game], state.heading_rad[game] = start.x_m, start.y_m, start.heading_rad
         state.speed_mps[game], state.present[game] = start.speed_mps, start.present
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
+        state.overlooked_m[game] = start.overlooked_m
         state.outcome[game], state.lapsed[game], state.step[game] = Outcome.RUNNING, False, 0
         for player in range(len(self.seats)):
             state.station_m[game, player] = self.world.road.routes.find(player, start.x_m[player], start.y_m[player])
             self._lapsed[game, player] = start.lapses[player].lapsed
-            self._drift_rad[game, player] = start.lapses[player].drift_rad
+            self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
         self._noise[game] = start.noise
 
     def _look(self, games: IntArray) -> None:

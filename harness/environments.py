@@ -22,6 +22,7 @@ from harness.drivers.learned import LearnedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
+from harness.game.attention import Habits
 from harness.game.observation import SIZE, observe
 from harness.game.seeding import generator_of
 from harness.game.start import draw_start
@@ -85,9 +86,9 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
     ) -> None:
         """Open the scene and load SUMO.
 
-        `player` ("ego" or "non_ego") is learned, for the payoff and with the attention of `persona`. `other` is the
+        `player` ("ego" or "non_ego") is learned, for the payoff and with the habits of `persona`. `other` is the
         other player's driver: None (nobody, the player is alone), "sumo", or the folder of a policy, which drives
-        with the attention of `other_persona`. Paths are looked for from the working directory, then in the
+        with the habits of `other_persona`. Paths are looked for from the working directory, then in the
         harness's own checkout. Raises UsageError for what can't be found or read, SimulationError where SUMO fails.
         """
         if player not in ROLES:
@@ -101,10 +102,10 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
             opponent = Seat(SumoDriver())
         else:
             opponent = Seat(LearnedDriver(read_policy(_found(other)), theirs.decisions == "sampled"))
-        seats, attention, present = [opponent] * 2, [theirs.lapses if other_persona else None] * 2, [1.0] * 2
-        seats[self._player], attention[self._player] = Seat(None, own.payoff), own.lapses
+        seats, habits, present = [opponent] * 2, [theirs.habits if other_persona else Habits()] * 2, [1.0] * 2
+        seats[self._player], habits[self._player] = Seat(None, own.payoff), own.habits
         present[1 - self._player] = float(other is not None)
-        self._game = _Game(scene, seats, attention, present)
+        self._game = _Game(scene, seats, habits, present)
         self._running = False
         self.render_mode = render_mode
         self.observation_space = _observation_space()
@@ -157,7 +158,7 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
         """Open the scene and load SUMO. Paths and errors are as in `DrivingEnv`."""
         personas = [_read_persona(ego_persona), _read_persona(non_ego_persona)]
         seats = [Seat(None, each.payoff) for each in personas]
-        self._game = _Game(scene, seats, [each.lapses for each in personas], [1.0, 1.0])
+        self._game = _Game(scene, seats, [each.habits for each in personas], [1.0, 1.0])
         self._generator: np.random.Generator | None = None
         self.render_mode = render_mode
         self.possible_agents = list(ROLES)
@@ -215,10 +216,10 @@ class _Game:
     """An arena with one game, which is started anew from a random generator."""
 
     def __init__(
-        self, scene: Place | OpenScene, seats: Sequence[Seat], attention: Sequence[Any], present: Sequence[float]
+        self, scene: Place | OpenScene, seats: Sequence[Seat], habits: Sequence[Habits], present: Sequence[float]
     ) -> None:
         self._scene = scene if isinstance(scene, OpenScene) else open_scene(_found(scene))
-        self._chances = self._scene.chances(attention, present)
+        self._chances = self._scene.chances(habits, present)
         self.arena = Arena(self._scene, 1, seats)
 
     def start(self, generator: np.random.Generator) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import sumo
 
+from harness.game.attention import Habits
 from harness.game.start import Start, draw_start
 from harness.traffic.opening import OpenScene, open_scene
 
@@ -84,7 +85,7 @@ non_ego = {{ vehicle = "non_ego", lane = "{non_ego[1]}", position_m = [30.0, 40.
 
 def drawn(scene: OpenScene, *parts: str | int, present: Sequence[float] = (1.0, 1.0)) -> Start:
     """A start drawn from named parts."""
-    return draw_start(scene.chances([None, None], present), *parts)
+    return draw_start(scene.chances([Habits(), Habits()], present), *parts)
 
 
 def placed(scene: OpenScene, *poses: tuple[float, float, float, float] | None) -> Start:

@@ -24,6 +24,7 @@ import harness
 from harness import Arena, ArenaVecEnv, DrivingEnv, ParallelDrivingEnv, Seat, UsageError, open_scene, read_document
 from harness.documents.persona import Persona
 from harness.drivers.sumo import SumoDriver
+from harness.game.attention import Habits
 from harness.game.observation import LAYOUT
 from harness.policy_file import Policy, write_policy
 from harness.traffic.local import LocalSimulation
@@ -311,7 +312,7 @@ def test_sb3__trains_beside_an_eval_callback_in_the_same_process(opened: Open, k
         scene = open_scene(REPOSITORY / "networks/merge")
         careful = read_document(REPOSITORY / "personas/careful.toml", Persona)
         arena = Arena(scene, 4, [Seat(None, careful.payoff), Seat(SumoDriver())])
-        training = opened(ArenaVecEnv, arena, 0, scene.chances([None, None], [1.0, 1.0]), "test")
+        training = opened(ArenaVecEnv, arena, 0, scene.chances([Habits(), Habits()], [1.0, 1.0]), "test")
     else:
         training = opened(DummyVecEnv, [lambda: Monitor(DrivingEnv())])
     judging = opened(Monitor, DrivingEnv(other="sumo"))

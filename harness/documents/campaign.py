@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
@@ -13,13 +14,13 @@ from harness.documents.scene import Name
 LEARNED, SUMO = "learned", "sumo"  # drivers an ego can have by name
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]
-DocumentPath = Annotated[str, Field(min_length=1, max_length=500)]
+DocumentPath = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]*$")]
 
 
 class Ego(Document):
     """The vehicle under study."""
 
-    driver: str = LEARNED
+    driver: DocumentPath = LEARNED
     """`learned` by the campaign, `sumo` for SUMO's own models, or the folder of a policy."""
     persona: DocumentPath = "../personas/careful.toml"
     """The ego's own payoff."""
@@ -62,9 +63,11 @@ class Training(Document):
 class NonEgoTraining(Document):
     """Round 1: how the non-ego learns."""
 
-    alone_share: float = Field(0.25, ge=0.0, le=1.0)
-    """Share of games without the ego, so that it learns the road as well."""
-    warm_start: bool = True
+    alone_share: float = Field(0.7, ge=0.0, le=1.0)
+    """Share of games without the ego: people learn on roads where mostly nobody is beside them."""
+    attentive_share: float = Field(0.5, ge=0.0, le=1.0)
+    """Share of the budget in which its attention does not lapse yet: people learn to drive before they text."""
+    warm_start: bool = False
     """Begin from the naive ego's parameters, a driver who knows the empty road, rather than from nothing."""
 
 
@@ -105,4 +108,4 @@ class Campaign(Document):
 
 def resolve(campaign_file: Path, written: str) -> Path:
     """A path in a campaign is relative to the campaign's own file."""
-    return (campaign_file.parent / written).resolve()
+    return Path(os.path.realpath(campaign_file.parent / written))

@@ -9,7 +9,7 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from harness.documents.reading import NUMBER, TABLE, Document, Mistakes, nearest
 from harness.documents.scene import Interval, Name
-from harness.game.attention import Attention
+from harness.game.attention import Attention, Habits, Overlooking
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
 
@@ -122,9 +122,11 @@ class Lapsing(Document):
     mean_attentive_s: float = Field(gt=0.1, le=3600.0)
     """Mean time between lapses (exponential)."""
     lapse_s: Interval
-    """Range of a lapse's length (uniform). In it the policy's actions are omitted: pedals released, wheel held."""
-    drift_rad: float = Field(0.0, ge=0.0, le=0.1)
-    """Standard deviation of the steering angle that road crown and bumps add in a lapse."""
+    """Range of a lapse's length (uniform). In it the policy's actions are omitted: pedals and wheel are let go."""
+    crown_rad: float = Field(0.0, ge=0.0, le=0.1)
+    """Steering angle, to the right, that the road's crown makes of a wheel let go."""
+    bumps_rad: float = Field(0.0, ge=0.0, le=0.1)
+    """Standard deviation, from lapse to lapse, of the steering angle that bumps and the car's own pull add to it."""
 
     @field_validator("lapse_s")
     @classmethod
@@ -132,6 +134,15 @@ class Lapsing(Document):
         if lapse_s[0] <= 0.0:
             raise ValueError("a lapse must last longer than 0 s")
         return lapse_s
+
+
+class Perception(Document):
+    """What a person fails to see."""
+
+    overlooks_share: float = Field(ge=0.0, le=1.0)
+    """Share of the drives in which the person does not look into the mirrors and over the shoulder."""
+    overlooked_up_to_m: float = Field(0.0, ge=-20.0, le=100.0)
+    """In such a drive, others whose centre is not at least this far ahead of the person's own are not seen."""
 
 
 def _fits(parameter: str, given: float | Parametrised) -> bool:
@@ -151,6 +162,7 @@ class Persona(Document):
     operational: Group = Group()
     human: Human = Human()
     attention: Lapsing | None = None
+    perception: Perception | None = None
     decisions: Literal["mode", "sampled"] = "mode"
     """Whether it always takes its policy's most likely action, or varies as the policy does."""
 
@@ -163,7 +175,7 @@ class Persona(Document):
                 key = f"{group}.terms.{name}"
                 if name in TERMS and name not in known:
                     right = TERMS[name].group
-                    wrong.append((key, f"is a {right} term", f"move it to [{right}.terms]"))
+                    wrong.append((key, f"belongs to the {right} terms", f"move it to [{right}.terms]"))
                 elif name not in known:
                     wrong.append((key, f"unknown {group} term", nearest(name, known)))
                 elif not _fits(TERMS[name].parameter, given):
@@ -199,8 +211,10 @@ class Persona(Document):
         return Payoff(alpha, tuple(terms), fuzzy)
 
     @property
-    def lapses(self) -> Attention | None:
-        """How attention lapses; None: never."""
-        if self.attention is None:
-            return None
-        return Attention(self.attention.mean_attentive_s, self.attention.lapse_s, self.attention.drift_rad)
+    def habits(self) -> Habits:
+        """How this person attends to the road."""
+        given, sight = self.attention, self.perception
+        return Habits(
+            Attention(given.mean_attentive_s, given.lapse_s, given.crown_rad, given.bumps_rad) if given else None,
+            Overlooking(sight.overlooks_share, sight.overlooked_up_to_m) if sight else Overlooking(),
+        )

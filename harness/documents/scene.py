@@ -73,7 +73,8 @@ class Scene(Document):
     """The SUMO net, a file of the scene's folder."""
     routes: PlainFile
     """The SUMO routes, vehicle types and vehicles, a file of the scene's folder."""
-    step_length_s: float = Field(0.1, ge=0.01, le=1.0)
+    step_length_s: float = Field(0.1, ge=0.01, le=0.2)
+    """Contact is looked for once a step: in a longer one a car could jump over another."""
     time_limit_s: float = Field(gt=0.0, le=600.0)
     """A player that has not reached its goal by then has failed."""
     friction: float = Field(0.8, gt=0.0, le=1.5)

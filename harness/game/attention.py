@@ -1,7 +1,8 @@
-"""Lapses of attention: while one lasts, a driver's actions are omitted and the car drifts.
+"""How a person attends to the road: lapses of attention, and what is overlooked.
 
-The paper (section 4.3.2): the distracted driver "omits atomic actions from the RL model during random intervals",
-about 5 s each, as reading a text message takes (NHTSA).
+While a lapse lasts, a driver's actions are omitted and the car drifts. The paper (section 4.3.2): the distracted
+driver "omits atomic actions from the RL model during random intervals", about 5 s each, as reading a text message
+takes (NHTSA).
 """
 
 from __future__ import annotations
@@ -15,13 +16,31 @@ from harness.game.arrays import BoolArray, FloatArray
 
 @dataclass(frozen=True)
 class Attention:
-    """How a person attends. A lapse begins after an exponentially distributed time of attention, and lasts for
-    a time drawn uniformly; in it the pedals are released, the wheel stays where it was, and road crown and bumps
-    turn it by an angle drawn per lapse from a normal distribution."""
+    """When attention lapses. A lapse begins after an exponentially distributed time of attention, and lasts for a time
+    drawn uniformly; in it pedals and wheel are let go, and the road steers: its crown to the right, and bumps by an
+    angle drawn per lapse from a normal distribution."""
 
     mean_attentive_s: float
     lapse_s: tuple[float, float]
-    drift_rad: float
+    crown_rad: float = 0.0
+    bumps_rad: float = 0.0
+
+
+@dataclass(frozen=True)
+class Overlooking:
+    """A driver who does not always look into the mirrors and over the shoulder: in `share` of the drives, others whose
+    centre is not at least `ahead_m` ahead of the driver's own are not seen."""
+
+    share: float = 0.0
+    ahead_m: float = 0.0
+
+
+@dataclass(frozen=True)
+class Habits:
+    """How a person attends: when attention lapses (None: never), and what is overlooked."""
+
+    attention: Attention | None = None
+    overlooking: Overlooking = Overlooking()
 
 
 @dataclass(frozen=True)
@@ -29,27 +48,35 @@ class Lapses:
     """One player's lapses over a game of T steps, drawn before it starts."""
 
     lapsed: BoolArray  # [T]
-    drift_rad: FloatArray  # [T] added to the steering angle the lapse began with
+    steering_rad: FloatArray  # [T] the angle that the road turns the wheel to in a lapse
 
 
 def draw_lapses(attention: Attention | None, steps: int, step_s: float, generator: np.random.Generator) -> Lapses:
     """Draw when one player's attention lapses in a game of `steps` steps. None: never.
 
-    The time since the last lapse before the game is unknown, so the first waiting time is exponential as well.
+    Who drives up to the scene has been lapsing before: a game starts within a lapse as often as lapses take time (the
+    stationary start of a renewal process).
     """
     lapsed = np.zeros(steps, dtype=bool)
-    drift = np.zeros(steps)
+    steering = np.zeros(steps)
     if attention is not None:
-        time, attentive_from = 0.0, 0
-        while True:
-            time += generator.exponential(attention.mean_attentive_s)
-            lasts = generator.uniform(*attention.lapse_s)
-            drifts = generator.normal(0.0, attention.drift_rad)
+        mean_lapse_s = 0.5 * (attention.lapse_s[0] + attention.lapse_s[1])
+        starts_within = generator.random() < mean_lapse_s / (mean_lapse_s + attention.mean_attentive_s)
+        passed = generator.random() if starts_within else 0.0  # share of the first lapse that is over
+        time = 0.0 if starts_within else generator.exponential(attention.mean_attentive_s)
+        attentive_from = 0
+        while time < steps * step_s:
+            lasts = generator.uniform(*attention.lapse_s) * (1.0 - passed)
+            turns = generator.normal(-attention.crown_rad, attention.bumps_rad)
             first = max(int(np.ceil(time / step_s)), attentive_from)
-            if first >= steps:
-                break
             end = first + max(round(lasts / step_s), 1)
-            lapsed[first:end], drift[first:end] = True, drifts
+            lapsed[first:end], steering[first:end] = True, turns
             attentive_from = end + 1  # a glance at the road, or two lapses were one
-            time += lasts
-    return Lapses(lapsed, drift)
+            time += lasts + generator.exponential(attention.mean_attentive_s)
+            passed = 0.0
+    return Lapses(lapsed, steering)
+
+
+def draw_overlooked_m(overlooking: Overlooking, generator: np.random.Generator) -> float:
+    """How far ahead of a player others must be to be seen by it in one game; -inf: anywhere."""
+    return overlooking.ahead_m if generator.random() < overlooking.share else -np.inf

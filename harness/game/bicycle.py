@@ -18,6 +18,7 @@ from harness.game.arrays import BoolArray, FloatArray
 from harness.game.state import State
 
 GRAVITY_MPS2 = 9.81
+WHEEL_CENTRE = 0.25  # gain of the wheel about its centre: small corrections are gentle, full lock is in reach
 
 
 @dataclass(frozen=True)
@@ -46,14 +47,16 @@ def requests(action: FloatArray, speed_mps: FloatArray, actuators: Actuators) ->
     """What a driver's action asks of the car.
 
     action [G, P, 2] in [-1, 1]: the pedals (-1 full brake, 0 coast, 1 full throttle) and the wheel (-1 as far
-    right, 1 as far left as is of use at this speed). Returns acceleration (m/s^2) and steering angle (rad), [G, P].
+    right, 1 as far left as is of use at this speed; gentle about the centre). Returns acceleration (m/s^2) and
+    steering angle (rad), [G, P].
     """
     pedals = np.clip(action[..., 0], -1.0, 1.0)
     wheel = np.clip(action[..., 1], -1.0, 1.0)
     acceleration = np.where(
         pedals >= 0.0, pedals * actuators.max_acceleration_mps2, pedals * actuators.max_braking_mps2
     )
-    return acceleration, wheel * steering_range_rad(speed_mps, actuators)
+    turned = wheel * (WHEEL_CENTRE + (1.0 - WHEEL_CENTRE) * wheel**2)
+    return acceleration, turned * steering_range_rad(speed_mps, actuators)
 
 
 def drive(

@@ -69,13 +69,13 @@ def _free_width(q: Quantities) -> tuple[FloatArray, FloatArray]:
     offset = q.lateral_offset_m[..., None]
     left = q.path.left_edge_m[..., AHEAD] - offset
     right = q.path.right_edge_m[..., AHEAD] - offset
-    if q.visible.any():
+    if q.seen.any():
         body = q.on_path
         near, far = (
             (body.ahead_m - body.half_length_m)[..., None],
             (body.ahead_m + body.half_length_m)[..., None],
         )
-        inside = q.visible[..., None] & (far > _EDGES[:-1]) & (near < _EDGES[1:])
+        inside = q.seen[..., None] & (far > _EDGES[:-1]) & (near < _EDGES[1:])
         on_left = (body.left_m > 0.0)[..., None]
         side_to_right = (body.left_m - body.half_width_m)[..., None]
         side_to_left = (body.left_m + body.half_width_m)[..., None]
@@ -87,7 +87,7 @@ def _free_width(q: Quantities) -> tuple[FloatArray, FloatArray]:
 def _see_others(q: Quantities, seen: FloatArray) -> None:
     """Fill [G, P, OTHERS * 7] with the nearest others, nearest first; zeros stay where there are fewer."""
     relative, state, bodies = q.relative, q.state, q.bodies
-    distance = np.where(q.visible & (relative.distance_m < _FAR_M), relative.distance_m, np.inf)
+    distance = np.where(q.seen & (relative.distance_m < _FAR_M), relative.distance_m, np.inf)
     order = np.argsort(distance, axis=-1, kind="stable")[..., :OTHERS]
     g, p, k = np.nonzero(np.isfinite(distance).sum(-1)[..., None] > np.arange(order.shape[-1]))
     b = order[g, p, k]

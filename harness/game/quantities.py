@@ -144,6 +144,11 @@ class Quantities:
         return self.bodies.present[:, None, :] & self.state.present[:, :, None] & others
 
     @cached_property
+    def seen(self) -> BoolArray:
+        """[G, P, B] visible bodies that the player does not overlook."""
+        return self.visible & (self.relative.ahead_m >= self.state.overlooked_m[..., None])
+
+    @cached_property
     def relative(self) -> Relative:
         """Bodies in the player's own frame."""
         state, bodies = self.state, self.bodies

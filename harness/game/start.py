@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.attention import Attention, Lapses, draw_lapses
+from harness.game.attention import Habits, Lapses, draw_lapses, draw_overlooked_m
 from harness.game.seeding import generator_of, seed_of
 
 
@@ -49,16 +49,17 @@ class Start:
     present: BoolArray
     noise: FloatArray  # [P, T, 2] standard normal, for drivers whose decisions vary
     lapses: tuple[Lapses, ...]
+    overlooked_m: FloatArray  # how far ahead of a player others must be to be seen by it
     seed: int  # of the traffic SUMO drives
 
 
 @dataclass(frozen=True)
 class Chances:
-    """What is drawn for a game: places [P], lengths [P], attention [P], the chance that each player takes part [P]."""
+    """What is drawn for a game: places [P], lengths [P], habits [P], the chance that each player takes part [P]."""
 
     places: Sequence[Place]
     length_m: FloatArray
-    attention: Sequence[Attention | None]
+    habits: Sequence[Habits]
     present_share: Sequence[float]
     steps: int
     step_s: float
@@ -88,9 +89,12 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
         np.stack([generator_of(*parts, "decisions", p).standard_normal((chances.steps, 2)) for p in players]),
         tuple(
             draw_lapses(
-                chances.attention[p], chances.steps, chances.step_s, generator_of(*parts, "attention", p)
+                chances.habits[p].attention, chances.steps, chances.step_s, generator_of(*parts, "attention", p)
             )
             for p in players
+        ),
+        np.array(
+            [draw_overlooked_m(chances.habits[p].overlooking, generator_of(*parts, "mirrors", p)) for p in players]
         ),
         seed_of(*parts, "traffic") % 2**31,
     )

@@ -46,6 +46,7 @@ class State:
     outcome: IntArray
     present: BoolArray  # takes part and has not left the scene
     lapsed: BoolArray  # attention is elsewhere in this step
+    overlooked_m: FloatArray  # others are seen from this far ahead of the player on; -inf: all around
     step: IntArray  # [G]
 
     @classmethod
@@ -62,6 +63,7 @@ class State:
             outcome=np.zeros(shape, dtype=np.int8),
             present=np.zeros(shape, dtype=bool),
             lapsed=np.zeros(shape, dtype=bool),
+            overlooked_m=np.full(shape, -np.inf),
             step=np.zeros(games, dtype=np.int64),
         )
 

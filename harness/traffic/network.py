@@ -26,7 +26,7 @@ from harness.game.road import Rails
 _SEAM_M = 0.05  # gaps up to twice this between lanes and junctions are closed
 _OPENING_M = 0.3  # of the outline that belongs to an opening
 _SMOOTH_M = 0.01
-_CAR = "passenger"
+_CAR, _SHOULDER = "passenger", "emergency"  # a paved shoulder is a lane for emergency vehicles
 _TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
 
 
@@ -46,18 +46,23 @@ def car_lanes(edge: Edge) -> list[Lane]:
     return [lane for lane in edge.getLanes() if lane.allows(_CAR)]
 
 
+def _paved_lanes(edge: Edge) -> list[Lane]:
+    """The edge's lanes that a car can be on, whether it may or not: a hard shoulder counts, a pavement does not."""
+    return [lane for lane in edge.getLanes() if lane.allows(_CAR) or lane.allows(_SHOULDER)]
+
+
 def lane_line(lane: Lane) -> FloatArray:
     """[n, 2] the lane's centre line."""
     return np.array([point[:2] for point in lane.getShape()], dtype=float)
 
 
 def drivable_area(net: Net) -> BaseGeometry:
-    """The area cars may use, m^2 in network coordinates."""
+    """The area cars can drive on, hard shoulders included, in network coordinates."""
     beyond = _turnarounds_beyond_the_scene(net)
     parts = [
         shapely.LineString(lane_line(lane)).buffer(lane.getWidth() / 2.0, cap_style="flat", join_style="mitre")
         for edge in net.getEdges(withInternal=True)
-        for lane in car_lanes(edge)
+        for lane in _paved_lanes(edge)
         if lane.getID() not in beyond and np.ptp(lane_line(lane), axis=0).any()
     ]
     for node in net.getNodes():
@@ -74,7 +79,7 @@ def rail_lines(net: Net, area: BaseGeometry) -> list[FloatArray]:
         for edge in net.getEdges(withInternal=False)
         for at_end in (False, True)
         if _is_fringe(edge, at_end)
-        for lane in car_lanes(edge)
+        for lane in _paved_lanes(edge)
     ]
     outline = area.boundary
     rails = shapely.difference(outline, shapely.union_all(openings)) if openings else outline

@@ -18,7 +18,7 @@ from harness.documents.reading import nearest, read_document
 from harness.documents.scene import Player, Scene, scene_file
 from harness.errors import Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.game.attention import Attention
+from harness.game.attention import Habits
 from harness.game.bicycle import Actuators
 from harness.game.quantities import REACH_M, World
 from harness.game.road import Road, Route, Routes
@@ -56,9 +56,9 @@ class OpenScene:
         players = {player.vehicle for player in self.document.players}
         return self.routes.departures(players, self.document.time_limit_s, generator)
 
-    def chances(self, attention: Sequence[Attention | None], present_share: Sequence[float]) -> Chances:
+    def chances(self, habits: Sequence[Habits], present_share: Sequence[float]) -> Chances:
         """What is drawn at the start of each game, for players that attend and take part like this."""
-        return Chances(self.places, self.world.length_m, attention, present_share, self.world.steps, self.world.step_s)
+        return Chances(self.places, self.world.length_m, habits, present_share, self.world.steps, self.world.step_s)
 
 
 def open_scene(folder: Path) -> OpenScene:
@@ -134,7 +134,23 @@ def _open_player(
         raise UsageError.of(
             routes.path, f"vehicle {vehicle.name}", f"its route {error}", "mend the route's edges"
         ) from None
-    return place, table, tuple(edge.getID() for edge in onward), routes.types[vehicle.vehicle_type]
+    kind = routes.types[vehicle.vehicle_type]
+    _room_beyond_goal(file, document, table, kind)
+    return place, table, tuple(edge.getID() for edge in onward), kind
+
+
+def _room_beyond_goal(file: Path, document: Scene, table: Route, kind: VehicleType) -> None:
+    """SUMO takes a vehicle it drives out of the traffic when its front bumper is at the end of its route: the goal,
+    which the body's centre has to reach, must lie before that by half the car and the way of a step."""
+    needed = 0.5 * kind.length_m + kind.max_speed_mps * document.step_length_s
+    if table.length_m - table.goal_m < needed:
+        nearest_end = document.goal.position_m - (needed - (table.length_m - table.goal_m))
+        raise UsageError.of(
+            file,
+            "goal.position_m",
+            f"leaves {table.length_m - table.goal_m:.1f} m of route behind the goal, {needed:.1f} m are needed",
+            f"choose {max(nearest_end, 0.0):.1f} or less, or add an edge to the route",
+        )
 
 
 def _goal(file: Path, document: Scene, net: Net) -> Edge:

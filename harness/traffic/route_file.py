@@ -165,7 +165,7 @@ def _flow(path: Path, element: ElementTree.Element, departure: Departure) -> Flo
         raise UsageError.of(path, f"flow {departure.name}", "has no rate", f"give one of {', '.join(_FLOW_RATES[1:])}")
     end = _number(path, element, "end", np.inf)
     if end <= departure.depart_s:
-        raise UsageError.of(path, f"flow {departure.name}.end", "does not lie after its begin", "give an end after the begin")
+        raise UsageError.of(path, f"flow {departure.name}.end", "does not lie after its begin", "give a later end")
     number = int(_number(path, element, "number", 0)) if "number" in given else None
     period = None
     if "vehsPerHour" in given:

@@ -1,0 +1,44 @@
+"""What is drawn of a net: the surface of the road, the marks between its lanes, and the goal."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from sumolib.net import Net
+
+from harness.game.arrays import FloatArray
+from harness.traffic.network import car_lanes, drivable_area, lane_line
+from harness.traffic.opening import OpenScene
+
+
+def surfaces(net: Net) -> list[list[FloatArray]]:
+    """The drivable area as polygons, each its outline and its holes as rings [n, 2]."""
+    area = drivable_area(net)
+    polygons = [part for part in getattr(area, "geoms", [area]) if part.geom_type == "Polygon"]
+    return [[np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)] for part in polygons]
+
+
+def lane_marks(net: Net) -> list[FloatArray]:
+    """The lines [n, 2] between neighbouring lanes of an edge."""
+    marks = []
+    for edge in net.getEdges(withInternal=False):
+        for right, _ in pairwise(car_lanes(edge)):  # SUMO counts an edge's lanes from the right
+            line = shapely.LineString(lane_line(right)).offset_curve(right.getWidth() / 2.0, join_style="mitre")
+            marks += [np.asarray(part.coords) for part in getattr(line, "geoms", [line]) if len(part.coords) > 1]
+    return marks
+
+
+def goal_line(scene: OpenScene, net: Net) -> list[FloatArray]:
+    """The line [2, 2] across the lanes at the goal."""
+    ends = []
+    for lane in car_lanes(net.getEdge(scene.document.goal.edge)):
+        line = shapely.LineString(lane_line(lane))
+        place = min(scene.document.goal.position_m / lane.getLength(), 1.0) * line.length
+        here, before = (np.array(line.interpolate(at).coords[0]) for at in (place, max(place - 0.5, 0.0)))
+        after = np.array(line.interpolate(place + 0.5).coords[0])
+        along = (after - before) / max(float(np.hypot(*(after - before))), 1e-9)
+        across = 0.5 * lane.getWidth() * np.array([-along[1], along[0]])
+        ends += [here - across, here + across]
+    return [np.array([ends[0], ends[-1]])]
