@@ -2,12 +2,105 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
+import sumo
+
+from harness.game.arrays import FloatArray
+from harness.game.quantities import Quantities, World
+from harness.game.state import Bodies, State
+from harness.traffic.opening import OpenScene, open_scene
 
 
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The top level of the repository: networks/, personas/ and campaigns/ lie in it."""
     return Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def merge(repository: Path) -> OpenScene:
+    """The scene networks/merge, opened."""
+    return open_scene(repository / "tests" / "data" / "merge")
+
+
+@pytest.fixture(scope="session")
+def build_net(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """`build_net(nodes, edges, connections="", *options)`: a net made by netconvert of the insides of its sources."""
+
+    def build(nodes: str, edges: str, connections: str = "", *options: str) -> Path:
+        folder = tmp_path_factory.mktemp("net")
+        sources = {"nodes": nodes, "edges": edges, "connections": connections}
+        for tag, text in sources.items():
+            (folder / f"{tag}.xml").write_text(f"<{tag}>{text}</{tag}>", encoding="utf-8")
+        given = ["-n", "nodes.xml", "-e", "edges.xml", "-x", "connections.xml", *options]
+        run_sumo_program("netconvert", [*given, "-o", "net.net.xml"], folder)
+        return folder / "net.net.xml"
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def generate_net(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """`generate_net(*options)`: a net made by netgenerate."""
+
+    def generate(*options: str) -> Path:
+        folder = tmp_path_factory.mktemp("net")
+        run_sumo_program("netgenerate", [*options, "-o", "net.net.xml"], folder)
+        return folder / "net.net.xml"
+
+    return generate
+
+
+def run_sumo_program(name: str, arguments: list[str], folder: Path) -> None:
+    """Run a program of the installed SUMO; fails with what it said."""
+    program = Path(sumo.SUMO_HOME) / "bin" / name
+    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
+    done = subprocess.run(
+        [program, *arguments], cwd=folder, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="session")
+def moment() -> Callable[..., Quantities]:
+    """`moment(world, players, others=())`: the quantities of one game, of cars given as dicts.
+
+    A car has x_m and y_m, and where it is not the usual heading_rad, speed_mps, acceleration_mps2, steering_rad,
+    outcome, present, length_m, width_m (the size of a player is the world's).
+    """
+
+    def make(world: World, players: Sequence[dict[str, Any]], others: Sequence[dict[str, Any]] = ()) -> Quantities:
+        state = State.empty(1, len(players))
+        state.present[:] = True
+        state.speed_mps[:] = 10.0
+        for p, car in enumerate(players):
+            for name, value in car.items():
+                getattr(state, name)[0, p] = value
+            state.station_m[0, p] = world.road.routes.find(p, car["x_m"], car["y_m"])
+        usual = {"heading_rad": 0.0, "speed_mps": 10.0, "length_m": 4.6, "width_m": 1.8, "present": True}
+        more = [{**usual, **other} for other in others]
+
+        def column(name: str, own: FloatArray) -> FloatArray:
+            return np.concatenate((own, [other[name] for other in more]))[None].astype(own.dtype)
+
+        bodies = Bodies(
+            column("x_m", state.x_m[0]),
+            column("y_m", state.y_m[0]),
+            column("heading_rad", state.heading_rad[0]),
+            column("speed_mps", state.speed_mps[0]),
+            column("length_m", world.length_m),
+            column("width_m", world.width_m),
+            column("present", state.present[0]),
+        )
+        before = state.station_m
+        state.station_m, offset = world.road.routes.locate(state.x_m, state.y_m, before)
+        return Quantities(world, state, bodies, np.zeros((1, len(players))), offset)
+
+    return make

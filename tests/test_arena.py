@@ -53,7 +53,7 @@ def crossing(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 
 @pytest.fixture(scope="module")
 def merge(repository: Any) -> OpenScene:
-    return open_scene(repository / "networks/merge")
+    return open_scene(repository / "tests/data/merge")
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,228 @@
+"""How a player's car moves, against numbers worked out by hand and laws that hold for every input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.game.arrays import FloatArray
+from harness.game.bicycle import (
+    GRAVITY_MPS2,
+    Actuators,
+    curvature_per_m,
+    drive,
+    lateral_acceleration_mps2,
+    requests,
+    steering_range_rad,
+)
+from harness.game.state import State
+
+STEP_S = 0.1
+GRIP_MPS2 = 0.8 * GRAVITY_MPS2
+
+
+def actuators(**changes: float) -> Actuators:
+    values = {
+        "max_acceleration_mps2": 3.0,
+        "max_braking_mps2": 8.0,
+        "max_speed_mps": 40.0,
+        "max_steering_rad": 0.6,
+        "max_steering_rate_radps": 0.8,
+        "wheelbase_m": 2.7,
+        **{name: value for name, value in changes.items() if name != "friction"},
+    }
+    arrays = {name: np.array([value]) for name, value in values.items()}
+    return Actuators(**arrays, friction=changes.get("friction", 0.8))
+
+
+def state_of(speed_mps: float, heading_rad: float = 0.0, steering_rad: float = 0.0) -> State:
+    state = State.empty(1, 1)
+    state.speed_mps[:], state.heading_rad[:], state.steering_rad[:] = speed_mps, heading_rad, steering_rad
+    state.present[:] = True
+    return state
+
+
+def advance(state: State, acceleration_mps2: float, steering_rad: float, car: Actuators | None = None) -> None:
+    drive(
+        state,
+        np.array([[acceleration_mps2]]),
+        np.array([[steering_rad]]),
+        np.array([[True]]),
+        car or actuators(),
+        STEP_S,
+    )
+
+
+@pytest.mark.parametrize(("acceleration", "speed"), [(2.0, 10.2), (-5.0, 9.5), (0.0, 10.0)])
+def test_drive__displacement_on_the_straight_is_the_new_speed_times_the_step(acceleration: float, speed: float) -> None:
+    state = state_of(10.0)
+    advance(state, acceleration, 0.0)
+    assert state.speed_mps[0, 0] == pytest.approx(speed)
+    assert state.x_m[0, 0] == pytest.approx(speed * 0.1)
+    assert state.y_m[0, 0] == 0.0
+    assert state.heading_rad[0, 0] == 0.0
+    assert state.acceleration_mps2[0, 0] == pytest.approx(acceleration)
+
+
+@pytest.mark.parametrize(("asked", "got"), [(9.0, 3.0), (-20.0, -7.848)])
+def test_drive__pedals_are_bounded_by_engine_and_grip(asked: float, got: float) -> None:
+    # brakes could do 8 m/s2, the tyres only 0.8 * 9.81 = 7.848 m/s2
+    state = state_of(10.0)
+    advance(state, asked, 0.0)
+    assert state.acceleration_mps2[0, 0] == pytest.approx(got)
+
+
+def test_drive__one_step_of_a_turn_is_as_worked_out_by_hand() -> None:
+    # At 10 m/s with the wheels at 0.1 rad and coasting:
+    #   tan 0.1 = 0.10033467       slip = atan(0.05016734) = 0.05012534, cos slip = 0.99874399
+    #   curvature = 0.99874399 * 0.10033467 / 2.7 = 0.03711437 1/m  (lateral 3.711 m/s2, below the grip of 7.848)
+    #   turned = 0.03711437 * 10 * 0.1 = 0.03711437 rad             course = 0.3 + 0.01855718 + 0.05012534 = 0.36868252
+    #   x = cos 0.36868252 = 0.93279999, y = sin 0.36868252 = 0.36038889
+    state = state_of(10.0, heading_rad=0.3, steering_rad=0.1)
+    advance(state, 0.0, 0.1)
+    assert state.heading_rad[0, 0] == pytest.approx(0.33711437, abs=1e-7)
+    assert state.x_m[0, 0] == pytest.approx(np.cos(0.36868252), abs=1e-7)
+    assert state.y_m[0, 0] == pytest.approx(np.sin(0.36868252), abs=1e-7)
+    assert state.speed_mps[0, 0] == 10.0
+    assert lateral_acceleration_mps2(state, actuators())[0, 0] == pytest.approx(3.711437, abs=1e-5)
+
+
+def test_drive__a_full_circle_has_the_radius_of_its_curvature() -> None:
+    state = state_of(5.0, steering_rad=0.3)
+    radius = 1.0 / float(curvature_per_m(np.array(0.3), np.array(2.7)))
+    steps = round(2.0 * np.pi * radius / (5.0 * STEP_S))
+    points = []
+    for _ in range(steps):
+        advance(state, 0.0, 0.3)
+        points.append((state.x_m[0, 0], state.y_m[0, 0]))
+    centre = np.mean(points, axis=0)
+    assert np.hypot(*(np.array(points) - centre).T) == pytest.approx(radius, rel=0.02)
+
+
+def test_drive__wheels_turn_no_faster_than_the_rack() -> None:
+    state = state_of(2.0)
+    advance(state, 0.0, 0.6)
+    assert state.steering_rad[0, 0] == pytest.approx(0.08)  # 0.8 rad/s for 0.1 s
+    advance(state, 0.0, -0.6)
+    assert state.steering_rad[0, 0] == pytest.approx(0.0)
+
+
+def test_drive__wheels_stop_at_the_lock() -> None:
+    state = state_of(2.0, steering_rad=0.58)
+    advance(state, 0.0, 2.0)
+    assert state.steering_rad[0, 0] == pytest.approx(0.6)
+
+
+def test_drive__too_fast_for_the_curve_the_car_runs_wide() -> None:
+    # 20 m/s and 0.3 rad would need 0.1132 /m * 400 = 45 m/s2; the tyres give 7.848 = 0.01962 /m * 400
+    state = state_of(20.0, steering_rad=0.3)
+    advance(state, 3.0, 0.3)
+    assert state.heading_rad[0, 0] == pytest.approx(7.848 / 20.0 * STEP_S)
+    assert state.acceleration_mps2[0, 0] == 0.0  # no grip is left for the engine
+
+
+def test_drive__brakes_to_a_stand_and_not_backwards() -> None:
+    state = state_of(0.3)
+    advance(state, -8.0, 0.0)
+    assert state.speed_mps[0, 0] == 0.0
+    assert state.x_m[0, 0] == 0.0
+    assert state.acceleration_mps2[0, 0] == pytest.approx(-3.0)  # 0.3 m/s in 0.1 s is all there was to lose
+
+
+def test_drive__players_that_do_not_move_are_untouched() -> None:
+    state = State.empty(1, 2)
+    state.speed_mps[:], state.heading_rad[:], state.steering_rad[:] = 10.0, 1.0, 0.05
+    before = state.copy()
+    two = Actuators(
+        **{name: value if name == "friction" else np.repeat(value, 2) for name, value in vars(actuators()).items()}
+    )
+    drive(state, np.full((1, 2), 2.0), np.full((1, 2), 0.1), np.array([[True, False]]), two, STEP_S)
+    for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"):
+        assert getattr(state, name)[0, 1] == getattr(before, name)[0, 1]
+        assert getattr(state, name)[0, 0] != getattr(before, name)[0, 0]
+
+
+CARS = st.builds(
+    actuators,
+    max_acceleration_mps2=st.floats(0.5, 15.0),
+    max_braking_mps2=st.floats(0.5, 15.0),
+    max_steering_rad=st.floats(0.05, 1.2),
+    max_steering_rate_radps=st.floats(0.1, 10.0),
+    wheelbase_m=st.floats(0.6, 12.0),
+    friction=st.floats(0.05, 1.5),
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    car=CARS,
+    speed=st.floats(0.0, 40.0),
+    steering=st.floats(-1.2, 1.2),
+    wishes=st.lists(st.tuples(st.floats(-20.0, 20.0), st.floats(-1.5, 1.5)), min_size=1, max_size=8),
+)
+def test_drive__the_tyres_never_give_more_than_the_friction_circle(
+    car: Actuators, speed: float, steering: float, wishes: list[tuple[float, float]]
+) -> None:
+    lock = float(car.max_steering_rad[0])
+    state = state_of(speed, steering_rad=float(np.clip(steering, -lock, lock)))
+    grip = car.friction * GRAVITY_MPS2
+    for acceleration, wheel in wishes:
+        before = state.copy()
+        advance(state, acceleration, wheel, car)
+        turned = (state.heading_rad - before.heading_rad + np.pi) % (2.0 * np.pi) - np.pi
+        lateral = state.speed_mps * turned / STEP_S  # what the path itself asks of the tyres
+        along = (state.speed_mps - before.speed_mps) / STEP_S
+        assert abs(lateral[0, 0]) <= grip + 1e-6
+        assert np.hypot(lateral, along)[0, 0] <= grip + 1e-6
+        reported = np.hypot(lateral_acceleration_mps2(state, car), state.acceleration_mps2)
+        assert reported[0, 0] <= grip + 1e-6
+        assert 0.0 <= state.speed_mps[0, 0] <= 40.0
+        assert abs(state.steering_rad[0, 0]) <= lock + 1e-12
+        moved = np.hypot(state.x_m - before.x_m, state.y_m - before.y_m)
+        assert moved[0, 0] == pytest.approx(state.speed_mps[0, 0] * STEP_S)
+        assert -np.pi <= state.heading_rad[0, 0] <= np.pi
+
+
+@settings(max_examples=50, deadline=None)
+@given(speed=st.floats(1.0, 39.0), wheel=st.floats(-0.6, 0.6), pedals=st.floats(-8.0, 3.0))
+def test_drive__left_and_right_are_mirror_images(speed: float, wheel: float, pedals: float) -> None:
+    one, two = state_of(speed, steering_rad=wheel / 2.0), state_of(speed, steering_rad=-wheel / 2.0)
+    advance(one, pedals, wheel)
+    advance(two, pedals, -wheel)
+    assert one.x_m[0, 0] == pytest.approx(two.x_m[0, 0])
+    assert one.y_m[0, 0] == pytest.approx(-two.y_m[0, 0])
+    assert one.heading_rad[0, 0] == pytest.approx(-two.heading_rad[0, 0])
+    assert one.speed_mps[0, 0] == pytest.approx(two.speed_mps[0, 0])
+
+
+@pytest.mark.parametrize(
+    ("speed", "steering"),
+    [
+        (0.0, 0.6),  # the lock
+        (5.0, 0.6),  # atan(2.7 * 7.848 / 25) = atan(0.847584) = 0.703 is beyond the lock
+        (10.0, 0.208807),  # atan(2.7 * 7.848 / 100) = atan(0.211896) = 0.211896 - 0.211896^3 / 3 + ...
+        (20.0, 0.052924),  # atan(2.7 * 7.848 / 400) = atan(0.052974)
+    ],
+)
+def test_steering_range__is_the_lock_or_where_the_tyres_let_go(speed: float, steering: float) -> None:
+    assert steering_range_rad(np.array([[speed]]), actuators())[0, 0] == pytest.approx(steering, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("action", "acceleration", "steering"),
+    [
+        ((0.0, 0.0), 0.0, 0.0),
+        ((1.0, 1.0), 3.0, 0.208807),
+        ((0.5, -0.5), 1.5, -0.045677),  # gentle about the centre: 0.5 * (0.25 + 0.75 * 0.5^2) = 0.21875 of 0.208807
+        ((-1.0, 0.0), -8.0, 0.0),
+        ((-0.25, -1.0), -2.0, -0.208807),
+        ((7.0, -9.0), 3.0, -0.208807),  # beyond [-1, 1] is as far as it goes
+    ],
+)
+def test_requests__scale_pedals_and_wheel(action: tuple[float, float], acceleration: float, steering: float) -> None:
+    speed: FloatArray = np.array([[10.0]])
+    asked, wheel = requests(np.array([[action]]), speed, actuators())
+    assert asked[0, 0] == pytest.approx(acceleration)
+    assert wheel[0, 0] == pytest.approx(steering, abs=1e-6)

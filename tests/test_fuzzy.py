@@ -1,0 +1,61 @@
+"""Fuzzy terms, against zero-order Sugeno inference by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.game.fuzzy import FuzzyFunction, FuzzySet
+
+# speed over the limit as a share of it: legal up to 0, thrilling between 0.05 and 0.3, frightening beyond 0.5
+LEGAL = FuzzySet("legal", (0.0, 0.1), (1.0, 0.0), 0.0)
+THRILLING = FuzzySet("thrilling", (0.0, 0.1, 0.3, 0.5), (0.0, 1.0, 1.0, 0.0), 2.0)
+FRIGHTENING = FuzzySet("frightening", (0.3, 0.5), (0.0, 1.0), -4.0)
+SPEEDY = FuzzyFunction("speed_over_limit", (LEGAL, THRILLING, FRIGHTENING))
+
+
+@pytest.mark.parametrize(
+    ("value", "membership"), [(-0.5, 0.0), (0.0, 0.0), (0.025, 0.25), (0.1, 1.0), (0.2, 1.0), (0.45, 0.25), (9.0, 0.0)]
+)
+def test_membership__is_linear_between_points_and_constant_outside(value: float, membership: float) -> None:
+    assert THRILLING.membership(np.array(value)) == pytest.approx(membership)
+
+
+@pytest.mark.parametrize(
+    ("value", "worth"),
+    [
+        (-0.3, 0.0),  # wholly legal
+        (0.025, 0.5),  # 0.75 legal, 0.25 thrilling: (0.75 * 0 + 0.25 * 2) / 1
+        (0.2, 2.0),  # wholly thrilling
+        (0.35, 0.5),  # 0.75 thrilling, 0.25 frightening: 0.75 * 2 - 0.25 * 4
+        (0.7, -4.0),  # wholly frightening
+    ],
+)
+def test_function__is_the_average_of_the_sets_weighted_by_membership(value: float, worth: float) -> None:
+    assert SPEEDY(np.array([value])) == pytest.approx([worth])
+
+
+def test_function__memberships_need_not_sum_to_1() -> None:
+    # 0.8 of the one set (value 1) and 0.8 of the other (value 3): (0.8 + 2.4) / 1.6 = 2, not 3.2
+    both = FuzzyFunction("q", (FuzzySet("a", (0.0,), (0.8,), 1.0), FuzzySet("b", (0.0,), (0.8,), 3.0)))
+    assert both(np.array([5.0])) == pytest.approx([2.0])
+
+
+def test_function__is_0_where_the_input_belongs_to_no_set() -> None:
+    hill = FuzzyFunction("q", (FuzzySet("hill", (1.0, 2.0, 3.0), (0.0, 1.0, 0.0), 5.0),))
+    assert hill(np.array([0.0, 0.5, 2.0, 3.0, 8.0])).tolist() == [0.0, 0.0, 5.0, 0.0, 0.0]
+
+
+def test_function__an_infinite_input_belongs_to_the_outermost_set() -> None:
+    assert SPEEDY(np.array([np.inf])) == pytest.approx([-4.0])
+
+
+def test_function__keeps_the_shape_of_its_input() -> None:
+    assert SPEEDY(np.zeros((4, 2))).shape == (4, 2)
+
+
+@given(st.floats(-2.0, 2.0))
+def test_function__stays_between_the_least_and_the_greatest_value(value: float) -> None:
+    assert -4.0 - 1e-9 <= SPEEDY(np.array([value]))[0] <= 2.0 + 1e-9

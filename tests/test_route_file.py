@@ -1,0 +1,170 @@
+"""What a route file says, and what is said about one that can't be understood."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.errors import UsageError
+from harness.traffic.route_file import Departure, RouteFile, VehicleType, read_route_file
+
+Write = Callable[[str], Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def to_file(inside: str) -> Path:
+        path = tmp_path / "a.rou.xml"
+        path.write_text(f"<routes>{inside}</routes>", encoding="utf-8")
+        return path
+
+    return to_file
+
+
+TYPE_AND_ROUTE = '<vType id="car" length="4.2" width="1.7" maxSpeed="33"/><route id="through" edges="one two three"/>'
+
+
+def flow(attributes: str) -> str:
+    return f'{TYPE_AND_ROUTE}<flow id="f" type="car" route="through" {attributes}/>'
+
+
+def everyone(routes: RouteFile, until_s: float = 10.0, seed: int = 0) -> list[Departure]:
+    return routes.departures(set(), until_s, np.random.default_rng(seed))
+
+
+def times(routes: RouteFile, until_s: float = 10.0, seed: int = 0) -> list[float]:
+    return [each.depart_s for each in everyone(routes, until_s, seed)]
+
+
+def problem(path: Path) -> str:
+    with pytest.raises(UsageError) as raised:
+        read_route_file(path)
+    assert len(raised.value.problems) == 1
+    assert raised.value.problems[0].file == str(path)
+    assert raised.value.problems[0].remedy
+    return str(raised.value).removeprefix(f"{path}: ")
+
+
+def test_vehicle__is_read_with_its_type_and_route(write: Write) -> None:
+    vehicle = (
+        '<vehicle id="v" type="car" route="through" depart="2.5" departLane="1" departPos="20" departSpeed="max"/>'
+    )
+    routes = read_route_file(write(TYPE_AND_ROUTE + vehicle))
+    assert routes.types["car"] == VehicleType("car", 4.2, 1.7, 33.0)
+    assert routes.vehicles["v"] == Departure("v", "car", ("one", "two", "three"), 2.5, "1", "20", "max")
+
+
+def test_vehicle__takes_sumos_defaults_where_nothing_is_said(write: Write) -> None:
+    routes = read_route_file(write('<vehicle id="v"><route edges="one"/></vehicle>'))
+    vehicle = routes.vehicles["v"]
+    assert vehicle == Departure("v", "DEFAULT_VEHTYPE", ("one",), 0.0, "first", "base", "0")
+    assert routes.types[vehicle.vehicle_type] == VehicleType("DEFAULT_VEHTYPE", 5.0, 1.8, 55.55)
+
+
+def test_vehicle__may_come_before_its_route(write: Write) -> None:
+    routes = read_route_file(write('<vehicle id="v" route="r"/><route id="r" edges="one"/>'))
+    assert routes.vehicles["v"].edges == ("one",)
+
+
+def test_types__are_handed_to_sumo_without_the_vehicles(write: Write) -> None:
+    mix = '<vTypeDistribution id="mix"><vType id="van" width="2.1"/></vTypeDistribution>'
+    routes = read_route_file(write(TYPE_AND_ROUTE + mix + '<flow id="f" type="mix" route="through" period="5"/>'))
+    assert "vTypeDistribution" in routes.types_xml
+    assert 'id="car"' in routes.types_xml
+    assert "<flow" not in routes.types_xml
+    assert "<route " not in routes.types_xml
+    assert routes.types["van"].width_m == 2.1
+
+
+@pytest.mark.parametrize(
+    ("attributes", "expected"),
+    [
+        ('period="3"', [0.0, 3.0, 6.0, 9.0]),
+        ('begin="1" end="8" period="3"', [1.0, 4.0, 7.0]),
+        ('begin="1" end="7" period="3"', [1.0, 4.0]),  # nobody departs at the end itself
+        ('vehsPerHour="1800"', [0.0, 2.0, 4.0, 6.0, 8.0]),  # 3600 / 1800 = 2 s
+        ('end="10" number="4"', [0.0, 2.5, 5.0, 7.5]),
+        ('period="1" number="2"', [0.0, 1.0]),
+        ('begin="2" end="4" probability="1"', [2.0, 3.0]),
+        ('probability="0"', []),
+        ('begin="20" period="1"', []),
+    ],
+)
+def test_flow__departs_when_it_says(write: Write, attributes: str, expected: list[float]) -> None:
+    assert times(read_route_file(write(flow(attributes)))) == pytest.approx(expected)
+
+
+def test_flow__its_vehicles_are_numbered_like_sumos(write: Write) -> None:
+    routes = read_route_file(write(flow('period="4" departSpeed="10"')))
+    assert [(each.name, each.speed) for each in everyone(routes)] == [("f.0", "10"), ("f.1", "10"), ("f.2", "10")]
+
+
+def test_flow__chance_comes_from_the_generator(write: Write) -> None:
+    routes = read_route_file(write(flow('probability="0.3"')))
+    assert times(routes, 300.0, seed=1) == times(routes, 300.0, seed=1)
+    assert times(routes, 300.0, seed=1) != times(routes, 300.0, seed=2)
+    # 2000 draws at 0.3: 600, standard deviation sqrt(2000 * 0.3 * 0.7) = 20.5
+    assert abs(len(times(routes, 2000.0)) - 600) < 5 * 20.5
+
+
+def test_departures__in_order_of_time_without_the_players(write: Write) -> None:
+    more = '<vehicle id="late" route="through" depart="4"/><vehicle id="ego" route="through"/>'
+    routes = read_route_file(write(flow('begin="1" period="5"') + more))
+    found = routes.departures({"ego"}, 10.0, np.random.default_rng(0))
+    assert [each.name for each in found] == ["f.0", "late", "f.1"]
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        ('<vehicle id="v" type="cat" route="through"/>', "vehicle v: unknown vehicle type 'cat' (did you mean 'car'?)"),
+        ('<vehicle id="v" route="trough"/>', "vehicle v: unknown route 'trough' (did you mean 'through'?)"),
+        ('<vehicle route="through"/>', "vehicle: has no 'id' (give every vehicle its id)"),
+        ('<vehicle id="v"/>', "vehicle: has no 'route' (give every vehicle its route)"),
+        ('<vehicle id="v"><route edges=" "/></vehicle>', "vehicle v: its route has no edges"),
+        ('<vehicle id="v" route="through" depart="soon"/>', "vehicle v.depart: 'soon' is not a number"),
+        ('<vehicle id="v" route="through" depart="-1"/>', "vehicle v.depart: '-1' is not a number that makes sense"),
+        ('<vehicle id="v" route="through" depart="nan"/>', "vehicle v.depart: 'nan' is not a number"),
+        ('<vehicle id="v" route="through" depart="inf"/>', "vehicle v.depart: 'inf' is not a number"),
+        ('<vType id="t" length="0"/>', "vType t.length: '0' is not a number that makes sense"),
+        ('<vType id="t" maxSpeed="0"/>', "vType t.maxSpeed: '0' is not a number that makes sense"),
+        ('<flow id="f" route="through" period="0"/>', "flow f.period: '0' is not a number that makes sense"),
+        ('<flow id="f" route="through" probability="2"/>', "flow f.probability: '2' is not a number"),
+        ('<flow id="f" route="through"/>', "flow f: has no rate (give one of period, vehsPerHour, probability)"),
+        ('<flow id="f" route="through" number="3"/>', "flow f: has no rate"),
+        ('<flow id="f" route="through" begin="5" end="4" number="3"/>', "flow f.end: does not lie after its begin"),
+        ('<vehicle id="v" route="through"/><vehicle id="v" route="through"/>', "vehicle v: stands twice"),
+        ('<trip id="t" from="a" to="b"/>', "trip: is not understood here (use vType"),
+    ],
+)
+def test_mistake__is_named_with_its_place_and_remedy(write: Write, inside: str, said: str) -> None:
+    assert problem(write(TYPE_AND_ROUTE + inside)).startswith(said)
+
+
+def test_file__that_is_missing(write: Write) -> None:
+    path = write("")
+    assert "there is no such file (did you mean 'a.rou.xml'?)" in problem(path.with_name("b.rou.xml"))
+
+
+def test_file__that_is_not_xml(tmp_path: Path) -> None:
+    path = tmp_path / "a.rou.xml"
+    path.write_text("<routes><vehicle", encoding="utf-8")
+    assert problem(path).startswith("is not readable XML")
+    path.write_bytes(b"\x89PNG\r\n\xff\xfe")
+    assert problem(path).startswith("is not readable XML")
+
+
+def test_file__with_an_entity_bomb_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.rou.xml"
+    laughs = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 10))
+    path.write_text(f'<!DOCTYPE r [<!ENTITY l0 "ha">{laughs}]><routes>&l9;</routes>', encoding="utf-8")
+    assert problem(path).startswith("carries XML entities")
+
+
+def test_file__with_an_external_entity_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.rou.xml"
+    path.write_text('<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><routes>&x;</routes>', encoding="utf-8")
+    assert problem(path).startswith("carries XML entities")
