@@ -14,7 +14,6 @@ import numpy as np
 from harness.arena import Arena, Seat, Step
 from harness.documents.persona import Persona
 from harness.drivers.protocol import Driver
-from harness.errors import HarnessError
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.seeding import generator_of
 from harness.game.start import Chances, draw_start
@@ -48,7 +47,7 @@ def assess(arm: Arm, episodes: int, report: Callable[[int, int], None] = lambda 
     Raises SimulationError if SUMO can't load the scene at all.
     """
     present = [0.0 if driver is None else 1.0 for driver in arm.drivers]
-    chances = arm.scene.chances([persona.lapses for persona in arm.personas], present)
+    chances = arm.scene.chances([persona.habits for persona in arm.personas], present)
     seats = [
         Seat(driver or _Absent(), persona.payoff) for driver, persona in zip(arm.drivers, arm.personas, strict=True)
     ]
@@ -57,7 +56,9 @@ def assess(arm: Arm, episodes: int, report: Callable[[int, int], None] = lambda 
         for episode in range(episodes):
             try:
                 yield _play(arena, arm, chances, episode)
-            except (HarnessError, ArithmeticError, ValueError, RuntimeError, OSError) as error:
+            except MemoryError:
+                raise
+            except Exception as error:  # a driver may raise whatever it likes: the other games are played
                 yield Game(_failed(arm, episode, error), None)
             report(episode + 1, episodes)
     finally:

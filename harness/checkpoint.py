@@ -56,7 +56,7 @@ def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
         return None
     try:
         with safe_open(path, framework="pt") as file:
-            metadata = file.metadata()
+            metadata = file.metadata() or {}
             if metadata.get("key") != key:
                 return None
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118

@@ -94,5 +94,7 @@ def _check_shapes(policy: Policy) -> None:
     if policy.tensors["log_deviation"].shape != (ACTIONS,):
         raise ValueError("log_deviation does not fit the actions")
     for name, tensor in policy.tensors.items():
+        if tensor.dtype != np.float32:
+            raise ValueError(f"{name} is {tensor.dtype}, not float32")
         if not np.isfinite(tensor).all():
             raise ValueError(f"{name} is not finite")

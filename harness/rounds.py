@@ -41,6 +41,7 @@ class TrainingStage:
     opponent: Drives | None
     initial: str | None
     alone_share: float
+    attentive_share: float = 0.0
 
     @property
     def id(self) -> str:
@@ -104,8 +105,10 @@ def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int) -> list[S
         stages.append(TrainingStage("naive", seed, "", EGO, None, None, 1.0))
     for persona in personas:
         initial = naive if learned and campaign.non_ego_training.warm_start else None
-        alone_share = campaign.non_ego_training.alone_share
-        stages.append(TrainingStage(persona, seed, persona, NON_EGO, ego, initial, alone_share))
+        how = campaign.non_ego_training
+        stages.append(
+            TrainingStage(persona, seed, persona, NON_EGO, ego, initial, how.alone_share, how.attentive_share)
+        )
     stages.append(AssessmentStage("naive_alone", seed, "", ego, None))
     stages.append(AssessmentStage("naive_vs_sumo", seed, "", ego, Drives("sumo")))
     for persona in personas:

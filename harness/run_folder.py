@@ -12,6 +12,7 @@ A stage is done when `done.json` is there with the key of its inputs; it is writ
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,9 +21,28 @@ from typing import Any
 
 from harness.errors import UsageError
 from harness.files import write_atomically
+from harness.rounds import stage_id
 
 FORMAT = 1
 MANIFEST = "manifest.json"
+_STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
+
+
+def _check(manifest: Any) -> None:
+    """Whether a manifest is one of ours, as far as others rely on it; names in it become names of files."""
+    if manifest["format"] != FORMAT:
+        raise ValueError(f"has format {manifest['format']!r}, not {FORMAT}")
+    if not isinstance(manifest["name"], str) or not isinstance(manifest["campaign"], dict):
+        raise ValueError("names no campaign")
+    if not manifest["seeds"] or not all(isinstance(seed, int) for seed in manifest["seeds"]):
+        raise ValueError("has no seeds")
+    if not all(isinstance(persona, str) for persona in manifest["personas"]):
+        raise ValueError("has no personas")
+    for name, entry in manifest["stages"].items():
+        if name != stage_id(entry["name"], entry["seed"]) or not _STAGE.fullmatch(name):
+            raise ValueError(f"{name!r} is no stage")
+        if entry["kind"] not in ("training", "assessment") or not isinstance(entry["status"], str):
+            raise ValueError(f"says nothing of stage {name!r}")
 
 
 @dataclass(frozen=True)
@@ -80,15 +100,16 @@ class RunFolder:
         """The manifest. Raises UsageError if the folder has none that can be read."""
         try:
             manifest = json.loads(self.manifest_file.read_text(encoding="utf-8"))
-            if manifest["format"] != FORMAT or not isinstance(manifest["name"], str):
-                raise ValueError(f"has format {manifest['format']!r}")
-        except FileNotFoundError:
+            _check(manifest)
+        except (FileNotFoundError, NotADirectoryError):
             raise UsageError.of(
                 self.path, "", f"is not a run folder: it has no {MANIFEST}", "name the folder a campaign wrote"
             ) from None
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise UsageError.of(self.manifest_file, "", f"is damaged: {error}", "run the campaign again") from None
-        return manifest
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+            raise UsageError.of(
+                self.manifest_file, "", f"is damaged: {error}", "run the campaign again into another folder, with --out"
+            ) from None
+        return dict(manifest)
 
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
         """Replace the manifest."""
@@ -96,6 +117,16 @@ class RunFolder:
 
     def claim(self, campaign: str) -> None:
         """Make the folder this campaign's. Raises UsageError if it is another's, or no run folder and not empty."""
+        try:
+            self._check_owner(campaign)
+            for name in ("policies", "traces", "tensorboard", ".stages"):
+                (self.path / name).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise UsageError.of(
+                self.path, "", f"can't be written: {error.strerror}", "choose a folder with --out"
+            ) from None
+
+    def _check_owner(self, campaign: str) -> None:
         if self.path.exists() and not self.path.is_dir():
             raise UsageError.of(self.path, "", "is a file", "choose a folder with --out")
         if self.manifest_file.exists():
@@ -109,13 +140,6 @@ class RunFolder:
                 )
         elif self.path.is_dir() and any(self.path.iterdir()):
             raise UsageError.of(self.path, "", "is not empty and not a run folder", "choose another folder with --out")
-        try:
-            for name in ("policies", "traces", "tensorboard", ".stages"):
-                (self.path / name).mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise UsageError.of(
-                self.path, "", f"can't be written: {error.strerror}", "choose a folder with --out"
-            ) from None
 
     def keep_scene(self, folder: Path, files: tuple[str, ...]) -> None:
         """Copy a scene's files, so that the run can be looked at when the scene has changed."""

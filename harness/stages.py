@@ -22,6 +22,7 @@ from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
 from harness.game.state import ROLES
+from harness.manoeuvre_file import name_manoeuvres
 from harness.policy_file import read_policy, write_policy
 from harness.preflight import OpenCampaign
 from harness.rounds import AssessmentStage, Drives, Stage, TrainingStage
@@ -53,7 +54,8 @@ class Conditions:
 def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str]:
     """Each stage's key: the hash of all that its numbers depend on, through the stages it needs."""
     scene = campaign.scene.document
-    rests_on = {name: campaign.hashes[name] for name in ("scene.toml", scene.net, scene.routes)}
+    files = ("scene.toml", scene.net, scene.routes)
+    rests_on = {name: campaign.hash_of(campaign.scene.folder / name) for name in files}
     personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
     given = _given_policy_hash(campaign.ego_policy)
     keys: dict[str, str] = {}
@@ -79,10 +81,10 @@ def _given_policy_hash(folder: Path | None) -> str:
 
 
 def conditions_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str]) -> Conditions:
-    """The conditions of a run of a campaign."""
+    """The conditions of a run of a campaign: on the run folder's copy of the scene, which stays what it was."""
     personas = {each.name: each for each in campaign.personas}
     return Conditions(
-        folder.path, campaign.scene.folder, campaign.document, campaign.ego_persona, personas, campaign.ego_policy, keys
+        folder.path, folder.scene, campaign.document, campaign.ego_persona, personas, campaign.ego_policy, keys
     )
 
 
@@ -121,6 +123,7 @@ def _train(
         (conditions.ego_persona, conditions.persona(stage.persona)),
         _driver(stage.opponent, conditions, folder),
         stage.alone_share,
+        stage.attentive_share,
         read_policy(folder.policy(stage.initial)) if stage.initial else None,
         settings,
         ("training", stage.seed, stage.name),
@@ -174,6 +177,7 @@ def _assess(
                 traces.add(game.trace)
     frame = typed(pd.DataFrame(records).reindex(columns=list(EPISODE_COLUMNS)))
     write_csv(frame, folder.work(stage.id) / "episodes.csv")
+    name_manoeuvres(folder, stage.id, scene)
     return {"episodes": len(records), "errors": sum(bool(record["error"]) for record in records)}
 
 

@@ -82,11 +82,27 @@ TRAINING_COLUMNS = {
 }
 """Columns of `training.csv`."""
 
+MANOEUVRE_COLUMNS = {
+    "arm": "object",
+    "persona": "object",
+    "seed": "int64",
+    "episode": "int64",
+    "player": "object",
+    "manoeuvre": "object",
+    "time_s": "float64",
+    "until_s": "float64",
+    "gap_m": "float64",
+    "ttc_s": "float64",
+    "text": "object",
+}
+"""Columns of `manoeuvres.csv`."""
+
 TABLES = {
     "episodes": EPISODE_COLUMNS,
     "summary": SUMMARY_COLUMNS,
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,
+    "manoeuvres": MANOEUVRE_COLUMNS,
 }
 
 _TRUTH = {"true": True, "false": False}

@@ -12,6 +12,8 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from harness.files import sync_folder
+
 _TEXT = pa.dictionary(pa.int32(), pa.string())
 SCHEMA = pa.schema(
     [
@@ -54,6 +56,7 @@ class TraceWriter:
             with self._scratch.open("rb") as file:
                 os.fsync(file.fileno())
             os.replace(self._scratch, self._path)
+            sync_folder(self._path.parent)
         else:
             self._scratch.unlink(missing_ok=True)
 

@@ -7,7 +7,8 @@ anew. So a training that was interrupted and one that was not are the same train
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from harness.documents.persona import Persona
 from harness.drivers.protocol import Driver
 from harness.game.observation import OF_OTHERS
 from harness.game.seeding import seed_of
+from harness.game.start import Chances
 from harness.game.state import Outcome
 from harness.policy_file import Policy
 from harness.traffic.opening import OpenScene
@@ -45,6 +47,8 @@ class Lesson:
     opponent: Driver | None
     """Who has the other seat; None: the learner is alone in every game."""
     alone_share: float
+    attentive_share: float
+    """Share of the budget in which nobody's attention lapses yet."""
     initial: Policy | None
     settings: Training
     parts: tuple[str | int, ...]
@@ -74,32 +78,48 @@ def train(
     or a parameter is not finite, SimulationError where SUMO fails, ValueError where the initial policy doesn't fit.
     """
     torch.set_num_threads(1)
-    settings = lesson.settings
     environment = _environment(lesson)
     try:
         model = _learner(lesson, environment, tensorboard)
         progress = read_checkpoint(model, key, checkpoint) or Progress(0, 0, [], [])
-        stopped = "budget"
-        while progress.steps < settings.steps:
+        while (stopped := _why_to_stop(lesson, progress)) is None:
             progress = _segment(lesson, model, environment, progress, report)
             write_checkpoint(model, progress, key, checkpoint)
-            if settings.early_convergence and has_converged(progress.segment_payoffs):
-                stopped = "converged"
-                break
         return Trained(policy_of(model, card), progress, stopped)
     finally:
         environment.close()
 
 
+def _why_to_stop(lesson: Lesson, progress: Progress) -> str | None:
+    """Asked before each segment, so that one who goes on from a finished training's checkpoint is told as well."""
+    settings = lesson.settings
+    attentive = ceil(_attentive_steps(lesson) / settings.segment_steps)
+    if settings.early_convergence and has_converged(progress.segment_payoffs[attentive:]):
+        return "converged"
+    return "budget" if progress.steps >= settings.steps else None
+
+
 def _environment(lesson: Lesson) -> ArenaVecEnv:
     seats = [Seat(lesson.opponent), Seat(lesson.opponent)]
     seats[lesson.learner] = Seat(None, lesson.personas[lesson.learner].payoff)
-    present = [0.0 if lesson.opponent is None else 1.0 - lesson.alone_share] * 2
-    present[lesson.learner] = 1.0
-    chances = lesson.scene.chances([persona.lapses for persona in lesson.personas], present)
     seed = seed_of(*lesson.parts, "sumo") % 2**31
     arena = Arena(lesson.scene, lesson.settings.games, seats, seed)
-    return ArenaVecEnv(arena, lesson.learner, chances, *lesson.parts)
+    return ArenaVecEnv(arena, lesson.learner, _chances(lesson, 0), *lesson.parts)
+
+
+def _chances(lesson: Lesson, steps: int) -> Chances:
+    """What the games are drawn from, `steps` into the training."""
+    present = [0.0 if lesson.opponent is None else 1.0 - lesson.alone_share] * 2
+    present[lesson.learner] = 1.0
+    habits = [persona.habits for persona in lesson.personas]
+    if steps < _attentive_steps(lesson):
+        habits = [replace(each, attention=None) for each in habits]
+    return lesson.scene.chances(habits, present)
+
+
+def _attentive_steps(lesson: Lesson) -> float:
+    lapses = any(persona.attention is not None for persona in lesson.personas)
+    return lesson.attentive_share * lesson.settings.steps if lapses else 0.0
 
 
 def _learner(lesson: Lesson, environment: ArenaVecEnv, tensorboard: Path | None) -> PPO:
@@ -143,13 +163,16 @@ def _segment(
 ) -> Progress:
     parts = (*lesson.parts, "segment", progress.segments)
     set_random_seed(seed_of(*parts, "learner") % 2**32)
-    environment.begin(*parts)
+    environment.begin(_chances(lesson, progress.steps), *parts)
     environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
     steps = min(lesson.settings.segment_steps, lesson.settings.steps - progress.steps)
     curve = _Curve(environment, progress, report, lesson)
     model.num_timesteps = progress.steps
     model._last_obs = None  # the games start anew
-    model.learn(steps, callback=curve, reset_num_timesteps=False)
+    try:
+        model.learn(steps, callback=curve, reset_num_timesteps=False)
+    except FloatingPointError as error:
+        raise FloatingPointError(f"{error}, after {model.num_timesteps} steps") from error
     for name, value in model.policy.state_dict().items():
         if not torch.isfinite(value).all():
             raise FloatingPointError(f"parameter {name} is not finite after {model.num_timesteps} steps")
@@ -175,16 +198,20 @@ class _Curve(BaseCallback):
 
     def _on_rollout_end(self) -> None:
         finished = self._environment.take_finished()
-        if any(not np.isfinite(game.payoff) for game in finished):
-            raise FloatingPointError(f"a game's payoff is not finite, within {self.num_timesteps} steps")
         self._window += finished
         self.games += finished
-        if self.num_timesteps - self._window_start >= CURVE_WINDOW_STEPS and self._window:
+        if self.num_timesteps - self._window_start >= CURVE_WINDOW_STEPS:
             self._close_window()
         self._report(self.num_timesteps, self._lesson.settings.steps)
 
+    def _on_training_end(self) -> None:
+        self._close_window()  # a segment's games are in its own windows, however short it was
+        self.logger.dump(self.num_timesteps)
+
     def _close_window(self) -> None:
         games = self._window
+        if not games:
+            return
         window = Window(
             steps=self.num_timesteps,
             mean_payoff=float(np.mean([game.payoff for game in games])),

@@ -41,14 +41,14 @@ class ArenaVecEnv(VecEnv):
 
     def __init__(self, arena: Arena, learner: int, chances: Chances, *parts: str | int) -> None:
         super().__init__(arena.games, OBSERVATION_SPACE, ACTION_SPACE)
-        self.arena, self._learner, self._chances = arena, learner, chances
+        self.arena, self._learner = arena, learner
         self._actions = np.zeros((arena.games, len(arena.seats), ACTIONS))
         self._finished: list[Finished] = []
-        self.begin(*parts)
+        self.begin(chances, *parts)
 
-    def begin(self, *parts: str | int) -> None:
-        """Draw the games to come from other named parts; `reset` starts them."""
-        self._parts = parts
+    def begin(self, chances: Chances, *parts: str | int) -> None:
+        """Draw the games to come like this, from these named parts; `reset` starts them."""
+        self._chances, self._parts = chances, parts
         self._played = np.zeros(self.num_envs, dtype=np.int64)
         self._payoff = np.zeros(self.num_envs)
 
@@ -65,6 +65,9 @@ class ArenaVecEnv(VecEnv):
         """Play a step; ended games restart at once, their last observation in `infos` as SB3 expects it."""
         step = self.arena.step(self._actions)
         payoff = step.payoff[:, self._learner].astype(np.float32)
+        if not np.isfinite(payoff).all():
+            game = int(np.flatnonzero(~np.isfinite(payoff))[0])
+            raise FloatingPointError(f"the payoff is {payoff[game]} in step {self.arena.state.step[game]} of a game")
         self._payoff += payoff
         done = ~self.arena.state.running[:, self._learner]
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

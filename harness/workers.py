@@ -16,6 +16,8 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any, Literal
@@ -27,6 +29,9 @@ from harness.stages import Conditions, carry_out
 TRIES = 3
 _REPORT_EVERY_S = 0.25
 _CONTEXT = multiprocessing.get_context("spawn")
+
+
+Work = Callable[[Stage, Conditions, Callable[[int, int], None]], dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -48,34 +53,43 @@ class _Worker:
     stage: Stage | None = None
 
 
+Hire = Callable[[], _Worker]
+
+
 def cores() -> int:
     """Cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def run_stages(
-    stages: Sequence[Stage], finished: Iterable[str], conditions: Conditions, jobs: int, tell: Callable[[Event], None]
+    stages: Sequence[Stage],
+    finished: Iterable[str],
+    conditions: Conditions,
+    jobs: int,
+    tell: Callable[[Event], None],
+    work: Work = carry_out,
 ) -> None:
     """Carry out every stage that is not finished, at most `jobs` at a time, each after what it needs.
 
-    Everything that happens is told; nothing is raised for a stage that fails.
+    Everything that happens is told; nothing is raised for a stage that fails. `work` does a stage, in a worker.
     """
     done, lost = set(finished), set[str]()
     waiting = [stage for stage in stages if stage.id not in done]
     tries: dict[str, int] = {}
-    with _workers(min(jobs, len(waiting)), conditions) as workers:
+    hire = partial(_start, work, conditions)
+    with _workers(min(jobs, len(waiting)), hire) as workers:
         while waiting or any(worker.stage for worker in workers):
             _skip_what_cannot_be(waiting, lost, tell)
-            _hand_out(waiting, workers, done, tell)
+            _hand_out(waiting, workers, done, hire, tell)
             busy = [worker for worker in workers if worker.stage]
             if not busy:
                 continue
-            for ready in wait([*(w.connection for w in busy), *(w.process.sentinel for w in busy)]):
-                worker = next(w for w in busy if ready in (w.connection, w.process.sentinel))
-                if worker.stage is None:
-                    continue  # its connection and its sentinel were both ready
-                event = _listen(worker, ready)
-                if event is None:
+            ready = wait([*(w.connection for w in busy), *(w.process.sentinel for w in busy)])
+            for worker in busy:
+                if worker.connection not in ready and worker.process.sentinel not in ready:
+                    continue
+                event = _listen(worker)
+                if event is None or worker.stage is None:
                     continue
                 if event.kind == "died":
                     tries[event.stage] = tries.get(event.stage, 0) + 1
@@ -83,7 +97,7 @@ def run_stages(
                         waiting.insert(0, worker.stage)
                     else:
                         event = Event("failed", event.stage, message=f"{event.message}, {TRIES} times over")
-                    _replace(worker, conditions)
+                    _replace(worker, hire)
                 if event.kind == "done":
                     done.add(event.stage)
                 if event.kind == "failed":
@@ -102,7 +116,13 @@ def _skip_what_cannot_be(waiting: list[Stage], lost: set[str], tell: Callable[[E
             tell(Event("skipped", stage.id, message=f"needs {', '.join(missing)}, which failed"))
 
 
-def _hand_out(waiting: list[Stage], workers: list[_Worker], done: set[str], tell: Callable[[Event], None]) -> None:
+def _hand_out(
+    waiting: list[Stage],
+    workers: list[_Worker],
+    done: set[str],
+    hire: Hire,
+    tell: Callable[[Event], None],
+) -> None:
     for worker in workers:
         ready = [stage for stage in waiting if set(stage.needs) <= done]
         if worker.stage is None and ready:
@@ -110,15 +130,19 @@ def _hand_out(waiting: list[Stage], workers: list[_Worker], done: set[str], tell
             stage = max(ready, key=lambda one: sum(one.id in other.needs for other in waiting))
             waiting.remove(stage)
             worker.stage = stage
-            worker.connection.send(stage)
+            try:
+                worker.connection.send(stage)
+            except OSError:  # it died while it had nothing to do
+                _replace(worker, hire)
+                worker.connection.send(stage)
             tell(Event("started", stage.id))
 
 
-def _listen(worker: _Worker, ready: object) -> Event | None:
+def _listen(worker: _Worker) -> Event | None:
     """What a worker has to say; its death if it died without a word."""
     assert worker.stage is not None
     try:
-        if ready is worker.connection or worker.connection.poll():
+        if worker.connection.poll():
             event: Event = worker.connection.recv()
             return event
     except (EOFError, OSError):
@@ -136,49 +160,71 @@ def _cause(exitcode: int | None) -> str:
 
 
 @contextmanager
-def _workers(count: int, conditions: Conditions) -> Iterator[list[_Worker]]:
-    workers = [_start(conditions) for _ in range(count)]
+def _workers(count: int, hire: Hire) -> Iterator[list[_Worker]]:
+    workers: list[_Worker] = []
     try:
+        for _ in range(count):
+            workers.append(hire())
         yield workers
     finally:
         for worker in workers:
-            worker.connection.close()
             worker.process.terminate()
         for worker in workers:
             worker.process.join(5.0)
             if worker.process.is_alive():
                 worker.process.kill()
+            worker.connection.close()
 
 
-def _start(conditions: Conditions) -> _Worker:
+def _start(work: Work, conditions: Conditions) -> _Worker:
     ours, theirs = _CONTEXT.Pipe()
-    process = _CONTEXT.Process(target=_work, args=(theirs, conditions), daemon=True)
-    process.start()
+    process = _CONTEXT.Process(target=_work, args=(theirs, work, conditions), daemon=True)
+    with _interrupts_held_back():
+        process.start()
     theirs.close()
     return _Worker(process, ours)
 
 
-def _replace(worker: _Worker, conditions: Conditions) -> None:
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Ctrl-C waits until a process is started whole, and the process is deaf to it from its first moment."""
+    if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    came: list[int] = []
+    resource_tracker.ensure_running()  # starting it would undo the mask
+    before = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which the process inherits
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, before)
+    if came:
+        raise KeyboardInterrupt
+
+
+def _replace(worker: _Worker, hire: Hire) -> None:
     worker.connection.close()
-    fresh = _start(conditions)
+    fresh = hire()
     worker.process, worker.connection = fresh.process, fresh.connection
 
 
 # --- in the worker's process -----------------------------------------------------------------------------------------
 
 
-def _work(connection: Connection, conditions: Conditions) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
+def _work(connection: Connection, work: Work, conditions: Conditions) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
         try:
             stage: Stage = connection.recv()
         except (EOFError, OSError):
             return
-        connection.send(_carry_out(stage, connection, conditions))
+        connection.send(_carry_out(stage, connection, work, conditions))
 
 
-def _carry_out(stage: Stage, connection: Connection, conditions: Conditions) -> Event:
+def _carry_out(stage: Stage, connection: Connection, work: Work, conditions: Conditions) -> Event:
     last = 0.0
 
     def report(done: int, total: int) -> None:
@@ -189,7 +235,7 @@ def _carry_out(stage: Stage, connection: Connection, conditions: Conditions) -> 
             connection.send(Event("progress", stage.id, done, total))
 
     try:
-        return Event("done", stage.id, info=carry_out(stage, conditions, report))
+        return Event("done", stage.id, info=work(stage, conditions, report))
     except (HarnessError, OSError, MemoryError) as error:
         return Event("failed", stage.id, message=str(error) or type(error).__name__)
     except Exception:  # a bug: its traceback is the message

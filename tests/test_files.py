@@ -1,0 +1,44 @@
+"""Files are there whole or not at all."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from harness.files import write_atomically
+
+
+def test_write_atomically__writes_and_replaces(tmp_path: Path) -> None:
+    file = tmp_path / "table.csv"
+    write_atomically(file, b"old")
+    write_atomically(file, b"new\x00")
+    assert file.read_bytes() == b"new\x00"
+    assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_write_atomically__the_file_can_be_read_by_others(tmp_path: Path) -> None:
+    write_atomically(tmp_path / "table.csv", b"")
+    assert (tmp_path / "table.csv").stat().st_mode & 0o777 == 0o644
+
+
+def test_write_atomically__failure_leaves_the_old_file_and_nothing_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "table.csv"
+    write_atomically(file, b"old")
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_atomically(file, b"new")
+    assert file.read_bytes() == b"old"
+    assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
+
+
+def test_write_atomically__missing_folder_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        write_atomically(tmp_path / "nowhere" / "table.csv", b"")
