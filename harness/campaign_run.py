@@ -10,20 +10,32 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from pydantic import ValidationError
 from rich.console import Console
 
 from harness.comparison import compare
+from harness.errors import UsageError
 from harness.files import write_atomically
+from harness.manoeuvre_file import manoeuvres_of
 from harness.preflight import OpenCampaign
 from harness.progress import StageProgress
+from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay import choose_games, replay_name, worst_first, write_replay
 from harness.reports.page import render_page
 from harness.rounds import AssessmentStage, Stage, TrainingStage, plan, questions, stage_id
-from harness.run_folder import FORMAT, RunFolder
+from harness.run_folder import FORMAT, MANIFEST, RunFolder
 from harness.stages import conditions_of, stage_keys
-from harness.tables import EPISODE_COLUMNS, TRAINING_COLUMNS, read_csv, summarise, typed, write_csv
+from harness.tables import (
+    EPISODE_COLUMNS,
+    MANOEUVRE_COLUMNS,
+    TRAINING_COLUMNS,
+    read_csv,
+    summarise,
+    typed,
+    write_csv,
+)
 from harness.trace_file import read_trace
-from harness.traffic.opening import open_scene
+from harness.traffic.opening import OpenScene, open_scene
 from harness.workers import Event, run_stages
 
 _PACKAGES = (
@@ -133,8 +145,16 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
-    replays = _write_replays(folder, episodes, console)
-    page = render_page(manifest, episodes, summary, comparisons, training, replays)
+    scene = open_scene(folder.scene)
+    with console.status("naming manoeuvres"):
+        manoeuvres = _manoeuvres(folder, done, scene)
+    write_csv(manoeuvres, folder.path / "manoeuvres.csv")
+    replays = _write_replays(folder, scene, episodes, console)
+    with console.status("writing the report"):
+        games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
+        page = render_page(
+            manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres
+        )
     write_atomically(folder.path / "report.html", page.encode())
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] != "done")
     return Outcome(comparisons, failed, int((episodes["error"] != "").sum()))
@@ -144,7 +164,10 @@ def questions_of(manifest: Mapping[str, Any]) -> list[Any]:
     """The questions that the finished arms of a run can answer."""
     from harness.documents.campaign import Campaign
 
-    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    try:
+        campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    except ValidationError as error:
+        raise UsageError.of(MANIFEST, "campaign", f"is damaged: {error}", "run the campaign again") from None
     done = {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
     return [
         question
@@ -154,13 +177,26 @@ def questions_of(manifest: Mapping[str, Any]) -> list[Any]:
 
 
 def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, columns: list[str]) -> pd.DataFrame:
-    frames = [read_csv(folder.work(name) / table) for name, entry in done.items() if entry["kind"] == kind]
+    frames = []
+    for name, entry in done.items():
+        if entry["kind"] == kind:
+            file = folder.work(name) / table
+            frame = read_csv(file)
+            of = frame["arm" if kind == "assessment" else "stage"]
+            if not ((of == entry["name"]) & (frame["seed"] == entry["seed"])).all():
+                raise UsageError.of(file, "", f"has rows that are not of {name}", "run the campaign again")
+            frames.append(frame)
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))
 
 
-def _write_replays(folder: RunFolder, episodes: pd.DataFrame, console: Console) -> list[str]:
+def _manoeuvres(folder: RunFolder, done: Mapping[str, Any], scene: OpenScene) -> pd.DataFrame:
+    arms = [name for name, entry in done.items() if entry["kind"] == "assessment"]
+    frames = [manoeuvres_of(folder, name, scene) for name in arms]
+    return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
+
+
+def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, console: Console) -> list[str]:
     chosen = worst_first(choose_games(episodes))
-    scene = open_scene(folder.scene)
     folder.replays.mkdir(exist_ok=True)
     names = [replay_name(game.arm, game.seed, game.episode) for game in chosen.itertuples()]
     with console.status(f"writing {len(names)} replays"):
@@ -183,5 +219,5 @@ def _drop_stale(replays: Path, names: set[str]) -> None:
     import shutil
 
     for old in replays.iterdir():
-        if old.name not in names:
+        if old.is_dir() and old.name not in names:
             shutil.rmtree(old)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import sys
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
 
+_OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.EMFILE, errno.ENOMEM)
 DONE, GAMES_ERRORED, USERS_MISTAKE, INTERRUPTED = 0, 1, 2, 130
 
 app = typer.Typer(
@@ -77,8 +79,7 @@ def campaign(
     except KeyboardInterrupt:
         console.print("Interrupted. What was done is kept: run the same command again to go on.")
         raise typer.Exit(INTERRUPTED) from None
-    _show(outcome.comparisons, console)
-    console.print(f"Report: {folder.path / 'report.html'}", highlight=False)
+    _show(outcome.comparisons, folder.path, console)
     if outcome.failed_stages:
         console.print(f"Not finished: {', '.join(outcome.failed_stages)}", style="red", highlight=False)
     if outcome.error_games:
@@ -99,7 +100,7 @@ def check(file: CampaignFile) -> None:
     stages = plan(opened.document, [persona.name for persona in opened.personas])
     trainings = sum(isinstance(stage, TrainingStage) for stage in stages)
     console = Console()
-    console.print(f"{file} is in order.", highlight=False)
+    console.print(f"{file} is in order.", highlight=False, markup=False, soft_wrap=True)
     console.print(
         f"{trainings} trainings of up to {opened.document.training.steps:,} steps, {len(stages) - trainings} arms of "
         f"{opened.document.assessment.episodes} episodes:",
@@ -121,21 +122,24 @@ def report(run: RunPath) -> None:
 
     console = Console()
     outcome = write_results(RunFolder(run), console)
-    _show(outcome.comparisons, console)
-    console.print(f"Report: {run / 'report.html'}", highlight=False)
+    _show(outcome.comparisons, run, console)
 
 
 @app.command()
 def replay(
     run: RunPath,
-    arm: Annotated[str | None, typer.Argument(help="The arm, such as naive_vs_speedy.", show_default=False)] = None,
-    episode: Annotated[int | None, typer.Argument(help="The episode's number.", show_default=False)] = None,
+    arm: Annotated[
+        str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.", show_default=False)
+    ] = None,
+    episode: Annotated[
+        int | None, typer.Argument(metavar="EPISODE", help="The episode's number.", show_default=False)
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(help="The training seed.  [default: the campaign's first]", show_default=False)
     ] = None,
     list_games: Annotated[bool, typer.Option("--list", help="List the games there are, worst first.")] = False,
 ) -> None:
-    """Watch a game in SUMO-GUI, exactly as it was played."""
+    """Watch a game in SUMO-GUI, exactly as it was played. Without ARM or EPISODE: list the games there are."""
     from rich.console import Console
 
     from harness.watching import game_table, watch
@@ -145,20 +149,24 @@ def replay(
         console.print(game_table(run, arm))
         return
     folder, process = watch(run, arm, episode, seed)
-    console.print(f"SUMO-GUI plays {folder}; press its play button. Closing it ends this command.", highlight=False)
+    message = f"SUMO-GUI plays {folder}; press its play button. Closing it ends this command."
+    console.print(message, highlight=False, markup=False, soft_wrap=True)
     process.wait()
 
 
-def _show(comparisons: Any, console: Any) -> None:
+def _show(comparisons: Any, run: Path, console: Any) -> None:
+    from rich.box import SIMPLE
     from rich.table import Table
 
-    table = Table(title="What is real", title_justify="left")
+    table = Table(title="What is real", title_justify="left", box=SIMPLE, padding=0)
     for name in ("question", "persona", "seed", "metric", "mean difference", "p", "p (Holm)", "verdict"):
-        table.add_column(name)
+        table.add_column(name, overflow="fold")
     for row in comparisons.itertuples():
-        numbers = (f"{value:.3g}" for value in (row.mean_difference, row.p_value, row.p_holm))
+        values = (row.mean_difference, row.p_value, row.p_holm)
+        numbers = ("" if value != value else f"{value:.3g}" for value in values)
         table.add_row(row.question, row.persona, str(row.seed), row.metric, *numbers, row.verdict)
     console.print(table)
+    console.print(f"Report: {run / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
 
 
 def _fail(message: str, code: int) -> NoReturn:
@@ -176,6 +184,10 @@ def main() -> None:
         _fail("\n".join(str(problem) for problem in error.problems), USERS_MISTAKE)
     except HarnessError as error:
         _fail(f"{type(error).__name__}: {error}", GAMES_ERRORED)
+    except OSError as error:
+        if error.errno not in _OF_THE_MACHINE:
+            raise
+        _fail(f"{error.filename or 'the run folder'}: {error.strerror}; what was done is kept", GAMES_ERRORED)
 
 
 if __name__ == "__main__":

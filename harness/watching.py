@@ -7,7 +7,9 @@ import tempfile
 from pathlib import Path
 
 import pandas as pd
+from rich.box import SIMPLE
 from rich.table import Table
+from rich.text import Text
 
 from harness.documents.reading import nearest
 from harness.errors import UsageError
@@ -25,10 +27,14 @@ def game_table(run: Path, arm: str | None) -> Table:
     if arm is not None:
         episodes = _of_arm(run, episodes, arm)
     table = Table(
-        title=f"Games of {run}, worst first", title_justify="left", caption="watch one: harness replay RUN ARM EPISODE"
+        title=Text(f"Games of {run}, worst first"),
+        title_justify="left",
+        caption="watch one: harness replay RUN ARM EPISODE",
+        box=SIMPLE,
+        padding=0,
     )
     for name in ("arm", "seed", "episode", "ego", "non-ego", "least TTC (s)", "duration (s)"):
-        table.add_column(name)
+        table.add_column(name, overflow="fold", no_wrap=name == "arm")
     for game in worst_first(episodes).itertuples():
         seconds = ("" if pd.isna(value) else f"{value:.1f}" for value in (game.ego_min_ttc_s, game.duration_s))
         table.add_row(game.arm, str(game.seed), str(game.episode), game.ego_outcome, game.non_ego_outcome, *seconds)

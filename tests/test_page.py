@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pandas as pd
 import pytest
+from recorded import SCENE, manoeuvres, recorded
 
 from harness.comparison import Question, Verdict, compare
 from harness.replay.choice import choose_games, replay_name, worst_first
@@ -124,6 +125,12 @@ def _windows(stage, seed, random):
         }
 
 
+def recordings(arguments, others=2):
+    """What render_page takes beside a campaign, of games drawn to fit it."""
+    games = recorded(arguments["episodes"], others)
+    return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
+
+
 def _done(seed):
     return {"kind": "assessment", "seed": seed, "status": "done", "seconds": 12.34, "message": ""}
 
@@ -190,7 +197,7 @@ def page(html):
 # --- numbers ---
 
 
-@pytest.mark.parametrize("name", list(TABLES))
+@pytest.mark.parametrize("name", ["comparisons", "summary", "training", "episodes"])
 def test_page__the_numbers_are_those_of_the_csv_file(name, small, page, tmp_path):
     write_csv(small[name], tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(newline="", encoding="utf-8") as file:
@@ -505,6 +512,12 @@ def test_replays__each_has_the_command_that_opens_it(page):
     assert "harness replay . naive_vs_speedy 6 --seed 2" in text_of(campaign(personas=["speedy"], seeds=(1, 2)))
 
 
+def test_replays__those_that_the_page_can_play_are_links(small):
+    html = without_curves(small | recordings(small))
+    assert '<a href="#game=naive_vs_speedy,1,6">naive_vs_speedy, game 6</a>' in html
+    assert "#game=" not in without_curves(small)
+
+
 def test_replays__none_is_said_plainly(small):
     assert "No game was recorded for replay." in text_of(small | {"replays": []})
 
@@ -512,8 +525,9 @@ def test_replays__none_is_said_plainly(small):
 # --- the file itself ---
 
 
-def test_page__is_the_same_bytes_for_the_same_input(html):
-    assert render_page(**campaign()) == html
+def test_page__is_the_same_bytes_for_the_same_input(small):
+    once, again = (without_curves(small | recordings(small)) for _ in range(2))
+    assert once == again
 
 
 def test_page__names_from_documents_stay_text():
@@ -521,10 +535,12 @@ def test_page__names_from_documents_stay_text():
     arguments = campaign(personas=[hostile, "\"><img src=x onerror='alert(2)'>", "$\\frac{"])
     arguments["manifest"]["name"] = hostile
     arguments["manifest"]["versions"] |= {hostile: hostile}
-    html = render_page(**with_errors(arguments, arguments["episodes"]["episode"] == 0))
+    with_errors(arguments, arguments["episodes"]["episode"] == 0)
+    html = render_page(**arguments, **recordings(arguments))
     page = Page(html)
     assert hostile in page.text
-    assert {tag for tag, _ in page.tags}.isdisjoint({"script", "img", "iframe", "object", "link", "base"})
+    assert {tag for tag, _ in page.tags}.isdisjoint({"img", "iframe", "object", "link", "base"})
+    assert [tag for tag, _ in page.tags].count("script") == 2  # what is recorded, and what plays it
     assert not [name for _, attributes in page.tags for name in attributes if name.startswith("on")]
 
 
@@ -547,7 +563,7 @@ def test_page__every_id_is_there_once_and_every_reference_has_one(html, page):
 
 def test_page__every_figure_says_what_it_shows(page):
     figures = [attributes for tag, attributes in page.tags if tag == "svg"]
-    assert len(figures) == 2 * 2 + 5  # two per persona, one per training stage
+    assert len(figures) == 2 * 4 + 5  # four per persona, one per training stage
     assert all(attributes["role"] == "img" and len(attributes["aria-label"]) > 40 for attributes in figures)
     assert "naive vs speedy: 30\N{NO-BREAK SPACE}%" in figures[0]["aria-label"] + figures[1]["aria-label"]
     assert [tag for tag, _ in page.tags].count("figcaption") == len(figures)
@@ -585,3 +601,36 @@ def test_page__takes_nothing_from_the_users_matplotlib_settings(small, html):
 
     with matplotlib.rc_context({"font.size": 30, "text.usetex": True, "axes.facecolor": "red"}):
         assert render_page(**small) == html
+
+
+# --- manoeuvres ---
+
+
+def test_manoeuvres__failures_are_counted_by_pair_and_arm(small):
+    page = Page(without_curves(small | recordings(small)))
+    heading, *rows = [[cell["text"] for cell in row] for row in page.tables["pairs"]]
+    episodes = small["episodes"]
+    failed = episodes[episodes["ego_failed"].fillna(0) == 1]
+    assert heading[:3] == ["non-ego", "ego", "failures"]
+    assert sum(int(row[2]) for row in rows) == len(failed)
+    assert sum(int(row[heading.index("naive_vs_speedy")]) for row in rows) == (failed["arm"] == "naive_vs_speedy").sum()
+    assert {(row[0], row[1]) for row in rows} == {("cut-in", "swerve"), ("drift", "hard brake"), ("tailgate", "overtake")}
+    assert all(sum(map(int, row[3:])) == int(row[2]) for row in rows)
+
+
+def test_manoeuvres__each_pair_opens_its_games_shortly_before_the_manoeuvre(small):
+    html = without_curves(small | recordings(small))
+    assert '<a href="#game=naive_vs_speedy,1,6&amp;t=2.5">naive_vs_speedy, game 6</a>: collision (gap 3.1 m' in html
+
+
+def test_manoeuvres__a_failure_without_any_is_counted_last(small):
+    found = recordings(small)["manoeuvres"]
+    page = Page(without_curves(small | recordings(small) | {"manoeuvres": found[found["episode"] > 2]}))
+    last = [cell["text"] for cell in page.tables["pairs"][-1]]
+    assert last[:2] == ["–", "–"]
+    assert int(last[2]) > 0
+
+
+def test_manoeuvres__without_a_table_nothing_is_said_of_them(page):
+    assert "pairs" not in page.tables
+    assert "Manoeuvres" not in page.text

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
-import pandas as pd
 from markupsafe import Markup
 
 from harness.comparison import Verdict
 from harness.reports import wording
+from harness.reports.distributions import paired_figure, pairs_of, spread_figure, spreads_of
 from harness.reports.figures import Column, Point, rate_figure, speed_figure
+from harness.reports.results import Results
 from harness.reports.wording import Row, Verdicts, failures, failures_of, interval, percent, played
 
 QUESTIONS = {
@@ -32,6 +32,8 @@ class Rate:
     series: str
     headline: str
     counts: Sequence[str]
+    spans: Sequence[tuple[float, float, float]]
+    """Each seed's rate and the ends of its interval, in per cent."""
 
 
 @dataclass(frozen=True)
@@ -61,56 +63,15 @@ class Card:
     tests: Sequence[Test]
     rate_figure: Markup
     speed_figure: Markup
+    paired_figure: Markup | None
+    """None where the ego was not retrained."""
+    spread_figure: Markup
+    worst: tuple[str, str] | None
+    """Key and description of the game to show: the worst that is embedded."""
 
 
-@dataclass(frozen=True)
-class Results:
-    """The tables as the cards look them up."""
-
-    arms: Mapping[tuple[str, int], Row]
-    """Rows of `summary` by arm and seed."""
-    comparisons: Sequence[Row]
-    speeds: Mapping[tuple[str, int], pd.Series]
-    """The ego's average speed in each game, by arm and seed."""
-    seeds: Sequence[int]
-    significance: float | None
-    planned: Container[str]
-    """Ids of the stages of the campaign, whether they are done or not."""
-
-    def of(self, arm: str) -> dict[int, Row]:
-        """The arm's rows by seed, where there are games that could be played."""
-        rows = {seed: self.arms.get((arm, seed)) for seed in self.seeds}
-        return {seed: row for seed, row in rows.items() if row is not None and played(row)}
-
-    def asked(self, question: str, persona: str) -> list[int]:
-        """The training seeds of which a question is asked: its treatment is played, or it is compared."""
-        _, treatment = wording.ARMS[question](persona)
-        compared = {row["seed"] for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)}
-        return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.planned or seed in compared]
-
-
-def results(
-    manifest: Mapping[str, Any], episodes: pd.DataFrame, summary: pd.DataFrame, comparisons: pd.DataFrame
-) -> Results:
-    """The frames, looked up by arm and seed."""
-    good = episodes[~unplayed(episodes)]
-    return Results(
-        {(row["arm"], row["seed"]): row for row in summary.to_dict("records")},
-        comparisons.to_dict("records"),
-        {key: games.dropna() for key, games in good.groupby(["arm", "seed"])["ego_mean_speed_mps"]},
-        sorted({*manifest.get("seeds", ()), *summary["seed"].tolist(), *comparisons["seed"].tolist()}),
-        manifest.get("campaign", {}).get("assessment", {}).get("significance"),
-        manifest.get("stages", {}),
-    )
-
-
-def unplayed(episodes: pd.DataFrame) -> pd.Series:
-    """Which games could not be played."""
-    return (episodes["ego_outcome"] == "error") | (episodes["error"] != "")
-
-
-def card(persona: str, place: int, found: Results) -> Card:
-    """The card of a persona; `place` tells its figures' ids from those of other cards."""
+def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None) -> Card:
+    """The card of a persona; `place` tells its figures' ids from those of other cards, `worst` is the game to show."""
     rows = [row for row in found.comparisons if row["persona"] == persona]
     retrained = bool(found.asked("RQ2", persona))
     arms = [
@@ -151,14 +112,37 @@ def card(persona: str, place: int, found: Results) -> Card:
             "Average speed of the ego. "
             + _alternative(columns, found, "mean_speed_mps", lambda speed: f"{wording.number(speed, 1)} m/s"),
         ),
+        _paired(persona, place, found) if retrained else None,
+        spread_figure(
+            spreads_of(columns, found.games),
+            f"spread{place}",
+            "Average speed, trailing distance, least time to collision and hardest braking of the ego in each game. "
+            + _alternative(columns, found, "min_ttc_s", lambda time: f"least time {wording.number(time, 1)} s"),
+        ),
+        worst,
     )
+
+
+def _paired(persona: str, place: int, found: Results) -> Markup:
+    pairs = pairs_of(persona, found.games)
+    mended = int((pairs[0].before_failed & ~pairs[0].after_failed).sum())
+    broken = int((~pairs[0].before_failed & pairs[0].after_failed).sum())
+    alternative = (
+        f"Average speed and least time to collision of {len(pairs[0].before)} episodes against {persona}, naive and "
+        f"retrained: {mended} failed before and no longer, {broken} fail only after retraining."
+    )
+    return paired_figure(pairs, f"paired{place}", alternative)
 
 
 def _rate(label: str, series: str, rows: Mapping[int, Row]) -> Rate:
     if not rows:
-        return Rate(label, series, "–", ["not played"])
+        return Rate(label, series, "–", ["not played"], [])
     shares = [row["failure_rate"] for row in rows.values()]
-    return Rate(label, series, percent(sum(shares) / len(shares)), _counts(rows))
+    spans = [
+        tuple(100.0 * row[name] for name in ("failure_rate", "failure_rate_low", "failure_rate_high"))
+        for row in rows.values()
+    ]
+    return Rate(label, series, percent(sum(shares) / len(shares)), _counts(rows), spans)
 
 
 def _counts(rows: Mapping[int, Row], who: str = "") -> list[str]:

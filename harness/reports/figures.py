@@ -83,7 +83,7 @@ class Curve:
 
 def rate_figure(columns: Sequence[Column], name: str, alternative: str) -> Markup:
     """A share of games per arm: a bar for the mean over seeds, and each seed's value with its interval."""
-    with _figure(4.8, 3.3) as figure:
+    with figure_of(4.8, 3.3) as figure:
         axes = _arms(figure, columns)
         for place, column in enumerate(columns):
             values = [point.value for point in column.points if math.isfinite(point.value)]
@@ -95,12 +95,12 @@ def rate_figure(columns: Sequence[Column], name: str, alternative: str) -> Marku
         axes.set_ylabel("failure rate (%)")
         axes.yaxis.set_major_formatter(lambda share, _: f"{share * 100:.3g}")
         _points(axes, columns, lambda share: f"{share * 100:.1f}".removesuffix(".0") + " %")
-        return _svg(figure, name, alternative)
+        return svg(figure, name, alternative)
 
 
 def speed_figure(columns: Sequence[Column], name: str, alternative: str) -> Markup:
     """Average speed per arm: a pale bar from quartile to quartile of the games, the mean and its interval."""
-    with _figure(4.8, 3.3) as figure:
+    with figure_of(4.8, 3.3) as figure:
         axes = _arms(figure, columns)
         axes.use_sticky_edges = False  # a pale bar does not stand on the axis
         for place, column in enumerate(columns):
@@ -114,12 +114,12 @@ def speed_figure(columns: Sequence[Column], name: str, alternative: str) -> Mark
         axes.set_ylabel("average speed of the ego (m/s)")
         _points(axes, columns, lambda speed: f"{speed:.1f}")
         axes.margins(y=0.14)
-        return _svg(figure, name, alternative)
+        return svg(figure, name, alternative)
 
 
 def learning_figure(curves: Sequence[Curve], series: str, name: str, alternative: str) -> Markup:
     """Mean payoff and failure rate of the learner over its steps, a line per seed, and where each stopped."""
-    with _figure(3.7, 3.9) as figure:
+    with figure_of(3.7, 3.9) as figure:
         payoff, failure = figure.subplots(2, 1, sharex=True)
         for place, curve in enumerate(curves):
             line = {
@@ -151,7 +151,7 @@ def learning_figure(curves: Sequence[Curve], series: str, name: str, alternative
         failure.xaxis.set_major_formatter(lambda steps, _: steps_text(steps))
         failure.locator_params(axis="x", nbins=5)
         failure.set_xlabel("training steps")
-        return _svg(figure, name, alternative)
+        return svg(figure, name, alternative)
 
 
 def steps_text(steps: float) -> str:
@@ -163,7 +163,8 @@ def steps_text(steps: float) -> str:
 
 
 @contextmanager
-def _figure(width_in: float, height_in: float) -> Iterator[Figure]:
+def figure_of(width_in: float, height_in: float) -> Iterator[Figure]:
+    """An empty figure in the page's style; the style holds until the end of the with block."""
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
@@ -216,17 +217,17 @@ def _points(axes: Axes, columns: Sequence[Column], text: Callable[[float], str])
                           textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
 
 
-def _svg(figure: Figure, name: str, alternative: str) -> Markup:
+def svg(figure: Figure, name: str, alternative: str) -> Markup:
     """The figure as an element of the page. `name` keeps its ids apart from those of the other figures."""
     written = io.StringIO()
     figure.savefig(written, format="svg", transparent=True, metadata={"Date": None})
-    svg = written.getvalue()
-    size = re.search(r'viewBox="[^"]*"', svg)
+    drawn = written.getvalue()
+    size = re.search(r'viewBox="[^"]*"', drawn)
     assert size is not None  # matplotlib always writes one
-    svg = re.sub(r"<(metadata|style)\b.*?</\1>", "", svg[svg.index(">", size.end()) + 1 :], flags=re.DOTALL)
-    svg = svg.replace('xlink:href="#', f'href="#{name}-').replace("url(#", f"url(#{name}-")
-    svg = svg.replace(' id="', f' id="{name}-')
-    svg = re.sub(r"font(?:-size)?: ([\d.]+px)(?:;? [^;\"]*'DejaVu Sans'[^;\"]*)", r"font-size: \1", svg)
+    drawn = re.sub(r"<(metadata|style)\b.*?</\1>", "", drawn[drawn.index(">", size.end()) + 1 :], flags=re.DOTALL)
+    drawn = drawn.replace('xlink:href="#', f'href="#{name}-').replace("url(#", f"url(#{name}-")
+    drawn = drawn.replace(' id="', f' id="{name}-')
+    drawn = re.sub(r"font(?:-size)?: ([\d.]+px)(?:;? [^;\"]*'DejaVu Sans'[^;\"]*)", r"font-size: \1", drawn)
     for stand_in, colour in _PAGE_COLOURS.items():
-        svg = svg.replace(stand_in, colour)
-    return Markup('<svg {} role="img" aria-label="{}">').format(Markup(size[0]), alternative) + Markup(svg)
+        drawn = drawn.replace(stand_in, colour)
+    return Markup('<svg {} role="img" aria-label="{}">').format(Markup(size[0]), alternative) + Markup(drawn)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,19 +10,30 @@ import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from harness.reports import wording
-from harness.reports.cards import card, results, unplayed
+from harness.reports.cards import card
 from harness.reports.cells import table
-from harness.reports.figures import Curve, learning_figure, steps_text
+from harness.reports.embedding import Embedded
+from harness.reports.figures import steps_text
+from harness.reports.games import RecordedGame, SceneDrawing, key
+from harness.reports.learning import learning, stopped
+from harness.reports.manoeuvres import failures_by_pair, marks_of
+from harness.reports.replays import keys, replay_list, worst_game
+from harness.reports.results import results, unplayed
 from harness.tables import typed
 
-MOST_ROWS = 5_000
+MOST_ROWS = 3_000
 """A table longer than this is left to its CSV file, and the page says so."""
+GAMES_BYTES = 8_000_000
+PAGE_BYTES = 10_000_000
+"""The page is not to be longer: recorded games get what the rest leaves of it, and never more than GAMES_BYTES."""
+_ROW_BYTES, _REST_BYTES = 1_100, 1_200_000
 REPLAYS_SHOWN = 12
 """The rest of the replays is folded away."""
-FAILURES = ("collision", "rail", "timeout")
-"""Outcomes in the order they are worth watching; games that went well follow."""
-
+SCRIPTS = tuple(
+    f"{name}.js"
+    for name in ("recorded", "road", "vehicles", "strips", "screen", "player", "controls", "clips", "tables")
+)
+"""In the order in which they use one another."""
 QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 
 
@@ -41,27 +51,6 @@ class Stage:
     message: str
 
 
-@dataclass(frozen=True)
-class Learning:
-    """One training stage's curves."""
-
-    stage: str
-    figure: Markup
-    stops: Sequence[str]
-
-
-@dataclass(frozen=True)
-class Replay:
-    """A recorded game and how to watch it."""
-
-    name: str
-    game: str
-    outcome: str
-    min_ttc: str
-    command: str
-    scene: str
-
-
 def render_page(
     manifest: Mapping[str, Any],
     episodes: pd.DataFrame,
@@ -69,19 +58,30 @@ def render_page(
     comparisons: pd.DataFrame,
     training: pd.DataFrame,
     replays: Sequence[str],
+    games: Iterable[RecordedGame] = (),
+    scene: SceneDrawing | None = None,
+    manoeuvres: pd.DataFrame | None = None,
 ) -> str:
     """The report as HTML. Equal input gives equal text.
 
     `manifest` is the content of manifest.json, the frames are those of the CSV files with the columns of
-    `harness.tables.TABLES`, `replays` the names of the folders under `replays/`, in any order.
+    `harness.tables.TABLES`, `replays` the names of the folders under `replays/`, in any order. `games`, the ones
+    to watch first on top, are taken until the page is full (`PAGE_BYTES`); without a `scene` there are none.
+    Without `manoeuvres` nothing is said of them.
     Raises ValueError when a frame is none of those tables.
     """
     episodes, summary, comparisons, training = map(typed, (episodes, summary, comparisons, training))
+    manoeuvres = typed(manoeuvres) if manoeuvres is not None else None
     found = results(manifest, episodes, summary, comparisons)
     named = (*manifest.get("personas", ()), *comparisons["persona"], *summary["persona"])
     personas = [name for name in dict.fromkeys(named) if name]
     stages = manifest.get("stages", {})
     errored = episodes[unplayed(episodes)]
+    rows = min(len(episodes), MOST_ROWS)
+    room = max(min(GAMES_BYTES, PAGE_BYTES - _REST_BYTES - rows * _ROW_BYTES), 0)
+    embedded = Embedded(scene, games, marks_of(manoeuvres), room)
+    shown = embedded.keys
+    arms, pairs = failures_by_pair(manoeuvres, episodes) if manoeuvres is not None else ([], None)
     tables = {
         "comparisons": table("comparisons", "Every test of the campaign.", comparisons),
         "summary": table("summary", "A row per arm and training seed.", summary),
@@ -103,21 +103,38 @@ def render_page(
         errors=len(errored),
         facts=_facts(manifest, found.seeds, len(personas)),
         several_seeds=len(found.seeds) > 1,
-        cards=[card(persona, place, found) for place, persona in enumerate(personas, 1)],
-        learning=_learning(stages, training),
+        cards=[
+            card(persona, place, found, worst_game(f"naive_vs_{persona}", episodes, shown))
+            for place, persona in enumerate(personas, 1)
+        ],
+        learning=learning(stages, training),
         rules=sorted({stage["rule"] for stage in stages.values() if stage.get("rule")}),
         stages=[_stage(name, stage) for name, stage in stages.items()],
         tables=tables,
         games=len(episodes),
         most_rows=MOST_ROWS,
-        replays=_replays(replays, episodes),
+        replays=replay_list(replays, episodes, shown),
         replays_shown=REPLAYS_SHOWN,
+        embedded=shown,
+        left=len(episodes) - len(errored) - len(shown),
+        keys=keys(episodes[:MOST_ROWS]),
+        key=key,
+        pairs=pairs,
+        pair_arms=arms,
+        recorded=embedded.document(),
+        script=Markup("\n").join(Markup(_source(environment, name)) for name in SCRIPTS),
         versions=manifest.get("versions", {}),
         glossary=_glossary(list(dict.fromkeys(summary["arm"])), personas),
         significance=found.significance,
         tests=int(comparisons["p_value"].notna().sum()),
     )
     return page.strip() + "\n"
+
+
+def _source(environment: Environment, name: str) -> str:
+    """A file beside the template, as it is: a script is no template."""
+    assert environment.loader is not None
+    return environment.loader.get_source(environment, name)[0].rstrip()
 
 
 def _facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
@@ -143,15 +160,10 @@ def _stage(name: str, stage: Mapping[str, Any]) -> Stage:
         str(stage.get("seed", "")),
         str(stage.get("status", "")),
         "–" if steps is None else f"{steps:,}" + (f" of {budget:,}" if budget is not None else ""),
-        _stopped(stage),
+        stopped(stage),
         duration(stage.get("seconds")),
         str(stage.get("message") or ""),
     )
-
-
-def _stopped(stage: Mapping[str, Any]) -> str:
-    stopped = stage.get("stopped")
-    return {"converged": "early: converged", "budget": "budget used", None: "–"}.get(stopped, str(stopped))
 
 
 def duration(seconds: float | None) -> str:
@@ -164,71 +176,6 @@ def duration(seconds: float | None) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60:02d} s"
     return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
-
-
-def _learning(stages: Mapping[str, Any], training: pd.DataFrame) -> list[Learning]:
-    """A figure per training stage, in order of first appearance, with a curve per seed."""
-    figures = []
-    for place, stage in enumerate(training["stage"].unique(), 1):
-        curves, stops = [], []
-        rows = training[training["stage"] == stage]
-        for seed, windows in rows.groupby("seed", sort=True):
-            of_manifest = stages.get(f"{stage}-seed{seed}", {})
-            windows = windows.sort_values("steps")
-            curves.append(
-                Curve(
-                    int(seed),
-                    windows["steps"].tolist(),
-                    windows["mean_payoff"].tolist(),
-                    windows["failure_rate"].tolist(),
-                    of_manifest.get("steps"),
-                    of_manifest.get("stopped") == "converged",
-                )
-            )
-            if of_manifest.get("steps") is not None:
-                stop = f"{of_manifest['steps']:,} steps ({_stopped(of_manifest)})"
-                stops.append(f"seed {seed}: {stop}" if rows["seed"].nunique() > 1 else stop)
-        series = "alone" if stage == "naive" else "retrained" if stage.startswith("retrained_") else "persona"
-        last = [f"seed {curve.seed} ends at mean payoff {curve.payoffs[-1]:.3g}" for curve in curves]
-        alternative = f"Learning curve of {stage}: mean payoff and failure rate over training steps; "
-        figures.append(
-            Learning(stage, learning_figure(curves, series, f"curve{place}", alternative + "; ".join(last)), stops)
-        )
-    return figures
-
-
-def _replays(names: Sequence[str], episodes: pd.DataFrame) -> list[Replay]:
-    """The replays, worst first, in the order of `harness.replay.choice.worst_first`, which reports can't import."""
-    games = {f"{game['arm']}-seed{game['seed']}-{game['episode']:03d}": game for game in episodes.to_dict("records")}
-    several_seeds = episodes["seed"].nunique() > 1
-    known = [(name, games[name]) for name in names if name in games]
-    known.sort(key=lambda pair: _worst(pair[1]))
-    shown = [_replay(name, game, several_seeds) for name, game in known]
-    strangers = sorted(set(names) - set(games))
-    return shown + [Replay(name, name, "–", "–", "", _scene(name)) for name in strangers]
-
-
-def _worst(game: Mapping[Any, Any]) -> tuple[Any, ...]:
-    outcome, ttc = game["ego_outcome"] or game["non_ego_outcome"], game["ego_min_ttc_s"]
-    severity = FAILURES.index(outcome) if outcome in FAILURES else len(FAILURES) + (outcome == "error")
-    return severity, ttc if ttc == ttc else float("inf"), game["arm"], game["seed"], game["episode"]
-
-
-def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool) -> Replay:
-    arm, seed, episode = game["arm"], game["seed"], game["episode"]
-    judged = "ego" if game["ego_outcome"] else "non-ego"
-    return Replay(
-        name,
-        f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
-        f"{judged}: {game['ego_outcome'] or game['non_ego_outcome']}",
-        wording.number(game["ego_min_ttc_s"], 2),
-        f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
-        _scene(name),
-    )
-
-
-def _scene(name: str) -> str:
-    return f"sumo-gui -c {shlex.quote(f'replays/{name}/scene.sumocfg')}"
 
 
 def _glossary(arms: Sequence[str], personas: Sequence[str]) -> list[tuple[str, str]]:

@@ -1,0 +1,150 @@
+// What a person does with the player: buttons, lists, keys and addresses.
+
+function control(root) {
+  const part = name => root.querySelector(`[data-is="${name}"]`);
+  const button = name => root.querySelector(`[data-do="${name}"]`);
+  const [choice, beside, slider, clock, speed, said] = ["game", "with", "time", "time-text", "speed", "said"].map(part);
+  const order = [...games.keys()];
+  const player = new Player(root.querySelector(".screens"), show);
+
+  function show() {
+    const { time, duration, playing } = player;
+    slider.max = duration;
+    slider.step = player.game?.step ?? "any";
+    slider.value = time;
+    slider.setAttribute("aria-valuetext", `${time.toFixed(1)} of ${duration.toFixed(1)} seconds`);
+    clock.textContent = `${time.toFixed(2)} / ${duration.toFixed(1)} s`;
+    root.dataset.time = time;
+    button("play").textContent = playing ? "Pause" : "Play";
+    button("play").setAttribute("aria-pressed", playing);
+    button("view").textContent = player.follows ? "Follow" : "Whole road";
+    button("view").setAttribute("aria-pressed", player.follows);
+  }
+
+  function say(text) {
+    said.textContent = text;
+  }
+
+  /** The address bar follows, so that reloading comes back here; it is written when a person has come to rest. */
+  function remember() {
+    if (player.game) history.replaceState(null, "", player.address());
+  }
+
+  async function open(key, other, time) {
+    if (!await player.open(key, other, time)) {
+      say("That game is not in this page. Open it from the run folder with: harness replay");
+      return false;
+    }
+    choice.value = key;
+    offer(player.game);
+    beside.value = player.beside ? keyOf(player.beside) : "";
+    root.dataset.ready = "yes";
+    say("");
+    return true;
+  }
+
+  /** The same episode in the other arms, the counterpart first. */
+  function offer(game) {
+    const same = [...games.values()].filter(each => each !== game && each.episode === game.episode && each.seed === game.seed);
+    const first = counterpartOf(game);
+    same.sort((a, b) => (b === first) - (a === first));
+    const options = same.map(each => make("option", { value: keyOf(each), text: `${each.arm}: ${OUTCOMES[each.outcome] ?? each.outcome}` }));
+    beside.replaceChildren(make("option", { value: "", text: "nothing" }), ...options);
+  }
+
+  function fillChoice() {
+    const arms = new Map();
+    for (const [key, game] of games) {
+      if (!arms.has(game.arm)) arms.set(game.arm, make("optgroup", { label: game.arm }));
+      arms.get(game.arm).append(make("option", { value: key, text: describe(game) }));
+    }
+    choice.append(...arms.values());
+  }
+
+  async function copyLink() {
+    remember();
+    try {
+      await navigator.clipboard.writeText(location.href);
+      say("The link to this moment is copied.");
+    } catch {
+      say("The link to this moment is in the address bar.");
+    }
+  }
+
+  const to = key => key && open(key).then(remember);
+  const faster = by => {
+    speed.selectedIndex = Math.min(Math.max(speed.selectedIndex + by, 0), speed.options.length - 1);
+    player.speed = Number(speed.value);
+  };
+  const nextTouch = () => {
+    const times = player.screens.flatMap(screen => screen.game.touches.map(touch => touch.time)).sort((a, b) => a - b);
+    if (times.length) player.seek(times.find(time => time > player.time + 1e-6) ?? times[0]);
+  };
+  const actions = {
+    play: () => { player.playing ? player.pause() : player.play(); if (!player.playing) remember(); },
+    start: () => { player.pause(); player.seek(0); },
+    end: () => { player.pause(); player.seek(player.duration); },
+    back: () => player.step(-1),
+    on: () => player.step(1),
+    secondBack: () => player.seek(player.time - 1),
+    secondOn: () => player.seek(player.time + 1),
+    faster: () => faster(1),
+    slower: () => faster(-1),
+    view: () => player.look(!player.follows),
+    in: () => player.zoom(1.25),
+    out: () => player.zoom(0.8),
+    asItWas: () => player.eachCamera(camera => camera.reset()),
+    later: () => to(order[order.indexOf(choice.value) + 1]),
+    earlier: () => to(order[order.indexOf(choice.value) - 1]),
+    beside: () => {
+      const other = player.beside ? undefined : counterpartOf(player.game);
+      if (!other && !player.beside) say("This episode of the other ego is not in this page.");
+      else open(choice.value, other && keyOf(other), player.time).then(remember);
+    },
+    contact: nextTouch,
+    link: copyLink,
+  };
+  const keys = {
+    " ": "play", ",": "back", ".": "on", Home: "start", End: "end", ArrowLeft: "secondBack", ArrowRight: "secondOn",
+    ArrowUp: "faster", ArrowDown: "slower", "+": "in", "=": "in", "-": "out", 0: "asItWas", f: "view", n: "later",
+    p: "earlier", b: "beside", c: "contact", l: "link",
+  };
+
+  for (const each of root.querySelectorAll("[data-do]")) each.addEventListener("click", () => actions[each.dataset.do]());
+  root.addEventListener("keydown", event => {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select, summary")) return;
+    if (event.key === " " && event.target.matches("button")) return; // it presses the button
+    const action = actions[keys[event.key]];
+    if (!action) return;
+    event.preventDefault();
+    action();
+  });
+  slider.addEventListener("input", () => { player.pause(); player.seek(Number(slider.value)); });
+  slider.addEventListener("change", remember);
+  speed.addEventListener("change", () => { player.speed = Number(speed.value); });
+  choice.addEventListener("change", () => to(choice.value));
+  beside.addEventListener("change", () => open(choice.value, beside.value, player.time).then(remember));
+
+  /** Open what the address asks for; `moved`: somebody has just followed a link to it. */
+  async function follow(moved) {
+    const wanted = asked(location.hash);
+    if (!wanted && moved) return;
+    const found = wanted && await open(wanted.key, wanted.beside, wanted.time);
+    if (!found && !player.game) await open(order[0]);
+    if (!wanted) return;
+    root.scrollIntoView({ behavior: moved && !stillMotion.matches ? "smooth" : "auto" });
+    root.focus({ preventScroll: true });
+    if (found && moved && wanted.time === undefined && !stillMotion.matches) {
+      player.seek(0);
+      player.play();
+    }
+  }
+
+  fillChoice();
+  root.hidden = false;
+  window.addEventListener("hashchange", () => follow(true));
+  follow(false);
+}
+
+const playerElement = document.querySelector(".player");
+if (playerElement) control(playerElement);

@@ -1,0 +1,142 @@
+"""Figures of single games: pairs from naive to retrained, and how a quantity is spread in each arm."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from harness.reports.figures import INK, SERIES, figure_of, svg
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FloatArray = NDArray[np.float64]
+QUANTITIES = {
+    "ego_mean_speed_mps": "average speed (m/s)",
+    "ego_trailing_distance_m": "trailing distance (m)",
+    "ego_min_ttc_s": "least time to collision (s)",
+    "ego_max_deceleration_mps2": "hardest braking (m/s²)",
+}
+PAIRED = ("ego_mean_speed_mps", "ego_min_ttc_s")
+MOST_DOTS = 600
+"""Games of an arm that are drawn one by one; of more, the middle half and the median alone."""
+_FAILED_ALPHA, _WELL_ALPHA = 0.95, 0.45
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """One quantity of the same episodes before and after, each [N]; NaN where it was not measured."""
+
+    label: str
+    before: FloatArray
+    after: FloatArray
+    before_failed: NDArray[np.bool_]
+    after_failed: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Spread:
+    """One quantity of every game of each arm [N], and which of them failed."""
+
+    label: str
+    arms: Sequence[tuple[str, str, FloatArray, NDArray[np.bool_]]]
+    """Label, series, values and failures of each arm."""
+
+
+def pairs_of(persona: str, games: pd.DataFrame) -> list[Pairs]:
+    """`PAIRED` of the episodes that both the naive and the retrained ego played against the persona."""
+    before, after = (games[games["arm"] == f"{ego}_vs_{persona}"] for ego in ("naive", "retrained"))
+    both = before.merge(after, on=["seed", "episode"], suffixes=("", "_after"))
+    failed = [_failed(both[column]) for column in ("ego_failed", "ego_failed_after")]
+    return [
+        Pairs(QUANTITIES[column], both[column].to_numpy(float), both[f"{column}_after"].to_numpy(float), *failed)
+        for column in PAIRED
+    ]
+
+
+def spreads_of(arms: Sequence[tuple[str, str, str]], games: pd.DataFrame) -> list[Spread]:
+    """`QUANTITIES` in the games of each arm, given as label, series and name."""
+    of_arm = [(label, series, games[games["arm"] == arm]) for label, series, arm in arms]
+    return [
+        Spread(
+            label,
+            [
+                (name, series, rows[column].to_numpy(float), _failed(rows["ego_failed"]))
+                for name, series, rows in of_arm
+            ],
+        )
+        for column, label in QUANTITIES.items()
+    ]
+
+
+def _failed(column: pd.Series) -> NDArray[np.bool_]:
+    failed: NDArray[np.bool_] = column.fillna(0).to_numpy(dtype=bool)
+    return failed
+
+
+def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str) -> Markup:
+    """A line per episode from the naive ego's game to the retrained one's; a cross is a failure."""
+    with figure_of(4.8, 3.5) as figure:
+        for axes, pairs in zip(figure.subplots(1, len(quantities), squeeze=False)[0], quantities, strict=True):
+            both = np.isfinite(pairs.before) & np.isfinite(pairs.after)
+            ends = np.stack((pairs.before, pairs.after))
+            axes.plot([0, 1], ends[:, both], color=INK, linewidth=0.7, alpha=0.22)
+            for place, (values, failed, series) in enumerate(
+                ((pairs.before, pairs.before_failed, "persona"), (pairs.after, pairs.after_failed, "retrained"))
+            ):
+                _games(axes, np.full(len(values), float(place)), values, failed, series)
+            if not both.any():
+                axes.annotate("no pair", (0.5, 0.5), xycoords="axes fraction", ha="center", fontsize=9)
+            axes.set_xlim(-0.25, 1.25)
+            axes.set_xticks([0, 1], ["naive", "retrained"])
+            axes.tick_params(axis="x", length=0)
+            axes.set_ylabel(pairs.label)
+        return svg(figure, name, alternative)
+
+
+def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> Markup:
+    """For each quantity and arm: every game as a dot, the middle half as a box, the median as a line."""
+    with figure_of(13.4, 4.0) as figure:
+        for axes, spread in zip(figure.subplots(1, len(quantities), squeeze=False)[0], quantities, strict=True):
+            for place, (_, series, values, failed) in enumerate(spread.arms):
+                measured = np.isfinite(values)
+                if not measured.any():
+                    axes.annotate(
+                        "none", (place, 0), (0, 4), xycoords=("data", "axes fraction"),
+                        textcoords="offset points", ha="center", fontsize=8,
+                    )  # fmt: skip
+                    continue
+                low, median, high = np.quantile(values[measured], [0.25, 0.5, 0.75])
+                axes.bar(place, high - low, 0.66, bottom=low, color=SERIES[series], alpha=0.22, linewidth=0)
+                axes.plot([place - 0.33, place + 0.33], [median, median], color=SERIES[series], linewidth=2)
+                if measured.sum() <= MOST_DOTS:
+                    _games(axes, place + _beside(len(values)), values, failed, series)
+            axes.use_sticky_edges = False
+            axes.set_title(spread.label, fontsize=10, loc="left")
+            axes.set_xlim(-0.6, len(spread.arms) - 0.4)
+            labels = [label for label, *_ in spread.arms]
+            axes.set_xticks(range(len(labels)), labels, fontsize=8)
+            axes.tick_params(axis="x", length=0)
+        return svg(figure, name, alternative)
+
+
+def _games(axes: Axes, x: FloatArray, values: FloatArray, failed: NDArray[np.bool_], series: str) -> None:
+    """Games as dots, failed ones as crosses."""
+    measured = np.isfinite(values)
+    for chosen, marker, size, alpha in ((measured & ~failed, "o", 2.4, _WELL_ALPHA), (measured & failed, "x", 4.2, _FAILED_ALPHA)):
+        if chosen.any():
+            axes.plot(
+                x[chosen], values[chosen], marker, color=SERIES[series], markersize=size, alpha=alpha,
+                markeredgewidth=1.1 if marker == "x" else 0, zorder=3,
+            )  # fmt: skip
+
+
+def _beside(games: int) -> FloatArray:
+    """Offsets that keep the dots of an arm apart: the golden section, which never falls into rows."""
+    return (np.arange(games) * 0.6180339887498949 % 1.0 - 0.5) * 0.5

@@ -1,0 +1,92 @@
+"""What the page's player needs of a recorded game and of the road, as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Track:
+    """The way of one road user: arrays [n], a value per step from `first_step` on, of the body's centre."""
+
+    name: str
+    """`ego`, `non_ego`, or SUMO's id of another road user."""
+    length_m: float
+    width_m: float
+    first_step: int
+    x_m: FloatArray
+    y_m: FloatArray
+    heading_rad: FloatArray
+    speed_mps: FloatArray
+
+
+@dataclass(frozen=True)
+class PlayerTrack(Track):
+    """The way of a player, and what was measured of it; gap and time are inf or NaN where there is nothing."""
+
+    acceleration_mps2: FloatArray
+    steering_rad: FloatArray
+    lapsed: NDArray[np.bool_]
+    leader_gap_m: FloatArray
+    time_to_collision_s: FloatArray
+    outcome: str
+    """goal, collision, rail, timeout; empty if it was still driving when the game ended."""
+    ended_step: int | None
+    """The step at which it came to that."""
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Where and when players came to grief."""
+
+    time_s: float
+    x_m: float
+    y_m: float
+    label: str
+
+
+@dataclass(frozen=True)
+class RecordedGame:
+    """One game, step 0 to step `steps`."""
+
+    arm: str
+    persona: str
+    seed: int
+    episode: int
+    step_s: float
+    steps: int
+    outcome: str
+    """Of the player that is judged: the ego, or the non-ego where it drives alone."""
+    players: Sequence[PlayerTrack]
+    others: Sequence[Track]
+    touches: Sequence[Touch]
+
+
+@dataclass(frozen=True)
+class SceneDrawing:
+    """The road as lines in the scene's coordinates (m), each [n, 2]."""
+
+    surfaces: Sequence[Sequence[FloatArray]]
+    """Polygons of the drivable area, each its outline and its holes."""
+    lane_marks: Sequence[FloatArray]
+    rails: Sequence[FloatArray]
+    goal: Sequence[FloatArray]
+
+
+def address(game: Any, time_s: float | None = None) -> str:
+    """The fragment of the page's address that opens a game (anything with arm, seed and episode) in the player."""
+    moment = "" if time_s is None else f"&t={time_s:.4g}"
+    return f"#game={key(game.arm, game.seed, game.episode)}{moment}"
+
+
+def key(arm: str, seed: int, episode: int) -> str:
+    """A game's name in addresses."""
+    return f"{quote(arm, safe='')},{seed},{episode}"

@@ -1,0 +1,111 @@
+// The player: one clock, and one or two games that keep step with it.
+
+class Player {
+  /** `screens` is the element the games are shown in; `changed` is called whenever the time or the games change. */
+  constructor(screens, changed) {
+    Object.assign(this, { element: screens, changed, screens: [], time: 0, speed: 1, playing: false, follows: true });
+    this.opening = 0;
+  }
+
+  get game() {
+    return this.screens[0]?.game;
+  }
+
+  get beside() {
+    return this.screens[1]?.game;
+  }
+
+  /** When the last of the games ends. */
+  get duration() {
+    return Math.max(0, ...this.screens.map(screen => screen.game.duration));
+  }
+
+  /** Show a game, or two, at a time; without one at the moment that matters. */
+  async open(key, beside, time) {
+    const turn = ++this.opening;
+    const chosen = [games.get(key), games.get(beside)].filter(Boolean);
+    if (!chosen.length) return false;
+    await Promise.all(chosen.map(opened));
+    if (turn !== this.opening) return true; // another game was asked for meanwhile
+    this.pause();
+    for (const screen of this.screens) screen.close();
+    this.screens = chosen.map(game => new GameScreen(game, at => { this.pause(); this.seek(at); }));
+    this.element.replaceChildren(...this.screens.map(screen => screen.element));
+    this.element.classList.toggle("two", this.screens.length > 1);
+    const ranges = rangesOf(chosen);
+    for (const screen of this.screens) {
+      screen.camera.follows = this.follows;
+      screen.begin();
+      screen.strips.align(ranges, this.duration);
+    }
+    this.seek(time ?? momentOf(chosen[0]));
+    return true;
+  }
+
+  seek(time) {
+    this.time = Math.min(Math.max(time, 0), this.duration);
+    for (const screen of this.screens) screen.draw(this.time);
+    this.changed();
+  }
+
+  /** Go on by whole steps, from the step that is shown. */
+  step(count) {
+    this.pause();
+    const { step } = this.game;
+    this.seek((Math.round(this.time / step) + count) * step);
+  }
+
+  play() {
+    if (this.playing || !this.game) return;
+    if (this.time > this.duration - 1e-6) this.time = 0;
+    this.playing = true;
+    let before = null;
+    const go = now => {
+      if (!this.playing) return;
+      if (before !== null) this.seek(this.time + Math.min(now - before, 250) / 1000 * this.speed);
+      before = now;
+      if (this.time >= this.duration) this.pause();
+      else requestAnimationFrame(go);
+    };
+    requestAnimationFrame(go);
+    this.changed();
+  }
+
+  pause() {
+    this.playing = false;
+    this.changed();
+  }
+
+  /** Show the whole road, or follow the players. */
+  look(follows) {
+    this.follows = follows;
+    this.eachCamera(camera => { camera.follows = follows; camera.reset(); });
+  }
+
+  zoom(factor) {
+    this.eachCamera(camera => { camera.zoom = Math.min(Math.max(camera.zoom * factor, 0.2), 12); });
+  }
+
+  eachCamera(change) {
+    for (const screen of this.screens) change(screen.camera);
+    this.seek(this.time);
+  }
+
+  /** The address of this moment. */
+  address() {
+    const beside = this.beside ? `&with=${keyOf(this.beside)}` : "";
+    return `#game=${keyOf(this.game)}&t=${Number(this.time.toFixed(2))}${beside}`;
+  }
+}
+
+/** What an address asks for; null when it is no game's. */
+function asked(hash) {
+  const parts = new Map(hash.replace(/^#/, "").split("&").map(part => [part.split("=", 1)[0], part.slice(part.indexOf("=") + 1)]));
+  if (!parts.has("game")) return null;
+  const time = Number.parseFloat(parts.get("t"));
+  return {
+    key: normal(parts.get("game")),
+    beside: parts.has("with") ? normal(parts.get("with")) : undefined,
+    time: Number.isFinite(time) ? time : undefined,
+  };
+}

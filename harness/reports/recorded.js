@@ -1,0 +1,122 @@
+// The recorded games of the page: unpacked when they are first watched (harness/reports/embedding.py packs them).
+
+const recorded = JSON.parse(document.getElementById("recorded").textContent);
+const COLUMNS = ["x", "y", "heading", "speed", "acceleration", "steering", "lapsed", "gap", "time"];
+const OFTEN_MISSING = new Set(["gap", "time"]);
+
+/** The name of a game in addresses. */
+function keyOf(game) {
+  return `${encodeURIComponent(game.arm)},${game.seed},${game.episode}`;
+}
+
+// Python and browsers do not escape quite the same characters: keys are compared in this form.
+function normal(key) {
+  const [, arm, seed, episode] = /^(.*),(-?\d+),(\d+)$/.exec(key) ?? [];
+  try {
+    return arm === undefined ? "" : keyOf({ arm: decodeURIComponent(arm), seed: Number(seed), episode: Number(episode) });
+  } catch {
+    return "";
+  }
+}
+
+const games = new Map(recorded.games.map(game => [keyOf(game), game]));
+const severalSeeds = new Set(recorded.games.map(game => game.seed)).size > 1;
+
+/** The game, with the columns of its tracks, once they are unpacked. */
+function opened(game) {
+  game.promise ??= inflate(game.packed).then(numbers => {
+    let at = 0;
+    const columns = (track, names) => {
+      for (const [place, name] of names.entries()) {
+        track[name] = column(numbers.subarray(at, at + track.count), recorded.scales[place], OFTEN_MISSING.has(name));
+        at += track.count;
+      }
+    };
+    for (const track of game.players) columns(track, COLUMNS);
+    for (const track of game.others) columns(track, COLUMNS.slice(0, recorded.ofOthers));
+    game.duration = game.steps * game.step;
+    game.touches = game.touches.map(([time, x, y]) => ({ time, x, y }));
+    game.packed = null;
+    return game;
+  });
+  return game.promise;
+}
+
+/** Base64 of deflated byte planes, as 32 bit numbers. */
+async function inflate(text) {
+  const packed = Uint8Array.from(atob(text), character => character.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const planes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const count = planes.length / 4;
+  const numbers = new Int32Array(count);
+  for (let n = 0; n < count; n++) {
+    numbers[n] = planes[n] | planes[n + count] << 8 | planes[n + 2 * count] << 16 | planes[n + 3 * count] << 24;
+  }
+  return numbers;
+}
+
+/** Differences of whole numbers, as the values they stand for; what is missing is NaN. */
+function column(differences, scale, mayMiss) {
+  const values = new Float64Array(differences.length);
+  let whole = 0;
+  for (let n = 0; n < differences.length; n++) {
+    whole += differences[n];
+    values[n] = mayMiss && whole < 0 ? NaN : whole * scale;
+  }
+  return values;
+}
+
+/** Where a road user is at a time between the steps; null when it is not there. */
+function poseAt(game, track, time) {
+  let place = Math.min(Math.max(time, 0), game.duration) / game.step - track.first;
+  if (Math.abs(place - Math.round(place)) < 1e-6) place = Math.round(place);
+  if (place < 0 || place > track.count - 1) return null;
+  const low = Math.floor(place), share = place - low, high = Math.min(low + 1, track.count - 1);
+  const turn = track.heading[high] - track.heading[low];
+  return {
+    x: track.x[low] + share * (track.x[high] - track.x[low]),
+    y: track.y[low] + share * (track.y[high] - track.y[low]),
+    heading: track.heading[low] + share * Math.atan2(Math.sin(turn), Math.cos(turn)),
+  };
+}
+
+/** The step of a track that is shown at a time; null when the road user is not there. */
+function stepAt(game, track, time) {
+  const step = Math.floor(Math.min(time, game.duration) / game.step + 1e-6) - track.first;
+  return step < 0 || step >= track.count ? null : step;
+}
+
+/** A track's value at a time; NaN when there is none. */
+function valueAt(game, track, name, time) {
+  const step = stepAt(game, track, time);
+  return step === null ? NaN : track[name][step];
+}
+
+/** When the players came to grief, or else the end. */
+function momentOf(game) {
+  return game.touches.length ? game.touches[game.touches.length - 1].time : game.duration;
+}
+
+const OUTCOMES = { goal: "goal reached", rail: "rail contact", collision: "collision", timeout: "out of time", "": "still driving" };
+
+function nameOf(game, track) {
+  if (track.name === "ego") return "ego";
+  return game.persona || "non-ego";
+}
+
+/** A game in words. */
+function titleOf(game) {
+  return `${game.arm}, ${severalSeeds ? `seed ${game.seed}, ` : ""}game ${game.episode}`;
+}
+
+function describe(game) {
+  const nearest = game.leastTime === null || game.leastTime === 0 ? "" : `, least TTC ${game.leastTime.toFixed(1)} s`;
+  return `game ${game.episode}${severalSeeds ? `, seed ${game.seed}` : ""}: ${OUTCOMES[game.outcome] ?? game.outcome}${nearest}`;
+}
+
+/** The same episode with the other ego; undefined when it is not in the page. */
+function counterpartOf(game) {
+  const other = { naive: "retrained", retrained: "naive" };
+  const arm = game.arm.replace(/^(naive|retrained)(?=_vs_)/, ego => other[ego]);
+  return arm === game.arm ? undefined : games.get(keyOf({ ...game, arm }));
+}

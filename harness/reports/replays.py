@@ -1,0 +1,90 @@
+"""The recorded games as a list to choose from, with the commands that open them on the desktop."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from harness.reports import wording
+from harness.reports.games import key
+
+FAILURES = ("collision", "rail", "timeout")
+"""Outcomes in the order they are worth watching; games that went well follow."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A recorded game and how to watch it."""
+
+    name: str
+    game: str
+    outcome: str
+    min_ttc: str
+    command: str
+    scene: str
+    watch: str
+    """Key of the game if the page can play it, else empty."""
+
+
+def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[Replay]:
+    """The replays, worst first, in the order of `harness.replay.choice.worst_first`, which reports can't import.
+
+    `embedded` are the keys of the games that the page can play.
+    """
+    games = {f"{game['arm']}-seed{game['seed']}-{game['episode']:03d}": game for game in episodes.to_dict("records")}
+    several_seeds = episodes["seed"].nunique() > 1
+    known = [(name, games[name]) for name in names if name in games]
+    known.sort(key=lambda pair: _worst(pair[1]))
+    shown = [_replay(name, game, several_seeds, embedded) for name, game in known]
+    strangers = sorted(set(names) - set(games))
+    return shown + [Replay(name, name, "–", "–", "", _scene(name), "") for name in strangers]
+
+
+def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tuple[str, str] | None:
+    """Key and description of the game of an arm to watch first, of those that the page can play."""
+    games = [game for game in episodes[episodes["arm"] == arm].to_dict("records") if _key(game) in embedded]
+    if not games:
+        return None
+    game = min(games, key=_worst)
+    outcome, ttc = game["ego_outcome"] or game["non_ego_outcome"], game["ego_min_ttc_s"]
+    ends = {"rail": "contact with the rail", "timeout": "out of time", "goal": "goal reached"}.get(outcome, outcome)
+    nearest = f", least time to collision {wording.number(ttc, 1)} s" if 0 < ttc < math.inf else ""
+    return _key(game), f"game {game['episode']}: {ends}{nearest}"
+
+
+def keys(episodes: pd.DataFrame) -> list[str]:
+    """The key of each game."""
+    return [_key(game) for game in episodes[["arm", "seed", "episode"]].to_dict("records")]
+
+
+def _key(game: Mapping[Any, Any]) -> str:
+    return key(game["arm"], game["seed"], game["episode"])
+
+
+def _worst(game: Mapping[Any, Any]) -> tuple[Any, ...]:
+    outcome, ttc = game["ego_outcome"] or game["non_ego_outcome"], game["ego_min_ttc_s"]
+    severity = FAILURES.index(outcome) if outcome in FAILURES else len(FAILURES) + (outcome == "error")
+    return severity, ttc if ttc == ttc else float("inf"), game["arm"], game["seed"], game["episode"]
+
+
+def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: Container[str]) -> Replay:
+    arm, seed, episode = game["arm"], game["seed"], game["episode"]
+    judged = "ego" if game["ego_outcome"] else "non-ego"
+    return Replay(
+        name,
+        f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
+        f"{judged}: {game['ego_outcome'] or game['non_ego_outcome']}",
+        wording.number(game["ego_min_ttc_s"], 2),
+        f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
+        _scene(name),
+        _key(game) if _key(game) in embedded else "",
+    )
+
+
+def _scene(name: str) -> str:
+    return f"sumo-gui -c {shlex.quote(f'replays/{name}/scene.sumocfg')}"

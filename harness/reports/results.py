@@ -1,0 +1,61 @@
+"""The tables of a run as the cards look them up."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from harness.reports import wording
+from harness.reports.wording import Row, played
+
+
+@dataclass(frozen=True)
+class Results:
+    """The tables as the cards look them up."""
+
+    arms: Mapping[tuple[str, int], Row]
+    """Rows of `summary` by arm and seed."""
+    comparisons: Sequence[Row]
+    speeds: Mapping[tuple[str, int], pd.Series]
+    """The ego's average speed in each game, by arm and seed."""
+    games: pd.DataFrame
+    """Rows of `episodes` that could be played."""
+    seeds: Sequence[int]
+    significance: float | None
+    planned: Container[str]
+    """Ids of the stages of the campaign, whether they are done or not."""
+
+    def of(self, arm: str) -> dict[int, Row]:
+        """The arm's rows by seed, where there are games that could be played."""
+        rows = {seed: self.arms.get((arm, seed)) for seed in self.seeds}
+        return {seed: row for seed, row in rows.items() if row is not None and played(row)}
+
+    def asked(self, question: str, persona: str) -> list[int]:
+        """The training seeds of which a question is asked: its treatment is played, or it is compared."""
+        _, treatment = wording.ARMS[question](persona)
+        compared = {row["seed"] for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)}
+        return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.planned or seed in compared]
+
+
+def results(
+    manifest: Mapping[str, Any], episodes: pd.DataFrame, summary: pd.DataFrame, comparisons: pd.DataFrame
+) -> Results:
+    """The frames, looked up by arm and seed."""
+    good = episodes[~unplayed(episodes)]
+    return Results(
+        {(row["arm"], row["seed"]): row for row in summary.to_dict("records")},
+        comparisons.to_dict("records"),
+        {key: games.dropna() for key, games in good.groupby(["arm", "seed"])["ego_mean_speed_mps"]},
+        good,
+        sorted({*manifest.get("seeds", ()), *summary["seed"].tolist(), *comparisons["seed"].tolist()}),
+        manifest.get("campaign", {}).get("assessment", {}).get("significance"),
+        manifest.get("stages", {}),
+    )
+
+
+def unplayed(episodes: pd.DataFrame) -> pd.Series:
+    """Which games could not be played."""
+    return (episodes["ego_outcome"] == "error") | (episodes["error"] != "")

@@ -1,0 +1,122 @@
+// One game on the screen: its title, the road from above, the values, and the curves.
+
+/** An element with a class, text and children: whatever comes from a document stays text. */
+function make(tag, { text, ...attributes } = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  if (text !== undefined) element.textContent = text;
+  element.append(...children);
+  return element;
+}
+
+class GameScreen {
+  /** `seek` is called with the time that the curves, or a manoeuvre, are clicked at. */
+  constructor(game, seek) {
+    this.game = game;
+    this.camera = new Camera(46);
+    this.view = make("canvas", { class: "view", role: "img" });
+    this.curves = make("canvas", { class: "curves", role: "img", "aria-label": this.described() });
+    this.values = make("p", { class: "values" });
+    this.element = make("article", { class: "screen", "aria-label": titleOf(game) },
+      this.heading(), this.view, this.values, this.curves, this.manoeuvres(seek));
+    this.time = 0;
+    this.seek = seek;
+  }
+
+  /** Begin to draw; the element must be in the page. */
+  begin() {
+    this.sheet = new Sheet(this.view, () => this.draw(this.time));
+    this.strips = new Strips(this.curves, this.game, this.seek);
+    let held = null;
+    this.view.addEventListener("pointerdown", event => {
+      held = [event.clientX, event.clientY];
+      this.view.setPointerCapture(event.pointerId);
+    });
+    this.view.addEventListener("pointermove", event => {
+      if (!held || !(event.buttons & 1)) return;
+      this.camera.moved.x -= (event.clientX - held[0]) / this.camera.scale;
+      this.camera.moved.y += (event.clientY - held[1]) / this.camera.scale;
+      held = [event.clientX, event.clientY];
+      this.draw(this.time);
+    });
+    this.view.addEventListener("wheel", event => { // as on maps: the page scrolls unless Ctrl is held, or two fingers pinch
+      if (!event.ctrlKey) return;
+      event.preventDefault();
+      this.camera.zoom = Math.min(Math.max(this.camera.zoom * Math.exp(-event.deltaY / 200), 0.2), 12);
+      this.draw(this.time);
+    }, { passive: false });
+  }
+
+  heading() {
+    const { game } = this;
+    const badge = make("span", { class: `badge ${game.outcome === "goal" ? "well" : "failed"}`, text: OUTCOMES[game.outcome] ?? game.outcome });
+    return make("h3", {}, document.createTextNode(`${titleOf(game)} `), badge);
+  }
+
+  described() {
+    const ends = this.game.players.map(track => `${nameOf(this.game, track)}: ${OUTCOMES[track.outcome] ?? track.outcome}`);
+    return `Speed, acceleration, steering, gap and time to collision over ${this.game.duration.toFixed(1)} s. ${ends.join("; ")}.`;
+  }
+
+  /** The manoeuvres as a list: each goes to its moment. */
+  manoeuvres(seek) {
+    const list = make("ol", { class: "marks" });
+    for (const mark of this.game.marks) {
+      const who = this.game.players.find(track => track.name === mark.player);
+      const what = `${mark.from.toFixed(1)} s  ${who ? nameOf(this.game, who) : mark.player}: ${mark.name}`;
+      const button = make("button", { type: "button", text: what });
+      button.addEventListener("click", () => seek(mark.from));
+      list.append(make("li", { class: mark.player === "ego" ? "of-ego" : "of-non-ego" }, button,
+        make("span", { text: mark.text ? ` ${mark.text}` : "" })));
+    }
+    return list;
+  }
+
+  draw(time) {
+    this.time = time;
+    const { sheet, camera, game } = this;
+    if (!sheet?.width) return;
+    const { context, ratio, width, height } = sheet;
+    const shown = Math.min(time, game.duration);
+    context.setTransform(ratio, 0, 0, ratio, 0, 0);
+    camera.look(game, shown, width, height);
+    drawRoad(context, camera, ratio);
+    drawGame(context, camera, ratio, game, shown, true);
+    drawScaleBar(context, camera);
+    if (time > game.duration + 1e-6) this.drawEnded(context, width);
+    const [x, y] = camera.place(0, 0);
+    this.view.dataset.camera = [x, y, camera.scale].map(value => value.toFixed(4)).join(" ");
+    this.strips?.draw(time);
+    this.say(shown);
+  }
+
+  drawEnded(context, width) {
+    context.font = `600 ${FONT}`;
+    context.textAlign = "right";
+    context.textBaseline = "top";
+    context.fillStyle = palette.ink;
+    context.fillText(`ended at ${this.game.duration.toFixed(1)} s`, width - 10, 8);
+  }
+
+  /** The values of the moment as text. */
+  say(time) {
+    const said = this.game.players.map(track => {
+      if (stepAt(this.game, track, time) === null) return [track.name, `${nameOf(this.game, track)}: has left`];
+      const speed = `${valueAt(this.game, track, "speed", time).toFixed(1)} m/s`;
+      const [gap, soon] = ["gap", "time"].map(name => valueAt(this.game, track, name, time));
+      return [track.name, `${nameOf(this.game, track)} ${speed}`
+        + (Number.isNaN(gap) ? "" : `, gap ${gap.toFixed(1)} m`) + (Number.isNaN(soon) ? "" : `, TTC ${soon.toFixed(1)} s`)];
+    });
+    const text = said.map(each => each[1]).join("; ");
+    if (text === this.text) return;
+    this.text = text;
+    this.values.replaceChildren(...said.map(([name, words]) => make("span", { class: name === "ego" ? "of-ego" : "of-non-ego", text: words })));
+    this.view.setAttribute("aria-label", `The road from above at ${time.toFixed(1)} s. ${text}.`);
+  }
+
+  close() {
+    this.sheet?.close();
+    this.strips?.close();
+    this.element.remove();
+  }
+}

@@ -1,0 +1,103 @@
+"""What a recorded game's quantities were, step by step: from its trace, all steps at once.
+
+The steps of the game take the place of the games' axis: row t of the arrays [T, P] is what `game.quantities`, which
+payoffs and metrics are made of, says of step t.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.quantities import Quantities, World
+from harness.game.road import MARGIN_M, SPACING_M, Routes
+from harness.game.state import ROLES, Bodies, State
+
+
+@dataclass(frozen=True)
+class Series:
+    """[T, P] of the players while they drove, NaN when they did not; inf where nobody leads, or none would touch."""
+
+    leader_gap_m: FloatArray
+    time_to_collision_s: FloatArray
+
+
+def series_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]]) -> Series:
+    """The series of one game's trace. `sizes_m` are length and width of each road user in it, by its name."""
+    quantities = quantities_of(trace, world, sizes_m)
+    drove = drove_in(trace)
+    return Series(
+        np.where(drove, quantities.leader_gap_m, np.nan), np.where(drove, quantities.time_to_collision_s, np.nan)
+    )
+
+
+def quantities_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]]) -> Quantities:
+    """The quantities of every step of one game. Nothing in them is of the step before (advanced_m is 0).
+
+    Where a player is along its route is looked for anew in each step: on a route that crosses itself, a player on
+    the crossing may be taken to be on the other branch.
+    """
+    names = [*ROLES, *sorted(set(trace["player"]) - set(ROLES))]
+    players, places = len(ROLES), _places(trace, names)
+    present = _filled(places, np.ones(len(trace), dtype=bool))
+    motion = {name: _filled(places, trace[name].to_numpy()) for name in _MOTION}
+    sizes = np.array([sizes_m.get(name, (0.0, 0.0)) for name in names])
+    state = State.empty(len(present), players)
+    for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "lapsed"):
+        setattr(state, name, motion[name][:, :players])
+    state.present = present[:, :players]
+    bodies = Bodies(
+        motion["x_m"],
+        motion["y_m"],
+        motion["heading_rad"],
+        motion["speed_mps"],
+        np.broadcast_to(sizes[:, 0], present.shape),
+        np.broadcast_to(sizes[:, 1], present.shape),
+        present,
+    )
+    station_m = _stations_m(world.road.routes, state.x_m, state.y_m)
+    state.station_m, offset_m = world.road.routes.locate(state.x_m, state.y_m, station_m)
+    return Quantities(world, state, bodies, np.zeros_like(offset_m), offset_m)
+
+
+def drove_in(trace: pd.DataFrame) -> BoolArray:
+    """[T, P] whether each player was driving: it was there, and nothing had ended its game a step before."""
+    places = _places(trace, ROLES)
+    there = _filled(places, np.ones(len(trace), dtype=bool))
+    running = _filled(places, (trace["outcome"] == "").to_numpy())
+    return there & np.concatenate((np.ones((1, len(ROLES)), dtype=bool), running[:-1]))
+
+
+_MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "lapsed")
+_Places = tuple[tuple[int, int], BoolArray, IntArray, IntArray]
+
+
+def _places(trace: pd.DataFrame, names: list[str] | tuple[str, ...]) -> _Places:
+    """The shape [T, names] that a trace fills, which of its rows are of `names`, and the place of each of those."""
+    column = trace["player"].map({name: place for place, name in enumerate(names)})
+    known = column.notna().to_numpy()
+    steps = trace["step"].to_numpy(dtype=np.int64)
+    shape = (int(steps.max()) + 1, len(names))
+    return shape, known, steps[known], column[known].to_numpy(dtype=np.int64)
+
+
+def _filled(places: _Places, values: NDArray) -> NDArray:
+    shape, known, steps, columns = places
+    filled = np.zeros(shape, dtype=values.dtype)
+    filled[steps, columns] = values[known]
+    return filled
+
+
+def _stations_m(routes: Routes, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+    """[T, P] the table's station nearest to each player."""
+    stations = []
+    for player in range(x_m.shape[1]):
+        rows = slice(routes.first_row[player], routes.last_row[player] + 1)
+        away = (routes.x_m[rows] - x_m[:, player, None]) ** 2 + (routes.y_m[rows] - y_m[:, player, None]) ** 2
+        stations.append(away.argmin(1) * SPACING_M - MARGIN_M)
+    return np.stack(stations, axis=1)
