@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +13,10 @@ from typing import Any
 import pandas as pd
 from pydantic import ValidationError
 from rich.console import Console
+from rich.progress import track
 
 from harness.comparison import compare
+from harness.documents.campaign import Campaign
 from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.manoeuvre_file import manoeuvres_of
@@ -58,7 +61,7 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
     """
-    folder.claim(campaign.document.name)
+    folder.claim(campaign.document.name, campaign.quick)
     scene = campaign.scene.document
     folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
     stages = plan(campaign.document, [persona.name for persona in campaign.personas])
@@ -162,8 +165,6 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
 
 def questions_of(manifest: Mapping[str, Any]) -> list[Any]:
     """The questions that the finished arms of a run can answer."""
-    from harness.documents.campaign import Campaign
-
     try:
         campaign = Campaign.model_validate(manifest["campaign"], strict=False)
     except ValidationError as error:
@@ -199,25 +200,23 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
     chosen = worst_first(choose_games(episodes))
     folder.replays.mkdir(exist_ok=True)
     names = [replay_name(game.arm, game.seed, game.episode) for game in chosen.itertuples()]
-    with console.status(f"writing {len(names)} replays"):
-        for game, name in zip(chosen.itertuples(), names, strict=True):
-            trace = read_trace(folder.traces(stage_id(game.arm, game.seed)), game.episode)
-            write_replay(
-                trace,
-                scene.net_file,
-                scene.routes.path,
-                folder.replays / name,
-                title=f"{game.arm}, seed {game.seed}, episode {game.episode}",
-                step_length_s=scene.world.step_s,
-                rails=scene.rail_lines,
-            )
+    games = list(zip(chosen.itertuples(), names, strict=True))
+    quiet = not console.is_terminal
+    for game, name in track(games, "writing replays", console=console, transient=True, disable=quiet):
+        write_replay(
+            read_trace(folder.traces(stage_id(game.arm, game.seed)), game.episode),
+            scene.net_file,
+            scene.routes.path,
+            folder.replays / name,
+            title=f"{game.arm}, seed {game.seed}, episode {game.episode}",
+            step_length_s=scene.world.step_s,
+            rails=scene.rail_lines,
+        )
     _drop_stale(folder.replays, set(names))
     return names
 
 
 def _drop_stale(replays: Path, names: set[str]) -> None:
-    import shutil
-
     for old in replays.iterdir():
         if old.is_dir() and old.name not in names:
             shutil.rmtree(old)

@@ -82,12 +82,13 @@ class RunFolder:
     # --- stages --------------------------------------------------------------------------------------------------
 
     def finished(self, stage: str, key: str) -> dict[str, Any] | None:
-        """What a stage said when it was done from these very inputs; None if it is not done."""
+        """What a stage said when it was done from these very inputs; None if it is not done, or its work is gone."""
         try:
             done = json.loads((self.work(stage) / "done.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return done["info"] if isinstance(done, dict) and done.get("key") == key else None
+        made = (self.policy(stage) / "policy.safetensors").is_file() or self.traces(stage).is_file()
+        return done["info"] if made and isinstance(done, dict) and done.get("key") == key else None
 
     def finish(self, stage: str, key: str, info: Mapping[str, Any]) -> None:
         """A stage is done: everything it wrote is there."""
@@ -115,10 +116,11 @@ class RunFolder:
         """Replace the manifest."""
         write_atomically(self.manifest_file, (json.dumps(manifest, indent=2) + "\n").encode())
 
-    def claim(self, campaign: str) -> None:
-        """Make the folder this campaign's. Raises UsageError if it is another's, or no run folder and not empty."""
+    def claim(self, campaign: str, quick: bool = False) -> None:
+        """Make the folder this campaign's. Raises UsageError if it is another's, holds its full run and this is a
+        quick one (or the other way round), or is no run folder and not empty."""
         try:
-            self._check_owner(campaign)
+            self._check_owner(campaign, quick)
             for name in ("policies", "traces", "tensorboard", ".stages"):
                 (self.path / name).mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -126,18 +128,19 @@ class RunFolder:
                 self.path, "", f"can't be written: {error.strerror}", "choose a folder with --out"
             ) from None
 
-    def _check_owner(self, campaign: str) -> None:
+    def _check_owner(self, campaign: str, quick: bool) -> None:
         if self.path.exists() and not self.path.is_dir():
             raise UsageError.of(self.path, "", "is a file", "choose a folder with --out")
         if self.manifest_file.exists():
-            owner = self.manifest()["name"]
-            if owner != campaign:
-                raise UsageError.of(
-                    self.path,
-                    "",
-                    f"belongs to campaign {owner!r}, not {campaign!r}",
-                    "choose another folder with --out",
-                )
+            manifest = self.manifest()
+            wrong = ""
+            if manifest["name"] != campaign:
+                wrong = f"belongs to campaign {manifest['name']!r}, not {campaign!r}"
+            elif bool(manifest.get("quick")) != quick:
+                kinds = ("a full run, which a quick one", "a quick run, which a full one")
+                wrong = f"holds {kinds[not quick]} would overwrite"
+            if wrong:
+                raise UsageError.of(self.path, "", wrong, "choose another folder with --out")
         elif self.path.is_dir() and any(self.path.iterdir()):
             raise UsageError.of(self.path, "", "is not empty and not a run folder", "choose another folder with --out")
 

@@ -89,7 +89,7 @@ def conditions_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, 
 
 
 def carry_out(stage: Stage, conditions: Conditions, report: Callable[[int, int], None]) -> dict[str, Any]:
-    """Do a stage and mark it done; says what came of it. What it wrote from other inputs is dropped first."""
+    """Do a stage, mark it done if all went well, say what came of it. What it wrote from other inputs is dropped."""
     folder, key = RunFolder(conditions.folder), conditions.keys[stage.id]
     work = folder.work(stage.id)
     started_from = work / "key"
@@ -102,7 +102,8 @@ def carry_out(stage: Stage, conditions: Conditions, report: Callable[[int, int],
     do = _train if isinstance(stage, TrainingStage) else _assess
     info = do(stage, conditions, folder, scene, report)  # type: ignore[arg-type]
     info["seconds"] = round(time.monotonic() - began, 1)
-    folder.finish(stage.id, key, info)
+    if not info.get("errors"):  # failures are not kept: the next run tries those games again
+        folder.finish(stage.id, key, info)
     return info
 
 

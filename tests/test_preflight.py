@@ -45,7 +45,13 @@ def test_open_campaign__the_papers(repository: Path) -> None:
     assert [persona.name for persona in campaign.personas] == ["speedy", "distracted"]
     assert campaign.ego_persona.name == "careful"
     assert campaign.document.training.steps == 3_000_000
-    assert {Path(name).name for name in campaign.hashes} >= {"merge.toml", "careful.toml", "speedy.toml", "scene.toml", "merge.net.xml"}
+    assert {Path(name).name for name in campaign.hashes} >= {
+        "merge.toml",
+        "careful.toml",
+        "speedy.toml",
+        "scene.toml",
+        "merge.net.xml",
+    }
     assert all(len(each) == 64 for each in campaign.hashes.values())
 
 

@@ -59,6 +59,13 @@ def test_claim__another_campaigns_is_refused_untouched(folder: RunFolder) -> Non
     assert folder.manifest() == MANIFEST
 
 
+@pytest.mark.parametrize("quick", [False, True])
+def test_claim__a_full_run_and_a_quick_one_do_not_overwrite_each_other(quick: bool, folder: RunFolder) -> None:
+    folder.write_manifest({**MANIFEST, "quick": not quick})
+    assert "would overwrite" in problem_of(lambda: folder.claim("tiny", quick))
+    folder.claim("tiny", not quick)
+
+
 def test_claim__a_folder_of_something_else_is_refused_untouched(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("x")
     assert "not empty" in problem_of(lambda: RunFolder(tmp_path).claim("tiny"))
@@ -133,6 +140,9 @@ def test_finished__only_with_the_key_of_these_inputs(folder: RunFolder) -> None:
     folder.work("naive-seed1").mkdir()
     assert folder.finished("naive-seed1", "key") is None
     folder.finish("naive-seed1", "key", {"steps": 7})
+    assert folder.finished("naive-seed1", "key") is None  # the policy it made is not there
+    folder.policy("naive-seed1").mkdir()
+    (folder.policy("naive-seed1") / "policy.safetensors").touch()
     assert folder.finished("naive-seed1", "key") == {"steps": 7}
     assert folder.finished("naive-seed1", "another") is None
     assert folder.finished("speedy-seed1", "key") is None
