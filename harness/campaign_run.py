@@ -25,6 +25,8 @@ from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay import choose_games, replay_name, worst_first, write_replay
 from harness.reports.page import render_page
+from harness.reports.results import results
+from harness.reports.wording import ARMS, Verdicts
 from harness.rounds import AssessmentStage, Stage, TrainingStage, plan, questions, stage_id
 from harness.run_folder import FORMAT, MANIFEST, RunFolder
 from harness.stages import conditions_of, stage_keys
@@ -51,7 +53,8 @@ _PACKAGES = (
 class Outcome:
     """What a run came to."""
 
-    comparisons: pd.DataFrame
+    verdicts: Sequence[tuple[str, Verdicts]]
+    """Of each persona and question."""
     failed_stages: tuple[str, ...]
     error_games: int
 
@@ -160,7 +163,9 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
         )
     write_atomically(folder.path / "report.html", page.encode())
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] != "done")
-    return Outcome(comparisons, failed, int((episodes["error"] != "").sum()))
+    found = results(manifest, episodes, summary, comparisons)
+    verdicts = [(persona, found.verdicts(each, persona)) for persona in manifest["personas"] for each in ARMS]
+    return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))
 
 
 def questions_of(manifest: Mapping[str, Any]) -> list[Any]:

@@ -79,7 +79,7 @@ def campaign(
     except KeyboardInterrupt:
         console.print("Interrupted. What was done is kept: run the same command again to go on.")
         raise typer.Exit(INTERRUPTED) from None
-    _show(outcome.comparisons, folder.path, console)
+    _show(outcome.verdicts, folder.path, console)
     if outcome.failed_stages:
         console.print(f"Not finished: {', '.join(outcome.failed_stages)}", style="red", highlight=False)
     if outcome.error_games:
@@ -122,7 +122,7 @@ def report(run: RunPath) -> None:
 
     console = Console()
     outcome = write_results(RunFolder(run), console)
-    _show(outcome.comparisons, run, console)
+    _show(outcome.verdicts, run, console)
 
 
 @app.command()
@@ -138,34 +138,43 @@ def replay(
         int | None, typer.Option(help="The training seed.  [default: the campaign's first]", show_default=False)
     ] = None,
     list_games: Annotated[bool, typer.Option("--list", help="List the games there are, worst first.")] = False,
+    film_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--film",
+            metavar="FILE",
+            help="Write the game as a film, .gif or .mp4, instead; needs no screen.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
     """Watch a game in SUMO-GUI, exactly as it was played. Without ARM or EPISODE: list the games there are."""
     from rich.console import Console
 
-    from harness.watching import game_table, watch
+    from harness.errors import UsageError
+    from harness.watching import film, found_game, game_table, watch
 
     console = Console()
+    if film_file is not None and (list_games or arm is None or episode is None):
+        raise UsageError.of("--film", str(film_file), "is of one game", "name it: harness replay RUN ARM EPISODE")
     if list_games or arm is None or episode is None:
         console.print(game_table(run, arm))
         return
-    folder, process = watch(run, arm, episode, seed)
-    message = f"SUMO-GUI plays {folder}; press its play button. Closing it ends this command."
-    console.print(message, highlight=False, markup=False, soft_wrap=True)
-    process.wait()
+    with found_game(run, arm, episode, seed) as game:
+        if film_file is None:
+            watch(game, console)
+        else:
+            film(game, film_file, console)
 
 
-def _show(comparisons: Any, run: Path, console: Any) -> None:
-    from rich.box import SIMPLE
-    from rich.table import Table
-
-    table = Table(title="What is real", title_justify="left", box=SIMPLE, padding=0)
-    for name in ("question", "persona", "seed", "metric", "mean difference", "p", "p (Holm)", "verdict"):
-        table.add_column(name, overflow="fold")
-    for row in comparisons.itertuples():
-        values = (row.mean_difference, row.p_value, row.p_holm)
-        numbers = ("" if value != value else f"{value:.3g}" for value in values)
-        table.add_row(row.question, row.persona, str(row.seed), row.metric, *numbers, row.verdict)
-    console.print(table)
+def _show(verdicts: Any, run: Path, console: Any) -> None:
+    styles = {"harm": "red", "mended": "green", "open": "yellow"}
+    for persona, verdict in verdicts:
+        label = f"{persona}, {verdict.question}: {verdict.label}"
+        console.print(label, style=f"bold {styles[verdict.tone]}", highlight=False, markup=False)
+        for sentence in (verdict.sentence, verdict.speed):
+            if sentence:
+                console.print(f"  {sentence}", highlight=False, markup=False)
     console.print(f"Report: {run / 'report.html'}", highlight=False, markup=False, soft_wrap=True)
 
 

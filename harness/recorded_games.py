@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -89,10 +90,7 @@ def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedG
         game.ego_outcome or game.non_ego_outcome,
         players,
         [Track(**_track(name, piece, sizes_m)) for name, rows in by_name.items() for piece in _pieces(rows)],
-        [
-            Touch(touch.time_s, touch.x_m, touch.y_m, touch.label)
-            for touch in contacts(trace, types, scene.rail_lines)
-        ],
+        [Touch(touch.time_s, touch.x_m, touch.y_m, touch.label) for touch in contacts(trace, types, scene.rail_lines)],
     )
 
 
@@ -107,13 +105,11 @@ def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
     """A road user's rows, cut where it was not there for a while."""
     cuts = np.flatnonzero(np.diff(rows["step"].to_numpy()) > 1) + 1
     edges = [0, *cuts.tolist(), len(rows)]
-    for first, end in zip(edges, edges[1:], strict=False):
+    for first, end in pairwise(edges):
         yield rows.iloc[first:end]
 
 
 def scene_drawing(scene: OpenScene) -> SceneDrawing:
     """What the player draws of a scene."""
     net = read_net(scene.net_file)
-    return SceneDrawing(
-        drawing.surfaces(net), drawing.lane_marks(net), scene.rail_lines, drawing.goal_line(scene, net)
-    )
+    return SceneDrawing(drawing.surfaces(net), drawing.lane_marks(net), scene.rail_lines, drawing.goal_line(scene, net))

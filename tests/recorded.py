@@ -48,14 +48,10 @@ def recorded_game(row, others=2):
         place = (players[0].x_m[-1], players[0].y_m[-1] - 0.9 if outcome == "collision" else 0.0)
         touches.append(Touch(float(time[-1]), *map(float, place), f"{outcome} at {time[-1]:.1f} s"))
     along = [
-        Track(
-            f"car {n}", 5.0, 1.8, 0, 80 + 30 * n + 9.0 * time, np.full(len(time), -1.6), 0 * time, 0 * time + 9.0
-        )
+        Track(f"car {n}", 5.0, 1.8, 0, 80 + 30 * n + 9.0 * time, np.full(len(time), -1.6), 0 * time, 0 * time + 9.0)
         for n in range(others)
     ]
-    return RecordedGame(
-        row.arm, row.persona, row.seed, row.episode, STEP_S, ends, outcome, players, along, touches
-    )
+    return RecordedGame(row.arm, row.persona, row.seed, row.episode, STEP_S, ends, outcome, players, along, touches)
 
 
 def _player(name, time, x_m, y_m, speed_mps, random, outcome):

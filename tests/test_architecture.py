@@ -54,10 +54,10 @@ ALLOWED: dict[str, set[str]] = {
     },
     "workers": {"errors", "rounds", "stages"},
     "reports": {"errors", "comparison", "tables", "manoeuvres"},
-    "replay": {"errors", "game"},
+    "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
     "watching": {
-        *("errors", "documents", "traffic", "replay", "rounds", "run_folder", "tables", "trace_file"),
+        *("errors", "documents", "traffic", "replay", "rounds", "run_folder", "tables", "trace_file", "manoeuvres"),
     },
     "progress": {"rounds", "workers"},
     "campaign_run": {
@@ -254,9 +254,7 @@ def test_names__say_something(path: Path) -> None:
     assert not words & FORBIDDEN_WORDS
 
 
-@pytest.mark.parametrize(
-    "path", sorted(path for path in PACKAGE.rglob("*") if path.suffix in LONGEST), ids=label
-)
+@pytest.mark.parametrize("path", sorted(path for path in PACKAGE.rglob("*") if path.suffix in LONGEST), ids=label)
 def test_file__stays_short(path: Path) -> None:
     lines = len(path.read_text(encoding="utf-8").splitlines())
     assert lines <= LONGEST[path.suffix], "a file this long is looking for its second noun"

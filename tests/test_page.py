@@ -515,7 +515,7 @@ def test_replays__each_has_the_command_that_opens_it(page):
 def test_replays__those_that_the_page_can_play_are_links(small):
     html = without_curves(small | recordings(small))
     assert '<a href="#game=naive_vs_speedy,1,6">naive_vs_speedy, game 6</a>' in html
-    assert "#game=" not in without_curves(small)
+    assert 'href="#game=' not in without_curves(small)
 
 
 def test_replays__none_is_said_plainly(small):
@@ -614,7 +614,7 @@ def test_manoeuvres__failures_are_counted_by_pair_and_arm(small):
     assert heading[:3] == ["non-ego", "ego", "failures"]
     assert sum(int(row[2]) for row in rows) == len(failed)
     assert sum(int(row[heading.index("naive_vs_speedy")]) for row in rows) == (failed["arm"] == "naive_vs_speedy").sum()
-    assert {(row[0], row[1]) for row in rows} == {("cut-in", "swerve"), ("drift", "hard brake"), ("tailgate", "overtake")}
+    assert [row[:2] for row in rows] == [["cut-in", "swerve"], ["drift", "hard brake"], ["tailgate", "overtake"]]
     assert all(sum(map(int, row[3:])) == int(row[2]) for row in rows)
 
 

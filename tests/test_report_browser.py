@@ -1,49 +1,18 @@
-"""The report in a real browser: Debian's Chromium, driven by Playwright.
-
-What is missing makes these tests skip, and fail where HARNESS_REQUIRE_BROWSER=1.
-"""
+"""The report in a real browser: what is on the page before anything is played."""
 
 from __future__ import annotations
 
-import os
-import shutil
-
 import pytest
-from test_page import campaign, with_errors
+from chromium import launched, opener
+from test_page import campaign, recordings, with_errors
 
 from harness.reports.page import render_page
-
-CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--no-first-run",
-    "--disable-quic",
-]
-
-
-def missing(what):
-    if os.environ.get("HARNESS_REQUIRE_BROWSER") == "1":
-        pytest.fail(f"{what}, and HARNESS_REQUIRE_BROWSER=1 asks for it")
-    pytest.skip(what)
 
 
 @pytest.fixture(scope="module")
 def browser():
-    try:
-        from playwright.sync_api import sync_playwright
-    except ImportError:
-        missing("the package playwright is not installed")
-    executable = next(filter(None, map(shutil.which, CHROMIUM)), None)
-    if executable is None:
-        missing("there is no Chromium (on Debian and Ubuntu: apt-get install chromium)")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=executable, args=ARGUMENTS)
+    with launched() as browser:
         yield browser
-        browser.close()
 
 
 @pytest.fixture(scope="module")
@@ -56,30 +25,14 @@ def report(tmp_path_factory):
 
 def write(folder, arguments):
     path = folder / "report.html"
-    path.write_text(render_page(**arguments), encoding="utf-8")
+    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
     return path
 
 
 @pytest.fixture
 def opened(browser, report):
-    """Opens a report in a window of its own; what the browser complained of or asked for is in `seen`."""
-    contexts = []
-
-    def open_page(path=report, width=1280, height=900, **settings):
-        context = browser.new_context(viewport={"width": width, "height": height}, **settings)
-        contexts.append(context)
-        page = context.new_page()
-        page.seen = []
-        page.on("console", lambda message: page.seen.append(message.text))
-        page.on("pageerror", lambda error: page.seen.append(str(error)))
-        page.on("dialog", lambda dialog: (page.seen.append(dialog.message), dialog.dismiss()))
-        page.on("request", lambda request: page.seen.append(request.url) if request.url != path.as_uri() else None)
-        page.goto(path.as_uri())
-        return page
-
-    yield open_page
-    for context in contexts:
-        context.close()
+    with opener(browser, report) as open_page:
+        yield open_page
 
 
 def test_report__opens_from_a_file_without_a_complaint_or_a_request(opened):
@@ -98,6 +51,9 @@ def test_report__the_verdicts_are_on_the_first_screen(opened):
         assert box["y"] + box["height"] < 900
     assert page.get_by_text("Quick run").is_visible()
     assert page.get_by_text("The speedy driver makes the naive ego fail in 18 of 60 games").is_visible()
+    for part in (".clip canvas", ".rates .retrained strong"):
+        box = page.locator(part).first.bounding_box()
+        assert box["y"] + box["height"] < 900
 
 
 @pytest.mark.parametrize("width", [400, 320, 1280])
@@ -144,7 +100,9 @@ def test_report__prints_with_its_verdicts_and_figures(opened):
     page.emulate_media(media="print")
     assert page.get_by_text("RQ1: yes").first.is_visible()
     assert page.locator("figure svg").first.is_visible()
-    assert not page.locator("nav").is_visible()
+    assert page.locator("#player canvas").first.is_visible()
+    for gone in ("nav", ".clock", ".filters"):
+        assert not page.locator(gone).first.is_visible()
     assert page.pdf().startswith(b"%PDF")
 
 

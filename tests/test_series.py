@@ -23,7 +23,7 @@ def drawn(**players):
     return pd.DataFrame(rows)
 
 
-SIZES_M = {name: (4.6, 1.8) for name in (*ROLES, "other")}
+SIZES_M = dict.fromkeys((*ROLES, "other"), (4.6, 1.8))
 
 
 def test_series__gap_and_time_to_a_slower_leader(merge):
@@ -55,11 +55,9 @@ def test_series__what_is_after_the_end_is_not_driven(merge):
 def test_series__are_what_the_records_were_made_of(run):
     folder = run()
     episodes = read_csv(folder / "episodes.csv").set_index(["arm", "episode"])
-    games = list(
-        recorded_games(
-            episodes.reset_index(), lambda arm, seed: folder / "traces" / f"{arm}-seed{seed}.parquet", open_scene(folder / "scene")
-        )
-    )
+    scene = open_scene(folder / "scene")
+    traces = folder / "traces"
+    games = list(recorded_games(episodes.reset_index(), lambda arm, seed: traces / f"{arm}-seed{seed}.parquet", scene))
     assert len(games) == len(episodes)
     for game in games:
         row = episodes.loc[(game.arm, game.episode)]

@@ -84,20 +84,7 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
     return Card(
         persona,
         f"persona-{place}",
-        [
-            (
-                words,
-                wording.verdicts(
-                    question,
-                    persona,
-                    found.asked(question, persona),
-                    [row for row in rows if row["question"] == question],
-                    found.arms,
-                    found.significance,
-                ),
-            )
-            for question, words in QUESTIONS.items()
-        ],
+        [(words, found.verdicts(question, persona)) for question, words in QUESTIONS.items()],
         [_rate(label, series, found.of(arm)) for label, series, arm in arms],
         _facts(persona, retrained, found),
         [_test(row) for row in rows],

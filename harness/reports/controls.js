@@ -31,14 +31,11 @@ function control(root) {
   }
 
   async function open(key, other, time) {
-    if (!await player.open(key, other, time)) {
-      say("That game is not in this page. Open it from the run folder with: harness replay");
-      return false;
-    }
+    if (!await player.open(key, other, time)) return false;
     choice.value = key;
     offer(player.game);
     beside.value = player.beside ? keyOf(player.beside) : "";
-    root.dataset.ready = "yes";
+    root.dataset.ready ??= Math.round(performance.now()); // milliseconds since the page was asked for
     say("");
     return true;
   }
@@ -119,7 +116,11 @@ function control(root) {
     event.preventDefault();
     action();
   });
-  slider.addEventListener("input", () => { player.pause(); player.seek(Number(slider.value)); });
+  slider.addEventListener("input", () => {
+    const wanted = Number(slider.value); // before pausing, which shows where the clock is
+    player.pause();
+    player.seek(wanted);
+  });
   slider.addEventListener("change", remember);
   speed.addEventListener("change", () => { player.speed = Number(speed.value); });
   choice.addEventListener("change", () => to(choice.value));
@@ -132,6 +133,7 @@ function control(root) {
     const found = wanted && await open(wanted.key, wanted.beside, wanted.time);
     if (!found && !player.game) await open(order[0]);
     if (!wanted) return;
+    if (!found) say("That game is not in this page. It is in the run folder: harness replay opens it.");
     root.scrollIntoView({ behavior: moved && !stillMotion.matches ? "smooth" : "auto" });
     root.focus({ preventScroll: true });
     if (found && moved && wanted.time === undefined && !stillMotion.matches) {

@@ -12,11 +12,11 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from harness.reports.figures import INK, SERIES, figure_of, svg
+from harness.reports.games import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = NDArray[np.float64]
 QUANTITIES = {
     "ego_mean_speed_mps": "average speed (m/s)",
     "ego_trailing_distance_m": "trailing distance (m)",
@@ -123,13 +123,15 @@ def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> 
             labels = [label for label, *_ in spread.arms]
             axes.set_xticks(range(len(labels)), labels, fontsize=8)
             axes.tick_params(axis="x", length=0)
+            axes.tick_params(axis="y", labelsize=9)
         return svg(figure, name, alternative)
 
 
 def _games(axes: Axes, x: FloatArray, values: FloatArray, failed: NDArray[np.bool_], series: str) -> None:
     """Games as dots, failed ones as crosses."""
     measured = np.isfinite(values)
-    for chosen, marker, size, alpha in ((measured & ~failed, "o", 2.4, _WELL_ALPHA), (measured & failed, "x", 4.2, _FAILED_ALPHA)):
+    well = (measured & ~failed, "o", 2.4, _WELL_ALPHA)
+    for chosen, marker, size, alpha in (well, (measured & failed, "x", 4.2, _FAILED_ALPHA)):
         if chosen.any():
             axes.plot(
                 x[chosen], values[chosen], marker, color=SERIES[series], markersize=size, alpha=alpha,

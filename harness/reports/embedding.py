@@ -110,7 +110,9 @@ def _game(game: RecordedGame, marks: Sequence[Mapping[str, Any]]) -> dict[str, A
         "steps": game.steps,
         "outcome": game.outcome,
         "leastTime": round(measured[0], 2) if measured else None,
-        "players": [_track(player) | {"outcome": player.outcome, "ended": player.ended_step} for player in game.players],
+        "players": [
+            _track(player) | {"outcome": player.outcome, "ended": player.ended_step} for player in game.players
+        ],
         "others": [_track(other) for other in game.others],
         "touches": [[round(each.time_s, 3), round(each.x_m, 2), round(each.y_m, 2)] for each in game.touches],
         "marks": list(marks),

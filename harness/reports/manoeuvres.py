@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.manoeuvres import pairs_in
+from harness.manoeuvres import Manoeuvre, Pair, pairs_in
 from harness.reports.games import key
 
 NONE_NAMED = "–"
@@ -53,23 +53,23 @@ def failures_by_pair(manoeuvres: pd.DataFrame, episodes: pd.DataFrame) -> tuple[
     found = pairs_in(manoeuvres)
     grouped: dict[tuple[str, str], list[FailedGame]] = {}
     for game in failed.itertuples():
-        pair = found.get((game.arm, game.seed, game.episode))
-        led = [each for each in ((pair.non_ego, pair.ego) if pair else ()) if each]
+        pair = found.get((game.arm, game.seed, game.episode), Pair(None, None))
+        led = [each for each in (pair.non_ego, pair.ego) if each]
         begins_s = min((each.time_s for each in led), default=float(game.duration_s))
         text = "; ".join(each.text for each in led if each.text)
-        shown = FailedGame(
-            game.arm, game.seed, game.episode, game.ego_outcome, max(begins_s - RUN_UP_S, 0.0), text
-        )
-        names = [
-            words(each.manoeuvre) if each else NONE_NAMED for each in ((pair.non_ego, pair.ego) if pair else (None, None))
-        ]
-        grouped.setdefault((names[0], names[1]), []).append(shown)
+        shown = FailedGame(game.arm, game.seed, game.episode, game.ego_outcome, max(begins_s - RUN_UP_S, 0.0), text)
+        grouped.setdefault((_name(pair.non_ego), _name(pair.ego)), []).append(shown)
     rows = [
         Failures(non_ego, ego, [sum(game.arm == arm for game in games) for arm in arms], games)
         for (non_ego, ego), games in grouped.items()
     ]
     nameless = (NONE_NAMED, NONE_NAMED)
-    return arms, sorted(rows, key=lambda row: ((row.non_ego, row.ego) == nameless, -len(row.games), row.non_ego, row.ego))
+    rows.sort(key=lambda row: ((row.non_ego, row.ego) == nameless, -len(row.games), row.non_ego, row.ego))
+    return arms, rows
+
+
+def _name(manoeuvre: Manoeuvre | None) -> str:
+    return words(manoeuvre.manoeuvre) if manoeuvre else NONE_NAMED
 
 
 def marks_of(manoeuvres: pd.DataFrame | None) -> Mapping[str, Sequence[Mapping[str, Any]]]:

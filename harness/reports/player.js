@@ -23,8 +23,8 @@ class Player {
   /** Show a game, or two, at a time; without one at the moment that matters. */
   async open(key, beside, time) {
     const turn = ++this.opening;
+    if (!games.has(key)) return false;
     const chosen = [games.get(key), games.get(beside)].filter(Boolean);
-    if (!chosen.length) return false;
     await Promise.all(chosen.map(opened));
     if (turn !== this.opening) return true; // another game was asked for meanwhile
     this.pause();

@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.reports import wording
-from harness.reports.wording import Row, played
+from harness.reports.wording import Row, Verdicts, played
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,12 @@ class Results:
         _, treatment = wording.ARMS[question](persona)
         compared = {row["seed"] for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)}
         return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.planned or seed in compared]
+
+    def verdicts(self, question: str, persona: str) -> Verdicts:
+        """The answer to a question about a persona, in words."""
+        rows = [row for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)]
+        seeds = self.asked(question, persona)
+        return wording.verdicts(question, persona, seeds, rows, self.arms, self.significance)
 
 
 def results(

@@ -201,8 +201,12 @@ class Strips {
         context.font = `600 ${FONT}`;
         context.textAlign = "right";
         context.textBaseline = "alphabetic";
-        const digits = Math.abs(value) < 99.95 ? 1 : 0;
-        context.fillText(value.toFixed(digits).replace("-", "−"), width - RIGHT - place * 42, this.top + row * ROW + 12);
+        const text = value.toFixed(Math.abs(value) < 99.95 ? 1 : 0).replace("-", "−");
+        const at = [width - RIGHT - place * 42, this.top + row * ROW + 12];
+        context.strokeStyle = palette.paper;
+        context.lineWidth = 4;
+        context.strokeText(text, ...at);
+        context.fillText(text, ...at);
       });
     }
   }

@@ -39,9 +39,7 @@ def tiled_net(net_file: Path, games: int) -> Path:
     """A net with G tiles of the scene's net: the net itself for one game, else from the cache."""
     if games == 1:
         return net_file
-    digest = hashlib.sha256(net_file.read_bytes() + f"{games} {_GAP_M} {sumo.__file__}".encode()).hexdigest()[
-        :24
-    ]
+    digest = hashlib.sha256(net_file.read_bytes() + f"{games} {_GAP_M} {sumo.__file__}".encode()).hexdigest()[:24]
     cache = Path(platformdirs.user_cache_dir("harness")) / "tiles"
     cache.mkdir(parents=True, exist_ok=True)
     merged = cache / f"{digest}.net.xml"

@@ -1,0 +1,129 @@
+"""SUMO-GUI steered from here by TraCI: it plays a replay folder, follows a vehicle, takes pictures.
+
+While a client that doesn't step keeps the connection, SUMO-GUI can't be closed by its user (1.28): so nothing here
+waits between steps. SUMO-GUI itself waits, as long as its delay says, at breakpoints, and when its user halts it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import traci
+from sumolib.miscutils import getFreeSocketPort
+from traci.exceptions import FatalTraCIError, TraCIException
+
+from harness.errors import SimulationError
+
+_CONNECTS_WITHIN_S = 60.0
+_TRIES_EVERY_S = 0.1
+_ENDS_WITHIN_S = 10.0
+
+
+class WindowClosed(SimulationError):
+    """SUMO-GUI has ended, or its user closed it."""
+
+
+class Window:
+    """A SUMO-GUI that waits for steps."""
+
+    def __init__(self, connection: Any, process: subprocess.Popen[bytes]) -> None:
+        self._connection, self.process = connection, process
+        self._view = connection.gui.getIDList()[0]
+
+    def step(self) -> None:
+        """Let it play a step, at its own pace. Raises WindowClosed when it has gone."""
+        with self._open():
+            self._connection.simulationStep()
+
+    def has(self, vehicle: str) -> bool:
+        """Whether a vehicle is there."""
+        with self._open():
+            return vehicle in self._connection.vehicle.getIDList()
+
+    def follow(self, vehicle: str) -> None:
+        """Keep a vehicle that is there in the middle."""
+        with self._open():
+            self._connection.gui.trackVehicle(self._view, vehicle)
+
+    def look_at(self, x_m: float, y_m: float, width_m: float, height_m: float) -> None:
+        """Show a piece of road around a point."""
+        half_width, half_height = 0.5 * width_m, 0.5 * height_m
+        with self._open():
+            self._connection.gui.setBoundary(
+                self._view, x_m - half_width, y_m - half_height, x_m + half_width, y_m + half_height
+            )
+
+    def photograph_next(self, file: Path, size_px: tuple[int, int]) -> None:
+        """Take a picture of what the next step shows; it is there when that step is done."""
+        with self._open():
+            self._connection.gui.screenshot(self._view, str(file), *size_px)
+
+    def release(self) -> None:
+        """End the simulation; the window stays, as long as its user wants."""
+        with contextlib.suppress(TraCIException, FatalTraCIError, OSError):
+            self._connection.close(wait=False)
+
+    @contextlib.contextmanager
+    def _open(self) -> Iterator[None]:
+        try:
+            yield
+        except (FatalTraCIError, OSError) as error:
+            raise WindowClosed(f"SUMO-GUI has ended: {error}") from error
+
+
+@contextlib.contextmanager
+def steered_gui(program: Path, options: list[str], environment: Mapping[str, str]) -> Iterator[Window]:
+    """Start SUMO-GUI with these options and steer it; it is ended when the block is left.
+
+    Raises SimulationError, with what SUMO-GUI said, if it can't start.
+    """
+    port = getFreeSocketPort()
+    with tempfile.TemporaryFile() as said:
+        process = subprocess.Popen(
+            [str(program), *options, "--remote-port", str(port)], env=dict(environment), stdout=said, stderr=said
+        )
+        try:
+            try:
+                connection = _connect(port, process)
+            except OSError as error:
+                said.seek(0)
+                words = said.read().decode(errors="replace").strip() or str(error)
+                raise SimulationError(f"SUMO-GUI can't start: {words}") from None
+            yield Window(connection, process)
+        finally:
+            _end(process)
+
+
+def _connect(port: int, process: subprocess.Popen[bytes]) -> Any:
+    until = time.monotonic() + _CONNECTS_WITHIN_S
+    while True:
+        # traci's own retrying prints to the user's terminal
+        with contextlib.suppress(FatalTraCIError, TraCIException, OSError):
+            return traci.connect(port, numRetries=0, proc=process)
+        if process.poll() is not None:
+            raise OSError(f"it ended with exit code {process.returncode}")
+        if time.monotonic() > until:
+            raise OSError(f"it did not answer within {_CONNECTS_WITHIN_S:.0f} s")
+        time.sleep(_TRIES_EVERY_S)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(timeout=_ENDS_WITHIN_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+def gui_environment(home: Path, display: str | None = None) -> dict[str, str]:
+    """The environment for a SUMO-GUI of the SUMO at `home`, on the screen `display` (None: the user's)."""
+    environment = os.environ | {"SUMO_HOME": str(home)}
+    return environment | ({"DISPLAY": display} if display else {})

@@ -1,0 +1,85 @@
+"""A real browser for tests of the report: Debian's Chromium, driven by Playwright.
+
+What is missing makes these tests skip, and fail where HARNESS_REQUIRE_BROWSER=1.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import time
+from contextlib import contextmanager
+
+import pytest
+
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--no-first-run",
+    "--disable-quic",
+]
+
+
+def missing(what):
+    if os.environ.get("HARNESS_REQUIRE_BROWSER") == "1":
+        pytest.fail(f"{what}, and HARNESS_REQUIRE_BROWSER=1 asks for it")
+    pytest.skip(what)
+
+
+@contextmanager
+def launched():
+    """The browser."""
+    try:
+        from playwright.sync_api import sync_playwright
+    except ImportError:
+        missing("the package playwright is not installed")
+    executable = next(filter(None, map(shutil.which, CHROMIUM)), None)
+    if executable is None:
+        missing("there is no Chromium (on Debian and Ubuntu: apt-get install chromium)")
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=executable, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def opener(browser, report):
+    """Opens a report in a window of its own; what the browser complained of or asked for is in `seen`."""
+    contexts = []
+
+    def open_page(path=report, width=1280, height=900, fragment="", **settings):
+        context = browser.new_context(viewport={"width": width, "height": height}, **settings)
+        contexts.append(context)
+        page = context.new_page()
+        page.seen = []
+        ours = path.as_uri()
+        page.on("console", lambda message: page.seen.append(message.text))
+        page.on("pageerror", lambda error: page.seen.append(str(error)))
+        page.on("dialog", lambda dialog: (page.seen.append(dialog.message), dialog.dismiss()))
+        page.on(
+            "request",
+            lambda request: (
+                page.seen.append(request.url)
+                if request.url.partition("#")[0] != ours and not request.url.startswith("blob:")
+                else None
+            ),
+        )
+        page.goto(ours + fragment)
+        return page
+
+    yield open_page
+    for context in contexts:
+        context.close()
+
+
+def until(page, expression, argument=None, seconds=20.0):
+    """Wait until a function of JavaScript is true; Playwright's own way of waiting breaks the page's policy."""
+    end = time.monotonic() + seconds
+    while not page.evaluate(expression, argument):
+        if time.monotonic() > end:
+            pytest.fail(f"waited {seconds:g} s in vain for: {expression}")
+        page.wait_for_timeout(20)
