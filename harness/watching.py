@@ -1,19 +1,24 @@
-"""Finding a recorded game in a run folder and opening it in SUMO-GUI."""
+"""Finding a recorded game in a run folder and showing it: in SUMO-GUI, or as a film."""
 
 from __future__ import annotations
 
-import subprocess
-import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pandas as pd
 from rich.box import SIMPLE
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
 from harness.documents.reading import nearest
 from harness.errors import UsageError
-from harness.replay import open_in_sumo_gui, replay_name, worst_first, write_replay
+from harness.manoeuvres import pairs_in
+from harness.replay import follow_in_sumo_gui, replay_name, worst_first, write_film, write_replay
 from harness.rounds import stage_id
 from harness.run_folder import RunFolder
 from harness.tables import read_csv
@@ -22,29 +27,46 @@ from harness.traffic.opening import open_scene
 
 
 def game_table(run: Path, arm: str | None) -> Table:
-    """The games of a run, or of one arm of it, worst first."""
-    episodes = _episodes(RunFolder(run))
+    """The games of a run, or of one arm of it, worst first, with what the non-ego did and how the ego answered."""
+    folder = RunFolder(run)
+    episodes = _episodes(folder)
+    named = folder.path / "manoeuvres.csv"
+    pairs = pairs_in(read_csv(named)) if named.is_file() else {}
+    missing = "" if named.is_file() else f"; name the manoeuvres: harness report {run}"
     if arm is not None:
         episodes = _of_arm(run, episodes, arm)
     table = Table(
         title=Text(f"Games of {run}, worst first"),
         title_justify="left",
-        caption="watch one: harness replay RUN ARM EPISODE",
+        caption=Text(f"watch one: harness replay RUN ARM EPISODE{missing}"),
         box=SIMPLE,
         padding=0,
     )
-    for name in ("arm", "seed", "episode", "ego", "non-ego", "least TTC (s)", "duration (s)"):
-        table.add_column(name, overflow="fold", no_wrap=name == "arm")
+    for name in ("arm", "seed", "episode", "ego", "non-ego", "manoeuvres", "TTC (s)"):
+        table.add_column(name, overflow="fold", no_wrap=name in ("arm", "ego", "non-ego"))
     for game in worst_first(episodes).itertuples():
-        seconds = ("" if pd.isna(value) else f"{value:.1f}" for value in (game.ego_min_ttc_s, game.duration_s))
-        table.add_row(game.arm, str(game.seed), str(game.episode), game.ego_outcome, game.non_ego_outcome, *seconds)
+        ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
+        pair = pairs.get((game.arm, game.seed, game.episode))
+        words = (str(game.seed), str(game.episode), game.ego_outcome, game.non_ego_outcome, pair.words if pair else "")
+        table.add_row(game.arm, *words, ttc)
     return table
 
 
-def watch(run: Path, arm: str, episode: int, seed: int | None) -> tuple[Path, subprocess.Popen[bytes]]:
-    """Open a game in SUMO-GUI; one that has no replay folder yet gets one from its trace.
+@dataclass(frozen=True)
+class FoundGame:
+    """A recorded game, ready to be shown."""
 
-    Raises UsageError if there is no such game, it could not be played, or there is no screen.
+    replay: Path
+    trace: pd.DataFrame
+    title: str
+    step_length_s: float
+
+
+@contextmanager
+def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
+    """A game with its replay folder; one that has none yet gets one from its trace, for as long as the block lasts.
+
+    Raises UsageError if there is no such game, or it could not be played.
     """
     folder = RunFolder(run)
     chosen_seed = folder.manifest()["seeds"][0] if seed is None else seed
@@ -59,20 +81,49 @@ def watch(run: Path, arm: str, episode: int, seed: int | None) -> tuple[Path, su
         )
     if found.iloc[0]["error"]:
         raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {found.iloc[0]['error']}", "choose another")
-    replay = folder.replays / replay_name(arm, chosen_seed, episode)
-    if not replay.is_dir():
-        replay = Path(tempfile.mkdtemp(prefix="harness-replay-")) / replay.name
-        scene = open_scene(folder.scene)
-        write_replay(
-            read_trace(folder.traces(stage_id(arm, chosen_seed)), episode),
-            scene.net_file,
-            scene.routes.path,
-            replay,
-            title=f"{arm}, seed {chosen_seed}, episode {episode}",
-            step_length_s=scene.world.step_s,
-            rails=scene.rail_lines,
+    scene = open_scene(folder.scene)
+    trace = read_trace(folder.traces(stage_id(arm, chosen_seed)), episode)
+    title = f"{arm}, seed {chosen_seed}, episode {episode}"
+    name = replay_name(arm, chosen_seed, episode)
+    with TemporaryDirectory(prefix="harness-replay-") as scratch:
+        replay = folder.replays / name
+        if not replay.is_dir():
+            replay = Path(scratch) / name
+            write_replay(
+                trace,
+                scene.net_file,
+                scene.routes.path,
+                replay,
+                title=title,
+                step_length_s=scene.world.step_s,
+                rails=scene.rail_lines,
+            )
+        yield FoundGame(replay, trace, title, scene.world.step_s)
+
+
+def watch(game: FoundGame, console: Console) -> None:
+    """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen or no SUMO-GUI."""
+    message = (
+        f"SUMO-GUI plays {game.replay} at half the speed of life, following the ego. It halts at a contact and at the "
+        "end: its play button goes on. Closing it ends this command."
+    )
+    follow_in_sumo_gui(game.replay, lambda: console.print(message, highlight=False, markup=False, soft_wrap=True))
+
+
+def film(game: FoundGame, file: Path, console: Console) -> None:
+    """Write a game as a film, with a bar that says how long it will take. Raises UsageError for what is missing."""
+    columns = (TextColumn("filming"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task("filming", total=None)
+        pictures = write_film(
+            game.replay,
+            game.trace,
+            file,
+            title=game.title,
+            step_length_s=game.step_length_s,
+            report=lambda done, total: bar.update(task, completed=done, total=total),
         )
-    return replay, open_in_sumo_gui(replay)
+    console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
 
 
 def _episodes(folder: RunFolder) -> pd.DataFrame:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from harness.assessment import Arm, assess
 from harness.documents.persona import Persona
 from harness.documents.reading import read_document
 from harness.game.arrays import FloatArray, IntArray
-from harness.manoeuvres import Manoeuvre, find_manoeuvres, manoeuvres_in, pair_of, pairs_in, rows_of
+from harness.manoeuvres import NAMES, Manoeuvre, find_manoeuvres, manoeuvres_in, pair_of, pairs_in, rows_of, thresholds
 from harness.tables import MANOEUVRE_COLUMNS, typed
 from harness.traffic.opening import OpenScene
 
@@ -44,7 +45,7 @@ def car(
     outcome: str = "",
     kind: str = "car",
 ) -> pd.DataFrame:
-    """A car's rows: it begins at `x_m` and is at `y_m` in every step, its nose where it goes; the last has `outcome`."""
+    """A car's rows: it begins at `x_m`, is at `y_m` in every step, its nose where it goes; the last has `outcome`."""
     time = np.arange(steps)
     speed = np.broadcast_to(np.asarray(speed_mps, dtype=float), steps)
     y = np.broadcast_to(np.asarray(y_m, dtype=float), steps)
@@ -504,7 +505,16 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path,
     for game in assess(arm, 12):
         assert game.trace is not None
         trace = pd.DataFrame(dict(game.trace))
-        stories[game.record["episode"]] = pair_of(find_manoeuvres(trace, merge.world)).story(
-            game.record["ego_outcome"]
-        )
+        stories[game.record["episode"]] = pair_of(find_manoeuvres(trace, merge.world)).story(game.record["ego_outcome"])
     assert "drift -> swerve -> rail" in stories.values(), stories
+
+
+# --- the page about them ----------------------------------------------------------------------------------------------
+
+
+def test_docs__state_every_rule_and_number(repository: Path) -> None:
+    page = (repository / "docs" / "manoeuvres.md").read_text(encoding="utf-8")
+    stated = {name: float(value) for name, value in re.findall(r"^\| `([A-Z_0-9]+)` \| ([0-9.]+) \|", page, re.M)}
+    numbers = {name: value for name, value in vars(thresholds).items() if name.isupper()}
+    assert stated == {name: pytest.approx(value, rel=5e-3) for name, value in numbers.items()}
+    assert re.findall(r"^\| `([a-z_]+)` \|", page, re.M) == list(NAMES)

@@ -251,3 +251,9 @@ def test_games__do_not_see_each_other(moment: Moment, world: World) -> None:
     for name in ("leader_gap_m", "time_to_collision_s", "clearance_m", "lane_offset_m", "goal_m", "time_gap_s"):
         expected = np.concatenate((getattr(one, name), getattr(two, name)))
         assert getattr(q, name) == pytest.approx(expected)
+
+
+def test_leader_gap__does_not_hang_on_where_the_routes_stations_lie(moment: Moment, world: World) -> None:
+    # bumper to bumper: 20 m between centres less a car of 4.6 m, wherever on the road (stations lie 0.5 m apart)
+    for x in (50.0, 50.1, 50.25, 50.3, 50.49):
+        assert moment(world, [car(x), car(x + 20.0)]).leader_gap_m[0, 0] == pytest.approx(15.4, abs=1e-9)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import subprocess
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -173,7 +173,12 @@ def play(folder: Path) -> tuple[pd.DataFrame, str]:
 @pytest.mark.parametrize("name", GAMES)
 def test_replay__every_frame_is_the_trace(name: str, merge_net: Path, tmp_path: Path) -> None:
     trace = GAMES[name]()
-    played, printed = play(write(trace, merge_net, tmp_path / name))
+    assert_plays(write(trace, merge_net, tmp_path / name), trace, {name: size[0] for name, size in SIZES.items()})
+
+
+def assert_plays(folder: Path, trace: pd.DataFrame, lengths_m: Mapping[str, float]) -> None:
+    """SUMO shows every frame of the trace and no other: place to 1e-3 m, heading to 0.1 degrees."""
+    played, printed = play(folder)
     assert printed == ""
 
     # the first frame of each vehicle is SUMO putting it into the simulation, a step before it was there
@@ -185,7 +190,7 @@ def test_replay__every_frame_is_the_trace(name: str, merge_net: Path, tmp_path: 
 
     both = trace.merge(played, on=["player", "step"], how="outer", indicator=True)
     assert (both["_merge"] == "both").all(), both[both["_merge"] != "both"]
-    length = both["vehicle_type"].map({name: size[0] for name, size in SIZES.items()}).fillna(5.0)
+    length = both["vehicle_type"].map(lengths_m).fillna(5.0)
     front_x = both["x_m"] + 0.5 * length * np.cos(both["heading_rad"])
     front_y = both["y_m"] + 0.5 * length * np.sin(both["heading_rad"])
     assert np.abs(both["x"] - front_x).max() <= 1e-3
@@ -302,8 +307,8 @@ def test_contacts__one_wreck_after_another(merge_net: Path) -> None:
     assert [contact.label for contact in found] == ["rail at 1.0 s", "collision at 3.1 s"]
 
 
-@pytest.mark.parametrize(("make", "times"), [(collision_game, ["3.300"]), (clean_game, [])])
-def test_view__halts_at_the_contact(
+@pytest.mark.parametrize(("make", "times"), [(collision_game, ["3.300", "4.400"]), (clean_game, ["17.000"])])
+def test_view__halts_at_the_contact_and_at_the_end(
     make: Callable[[], pd.DataFrame], times: list[str], merge_net: Path, tmp_path: Path
 ) -> None:
     folder = write(make(), merge_net, tmp_path / "replay")

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-import select
-import shutil
 import subprocess
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,41 +13,39 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from PIL import Image
+from PIL import Image, ImageGrab
 from test_replay import GAMES, RAILS, STEP_S, collision_game, merge_net, write
 
-from harness.replay import open_in_sumo_gui
+from harness.replay import desktop, follow_in_sumo_gui, open_in_sumo_gui
 from harness.replay.contact import contacts
 from harness.replay.desktop import find_sumo_gui
 from harness.replay.vehicles import types_of_vehicles
 from harness.replay.view import choose_view
+from harness.replay.virtual_screen import find_xvfb, virtual_screen
+from harness.traffic import gui
 
 __all__ = ["merge_net"]  # a fixture of test_replay
 
 
-@pytest.fixture(scope="module")
-def screen() -> Iterator[str]:
-    """The name of a virtual screen. Where there can be none, skips; under HARNESS_REQUIRE_GUI=1, fails."""
-    needed = {"Xvfb": shutil.which("Xvfb"), "sumo-gui": find_sumo_gui()}
+def require_gui() -> None:
+    """Skips where SUMO-GUI can't run on a virtual screen; under HARNESS_REQUIRE_GUI=1, fails."""
+    needed = {"Xvfb": find_xvfb(), "sumo-gui": find_sumo_gui()}
     missing = [name for name, found in needed.items() if not found]
     if missing:
         reason = f"needs {' and '.join(missing)}"
         if os.environ.get("HARNESS_REQUIRE_GUI") == "1":
             pytest.fail(reason)
         pytest.skip(reason)
-    read, write_end = os.pipe()
-    command = ["Xvfb", "-displayfd", str(write_end), "-screen", "0", "1400x900x24", "+extension", "GLX"]
-    server = subprocess.Popen(command, pass_fds=(write_end,), stderr=subprocess.DEVNULL)
-    os.close(write_end)
-    try:
-        ready, _, _ = select.select([read], [], [], 30.0)
-        number = os.read(read, 16).decode().strip() if ready else ""
-        assert number, "Xvfb doesn't start"
-        yield f":{number}"
-    finally:
-        os.close(read)
-        server.terminate()
-        server.wait(timeout=10)
+
+
+@pytest.fixture(scope="module")
+def screen() -> Iterator[str]:
+    """The name of a virtual screen."""
+    require_gui()
+    xvfb = find_xvfb()
+    assert xvfb is not None
+    with virtual_screen(xvfb, (1400, 900)) as name:
+        yield name
 
 
 def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
@@ -135,3 +132,67 @@ def test_gui__halts_at_the_contact(
     finally:
         gui.kill()
         gui.wait(timeout=10)
+
+
+def test_gui__follows_the_ego_and_halts_at_the_contact(
+    screen: str, merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = collision_game()
+    folder = write(trace, merge_net, tmp_path / "replay")
+    settings = folder / "view.xml"
+    settings.write_text(re.sub(r"<delay [^>]*>", '<delay value="20"/>', settings.read_text()))
+    monkeypatch.setenv("DISPLAY", screen)
+    started: list[subprocess.Popen[bytes]] = []
+
+    class Noted(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *arguments: object, **options: object) -> None:
+            super().__init__(*arguments, **options)  # type: ignore[call-overload]
+            started.append(self)
+
+    monkeypatch.setattr(gui.subprocess, "Popen", Noted)
+    opened = threading.Event()
+    watching = threading.Thread(target=follow_in_sumo_gui, args=(folder, opened.set), daemon=True)
+    watching.start()
+    try:
+        assert opened.wait(60.0)
+        pictures = settled(screen)
+        assert watching.is_alive()  # at a halt, or the game would be over long since
+    finally:
+        started[0].kill()  # as when its user closes it
+    watching.join(20.0)
+    assert not watching.is_alive()
+
+    contact = trace[trace["outcome"] == "collision"]["step"].min()
+    expected = trace[trace["step"] == contact].set_index("player")
+    places = {name: middle(mask(pictures)) for name, mask in (("ego", blue), ("non_ego", orange))}
+    canvas = np.argwhere(blue(pictures) | orange(pictures) | ground(pictures))
+    centre = 0.5 * (canvas.min(0) + canvas.max(0))
+    assert abs(places["ego"][1] - centre[1]) < 30  # pixels; SUMO-GUI follows the front bumper
+    metre = (canvas.max(0) - canvas.min(0))[1] / desktop.FOLLOWED_M[0]
+    apart = (places["non_ego"][1] - places["ego"][1]) / metre
+    assert apart == pytest.approx(expected.loc["non_ego", "x_m"] - expected.loc["ego", "x_m"], abs=0.8)
+
+
+def settled(screen: str) -> np.ndarray:
+    """What is on the screen [height, width, 3] once nothing moves any more."""
+    before, since = np.zeros(0), time.monotonic()
+    deadline = since + 60.0
+    while time.monotonic() < deadline:
+        now = np.asarray(ImageGrab.grab(xdisplay=screen).convert("RGB")).astype(int)
+        if not np.array_equal(now, before) or not blue(now).any():
+            before, since = now, time.monotonic()
+        elif time.monotonic() - since > 2.0:
+            return now
+        time.sleep(0.2)
+    pytest.fail("SUMO-GUI never comes to rest")
+
+
+def middle(mask: np.ndarray) -> np.ndarray:
+    """Row and column of the middle of the marked pixels that belong together: toolbars have blue ones too."""
+    rows = np.argwhere(mask)
+    rows = rows[np.abs(rows - np.median(rows, axis=0)).max(1) < 60]
+    return 0.5 * (rows.min(0) + rows.max(0))
+
+
+def ground(picture: np.ndarray) -> np.ndarray:
+    return (picture == (214, 224, 206)).all(-1)

@@ -55,9 +55,7 @@ def test_summarise__agrees_with_the_arithmetic_on_paper():
             game(episode=0, ego_mean_speed_mps=20.0, ego_min_ttc_s=3.0, ego_payoff=1.0),
             game(episode=1, ego_mean_speed_mps=22.0, ego_min_ttc_s=5.0, ego_payoff=2.0),
             game(episode=2, ego_outcome="collision", ego_failed=1, ego_mean_speed_mps=15.0, ego_payoff=-6.0),
-            game(
-                episode=3, ego_outcome="error", ego_failed=None, error="the simulator died", ego_payoff=99.0
-            ),
+            game(episode=3, ego_outcome="error", ego_failed=None, error="the simulator died", ego_payoff=99.0),
         )
     ).to_dict("records")
     assert (row["episodes"], row["errors"]) == (4, 1)
@@ -140,9 +138,9 @@ def test_summarise__arms_are_in_order_of_first_appearance_with_their_seeds():
 
 def test_summarise__an_arm_without_ego_has_empty_ego_cells_not_zeros():
     alone = {"persona": "speedy", "ego_outcome": "", "ego_failed": None, "non_ego_outcome": "goal"}
-    (row,) = summarise(
-        episodes_of(game("speedy_alone", 0, **alone), game("speedy_alone", 1, **alone))
-    ).to_dict("records")
+    (row,) = summarise(episodes_of(game("speedy_alone", 0, **alone), game("speedy_alone", 1, **alone))).to_dict(
+        "records"
+    )
     assert (row["episodes"], row["errors"], row["non_ego_goal_rate"]) == (2, 0, 1)
     for column in ("failure_rate", "failure_rate_high", "collisions", "rails", "timeouts", "mean_speed_mps"):
         assert pd.isna(row[column])
@@ -260,9 +258,7 @@ def test_read_csv__agrees_with_pandas_reading_the_same_file(tmp_path):
     assert read_csv(path)["ego_payoff"].tolist() == by_pandas["ego_payoff"].tolist()
 
 
-@pytest.mark.parametrize(
-    "text", ["", "arm,persona\n", "half\n", ",".join(TABLES["training"]) + "\nnaive,,1,100\n"]
-)
+@pytest.mark.parametrize("text", ["", "arm,persona\n", "half\n", ",".join(TABLES["training"]) + "\nnaive,,1,100\n"])
 def test_read_csv__what_is_no_table_is_the_users_mistake_and_names_the_file(tmp_path, text):
     path = tmp_path / "training.csv"
     path.write_text(text)

@@ -51,12 +51,7 @@ def _beyond(u: FloatArray, v: FloatArray, box: Box) -> tuple[FloatArray, FloatAr
 def _separated(u: FloatArray, v: FloatArray, box: Box) -> BoolArray:
     """Whether an axis of the box separates it from the convex hull of points [..., n] of its frame."""
     half_length, half_width = 0.5 * box.length_m, 0.5 * box.width_m
-    return (
-        (u.min(-1) > half_length)
-        | (u.max(-1) < -half_length)
-        | (v.min(-1) > half_width)
-        | (v.max(-1) < -half_width)
-    )
+    return (u.min(-1) > half_length) | (u.max(-1) < -half_length) | (v.min(-1) > half_width) | (v.max(-1) < -half_width)
 
 
 def boxes_touch(a: Box, b: Box) -> BoolArray:
@@ -121,9 +116,7 @@ def box_segment_distance(box: Box, segments: FloatArray) -> FloatArray:
     span2 = np.maximum(span_u * span_u + span_v * span_v, 1e-12)
     share = (corner_u * span_u[..., None] + corner_v * span_v[..., None]) / span2[..., None]
     share = np.minimum(np.maximum(share, 0.0), 1.0)
-    from_corners = np.hypot(corner_u - share * span_u[..., None], corner_v - share * span_v[..., None]).min(
-        -1
-    )
+    from_corners = np.hypot(corner_u - share * span_u[..., None], corner_v - share * span_v[..., None]).min(-1)
 
     side = corner_u * span_v[..., None] - corner_v * span_u[..., None]
     apart = _separated(u, v, box) | (side.min(-1) > 0.0) | (side.max(-1) < 0.0)

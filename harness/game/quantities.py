@@ -15,7 +15,7 @@ from harness.game import geometry
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Actuators, lateral_acceleration_mps2
 from harness.game.geometry import Box
-from harness.game.road import SPACING_M, Road
+from harness.game.road import MARGIN_M, SPACING_M, Road
 from harness.game.state import Bodies, State
 
 PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])  # where the way is looked at, from a player
@@ -173,8 +173,10 @@ class Quantities:
         )
         cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
         half_length, half_width = 0.5 * bodies.length_m[:, None, :], 0.5 * bodies.width_m[:, None, :]
+        routes = self.world.road.routes
+        to_row_m = (self._rows - routes.first_row) * SPACING_M - MARGIN_M - self.state.station_m  # the rounding of rows
         return OnPath(
-            _at(along, nearest) + PATH_M[nearest],
+            _at(along, nearest) + PATH_M[nearest] + to_row_m[..., None],
             left,
             half_length * cos + half_width * sin,
             half_length * sin + half_width * cos,

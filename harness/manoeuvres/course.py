@@ -46,9 +46,7 @@ class Course:
         quantities = quantities_of(trace, world, sizes)
         players = len(ROLES)
         bodies = Bodies(*(getattr(quantities.bodies, each.name)[:, :players] for each in fields(Bodies)))
-        between = Quantities(
-            world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m
-        )
+        between = Quantities(world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m)
         drove = drove_in(trace)
         if drove[:, EGO].any():
             drove[int(np.flatnonzero(drove[:, EGO])[-1]) + 1 :] = False

@@ -20,10 +20,15 @@ class Pair:
     non_ego: Manoeuvre | None
     ego: Manoeuvre | None
 
-    def story(self, outcome: str) -> str:
-        """In words with how it ended, such as "drift -> swerve -> rail"; "-" is nothing that has a name."""
+    @property
+    def words(self) -> str:
+        """Such as "drift -> swerve"; "-" is nothing that has a name."""
         names = (each.manoeuvre.replace("_", " ") if each else "-" for each in (self.non_ego, self.ego))
-        return " -> ".join((*names, outcome))
+        return " -> ".join(names)
+
+    def story(self, outcome: str) -> str:
+        """In words with how it ended, such as "drift -> swerve -> rail"."""
+        return f"{self.words} -> {outcome}"
 
 
 def pair_of(found: Sequence[Manoeuvre], ended_s: float = math.inf) -> Pair:

@@ -157,11 +157,10 @@ def forced_stops(course: Course, player: int, other: int) -> Iterator[Span]:
     at_end = lane_end <= least.FORCED_LANE_END_M + _SLACK
     mask = drove & has_driven & (speed <= least.STANDSTILL_MPS + _SLACK) & (behind | at_end)
     for first, last in course.stretches(mask, least.FORCED_LEAST_S):
-        if behind[first]:
-            text = f"is brought to {speed[first : last + 1].min():.1f} m/s, {gap[first]:.1f} m behind another"
-        else:
-            text = f"is brought to {speed[first : last + 1].min():.1f} m/s, {lane_end[first]:.1f} m before its lane ends"
-        yield _span(course, player, first, last, text)
+        where = (
+            f"{gap[first]:.1f} m behind another" if behind[first] else f"{lane_end[first]:.1f} m before its lane ends"
+        )
+        yield _span(course, player, first, last, f"is brought to {speed[first : last + 1].min():.1f} m/s, {where}")
 
 
 RULES: Mapping[str, Callable[[Course, int, int], Iterator[Span]]] = {

@@ -18,9 +18,9 @@ CUT_IN_LOOK_BACK_S = 1.0
 # --- hard_brake ---
 
 HARD_BRAKE_MPS2 = 4.0
-"""Least deceleration. UN Regulation No. 157 (5.5.1): the most that a car should ask for that stops without need for
-haste; AASHTO's comfortable deceleration is 3.4 m/s2 and naturalistic studies count from 0.45 g = 4.4 m/s2 on
-(Simons-Morton et al. 2012, "Do elevated gravitational-force events while driving predict crashes and near crashes?")."""
+"""Least deceleration. UN Regulation No. 157 (5.5.1): the most that an automated car should brake with when it stops
+without an emergency. Near it: 3.4 m/s2, what AASHTO holds to be comfortable, and 0.45 g = 4.4 m/s2, from which on
+naturalistic studies count (Simons-Morton et al. 2012, Am. J. Epidemiology 175:1075)."""
 HARD_BRAKE_LEAST_S = 0.3
 """Least duration: shorter is a touch of the pedal. Our own."""
 

@@ -4,20 +4,63 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from harness.errors import Problem, UsageError
 
+FOLLOWED_M = (80.0, 40.0)  # of road around the ego: a car of 4.6 m is then 73 pixels long
+_EGO = "ego"
+_END = re.compile(r'<(end|step-length) value="([0-9.]+)"')
+
 
 def open_in_sumo_gui(folder: Path) -> subprocess.Popen[bytes]:
-    """Start SUMO-GUI on a replay folder and return without waiting for it.
+    """Start SUMO-GUI on a replay folder, as anyone can without us, and return without waiting for it.
 
     Raises UsageError, naming the remedy, when the folder is no replay, when there is no SUMO-GUI or when
     there is no screen to show it on.
     """
+    program = _ready(folder)
+    return subprocess.Popen(
+        [str(program), "-c", str(folder / "scene.sumocfg")], env=os.environ | {"SUMO_HOME": str(home_of(program))}
+    )
+
+
+def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) -> None:
+    """Play a replay folder in SUMO-GUI with the view following the ego; ends when its user closes SUMO-GUI.
+
+    `opened` is called once it is there. A folder alone can't say what to follow: SUMO-GUI has no such setting, only
+    this command from outside. Raises
+    UsageError as `open_in_sumo_gui` does, SimulationError if SUMO-GUI can't start.
+    """
+    from harness.traffic.gui import WindowClosed, gui_environment, steered_gui
+
+    program = _ready(folder)
+    configuration = folder / "scene.sumocfg"
+    said = dict(_END.findall(configuration.read_text(encoding="utf-8")))
+    steps = round(float(said["end"]) / float(said["step-length"]))
+    with steered_gui(program, ["-c", str(configuration)], gui_environment(home_of(program))) as window:
+        opened()
+        try:
+            following = False
+            for _ in range(steps):
+                window.step()
+                if not following and window.has(_EGO):
+                    window.look_at(0.0, 0.0, *FOLLOWED_M)
+                    window.follow(_EGO)
+                    following = True
+        except WindowClosed:
+            return
+        window.release()
+        window.process.wait()
+
+
+def _ready(folder: Path) -> Path:
+    """SUMO-GUI, where all is there to play a folder in it."""
     configuration = folder / "scene.sumocfg"
     program = find_sumo_gui()
     problems = []
@@ -39,19 +82,19 @@ def open_in_sumo_gui(folder: Path) -> subprocess.Popen[bytes]:
                 "pip install eclipse-sumo, or put SUMO's bin folder on PATH",
             )
         )
-    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        problems.append(
-            Problem(
-                "sumo-gui",
-                "DISPLAY",
-                "there is no screen to show it on",
-                f"on a computer with a desktop and SUMO: sumo-gui -c {configuration}; over a network: ssh -X",
-            )
-        )
+    remedy = f"film it: --film game.gif; or on a computer with a desktop and SUMO: sumo-gui -c {configuration}"
+    if no_screen := screen_problem(remedy):
+        problems.append(no_screen)
     if problems or program is None:
         raise UsageError(problems)
-    environment = os.environ | {"SUMO_HOME": str(_home_of(program))}
-    return subprocess.Popen([program, "-c", str(configuration)], env=environment)
+    return program
+
+
+def screen_problem(remedy: str) -> Problem | None:
+    """Whether there is no screen to show SUMO-GUI on."""
+    if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        return Problem("sumo-gui", "DISPLAY", "there is no screen to show it on", remedy)
+    return None
 
 
 def find_sumo_gui() -> Path | None:
@@ -65,7 +108,7 @@ def find_sumo_gui() -> Path | None:
     return Path(found) if found else None
 
 
-def _home_of(program: Path) -> Path:
+def home_of(program: Path) -> Path:
     """SUMO's own folder, where it finds its data: the one above `bin`, but for a distribution's layout."""
     home = program.resolve().parent.parent
     return home if (home / "data").is_dir() else Path(os.environ.get("SUMO_HOME", "/usr/share/sumo"))

@@ -4,7 +4,7 @@ scene.sumocfg      what SUMO opens: names the files below
 scene.net.xml      the scene's net, copied
 scene.add.xml      vehicle types in the colours of the game, rails, the place of contact
 episode.fcd.xml    every pose of every vehicle
-view.xml           zoom, speed, and the halt at the contact
+view.xml           zoom, speed, and the halts at contacts and at the end
 """
 
 from __future__ import annotations
@@ -60,10 +60,11 @@ def write_replay(
         shutil.copyfile(net_file, partial / "scene.net.xml")
         write_xml(_scenery(types, rails, found, view, title), partial / "scene.add.xml")
         write_recording(trace, types, lanes, step_length_s, partial / "episode.fcd.xml")
-        write_xml(view_settings(view, found, lanes, step_length_s), partial / "view.xml")
+        moments = [*(contact.time_s for contact in found), float(trace["time_s"].max())]
+        halts_s = sorted({shown_at(moment, step_length_s) for moment in moments})
+        write_xml(view_settings(view, halts_s, lanes), partial / "view.xml")
         # one step beyond the one that shows the last sample: without an end SUMO would never stop
-        end_s = shown_at(float(trace["time_s"].max()), step_length_s) + step_length_s
-        write_xml(_configuration(title, end_s, step_length_s), partial / "scene.sumocfg")
+        write_xml(_configuration(title, halts_s[-1] + step_length_s, step_length_s), partial / "scene.sumocfg")
         shutil.rmtree(folder, ignore_errors=True)
         partial.rename(folder)
     finally:
@@ -117,7 +118,8 @@ def _scenery(
             for a in (2 * math.pi * k / 36 for k in range(37))
         ]
         _line(root, f"contact_{number}", ring, colour="220,20,20", width_m=0.24, layer=6)
-        _text(root, f"contact_{number}_label", contact.label, contact.x_m, contact.y_m + 1.5 * _RING_RADIUS_M)
+        side = -1 if number % 2 else 1  # two that are near each other stay legible
+        _text(root, f"contact_{number}_label", contact.label, contact.x_m, contact.y_m + side * 1.5 * _RING_RADIUS_M)
     _text(root, "title", title, view.x_m, view.y_m + 0.4 * view.height_m)
     return root
 

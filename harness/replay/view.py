@@ -11,7 +11,6 @@ import pandas as pd
 
 from harness.replay.contact import Contact
 from harness.replay.lanes import Lanes
-from harness.replay.recording import shown_at
 from harness.replay.vehicles import PLAYER_COLOURS
 
 WINDOW_PX = (1280, 640)
@@ -61,8 +60,8 @@ def _closest_approach(trace: pd.DataFrame) -> np.ndarray:
     return pairs.loc[distance.idxmin(), ["x_m", "y_m"]].to_numpy(float)
 
 
-def view_settings(view: View, found: Sequence[Contact], lanes: Lanes, step_length_s: float) -> ElementTree.Element:
-    """SUMO-GUI's settings file. It halts at the step that shows a contact; "play" goes on from there."""
+def view_settings(view: View, halts_s: Sequence[float], lanes: Lanes) -> ElementTree.Element:
+    """SUMO-GUI's settings file. It halts at these times of its own clock; "play" goes on from there."""
     left, bottom, right, top = lanes.bounds()
     net = (right - left + 2 * _NET_MARGIN_M, top - bottom + 2 * _NET_MARGIN_M)
     whole = min(_CANVAS_PX[0] / net[0], _CANVAS_PX[1] / net[1])  # pixels per metre at zoom 100
@@ -85,6 +84,6 @@ def view_settings(view: View, found: Sequence[Contact], lanes: Lanes, step_lengt
         root, "viewport", x=f"{view.x_m:.2f}", y=f"{view.y_m:.2f}", zoom=f"{100 * wanted / whole:.2f}"
     )
     ElementTree.SubElement(root, "delay", value=str(_DELAY_MS))
-    for contact in found:
-        ElementTree.SubElement(root, "breakpoint", time=f"{shown_at(contact.time_s, step_length_s):.3f}")
+    for halt_s in halts_s:
+        ElementTree.SubElement(root, "breakpoint", time=f"{halt_s:.3f}")
     return root

@@ -167,6 +167,8 @@ def _failure_sentence(question: str, persona: str, verdict: Verdict, row: Row, b
 
 def _speed_sentence(verdict: Verdict, row: Row, before: Row, after: Row) -> str:
     was, now = (number(arm["mean_speed_mps"], 1) for arm in (before, after))
+    if was == now:
+        was, now = (number(arm["mean_speed_mps"], 3) for arm in (before, after))
     speeds = f"Average speed: {now}{NO_SPACE}m/s instead of {was}{NO_SPACE}m/s"
     slower = row["question"] == "RQ1"
     direction = "slower" if slower else "faster"

@@ -23,6 +23,7 @@ from harness.errors import SimulationError
 
 _CONNECTS_WITHIN_S = 60.0
 _TRIES_EVERY_S = 0.1
+_ANSWERS_WITHIN_S = 60.0
 _ENDS_WITHIN_S = 10.0
 
 
@@ -33,9 +34,14 @@ class WindowClosed(SimulationError):
 class Window:
     """A SUMO-GUI that waits for steps."""
 
-    def __init__(self, connection: Any, process: subprocess.Popen[bytes]) -> None:
+    def __init__(self, connection: Any, process: subprocess.Popen[bytes], patient: bool) -> None:
         self._connection, self.process = connection, process
-        self._view = connection.gui.getIDList()[0]
+        # traci has no word for it: without, a SUMO-GUI that shows what is wrong in a dialogue is waited for for ever
+        connection._socket.settimeout(_ANSWERS_WITHIN_S)
+        with self._open():
+            self._view = connection.gui.getIDList()[0]
+        if patient:
+            connection._socket.settimeout(None)
 
     def step(self) -> None:
         """Let it play a step, at its own pace. Raises WindowClosed when it has gone."""
@@ -79,24 +85,28 @@ class Window:
 
 
 @contextlib.contextmanager
-def steered_gui(program: Path, options: list[str], environment: Mapping[str, str]) -> Iterator[Window]:
+def steered_gui(
+    program: Path, options: list[str], environment: Mapping[str, str], patient: bool = True
+) -> Iterator[Window]:
     """Start SUMO-GUI with these options and steer it; it is ended when the block is left.
 
-    Raises SimulationError, with what SUMO-GUI said, if it can't start.
+    `patient`: a step may take as long as it likes, for a user may halt it. Raises SimulationError, with what
+    SUMO-GUI said, if it can't start.
     """
     port = getFreeSocketPort()
-    with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(
-            [str(program), *options, "--remote-port", str(port)], env=dict(environment), stdout=said, stderr=said
-        )
+    with tempfile.TemporaryDirectory(prefix="harness-gui-") as folder, tempfile.TemporaryFile() as said:
+        errors = Path(folder) / "errors"
+        more = ["--remote-port", str(port), "--error-log", str(errors)]
+        process = subprocess.Popen([str(program), *options, *more], env=dict(environment), stdout=said, stderr=said)
         try:
             try:
-                connection = _connect(port, process)
-            except OSError as error:
+                window = Window(_connect(port, process), process, patient)
+            except (OSError, WindowClosed) as error:
                 said.seek(0)
-                words = said.read().decode(errors="replace").strip() or str(error)
+                logged = errors.read_bytes() if errors.is_file() else b""
+                words = (logged or said.read()).decode(errors="replace").strip() or str(error)
                 raise SimulationError(f"SUMO-GUI can't start: {words}") from None
-            yield Window(connection, process)
+            yield window
         finally:
             _end(process)
 
