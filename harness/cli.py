@@ -10,7 +10,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 _OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.EMFILE, errno.ENOMEM)
-DONE, GAMES_ERRORED, USERS_MISTAKE, INTERRUPTED = 0, 1, 2, 130
+GAMES_ERRORED, USERS_MISTAKE, INTERRUPTED = 1, 2, 130
 
 app = typer.Typer(
     name="harness",

@@ -8,8 +8,11 @@ HarnessError                 anything the harness itself raises
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 class HarnessError(Exception):
@@ -48,3 +51,12 @@ class StageFailed(HarnessError):
 
 class SimulationError(HarnessError):
     """SUMO refused a command, died, or lost a vehicle it was given."""
+
+
+def attempt(problems: list[Problem], action: Callable[[], T]) -> T | None:
+    """The action's result, or None: the user's mistakes in it join `problems`, so that the rest is looked at too."""
+    try:
+        return action()
+    except UsageError as error:
+        problems.extend(error.problems)
+        return None

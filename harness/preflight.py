@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 from pydantic import ConfigDict
 
 from harness.documents.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego, Training, resolve
 from harness.documents.persona import Persona
 from harness.documents.reading import Document, read_document
-from harness.errors import Problem, UsageError
+from harness.errors import Problem, UsageError, attempt
 from harness.policy_file import read_policy
 from harness.rounds import plan
 from harness.traffic.opening import OpenScene, open_scene
 
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -49,22 +46,15 @@ def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
     """Read a campaign and everything it names. Raises UsageError with every problem found."""
     problems: list[Problem] = []
 
-    def attempt(action: Callable[[], T]) -> T | None:
-        try:
-            return action()
-        except UsageError as error:
-            problems.extend(error.problems)
-            return None
-
-    document = attempt(lambda: read_document(file, Campaign))
+    document = attempt(problems, lambda: read_document(file, Campaign))
     named = document or _named(file)
     if named is None:
         raise UsageError(problems)
     scene_folder = resolve(file, named.scene)
-    scene = attempt(lambda: open_scene(scene_folder))
+    scene = attempt(problems, lambda: open_scene(scene_folder))
     persona_files = [resolve(file, named.ego.persona), *(resolve(file, each) for each in named.personas)]
-    personas = [attempt(lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
-    ego_policy = attempt(lambda: _ego_policy(file, named.ego.driver))
+    personas = [attempt(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
+    ego_policy = attempt(problems, lambda: _ego_policy(file, named.ego.driver))
     for given, persona in zip(named.personas, personas[1:], strict=True):
         names = [each.name for each in personas[1:] if each is not None]
         if persona is not None and names.count(persona.name) > 1:

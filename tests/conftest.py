@@ -26,7 +26,7 @@ def repository() -> Path:
 
 @pytest.fixture(scope="session")
 def merge(repository: Path) -> OpenScene:
-    """The scene networks/merge, opened."""
+    """The scene tests/data/merge, opened: a merge whose numbers stay while networks/merge is worked on."""
     return open_scene(repository / "tests" / "data" / "merge")
 
 

@@ -466,11 +466,11 @@ DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4
     ],
 )
 def test_pair__what_the_non_ego_did_and_how_the_ego_answered(found: list[Manoeuvre], expected: str) -> None:
-    assert pair_of(found).story("rail") == expected
+    assert f"{pair_of(found).words} -> rail" == expected
 
 
 def test_pair__nothing_after_the_end() -> None:
-    assert pair_of([DRIFT, SWERVE], ended_s=3.9).story("collision") == "drift -> - -> collision"
+    assert pair_of([DRIFT, SWERVE], ended_s=3.9).words == "drift -> -"
 
 
 # --- the paper's figure 4, played -------------------------------------------------------------------------------------
@@ -505,7 +505,8 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path,
     for game in assess(arm, 12):
         assert game.trace is not None
         trace = pd.DataFrame(dict(game.trace))
-        stories[game.record["episode"]] = pair_of(find_manoeuvres(trace, merge.world)).story(game.record["ego_outcome"])
+        words = pair_of(find_manoeuvres(trace, merge.world)).words
+        stories[game.record["episode"]] = f"{words} -> {game.record['ego_outcome']}"
     assert "drift -> swerve -> rail" in stories.values(), stories
 
 

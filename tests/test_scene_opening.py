@@ -15,7 +15,7 @@ from harness.traffic.opening import OpenScene, open_scene
 
 @pytest.fixture
 def folder(repository: Path, tmp_path: Path) -> Path:
-    """A copy of networks/merge to break, its document without comments."""
+    """A copy of tests/data/merge to break, its document without comments."""
     copy = Path(shutil.copytree(repository / "tests" / "data" / "merge", tmp_path / "merge"))
     document = (copy / "scene.toml").read_text(encoding="utf-8")
     (copy / "scene.toml").write_text(re.sub(r" *#.*", "", document), encoding="utf-8")

@@ -54,13 +54,8 @@ def _separated(u: FloatArray, v: FloatArray, box: Box) -> BoolArray:
     return (u.min(-1) > half_length) | (u.max(-1) < -half_length) | (v.min(-1) > half_width) | (v.max(-1) < -half_width)
 
 
-def boxes_touch(a: Box, b: Box) -> BoolArray:
-    """[...] whether boxes share a point (separating axis theorem)."""
-    return ~(_separated(*_corners_in_frame(b, a), a) | _separated(*_corners_in_frame(a, b), b))
-
-
 def box_distance(a: Box, b: Box) -> FloatArray:
-    """[...] distance between boxes; 0 where they touch."""
+    """[...] distance between boxes; 0 where they share a point (separating axis theorem)."""
     nearest, apart = [], []
     for frame, other in ((a, b), (b, a)):
         u, v = _corners_in_frame(other, frame)

@@ -26,10 +26,6 @@ class Pair:
         names = (each.manoeuvre.replace("_", " ") if each else "-" for each in (self.non_ego, self.ego))
         return " -> ".join(names)
 
-    def story(self, outcome: str) -> str:
-        """In words with how it ended, such as "drift -> swerve -> rail"."""
-        return f"{self.words} -> {outcome}"
-
 
 def pair_of(found: Sequence[Manoeuvre], ended_s: float = math.inf) -> Pair:
     """The pair of one game that led to its end at `ended_s` (manoeuvres that begin later are left out).

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from harness.errors import HarnessError
+from harness.traffic.gui import end_process
 
 _STARTS_WITHIN_S = 30.0
-_ENDS_WITHIN_S = 10.0
 
 
 def find_xvfb() -> Path | None:
@@ -44,9 +44,4 @@ def virtual_screen(program: Path, size_px: tuple[int, int]) -> Iterator[str]:
             yield f":{number}"
         finally:
             os.close(read)
-            server.terminate()
-            try:
-                server.wait(timeout=_ENDS_WITHIN_S)
-            except subprocess.TimeoutExpired:
-                server.kill()
-                server.wait()
+            end_process(server)

@@ -81,12 +81,6 @@ class SceneDrawing:
     goal: Sequence[FloatArray]
 
 
-def address(game: Any, time_s: float | None = None) -> str:
-    """The fragment of the page's address that opens a game (anything with arm, seed and episode) in the player."""
-    moment = "" if time_s is None else f"&t={time_s:.4g}"
-    return f"#game={key(game.arm, game.seed, game.episode)}{moment}"
-
-
 def key(arm: str, seed: int, episode: int) -> str:
     """A game's name in addresses."""
     return f"{quote(arm, safe='')},{seed},{episode}"

@@ -108,7 +108,7 @@ def steered_gui(
                 raise SimulationError(f"SUMO-GUI can't start: {words}") from None
             yield window
         finally:
-            _end(process)
+            end_process(process)
 
 
 def _connect(port: int, process: subprocess.Popen[bytes]) -> Any:
@@ -124,7 +124,8 @@ def _connect(port: int, process: subprocess.Popen[bytes]) -> Any:
         time.sleep(_TRIES_EVERY_S)
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
+def end_process(process: subprocess.Popen[bytes]) -> None:
+    """End a program, by force if it does not end when asked."""
     process.terminate()
     try:
         process.wait(timeout=_ENDS_WITHIN_S)

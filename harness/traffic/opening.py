@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
 from shapely.geometry.base import BaseGeometry
@@ -16,7 +15,7 @@ from sumolib.net.lane import Lane
 
 from harness.documents.reading import nearest, read_document
 from harness.documents.scene import Player, Scene, scene_file
-from harness.errors import Problem, UsageError
+from harness.errors import Problem, UsageError, attempt
 from harness.game.arrays import FloatArray
 from harness.game.attention import Habits
 from harness.game.bicycle import Actuators
@@ -27,8 +26,6 @@ from harness.game.state import ROLES
 from harness.traffic import network
 from harness.traffic.route_file import Departure, RouteFile, VehicleType, parse_xml, read_route_file
 from harness.traffic.route_table import route_table
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -68,17 +65,17 @@ def open_scene(folder: Path) -> OpenScene:
     net_file, route_path = folder / document.net, folder / document.routes
     problems: list[Problem] = []
     net, routes = (
-        _attempt(problems, lambda: _checked_net(net_file)),
-        _attempt(problems, lambda: read_route_file(route_path)),
+        attempt(problems, lambda: _checked_net(net_file)),
+        attempt(problems, lambda: read_route_file(route_path)),
     )
     if net is None or routes is None:
         raise UsageError(problems)
     area = network.drivable_area(net)
     opened = [
-        _attempt(problems, lambda k=k: _open_player(document_file, document, ROLES[k], net, area, routes))  # type: ignore[misc]
+        attempt(problems, lambda k=k: _open_player(document_file, document, ROLES[k], net, area, routes))  # type: ignore[misc]
         for k in range(len(ROLES))
     ]
-    _attempt(problems, lambda: _check_traffic(document, net, routes))
+    attempt(problems, lambda: _check_traffic(document, net, routes))
     if problems or None in opened:
         raise UsageError(problems)
     places, tables, edges, types = zip(*opened, strict=True)
@@ -99,25 +96,16 @@ def _checked_net(path: Path) -> Net:
     return network.read_net(path)
 
 
-def _attempt(problems: list[Problem], action: Callable[[], T]) -> T | None:
-    """The action's result; its problems are collected, so that the rest can be looked at too."""
-    try:
-        return action()
-    except UsageError as error:
-        problems += error.problems
-        return None
-
-
 def _open_player(
     file: Path, document: Scene, role: str, net: Net, area: BaseGeometry, routes: RouteFile
 ) -> tuple[Place, Route, tuple[str, ...], VehicleType]:
     player: Player = getattr(document, role)
     problems: list[Problem] = []
-    lane = _attempt(problems, lambda: network.find_lane(net, file, f"{role}.lane", player.lane))
-    goal = _attempt(problems, lambda: _goal(file, document, net))
-    vehicle = _attempt(problems, lambda: _vehicle(file, role, player, routes))
-    edges = _attempt(problems, lambda: _edges(vehicle, net, routes)) if vehicle else None
-    place = _attempt(problems, lambda: _place(file, document, role, player, lane, net)) if lane else None
+    lane = attempt(problems, lambda: network.find_lane(net, file, f"{role}.lane", player.lane))
+    goal = attempt(problems, lambda: _goal(file, document, net))
+    vehicle = attempt(problems, lambda: _vehicle(file, role, player, routes))
+    edges = attempt(problems, lambda: _edges(vehicle, net, routes)) if vehicle else None
+    place = attempt(problems, lambda: _place(file, document, role, player, lane, net)) if lane else None
     if lane is None or goal is None or vehicle is None or edges is None or place is None:
         raise UsageError(problems)
     if lane.getEdge() not in edges:
@@ -244,7 +232,7 @@ def _check_traffic(document: Scene, net: Net, routes: RouteFile) -> None:
         where = (str(routes.path), f"vehicle {other.name}")
         if other.name in ROLES and players <= routes.vehicles.keys():
             problems.append(Problem(*where, "has a player's name without being it", "call it something else"))
-        edges = _attempt(problems, lambda other=other: _edges(other, net, routes)) or []  # type: ignore[misc]
+        edges = attempt(problems, lambda other=other: _edges(other, net, routes)) or []  # type: ignore[misc]
         for edge, following in pairwise(edges):
             if not edge.getConnections(following):
                 text = f"its route has no connection from edge {edge.getID()!r} to {following.getID()!r}"
