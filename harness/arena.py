@@ -148,15 +148,8 @@ class Arena:
             x, y, heading, speed = reading.players[games, player].T
             gained = np.where(state.step[games] > 0, speed - state.speed_mps[games, player], 0.0)
             state.acceleration_mps2[games, player] = gained / self.world.step_s
-            state.steering_rad[games, player] = self._steered(player, games, heading, speed)
             state.x_m[games, player], state.y_m[games, player] = x, y
             state.heading_rad[games, player], state.speed_mps[games, player] = heading, speed
-
-    def _steered(self, player: int, games: IntArray, heading_rad: FloatArray, speed_mps: FloatArray) -> FloatArray:
-        """The steering angle with which a car would have turned as SUMO turned a player, which has no wheel there."""
-        turned = (heading_rad - self.state.heading_rad[games, player] + np.pi) % (2.0 * np.pi) - np.pi
-        curvature = turned / np.maximum(speed_mps * self.world.step_s, 0.1)
-        return np.arctan(self.world.actuators.wheelbase_m[player] * curvature)
 
     def _locate(self) -> tuple[FloatArray, FloatArray]:
         """How far each player came along its route, and where it is across it."""

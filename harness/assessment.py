@@ -21,6 +21,8 @@ from harness.game.state import EGO, NON_EGO, ROLES, Outcome
 from harness.metrics import OF_EGO, OF_NON_EGO, Drive
 from harness.traffic.opening import OpenScene
 
+_UNMEASURED = np.full((1, len(ROLES)), np.nan)  # [G, P] of one game
+
 
 @dataclass(frozen=True)
 class Arm:
@@ -103,14 +105,16 @@ def _record(arm: Arm, arena: Arena, episode: int, steps: Sequence[Step]) -> dict
     for player, metrics in ((EGO, OF_EGO), (NON_EGO, OF_NON_EGO)):
         takes_part = arm.drivers[player] is not None
         record[f"{ROLES[player]}_outcome"] = outcomes[player].word if takes_part else ""
-        drive = _drive(steps, player, outcomes[player], arm.scene.world.step_s) if takes_part else None
+        drive = _drive(arm, steps, player, outcomes[player]) if takes_part else None
         for name, metric in metrics.items():
             record[name] = metric(drive) if drive is not None else None
     record["ego_failed"] = int(outcomes[EGO] is not Outcome.GOAL) if arm.drivers[EGO] is not None else None
     return record
 
 
-def _drive(steps: Sequence[Step], player: int, outcome: Outcome, step_s: float) -> Drive:
+def _drive(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> Drive:
+    driver = arm.drivers[player]
+    has_wheel = driver is not None and driver.takes_over  # SUMO steers nobody: its cars change lanes without a wheel
     drove = [step for step in steps if step.drove[0, player]]
 
     def series(value: Callable[[Step], FloatArray]) -> FloatArray:
@@ -118,10 +122,10 @@ def _drive(steps: Sequence[Step], player: int, outcome: Outcome, step_s: float) 
 
     return Drive(
         outcome,
-        step_s,
+        arm.scene.world.step_s,
         series(lambda step: step.quantities.state.speed_mps),
         series(lambda step: step.quantities.state.acceleration_mps2),
-        series(lambda step: step.quantities.lateral_acceleration_mps2),
+        series(lambda step: step.quantities.lateral_acceleration_mps2 if has_wheel else _UNMEASURED),
         series(lambda step: step.quantities.leader_gap_m),
         series(lambda step: step.quantities.time_to_collision_s),
         series(lambda step: step.payoff),

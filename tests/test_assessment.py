@@ -250,3 +250,10 @@ def test_trace__types_are_those_of_the_route_file(merge: OpenScene) -> None:
         "ego": [merge.vehicle(0).vehicle_type],
         "non_ego": [merge.vehicle(1).vehicle_type],
     }
+
+
+def test_assess__sumo_has_no_wheel_and_what_needs_one_is_not_measured(merge: OpenScene) -> None:
+    (game, *_) = play(arm(merge, SumoDriver(), SumoDriver()), 1)
+    assert game.record["ego_max_lateral_acceleration_mps2"] is None
+    assert game.trace is not None
+    assert set(game.trace["steering_rad"]) == {0.0}  # or its lane changes would be named swerves
