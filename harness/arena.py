@@ -17,7 +17,7 @@ A game's chance is drawn when it starts (`game.start`). Training and assessment 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -33,7 +33,7 @@ from harness.game.start import Start
 from harness.game.state import Bodies, Outcome, State
 from harness.traffic.opening import OpenScene
 from harness.traffic.route_file import Departure
-from harness.traffic.simulation import Reading, open_simulation
+from harness.traffic.simulation import NOTICED_M, Reading, open_simulation
 
 NEAREST = 16  # others that a game's bodies have room for
 
@@ -61,14 +61,17 @@ class Step:
 class Arena:
     """G games on one scene, in which the same seats are taken."""
 
-    def __init__(self, scene: OpenScene, games: int, seats: Sequence[Seat], seed: int = 0) -> None:
+    def __init__(
+        self, scene: OpenScene, games: int, seats: Sequence[Seat], seed: int = 0, recorded: bool = False
+    ) -> None:
         """Load SUMO. Every game has to be started with `start` before the first step.
 
+        `recorded`: `reading` tells of all others in every step, and not only of those near a player (at a price).
         Raises SimulationError if SUMO can't load the scene.
         """
         self.scene, self.world, self.games, self.seats = scene, scene.world, games, tuple(seats)
         self._taken_over = np.array([seat.driver is None or seat.driver.takes_over for seat in seats])
-        self.simulation = open_simulation(scene, games, self._taken_over.tolist(), seed)
+        self.simulation = open_simulation(scene, games, self._taken_over.tolist(), seed, recorded)
         players = len(self.seats)
         self.state = State.empty(games, players)
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
@@ -77,8 +80,8 @@ class Arena:
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._all_games = np.arange(games)
         self.reading: Reading | None = None
-        self._players_length = np.broadcast_to(self.world.length_m, (games, players))
-        self._players_width = np.broadcast_to(self.world.width_m, (games, players))
+        self._players_length = np.tile(self.world.length_m, (games, 1))
+        self._players_width = np.tile(self.world.width_m, (games, 1))
 
     def start(self, starts: Mapping[int, Start], departures: Mapping[int, list[Departure]] | None = None) -> None:
         """(Re)start games, each from its `Start`, and look."""
@@ -142,6 +145,8 @@ class Arena:
         return np.where(lapsed, 0.0, acceleration), np.where(lapsed, drifting, steering)
 
     def _take_back(self, reading: Reading, drove: BoolArray) -> None:
+        if reading.players is None:
+            return
         state = self.state
         for player in np.flatnonzero(~self._taken_over):
             games = np.flatnonzero(drove[:, player])
@@ -174,17 +179,19 @@ class Arena:
 
     def _settle(self, quantities: Quantities, drove: BoolArray) -> None:
         """Who reached the goal leaves, who crashed stands; then everyone looks."""
-        self.observation = observe(quantities)
         ended = drove & (self.state.outcome != Outcome.RUNNING)
-        if ended.any():
-            for game, player in np.argwhere(ended).tolist():
-                if self.state.outcome[game, player] == Outcome.GOAL:
-                    self.simulation.remove(game, player)
-                else:
-                    self.simulation.halt(game, player)
-            self.state = self.state.copy()  # `quantities` keeps what was true at the end of the step
-            self._stop(ended)
-            self._look(np.flatnonzero(ended.any(1)))
+        if not ended.any():
+            self.observation = observe(quantities)
+            return
+        for game, player in np.argwhere(ended).tolist():
+            if self.state.outcome[game, player] == Outcome.GOAL:
+                self.simulation.remove(game, player)
+            else:
+                self.simulation.halt(game, player)
+        self.state = self.state.copy()  # `quantities` keeps what was true at the end of the step
+        self._stop(ended)
+        way = (quantities.advanced_m, quantities.lateral_offset_m)
+        self.observation = observe(Quantities(self.world, self.state, self._bodies(self.reading), *way))
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
@@ -214,11 +221,9 @@ class Arena:
 
     def quantities_of(self, games: IntArray) -> Quantities:
         """The quantities of some games [N], as they are now."""
-        state = State(*(getattr(self.state, each.name)[games] for each in fields(State)))
-        bodies = self._bodies(self.reading)
-        some = Bodies(*(getattr(bodies, each.name)[games] for each in fields(Bodies)))
+        state, bodies = self.state.of(games), self._bodies(self.reading).of(games)
         state.station_m, offset = self.world.road.routes.locate(state.x_m, state.y_m, state.station_m)
-        return Quantities(self.world, state, some, np.zeros_like(offset), offset)
+        return Quantities(self.world, state, bodies, np.zeros_like(offset), offset)
 
     def _bodies(self, reading: Reading | None) -> Bodies:
         """Players first, then the others nearest to them."""
@@ -233,7 +238,7 @@ class Arena:
                 self._players_width,
                 state.present.copy(),
             )
-        columns = self._nearest(reading)
+        columns, near = self._nearest(reading)
 
         def beside(own: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
             return np.concatenate((own, np.take_along_axis(others, columns, 1)), axis=1)
@@ -245,14 +250,12 @@ class Arena:
             beside(state.speed_mps, reading.speed_mps),
             beside(self._players_length, reading.length_m),
             beside(self._players_width, reading.width_m),
-            beside(state.present, reading.present),
+            beside(state.present, near),
         )
 
-    def _nearest(self, reading: Reading) -> IntArray:
-        if reading.x_m.shape[1] <= NEAREST:
-            return np.broadcast_to(np.arange(reading.x_m.shape[1]), reading.x_m.shape)
-        away = np.hypot(
-            reading.x_m[:, None] - self.state.x_m[..., None], reading.y_m[:, None] - self.state.y_m[..., None]
-        )
-        away = np.where(self.state.present[..., None] & reading.present[:, None], away, np.inf).min(1)
-        return np.argsort(away, axis=1, kind="stable")[:, :NEAREST]
+    def _nearest(self, reading: Reading) -> tuple[IntArray, BoolArray]:
+        """[G, B] columns of the reading with the others nearest to the players; [G, M] which of them are noticed."""
+        state = self.state
+        away = np.hypot(reading.x_m[:, None] - state.x_m[..., None], reading.y_m[:, None] - state.y_m[..., None])
+        away = np.where(state.present[..., None] & reading.present[:, None], away, np.inf).min(1)
+        return np.argsort(away, axis=1, kind="stable")[:, :NEAREST], away <= NOTICED_M

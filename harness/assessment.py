@@ -53,7 +53,7 @@ def assess(arm: Arm, episodes: int, report: Callable[[int, int], None] = lambda 
     seats = [
         Seat(driver or _Absent(), persona.payoff) for driver, persona in zip(arm.drivers, arm.personas, strict=True)
     ]
-    arena = Arena(arm.scene, 1, seats)
+    arena = Arena(arm.scene, 1, seats, recorded=True)
     try:
         for episode in range(episodes):
             try:

@@ -49,15 +49,15 @@ def quantities_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple
     sizes = np.array([sizes_m.get(name, (0.0, 0.0)) for name in names])
     state = State.empty(len(present), players)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "lapsed"):
-        setattr(state, name, motion[name][:, :players])
-    state.present = present[:, :players]
+        setattr(state, name, motion[name][:, :players].copy())
+    state.present = present[:, :players].copy()
     bodies = Bodies(
         motion["x_m"],
         motion["y_m"],
         motion["heading_rad"],
         motion["speed_mps"],
-        np.broadcast_to(sizes[:, 0], present.shape),
-        np.broadcast_to(sizes[:, 1], present.shape),
+        np.tile(sizes[:, 0], (len(present), 1)),
+        np.tile(sizes[:, 1], (len(present), 1)),
         present,
     )
     station_m = _stations_m(world.road.routes, state.x_m, state.y_m)

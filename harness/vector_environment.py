@@ -34,14 +34,17 @@ class Finished:
 class ArenaVecEnv(VecEnv):
     """G games of one learner, as SB3 wants them. A game ends with the learner's part in it.
 
-    Each game is drawn from `parts`, the number of its tile and how many games that tile has had.
+    Each game is drawn from `parts`, the number of its tile and how many games that tile has had. Rewards are payoffs
+    times `payoff_scale`.
     """
 
     render_mode = None
 
-    def __init__(self, arena: Arena, learner: int, chances: Chances, *parts: str | int) -> None:
+    def __init__(
+        self, arena: Arena, learner: int, chances: Chances, *parts: str | int, payoff_scale: float = 1.0
+    ) -> None:
         super().__init__(arena.games, OBSERVATION_SPACE, ACTION_SPACE)
-        self.arena, self._learner = arena, learner
+        self.arena, self._learner, self._payoff_scale = arena, learner, payoff_scale
         self._actions = np.zeros((arena.games, len(arena.seats), ACTIONS))
         self._finished: list[Finished] = []
         self.begin(chances, *parts)
@@ -77,7 +80,7 @@ class ArenaVecEnv(VecEnv):
                 infos[game] = {"terminal_observation": self.arena.observation[game, self._learner].copy()}
                 self._finish(int(game))
             self._start(ended.tolist())
-        return self.arena.observation[:, self._learner].copy(), payoff, done, infos
+        return self.arena.observation[:, self._learner].copy(), payoff * self._payoff_scale, done, infos
 
     def take_finished(self) -> list[Finished]:
         """The games that ended since the last call."""

@@ -23,7 +23,8 @@ PACKAGE = REPOSITORY / "harness"
 ALLOWED: dict[str, set[str]] = {
     "errors": set(),
     "files": set(),
-    "game": set(),
+    "compiling": set(),
+    "game": {"compiling"},
     "documents": {"errors", "game"},  # game: payoff terms and what a persona is made of
     "traffic": {"errors", "documents", "game"},
     "policy_file": {"errors", "files", "game"},
@@ -56,6 +57,7 @@ ALLOWED: dict[str, set[str]] = {
     "reports": {"errors", "comparison", "tables", "manoeuvres"},
     "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
+    "model_card": {"documents", "files", "game", "policy_file", "reports", "rounds", "run_folder"},
     "watching": {
         *("errors", "documents", "traffic", "replay", "rounds", "run_folder", "tables", "trace_file", "manoeuvres"),
     },
@@ -63,7 +65,7 @@ ALLOWED: dict[str, set[str]] = {
     "campaign_run": {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
-        "manoeuvre_file",
+        *("manoeuvre_file", "model_card"),
     },
 }
 ALLOWED["cli"] = set(ALLOWED)
@@ -75,6 +77,7 @@ LEARNERS = {"torch", "stable_baselines3"}
 GAME_MAY_IMPORT = {
     "__future__",
     "abc",
+    "bisect",
     "collections",
     "dataclasses",
     "enum",

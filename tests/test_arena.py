@@ -300,7 +300,7 @@ def test_others__contact_with_one_is_a_collision(straight: OpenScene, opened: Op
 
 
 def test_others__start_again_with_their_game(straight: OpenScene, opened: Open) -> None:
-    arena, start = opened(straight), placed(straight, (200, RIGHT_Y, 0, 0), None)
+    arena, start = opened(straight), placed(straight, (150, RIGHT_Y, 0, 0), None)
     van = Departure("van", "van", ("road",), 0.3, "1", "50", "8")
     for _ in range(2):
         begun(arena, start, van)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.game.arrays import BoolArray
-from harness.game.attention import Attention, Overlooking, draw_lapses, draw_overlooked_m
+from harness.game.attention import Attention, Lapses, Overlooking, draw_lapses, draw_overlooked_m
 
 TEXTING = Attention(mean_attentive_s=10.0, lapse_s=(4.0, 6.0), bumps_rad=0.01)
 
@@ -20,7 +20,7 @@ def runs(lapsed: BoolArray) -> list[tuple[int, int]]:
 
 
 def test_lapses__none_without_an_attention() -> None:
-    lapses = draw_lapses(None, 250, 0.1, np.random.default_rng(0))
+    lapses = Lapses.none(250)
     assert lapses.lapsed.shape == (250,)
     assert not lapses.lapsed.any()
     assert not lapses.steering_rad.any()

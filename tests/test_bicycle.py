@@ -136,7 +136,7 @@ def test_drive__players_that_do_not_move_are_untouched() -> None:
     state.speed_mps[:], state.heading_rad[:], state.steering_rad[:] = 10.0, 1.0, 0.05
     before = state.copy()
     two = Actuators(
-        **{name: value if name == "friction" else np.repeat(value, 2) for name, value in vars(actuators()).items()}
+        **{name: value if name == "friction" else np.repeat(value, 2) for name, value in actuators()._asdict().items()}
     )
     drive(state, np.full((1, 2), 2.0), np.full((1, 2), 0.1), np.array([[True, False]]), two, STEP_S)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"):

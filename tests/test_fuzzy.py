@@ -13,6 +13,7 @@ from harness.game.fuzzy import FuzzyFunction, FuzzySet
 LEGAL = FuzzySet("legal", (0.0, 0.1), (1.0, 0.0), 0.0)
 THRILLING = FuzzySet("thrilling", (0.0, 0.1, 0.3, 0.5), (0.0, 1.0, 1.0, 0.0), 2.0)
 FRIGHTENING = FuzzySet("frightening", (0.3, 0.5), (0.0, 1.0), -4.0)
+EVERYTHING = FuzzySet("everything", (0.0,), (1.0,), 0.0)
 SPEEDY = FuzzyFunction("speed_over_limit", (LEGAL, THRILLING, FRIGHTENING))
 
 
@@ -20,7 +21,9 @@ SPEEDY = FuzzyFunction("speed_over_limit", (LEGAL, THRILLING, FRIGHTENING))
     ("value", "membership"), [(-0.5, 0.0), (0.0, 0.0), (0.025, 0.25), (0.1, 1.0), (0.2, 1.0), (0.45, 0.25), (9.0, 0.0)]
 )
 def test_membership__is_linear_between_points_and_constant_outside(value: float, membership: float) -> None:
-    assert THRILLING.membership(np.array(value)) == pytest.approx(membership)
+    # beside a set of value 0 that everything belongs to wholly, the output is membership / (membership + 1)
+    beside = FuzzyFunction("q", (FuzzySet("hill", THRILLING.inputs, THRILLING.memberships, 1.0), EVERYTHING))
+    assert beside(np.array([value])) == pytest.approx([membership / (membership + 1.0)])
 
 
 @pytest.mark.parametrize(

@@ -13,15 +13,17 @@ from harness.game.geometry import (
     Box,
     box_distance,
     box_segment_distance,
-    corners,
+    distance_to_nearest_box,
+    distance_to_nearest_segment,
     time_to_contact,
+    time_to_first_contact,
 )
 
 NUMBER = st.floats(-12.0, 12.0).map(lambda value: round(value, 3))
 
 
 def box(x: float, y: float, heading: float = 0.0, length: float = 4.6, width: float = 1.8) -> Box:
-    return Box(*(np.array([each], dtype=float) for each in (x, y, heading, length, width)))
+    return Box(*(float(each) for each in (x, y, heading, length, width)))
 
 
 BOXES = st.builds(
@@ -34,31 +36,32 @@ BOXES = st.builds(
 )
 
 
+def ring(each: Box) -> FloatArray:
+    """Its corners [4, 2], round from the front left."""
+    along, across = 0.5 * each.length_m * np.array([1, 1, -1, -1]), 0.5 * each.width_m * np.array([1, -1, -1, 1])
+    cos, sin = np.cos(each.heading_rad), np.sin(each.heading_rad)
+    return np.stack((each.x_m + along * cos - across * sin, each.y_m + along * sin + across * cos), axis=-1)
+
+
 def polygon(each: Box) -> shapely.Polygon:
-    return shapely.Polygon(np.stack(corners(each), axis=-1)[0])
+    return shapely.Polygon(ring(each))
 
 
 def segment(x1: float, y1: float, x2: float, y2: float) -> FloatArray:
-    return np.array([[[x1, y1], [x2, y2]]])
-
-
-def test_corners__go_round_from_the_front_left() -> None:
-    x, y = corners(box(10.0, 5.0, np.pi / 2, length=4.0, width=2.0))  # facing north: its left is west
-    assert x[0] == pytest.approx([9.0, 11.0, 11.0, 9.0])
-    assert y[0] == pytest.approx([7.0, 7.0, 3.0, 3.0])
+    return np.array([[x1, y1], [x2, y2]])
 
 
 def touch(a: Box, b: Box) -> bool:
     """Contact, as the game has it: the distance is exactly 0."""
-    return bool(box_distance(a, b)[0] == 0.0)
+    return box_distance(a, b) == 0.0
 
 
 @settings(max_examples=300, deadline=None)
 @given(BOXES, BOXES)
 def test_boxes__distance_and_touch_are_shapelys(a: Box, b: Box) -> None:
     distance = polygon(a).distance(polygon(b))
-    assert box_distance(a, b)[0] == pytest.approx(distance, abs=1e-6)
-    assert box_distance(b, a)[0] == pytest.approx(distance, abs=1e-6)
+    assert box_distance(a, b) == pytest.approx(distance, abs=1e-6)
+    assert box_distance(b, a) == pytest.approx(distance, abs=1e-6)
     if distance > 1e-6:
         assert not touch(a, b)
     elif polygon(a).intersection(polygon(b)).area > 1e-6:
@@ -70,26 +73,60 @@ def test_boxes__distance_and_touch_are_shapelys(a: Box, b: Box) -> None:
 @given(BOXES, st.tuples(NUMBER, NUMBER, NUMBER, NUMBER))
 def test_box_segment__distance_is_shapelys(a: Box, ends: tuple[float, float, float, float]) -> None:
     line = shapely.LineString([ends[:2], ends[2:]])
-    assert box_segment_distance(a, segment(*ends))[0] == pytest.approx(polygon(a).distance(line), abs=1e-6)
+    assert box_segment_distance(a, segment(*ends)) == pytest.approx(polygon(a).distance(line), abs=1e-6)
 
 
 def test_box_segment__a_segment_inside_a_box_touches_it() -> None:
-    assert box_segment_distance(box(0, 0), segment(-0.5, 0.1, 0.5, -0.1))[0] == 0.0
+    assert box_segment_distance(box(0, 0), segment(-0.5, 0.1, 0.5, -0.1)) == 0.0
 
 
 def test_box_segment__a_segment_through_a_box_touches_it_though_both_ends_lie_far_off() -> None:
-    assert box_segment_distance(box(0, 0, 0.7), segment(-50, 1, 50, -1))[0] == 0.0
+    assert box_segment_distance(box(0, 0, 0.7), segment(-50, 1, 50, -1)) == 0.0
 
 
 def test_box_segment__a_point_counts_as_a_segment() -> None:
-    assert box_segment_distance(box(0, 0), segment(5.3, 0.0, 5.3, 0.0))[0] == pytest.approx(3.0)  # 5.3 - 4.6 / 2
+    assert box_segment_distance(box(0, 0), segment(5.3, 0.0, 5.3, 0.0)) == pytest.approx(3.0)  # 5.3 - 4.6 / 2
 
 
-def test_box_segment__shapes_broadcast() -> None:
-    cars = Box(*(np.array([[each], [each + 1.0]]) for each in (0.0, 0.0, 0.0, 4.0, 2.0)))
-    lines = np.stack((segment(-9, 6, 9, 6)[0], segment(-9, 9, 9, 9)[0]))
-    assert box_segment_distance(cars, lines).shape == (2, 2)
-    assert box_segment_distance(cars, lines)[0] == pytest.approx([5.0, 8.0])
+def columns(*boxes: Box) -> Box:
+    """Boxes as one row [1, B]."""
+    return Box(*(np.array([each]) for each in zip(*boxes, strict=True)))
+
+
+def players(*boxes: Box) -> Box:
+    """Boxes as one row of players: places [1, P], sizes [P]."""
+    return Box(*columns(*boxes)[:3], *(each[0] for each in columns(*boxes)[3:]))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.lists(BOXES, min_size=2, max_size=2), st.lists(BOXES, min_size=1, max_size=5), st.floats(0.5, 15.0))
+def test_nearest_box__is_the_least_distance_of_those_marked(own: list[Box], others: list[Box], limit: float) -> None:
+    among = np.array([[[(p + b) % 2 == 0 for b in range(len(others))] for p in range(2)]])
+    found = distance_to_nearest_box(players(*own), columns(*others), among, limit)
+    for p in range(2):
+        distances = [polygon(own[p]).distance(polygon(b)) for k, b in enumerate(others) if among[0, p, k]]
+        assert found[0, p] == pytest.approx(min([*distances, limit]), abs=1e-6)
+
+
+@settings(max_examples=100, deadline=None)
+@given(BOXES, st.lists(st.tuples(NUMBER, NUMBER, NUMBER, NUMBER), min_size=1, max_size=6), st.floats(0.5, 15.0))
+def test_nearest_segment__is_the_least_distance_of_the_rows(
+    a: Box, ends: list[tuple[float, float, float, float]], limit: float
+) -> None:
+    segments = np.array([segment(*each) for each in ends])
+    rows = np.arange(0, len(ends), 2)[None, None]  # not all of them
+    distances = [polygon(a).distance(shapely.LineString(segments[k])) for k in rows[0, 0]]
+    found = distance_to_nearest_segment(players(a), segments, rows, limit)
+    assert found[0, 0] == pytest.approx(min([*distances, limit]), abs=1e-6)
+
+
+def test_first_contact__is_the_soonest_of_those_marked() -> None:
+    # 20 m ahead at 5 m/s less: 4 s; 10 m behind at 5 m/s more: 2 s; one that touches is not looked at
+    others = columns(box(24.6, 0), box(-14.6, 0), box(1, 0))
+    speeds = np.array([[10.0]]), np.array([[5.0, 15.0, 10.0]])
+    for among, seconds in (([True, True, False], 2.0), ([True, False, False], 4.0), ([False] * 3, np.inf)):
+        found = time_to_first_contact(players(box(0, 0)), others, *speeds, np.array([[among]]))
+        assert found[0, 0] == pytest.approx(seconds)
 
 
 @pytest.mark.parametrize(("gap", "touches"), [(-0.001, True), (0.001, False)])
@@ -100,36 +137,34 @@ def test_boxes__a_millimetre_decides(gap: float, touches: bool) -> None:
 
 def test_time_to_contact__is_the_gap_over_the_closing_speed() -> None:
     # centres 24.6 m apart, less 4.6 m of car: 20 m at 5 m/s
-    assert time_to_contact(box(0, 0), box(24.6, 0), np.array([-5.0]), np.array([0.0]))[0] == pytest.approx(4.0)
+    assert time_to_contact(box(0, 0), box(24.6, 0), -5.0, 0.0) == pytest.approx(4.0)
 
 
 def test_time_to_contact__corner_meets_corner() -> None:
     # 4.6 m long, 1.8 m wide, diagonally: along they overlap from (10 - 4.6) / 2 = 2.7 s to (10 + 4.6) / 2 = 7.3 s,
     # across from (6 - 1.8) / 1 = 4.2 s to (6 + 1.8) / 1 = 7.8 s: the later of the two begins the contact
-    found = time_to_contact(box(0, 0), box(10, 6), np.array([-2.0]), np.array([-1.0]))
-    assert found[0] == pytest.approx(4.2)
+    found = time_to_contact(box(0, 0), box(10, 6), -2.0, -1.0)
+    assert found == pytest.approx(4.2)
 
 
 @pytest.mark.parametrize("velocity", [(5.0, 0.0), (-5.0, 3.0), (0.0, 0.0), (0.0, 8.0)])
 def test_time_to_contact__of_cars_that_miss_is_never(velocity: tuple[float, float]) -> None:
-    vx, vy = (np.array([each]) for each in velocity)
-    assert time_to_contact(box(0, 0), box(24.6, 0), vx, vy)[0] == np.inf
+    assert time_to_contact(box(0, 0), box(24.6, 0), *velocity) == np.inf
 
 
 def test_time_to_contact__is_0_where_they_touch_already() -> None:
     for vx, vy in ((0.0, 0.0), (20.0, 0.0), (-3.0, 9.0)):
-        assert time_to_contact(box(0, 0), box(2, 1, 0.4), np.array([vx]), np.array([vy]))[0] == 0.0
+        assert time_to_contact(box(0, 0), box(2, 1, 0.4), vx, vy) == 0.0
 
 
 @settings(max_examples=60, deadline=None)
 @given(BOXES, BOXES, st.floats(-8.0, 8.0), st.floats(-8.0, 8.0))
 def test_time_to_contact__agrees_with_moving_the_box_in_small_steps(a: Box, b: Box, vx: float, vy: float) -> None:
-    found = time_to_contact(a, b, np.array([vx]), np.array([vy]))[0]
-    back = time_to_contact(b, a, np.array([-vx]), np.array([-vy]))[0]
+    found = time_to_contact(a, b, vx, vy)
+    back = time_to_contact(b, a, -vx, -vy)
     assert found == pytest.approx(back, abs=1e-6) or min(found, back) > 1e3
     times = np.arange(0.0, 6.0, 0.02)
-    ring = np.stack(corners(b), axis=-1)[0]
-    moved = shapely.polygons(ring + times[:, None, None] * np.array([vx, vy]))
+    moved = shapely.polygons(ring(b) + times[:, None, None] * np.array([vx, vy]))
     distance = shapely.distance(moved, polygon(a))
     graze = 0.02 * np.hypot(vx, vy) + 1e-6  # what a step can pass over
     touching = np.flatnonzero(distance <= 0.0)

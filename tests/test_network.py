@@ -20,7 +20,7 @@ from sumolib.net.edge import Edge
 
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.geometry import Box, box_segment_distance
+from harness.game.geometry import Box
 from harness.game.road import MARGIN_M, SPACING_M, Rails, Route
 from harness.traffic import network
 from harness.traffic.opening import OpenScene, open_scene
@@ -154,9 +154,8 @@ def clearance(rails: Rails, route: Route, offset_m: float = 0.0) -> FloatArray:
     heading = route.heading_rad[inside]
     x = route.x_m[inside] - offset_m * np.sin(heading)
     y = route.y_m[inside] + offset_m * np.cos(heading)
-    size = np.ones((len(x), 1))
-    cars = Box(x[:, None], y[:, None], heading[:, None], 4.6 * size, 1.8 * size)
-    return box_segment_distance(cars, rails.near(x, y)).min(-1)
+    cars = Box(x[:, None], y[:, None], heading[:, None], np.array([4.6]), np.array([1.8]))
+    return rails.distance_m(cars, 10.0)
 
 
 # --- the merge scene -------------------------------------------------------------------------------------------------
@@ -259,8 +258,8 @@ def test_route__rails_stand_on_both_sides(nets: dict[str, Read], name: str) -> N
         for offset in (table.left_edge_m[row], table.right_edge_m[row]):
             x = np.array([table.x_m[row] - offset * np.sin(table.heading_rad[row])])
             y = np.array([table.y_m[row] + offset * np.cos(table.heading_rad[row])])
-            point = Box(x[:, None], y[:, None], *(np.full((1, 1), each) for each in (0.0, 0.1, 0.1)))
-            assert box_segment_distance(point, read.rails.near(x, y)).min() < 0.05
+            point = Box(x[:, None], y[:, None], np.zeros((1, 1)), np.array([0.1]), np.array([0.1]))
+            assert read.rails.distance_m(point, 10.0) < 0.05
 
 
 @pytest.mark.parametrize("name", ["curve", "crossing", "crossing of left-hand traffic", "two-way street", "roundabout"])
@@ -272,9 +271,8 @@ def test_fringe__is_open(nets: dict[str, Read], name: str) -> None:
         table = read.table(edge)
         last = np.flatnonzero(stations(table) <= table.length_m)[-1]
         for row in range(last - 6, last + 12):  # from within the road until it has left
-            place = (table.x_m[row], table.y_m[row], table.heading_rad[row], 4.6, 1.8)
-            car = Box(*(np.array([[each]]) for each in place))
-            assert box_segment_distance(car, read.rails.near(car.x_m[:, 0], car.y_m[:, 0])).min() > 0.0
+            place = (np.array([[each]]) for each in (table.x_m[row], table.y_m[row], table.heading_rad[row]))
+            assert read.rails.distance_m(Box(*place, np.array([4.6]), np.array([1.8])), 10.0) > 0.0
 
 
 def test_fringe__the_other_end_of_a_ring_is_not_one(build_net: Build) -> None:

@@ -122,8 +122,8 @@ def test_rails__every_segment_within_reach_is_found(
     reach: float,
 ) -> None:
     rails = Rails.of(np.array(segments), reach)
-    x, y = np.array(points).T
-    found = rails.near(x, y)
+    x, y = np.array(points).T[:, :, None]
+    found = rails.segments[rails.near(x, y)[:, 0]]
     for k, point in enumerate(points):
         known = {tuple(each.ravel()) for each in found[k]}
         for each in segments:
@@ -139,10 +139,11 @@ def distance(point: FloatArray, segment: FloatArray) -> float:
 
 def test_rails__there_may_be_none() -> None:
     rails = Rails.of(np.zeros((0, 2, 2)), 20.0)
-    near = rails.near(np.array([0.0, 500.0]), np.array([0.0, -500.0]))
-    assert (np.abs(near) > 1e5).all()  # nothing but the far-away filler
+    near = rails.near(np.array([[0.0, 500.0]]), np.array([[0.0, -500.0]]))
+    assert (np.abs(rails.segments[near]) > 1e5).all()  # nothing but the far-away filler
 
 
 def test_rails__far_from_all_of_them_is_no_error() -> None:
     rails = Rails.of(np.array([[[0.0, 0.0], [10.0, 0.0]]]), 20.0)
-    assert rails.near(np.array([1e4, -1e4]), np.array([1e4, -1e4])).shape[0] == 2
+    for place in (1e4, -1e4, np.inf, np.nan):
+        assert rails.near(np.array([[place]]), np.array([[place]])).shape[:2] == (1, 1)

@@ -50,31 +50,34 @@ class Lapses:
     lapsed: BoolArray  # [T]
     steering_rad: FloatArray  # [T] the angle that the road turns the wheel to in a lapse
 
+    @classmethod
+    def none(cls, steps: int) -> Lapses:
+        """Attention all the time."""
+        return cls(np.zeros(steps, dtype=bool), np.zeros(steps))
 
-def draw_lapses(attention: Attention | None, steps: int, step_s: float, generator: np.random.Generator) -> Lapses:
-    """Draw when one player's attention lapses in a game of `steps` steps. None: never.
+
+def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.random.Generator) -> Lapses:
+    """Draw when one player's attention lapses in a game of `steps` steps.
 
     Who drives up to the scene has been lapsing before: a game starts within a lapse as often as lapses take time (the
     stationary start of a renewal process).
     """
-    lapsed = np.zeros(steps, dtype=bool)
-    steering = np.zeros(steps)
-    if attention is not None:
-        mean_lapse_s = 0.5 * (attention.lapse_s[0] + attention.lapse_s[1])
-        starts_within = generator.random() < mean_lapse_s / (mean_lapse_s + attention.mean_attentive_s)
-        passed = generator.random() if starts_within else 0.0  # share of the first lapse that is over
-        time = 0.0 if starts_within else generator.exponential(attention.mean_attentive_s)
-        attentive_from = 0
-        while time < steps * step_s:
-            lasts = generator.uniform(*attention.lapse_s) * (1.0 - passed)
-            turns = generator.normal(-attention.crown_rad, attention.bumps_rad)
-            first = max(int(np.ceil(time / step_s)), attentive_from)
-            end = first + max(round(lasts / step_s), 1)
-            lapsed[first:end], steering[first:end] = True, turns
-            attentive_from = end + 1  # a glance at the road, or two lapses were one
-            time += lasts + generator.exponential(attention.mean_attentive_s)
-            passed = 0.0
-    return Lapses(lapsed, steering)
+    lapses = Lapses.none(steps)
+    mean_lapse_s = 0.5 * (attention.lapse_s[0] + attention.lapse_s[1])
+    starts_within = generator.random() < mean_lapse_s / (mean_lapse_s + attention.mean_attentive_s)
+    passed = generator.random() if starts_within else 0.0  # share of the first lapse that is over
+    time = 0.0 if starts_within else generator.exponential(attention.mean_attentive_s)
+    attentive_from = 0
+    while time < steps * step_s:
+        lasts = generator.uniform(*attention.lapse_s) * (1.0 - passed)
+        turns = generator.normal(-attention.crown_rad, attention.bumps_rad)
+        first = max(int(np.ceil(time / step_s)), attentive_from)
+        end = first + max(round(lasts / step_s), 1)
+        lapses.lapsed[first:end], lapses.steering_rad[first:end] = True, turns
+        attentive_from = end + 1  # a glance at the road, or two lapses were one
+        time += lasts + generator.exponential(attention.mean_attentive_s)
+        passed = 0.0
+    return lapses
 
 
 def draw_overlooked_m(overlooking: Overlooking, generator: np.random.Generator) -> float:

@@ -10,10 +10,11 @@ integrated like SUMO's Euler update (displacement = new speed times step), with 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
+from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.state import State
 
@@ -21,8 +22,7 @@ GRAVITY_MPS2 = 9.81
 WHEEL_CENTRE = 0.25  # gain of the wheel about its centre: small corrections are gentle, full lock is in reach
 
 
-@dataclass(frozen=True)
-class Actuators:
+class Actuators(NamedTuple):
     """What the players' cars can do. Arrays are [P]; `friction` is the road's, as a share of g."""
 
     max_acceleration_mps2: FloatArray
@@ -34,6 +34,7 @@ class Actuators:
     friction: float
 
 
+@compiled
 def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArray:
     """[G, P] largest steering angle of use at this speed: the car's lock, or where the tyres would let go."""
     grip = actuators.friction * GRAVITY_MPS2
@@ -43,6 +44,7 @@ def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArra
     )
 
 
+@compiled
 def requests(action: FloatArray, speed_mps: FloatArray, actuators: Actuators) -> tuple[FloatArray, FloatArray]:
     """What a driver's action asks of the car.
 
@@ -50,13 +52,13 @@ def requests(action: FloatArray, speed_mps: FloatArray, actuators: Actuators) ->
     right, 1 as far left as is of use at this speed; gentle about the centre). Returns acceleration (m/s^2) and
     steering angle (rad), [G, P].
     """
-    pedals = np.clip(action[..., 0], -1.0, 1.0)
-    wheel = np.clip(action[..., 1], -1.0, 1.0)
-    acceleration = np.where(
-        pedals >= 0.0, pedals * actuators.max_acceleration_mps2, pedals * actuators.max_braking_mps2
-    )
-    turned = wheel * (WHEEL_CENTRE + (1.0 - WHEEL_CENTRE) * wheel**2)
-    return acceleration, turned * steering_range_rad(speed_mps, actuators)
+    acceleration, steering = np.empty(speed_mps.shape), steering_range_rad(speed_mps, actuators)
+    for g, p in np.ndindex(speed_mps.shape):
+        pedals, wheel = _within(action[g, p, 0], 1.0), _within(action[g, p, 1], 1.0)
+        strongest = actuators.max_acceleration_mps2[p] if pedals >= 0.0 else actuators.max_braking_mps2[p]
+        acceleration[g, p] = pedals * strongest
+        steering[g, p] *= wheel * (WHEEL_CENTRE + (1.0 - WHEEL_CENTRE) * wheel**2)
+    return acceleration, steering
 
 
 def drive(
@@ -72,33 +74,51 @@ def drive(
     Steering follows its request as fast as the rack allows; what grip the curve uses is missing for speeding up and
     braking (friction circle), and where the grip is not enough for the curve the car runs wide.
     """
+    motion = (state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad)
+    _drive(*motion, acceleration_mps2, steering_rad, moving, actuators, step_s)
+
+
+@compiled
+def _drive(
+    x_m: FloatArray,
+    y_m: FloatArray,
+    heading_rad: FloatArray,
+    speed_mps: FloatArray,
+    acceleration_mps2: FloatArray,
+    steering_rad: FloatArray,
+    wanted_acceleration_mps2: FloatArray,
+    wanted_steering_rad: FloatArray,
+    moving: BoolArray,
+    actuators: Actuators,
+    step_s: float,
+) -> None:
     grip = actuators.friction * GRAVITY_MPS2
-    turn = actuators.max_steering_rate_radps * step_s
-    steering = state.steering_rad + np.clip(steering_rad - state.steering_rad, -turn, turn)
-    steering = np.clip(steering, -actuators.max_steering_rad, actuators.max_steering_rad)
-    wanted = curvature_per_m(steering, actuators.wheelbase_m)
+    for g, p in np.ndindex(moving.shape):
+        if moving[g, p]:
+            rack = actuators.max_steering_rate_radps[p] * step_s
+            turn = _within(wanted_steering_rad[g, p] - steering_rad[g, p], rack)
+            steering = _within(steering_rad[g, p] + turn, actuators.max_steering_rad[p])
+            wanted = curvature_per_m(steering, actuators.wheelbase_m[p])
 
-    left_for_pedals = _rest_of(grip, wanted * state.speed_mps**2)
-    most_up = np.minimum(actuators.max_acceleration_mps2, left_for_pedals)
-    most_down = np.minimum(actuators.max_braking_mps2, left_for_pedals)
-    acceleration = np.clip(acceleration_mps2, -most_down, most_up)
-    speed = np.clip(state.speed_mps + acceleration * step_s, 0.0, actuators.max_speed_mps)
-    acceleration = (speed - state.speed_mps) / step_s
+            before = speed_mps[g, p]
+            left_for_pedals = _rest_of(grip, wanted * before**2)
+            most_up = min(actuators.max_acceleration_mps2[p], left_for_pedals)
+            most_down = min(actuators.max_braking_mps2[p], left_for_pedals)
+            acceleration = min(max(wanted_acceleration_mps2[g, p], -most_down), most_up)
+            speed = min(max(before + acceleration * step_s, 0.0), actuators.max_speed_mps[p])
+            acceleration = (speed - before) / step_s
 
-    tightest = _rest_of(grip, acceleration) / np.maximum(speed, 0.1) ** 2
-    curvature = np.clip(wanted, -tightest, tightest)
-    slip = np.arcsin(np.clip(0.5 * curvature * actuators.wheelbase_m, -1.0, 1.0))
-    turned = curvature * speed * step_s
-    course = state.heading_rad + 0.5 * turned + slip
-    np.copyto(state.x_m, state.x_m + speed * step_s * np.cos(course), where=moving)
-    np.copyto(state.y_m, state.y_m + speed * step_s * np.sin(course), where=moving)
-    heading = state.heading_rad + turned
-    np.copyto(state.heading_rad, (heading + np.pi) % (2.0 * np.pi) - np.pi, where=moving)
-    np.copyto(state.acceleration_mps2, acceleration, where=moving)
-    np.copyto(state.speed_mps, speed, where=moving)
-    np.copyto(state.steering_rad, steering, where=moving)
+            curvature = _within(wanted, _rest_of(grip, acceleration) / max(speed, 0.1) ** 2)
+            slip = np.arcsin(_within(0.5 * curvature * actuators.wheelbase_m[p], 1.0))
+            turned = curvature * speed * step_s
+            course = heading_rad[g, p] + 0.5 * turned + slip
+            x_m[g, p] += speed * step_s * np.cos(course)
+            y_m[g, p] += speed * step_s * np.sin(course)
+            heading_rad[g, p] = (heading_rad[g, p] + turned + np.pi) % (2.0 * np.pi) - np.pi
+            acceleration_mps2[g, p], speed_mps[g, p], steering_rad[g, p] = acceleration, speed, steering
 
 
+@compiled
 def curvature_per_m(steering_rad: FloatArray, wheelbase_m: FloatArray) -> FloatArray:
     """[...] curvature of the path of the centre of the wheelbase at a steering angle."""
     return np.cos(np.arctan(0.5 * np.tan(steering_rad))) * np.tan(steering_rad) / wheelbase_m
@@ -106,12 +126,24 @@ def curvature_per_m(steering_rad: FloatArray, wheelbase_m: FloatArray) -> FloatA
 
 def lateral_acceleration_mps2(state: State, actuators: Actuators) -> FloatArray:
     """[G, P] lateral acceleration at this steering and speed, bounded by the grip that the pedals leave."""
-    grip = actuators.friction * GRAVITY_MPS2
-    sideways = curvature_per_m(state.steering_rad, actuators.wheelbase_m) * state.speed_mps**2
-    most = _rest_of(grip, state.acceleration_mps2)
-    return np.clip(sideways, -most, most)
+    return _lateral_acceleration_mps2(state.steering_rad, state.speed_mps, state.acceleration_mps2, actuators)
 
 
+@compiled
+def _lateral_acceleration_mps2(
+    steering_rad: FloatArray, speed_mps: FloatArray, acceleration_mps2: FloatArray, actuators: Actuators
+) -> FloatArray:
+    sideways = curvature_per_m(steering_rad, actuators.wheelbase_m) * speed_mps**2
+    return _within(sideways, _rest_of(actuators.friction * GRAVITY_MPS2, acceleration_mps2))
+
+
+@compiled
 def _rest_of(grip_mps2: float, used_mps2: FloatArray) -> FloatArray:
     """[...] what the friction circle leaves in one direction when so much is used in the other."""
     return np.sqrt(np.maximum(grip_mps2**2 - used_mps2**2, 0.0))
+
+
+@compiled
+def _within(value: FloatArray, most: FloatArray | float) -> FloatArray:
+    """[...] a value kept between -most and most."""
+    return np.minimum(np.maximum(value, -most), most)

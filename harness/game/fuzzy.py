@@ -7,9 +7,11 @@ The output is the average of the sets' values, weighted by how much the input be
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from harness.compiling import compiled
 from harness.game.arrays import FloatArray
 
 
@@ -22,10 +24,6 @@ class FuzzySet:
     memberships: tuple[float, ...]
     value: float
 
-    def membership(self, value: FloatArray) -> FloatArray:
-        """[...] how much inputs [...] belong to the set."""
-        return np.interp(value, self.inputs, self.memberships)
-
 
 @dataclass(frozen=True)
 class FuzzyFunction:
@@ -36,7 +34,33 @@ class FuzzyFunction:
 
     def __call__(self, value: FloatArray) -> FloatArray:
         """[...] value of the function; 0 where the input belongs to no set."""
-        memberships = np.stack([each.membership(value) for each in self.sets])
-        values = np.array([each.value for each in self.sets]).reshape(-1, *([1] * np.ndim(value)))
-        total = memberships.sum(0)
-        return np.where(total > 0.0, (memberships * values).sum(0) / np.maximum(total, 1e-12), 0.0)
+        value = np.asarray(value, dtype=float)
+        return _inferred(value.ravel(), *self._points, self._values).reshape(value.shape)
+
+    @cached_property
+    def _points(self) -> tuple[FloatArray, FloatArray]:
+        """[S, N] inputs and memberships of the sets' points; a set that has fewer repeats its last."""
+        most = max(len(each.inputs) for each in self.sets)
+        inputs, memberships = (
+            [[*points, *[points[-1]] * (most - len(points))] for points in columns]
+            for columns in zip(*((each.inputs, each.memberships) for each in self.sets), strict=True)
+        )
+        return np.array(inputs), np.array(memberships)
+
+    @cached_property
+    def _values(self) -> FloatArray:
+        return np.array([each.value for each in self.sets])
+
+
+@compiled
+def _inferred(value: FloatArray, inputs: FloatArray, memberships: FloatArray, values: FloatArray) -> FloatArray:
+    found = np.zeros(value.shape)
+    for n in range(len(value)):
+        total, weighted = 0.0, 0.0
+        for k in range(len(values)):
+            membership = np.interp(value[n], inputs[k], memberships[k])
+            total += membership
+            weighted += membership * values[k]
+        if total > 0.0:
+            found[n] = weighted / total
+    return found

@@ -1,4 +1,4 @@
-"""Exact geometry of oriented boxes and line segments. Shapes broadcast; nothing here knows of games or roads.
+"""Exact geometry of oriented boxes and line segments. Nothing here knows of games or roads.
 
 Everything is worked out in a box's own frame, where a box is |u| <= half length, |v| <= half width: for convex shapes
 the distance is that of a corner of one to the other, and they touch unless an axis of either separates them.
@@ -6,113 +6,194 @@ the distance is that of a corner of one to the other, and they touch unless an a
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from math import cos, hypot, inf, sin, sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray
-
-_ALONG = np.array([0.5, 0.5, -0.5, -0.5])
-_ACROSS = np.array([0.5, -0.5, -0.5, 0.5])
+from harness.compiling import compiled
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 
 
 class Box(NamedTuple):
-    """Oriented boxes by centre, heading and size, each [...]."""
+    """Oriented boxes by centre, heading and size: numbers, or arrays of the shape that who takes them says."""
 
-    x_m: FloatArray
-    y_m: FloatArray
-    heading_rad: FloatArray
-    length_m: FloatArray
-    width_m: FloatArray
-
-
-def corners(box: Box) -> tuple[FloatArray, FloatArray]:
-    """x, y [..., 4] of a box's corners: front left, front right, rear right, rear left."""
-    cos, sin = np.cos(box.heading_rad)[..., None], np.sin(box.heading_rad)[..., None]
-    along, across = box.length_m[..., None] * _ALONG, box.width_m[..., None] * _ACROSS
-    return box.x_m[..., None] + along * cos - across * sin, box.y_m[..., None] + along * sin + across * cos
+    x_m: Any
+    y_m: Any
+    heading_rad: Any
+    length_m: Any
+    width_m: Any
 
 
-def _corners_in_frame(of: Box, frame: Box) -> tuple[FloatArray, FloatArray]:
-    """u, v [..., 4] of the corners of one box in the frame of another."""
-    turned = of.heading_rad - frame.heading_rad
-    cos, sin = np.cos(frame.heading_rad), np.sin(frame.heading_rad)
-    dx, dy = of.x_m - frame.x_m, of.y_m - frame.y_m
-    centre = np.zeros_like(turned)
-    u, v = corners(Box(centre, centre, turned, of.length_m, of.width_m))
-    return u + (dx * cos + dy * sin)[..., None], v + (dy * cos - dx * sin)[..., None]
+# --- two boxes -------------------------------------------------------------------------------------------------------
 
 
-def _beyond(u: FloatArray, v: FloatArray, box: Box) -> tuple[FloatArray, FloatArray]:
-    """How far points [..., n] of a box's frame lie beyond its ends and its sides; negative within."""
-    return np.abs(u) - 0.5 * box.length_m[..., None], np.abs(v) - 0.5 * box.width_m[..., None]
+@compiled
+def box_distance(a: Box, b: Box) -> float:
+    """Distance between two boxes; 0 where they share a point (separating axis theorem)."""
+    from_a, apart_in_a = _distance_in_frame(a, b)
+    from_b, apart_in_b = _distance_in_frame(b, a)
+    return min(from_a, from_b) if apart_in_a or apart_in_b else 0.0
 
 
-def _separated(u: FloatArray, v: FloatArray, box: Box) -> BoolArray:
-    """Whether an axis of the box separates it from the convex hull of points [..., n] of its frame."""
-    half_length, half_width = 0.5 * box.length_m, 0.5 * box.width_m
-    return (u.min(-1) > half_length) | (u.max(-1) < -half_length) | (v.min(-1) > half_width) | (v.max(-1) < -half_width)
+@compiled
+def _distance_in_frame(frame: Box, box: Box) -> tuple[float, bool]:
+    """Distance of a box's nearest corner to the frame's box, and whether an axis of the frame separates the two."""
+    u, v = _in_frame(frame, box.x_m, box.y_m)
+    turned = box.heading_rad - frame.heading_rad
+    cosine, sine = cos(turned), sin(turned)
+    half_length, half_width = 0.5 * frame.length_m, 0.5 * frame.width_m
+    nearest2 = inf
+    for along in (0.5 * box.length_m, -0.5 * box.length_m):
+        for across in (0.5 * box.width_m, -0.5 * box.width_m):
+            beyond_end = max(abs(u + along * cosine - across * sine) - half_length, 0.0)
+            beyond_side = max(abs(v + along * sine + across * cosine) - half_width, 0.0)
+            nearest2 = min(nearest2, beyond_end**2 + beyond_side**2)
+    reach_u, reach_v = _reach(box, cosine, sine)
+    return sqrt(nearest2), abs(u) > half_length + reach_u or abs(v) > half_width + reach_v
 
 
-def box_distance(a: Box, b: Box) -> FloatArray:
-    """[...] distance between boxes; 0 where they share a point (separating axis theorem)."""
-    nearest, apart = [], []
-    for frame, other in ((a, b), (b, a)):
-        u, v = _corners_in_frame(other, frame)
-        along, across = _beyond(u, v, frame)
-        nearest.append(np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)).min(-1))
-        apart.append(_separated(u, v, frame))
-    return np.where(apart[0] | apart[1], np.minimum(*nearest), 0.0)
-
-
-def time_to_contact(a: Box, b: Box, velocity_x_mps: FloatArray, velocity_y_mps: FloatArray) -> FloatArray:
-    """[...] seconds until box b, moving at that velocity relative to a, touches a; inf if never.
+@compiled
+def time_to_contact(a: Box, b: Box, velocity_x_mps: float, velocity_y_mps: float) -> float:
+    """Seconds until box b, moving at that velocity relative to a, touches a; inf if never.
 
     Exact for boxes that keep heading and velocity (separating axes, swept in time): 0 where they touch.
     """
-    enter, leave = np.full(np.shape(velocity_x_mps), -np.inf), np.full(np.shape(velocity_x_mps), np.inf)
-    for frame, other, sign in ((a, b, 1.0), (b, a, -1.0)):
-        cos, sin = np.cos(frame.heading_rad), np.sin(frame.heading_rad)
-        rates = (
-            sign * (velocity_x_mps * cos + velocity_y_mps * sin),
-            sign * (velocity_y_mps * cos - velocity_x_mps * sin),
-        )
-        halves = (0.5 * frame.length_m, 0.5 * frame.width_m)
-        for place, rate, half in zip(_corners_in_frame(other, frame), rates, halves, strict=True):
-            first, last = _overlap_interval(place.min(-1) - half, place.max(-1) + half, rate)
-            enter, leave = np.maximum(enter, first), np.minimum(leave, last)
-    return np.where((enter <= leave) & (leave >= 0.0), np.maximum(enter, 0.0), np.inf)
+    enter, leave = _overlap_in_frame(a, b, velocity_x_mps, velocity_y_mps)
+    enter_b, leave_b = _overlap_in_frame(b, a, -velocity_x_mps, -velocity_y_mps)
+    enter, leave = max(enter, enter_b), min(leave, leave_b)
+    return max(enter, 0.0) if enter <= leave and leave >= 0.0 else inf
 
 
-def _overlap_interval(low: FloatArray, high: FloatArray, rate: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """When [low, high] + rate * t contains 0."""
-    moving = np.abs(rate) > 1e-9
-    safe = np.where(moving, rate, 1.0)
-    one, two = -low / safe, -high / safe
-    always = (low <= 0.0) & (high >= 0.0)
-    still_enter, still_leave = np.where(always, -np.inf, np.inf), np.where(always, np.inf, -np.inf)
+@compiled
+def _overlap_in_frame(frame: Box, box: Box, velocity_x_mps: float, velocity_y_mps: float) -> tuple[float, float]:
+    """From when to when no axis of the frame separates its box and one that moves at a velocity relative to it."""
+    u, v = _in_frame(frame, box.x_m, box.y_m)
+    rate_u, rate_v = _in_frame(Box(0.0, 0.0, frame.heading_rad, 0.0, 0.0), velocity_x_mps, velocity_y_mps)
+    turned = box.heading_rad - frame.heading_rad
+    reach_u, reach_v = _reach(box, cos(turned), sin(turned))
+    enter_u, leave_u = _overlap(u, rate_u, 0.5 * frame.length_m + reach_u)
+    enter_v, leave_v = _overlap(v, rate_v, 0.5 * frame.width_m + reach_v)
+    return max(enter_u, enter_v), min(leave_u, leave_v)
+
+
+@compiled
+def _overlap(place: float, rate: float, reach: float) -> tuple[float, float]:
+    """From when to when |place + rate * t| <= reach."""
+    if abs(rate) <= 1e-9:
+        return (-inf, inf) if abs(place) <= reach else (inf, -inf)
+    middle, half = -place / rate, reach / abs(rate)
+    return middle - half, middle + half
+
+
+@compiled
+def _in_frame(frame: Box, x_m: float, y_m: float) -> tuple[float, float]:
+    """u, v of a point in a box's frame."""
+    cosine, sine = cos(frame.heading_rad), sin(frame.heading_rad)
+    dx, dy = x_m - frame.x_m, y_m - frame.y_m
+    return dx * cosine + dy * sine, dy * cosine - dx * sine
+
+
+@compiled
+def _reach(box: Box, cosine: float, sine: float) -> tuple[float, float]:
+    """How far a box that is turned by an angle reaches from its centre along either axis."""
+    half_length, half_width = 0.5 * box.length_m, 0.5 * box.width_m
     return (
-        np.where(moving, np.minimum(one, two), still_enter),
-        np.where(moving, np.maximum(one, two), still_leave),
+        half_length * abs(cosine) + half_width * abs(sine),
+        half_length * abs(sine) + half_width * abs(cosine),
     )
 
 
-def box_segment_distance(box: Box, segments: FloatArray) -> FloatArray:
-    """[...] distance of a box to segments [..., 2, 2] (start and end, x and y); 0 where they touch."""
-    cos, sin = np.cos(box.heading_rad), np.sin(box.heading_rad)
-    dx, dy = segments[..., 0] - box.x_m[..., None], segments[..., 1] - box.y_m[..., None]
-    u, v = dx * cos[..., None] + dy * sin[..., None], dy * cos[..., None] - dx * sin[..., None]
-    along, across = _beyond(u, v, box)
-    from_ends = np.hypot(np.maximum(along, 0.0), np.maximum(across, 0.0)).min(-1)
+# --- a box and a segment ---------------------------------------------------------------------------------------------
 
-    span_u, span_v = u[..., 1] - u[..., 0], v[..., 1] - v[..., 0]
-    corner_u = box.length_m[..., None] * _ALONG - u[..., :1]
-    corner_v = box.width_m[..., None] * _ACROSS - v[..., :1]
-    span2 = np.maximum(span_u * span_u + span_v * span_v, 1e-12)
-    share = (corner_u * span_u[..., None] + corner_v * span_v[..., None]) / span2[..., None]
-    share = np.minimum(np.maximum(share, 0.0), 1.0)
-    from_corners = np.hypot(corner_u - share * span_u[..., None], corner_v - share * span_v[..., None]).min(-1)
 
-    side = corner_u * span_v[..., None] - corner_v * span_u[..., None]
-    apart = _separated(u, v, box) | (side.min(-1) > 0.0) | (side.max(-1) < 0.0)
-    return np.where(apart, np.minimum(from_ends, from_corners), 0.0)
+@compiled
+def box_segment_distance(box: Box, segment: FloatArray) -> float:
+    """Distance of a box to a segment [2, 2] (start and end, x and y); 0 where they touch."""
+    return _box_segment_distance(box, cos(box.heading_rad), sin(box.heading_rad), segment, inf)
+
+
+@compiled
+def _box_segment_distance(box: Box, cosine: float, sine: float, segment: FloatArray, limit_m: float) -> float:
+    """The distance where it is below a limit, else something not below it; with cosine and sine of the heading."""
+    dx, dy = segment[0, 0] - box.x_m, segment[0, 1] - box.y_m
+    u0, v0 = dx * cosine + dy * sine, dy * cosine - dx * sine
+    dx, dy = segment[1, 0] - box.x_m, segment[1, 1] - box.y_m
+    u1, v1 = dx * cosine + dy * sine, dy * cosine - dx * sine
+    half_length, half_width = 0.5 * box.length_m, 0.5 * box.width_m
+    gap = max(min(u0, u1) - half_length, -max(u0, u1) - half_length)
+    gap = max(gap, min(v0, v1) - half_width, -max(v0, v1) - half_width)
+    if gap >= limit_m:
+        return gap
+    nearest2 = min(
+        max(abs(u0) - half_length, 0.0) ** 2 + max(abs(v0) - half_width, 0.0) ** 2,
+        max(abs(u1) - half_length, 0.0) ** 2 + max(abs(v1) - half_width, 0.0) ** 2,
+    )
+    span_u, span_v = u1 - u0, v1 - v0
+    span2 = max(span_u * span_u + span_v * span_v, 1e-12)
+    least_side, most_side = inf, -inf
+    for corner_u in (half_length - u0, -half_length - u0):
+        for corner_v in (half_width - v0, -half_width - v0):
+            share = min(max((corner_u * span_u + corner_v * span_v) / span2, 0.0), 1.0)
+            nearest2 = min(nearest2, (corner_u - share * span_u) ** 2 + (corner_v - share * span_v) ** 2)
+            side = corner_u * span_v - corner_v * span_u
+            least_side, most_side = min(least_side, side), max(most_side, side)
+    return sqrt(nearest2) if gap > 0.0 or least_side > 0.0 or most_side < 0.0 else 0.0
+
+
+# --- many of them ----------------------------------------------------------------------------------------------------
+# Boxes `own` have places [N, P] and sizes [P], `others` are [N, B]: each is looked at against those of its own row
+# that are marked in `among` [N, P, B].
+
+
+@compiled
+def distance_to_nearest_box(own: Box, others: Box, among: BoolArray, limit_m: float) -> FloatArray:
+    """[N, P] distance to the nearest of the others, never over a limit."""
+    found = np.full(own.x_m.shape, limit_m)
+    for n, p, b in np.ndindex(among.shape):
+        if among[n, p, b]:
+            a, other = _own(own, n, p), _other(others, n, b)
+            radii = 0.5 * (hypot(a.length_m, a.width_m) + hypot(other.length_m, other.width_m))
+            if hypot(a.x_m - other.x_m, a.y_m - other.y_m) - radii < found[n, p]:
+                found[n, p] = min(found[n, p], box_distance(a, other))
+    return found
+
+
+@compiled
+def time_to_first_contact(
+    own: Box, others: Box, own_speed_mps: FloatArray, speed_mps: FloatArray, among: BoolArray
+) -> FloatArray:
+    """[N, P] seconds until the first contact with one of the others if all keep heading and speed; inf if none."""
+    found = np.full(own.x_m.shape, inf)
+    for n, p, b in np.ndindex(among.shape):
+        if among[n, p, b]:
+            a, other = _own(own, n, p), _other(others, n, b)
+            velocity_x = speed_mps[n, b] * cos(other.heading_rad) - own_speed_mps[n, p] * cos(a.heading_rad)
+            velocity_y = speed_mps[n, b] * sin(other.heading_rad) - own_speed_mps[n, p] * sin(a.heading_rad)
+            found[n, p] = min(found[n, p], time_to_contact(a, other, velocity_x, velocity_y))
+    return found
+
+
+@compiled
+def distance_to_nearest_segment(own: Box, segments: FloatArray, rows: IntArray, limit_m: float) -> FloatArray:
+    """[N, P] distance to the nearest of the segments [S, 2, 2] in rows [N, P, K], never over a limit."""
+    found = np.full(own.x_m.shape, limit_m)
+    for n, p in np.ndindex(own.x_m.shape):
+        box = _own(own, n, p)
+        cosine, sine = cos(box.heading_rad), sin(box.heading_rad)
+        for k in range(rows.shape[2]):
+            distance = _box_segment_distance(box, cosine, sine, segments[rows[n, p, k]], found[n, p])
+            found[n, p] = min(found[n, p], distance)
+    return found
+
+
+@compiled
+def _own(own: Box, n: int, p: int) -> Box:
+    return Box(own.x_m[n, p], own.y_m[n, p], own.heading_rad[n, p], own.length_m[p], own.width_m[p])
+
+
+@compiled
+def _other(others: Box, n: int, b: int) -> Box:
+    return Box(
+        others.x_m[n, b], others.y_m[n, b], others.heading_rad[n, b], others.length_m[n, b], others.width_m[n, b]
+    )

@@ -11,11 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from harness.game.arrays import FloatArray
-from harness.game.quantities import PATH_M, Quantities
+from harness.compiling import compiled
+from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.quantities import PATH_M, OnPath, Quantities, Relative
 
-AHEAD = PATH_M >= 0.0
-AHEAD_M = PATH_M[AHEAD]
+_BEHIND = int(np.searchsorted(PATH_M, 0.0))  # how many of them are not ahead
+AHEAD_M = PATH_M[_BEHIND:]
 OTHERS = 3  # how many of the nearest others are seen
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
@@ -23,6 +24,7 @@ _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  #
 _SPEED_MPS, _ACCELERATION_MPS2, _SIDE_M, _FAR_M = 30.0, 10.0, 8.0, 100.0
 _AHEAD_M, _CLOSING_MPS, _CROSSING_MPS = 50.0, 10.0, 5.0
 _OTHER = ("seen", "ahead_m", "left_m", "ahead_mps", "left_mps", "turned_sin", "turned_cos")
+_ENTRIES = len(_OTHER)
 
 LAYOUT: tuple[str, ...] = (
     "speed_mps",
@@ -38,69 +40,94 @@ LAYOUT: tuple[str, ...] = (
     *(f"other{k}_{name}" for k in range(OTHERS) for name in _OTHER),
 )
 SIZE = len(LAYOUT)
-_TURNED = slice(6, 6 + len(AHEAD_M))
-_LEFT = slice(_TURNED.stop + 1, _TURNED.stop + 1 + len(AHEAD_M))
-_RIGHT = slice(_LEFT.stop, _LEFT.stop + len(AHEAD_M))
+_COUNT = len(AHEAD_M)
+_TURNED = 6  # where the entries of each kind begin
+_LEFT = _TURNED + _COUNT + 1
+_RIGHT = _LEFT + _COUNT
+_FIRST_OTHER = _RIGHT + _COUNT
 OF_OTHERS = np.array([name.startswith("other") for name in LAYOUT])
 
 
 def observe(q: Quantities) -> FloatArray:
     """[G, P, SIZE] float32 in [-1, 1]: what each player sees. Players that are not there see zeros."""
-    state = q.state
-    seen = np.zeros((*state.x_m.shape, SIZE))
-    seen[..., 0] = state.speed_mps / _SPEED_MPS
-    seen[..., 1] = q.speed_over_limit
-    seen[..., 2] = state.acceleration_mps2 / _ACCELERATION_MPS2
-    seen[..., 3] = state.steering_rad / q.world.actuators.max_steering_rad
-    seen[..., 4] = np.minimum(q.lane_end_m, _FAR_M) / _FAR_M
-    seen[..., 5] = q.goal_m / (2.0 * _FAR_M)
-    turned = q.path.heading_rad[..., AHEAD] - state.heading_rad[..., None]
-    seen[..., _TURNED] = 2.0 * ((turned + np.pi) % (2.0 * np.pi) - np.pi)
-    seen[..., _TURNED.stop] = q.lateral_offset_m / -_SIDE_M
-    left, right = _free_width(q)
-    seen[..., _LEFT], seen[..., _RIGHT] = left / _SIDE_M, right / _SIDE_M
-    _see_others(q, seen[..., _RIGHT.stop :])
-    seen *= state.present[..., None]
-    return np.minimum(np.maximum(seen, -1.0), 1.0).astype(np.float32)
+    state, actuators, routes = q.state, q.world.actuators, q.world.road.routes
+    view = np.zeros((*state.x_m.shape, SIZE))
+    view[..., 0] = state.speed_mps / _SPEED_MPS
+    view[..., 1] = q.speed_over_limit
+    view[..., 2] = state.acceleration_mps2 / _ACCELERATION_MPS2
+    view[..., 3] = state.steering_rad / actuators.max_steering_rad
+    view[..., 4] = q.lane_end_m / _FAR_M
+    view[..., 5] = q.goal_m / (2.0 * _FAR_M)
+    edges = (routes.left_edge_m, routes.right_edge_m)
+    _look_ahead(view, state.heading_rad, q.lateral_offset_m, q.path_rows, routes.heading_rad, *edges, q.seen, q.on_path)
+    _look_at_others(view, state.speed_mps, q.bodies.speed_mps, q.seen, q.relative)
+    return _within_bounds(view, state.present)
 
 
-def _free_width(q: Quantities) -> tuple[FloatArray, FloatArray]:
-    """[G, P, K] free width to the left (positive) and to the right (negative) of the player at `AHEAD_M`."""
-    offset = q.lateral_offset_m[..., None]
-    left = q.path.left_edge_m[..., AHEAD] - offset
-    right = q.path.right_edge_m[..., AHEAD] - offset
-    if q.seen.any():
-        body = q.on_path
-        near, far = (
-            (body.ahead_m - body.half_length_m)[..., None],
-            (body.ahead_m + body.half_length_m)[..., None],
-        )
-        inside = q.seen[..., None] & (far > _EDGES[:-1]) & (near < _EDGES[1:])
-        on_left = (body.left_m > 0.0)[..., None]
-        side_to_right = (body.left_m - body.half_width_m)[..., None]
-        side_to_left = (body.left_m + body.half_width_m)[..., None]
-        left = np.minimum(left, np.where(inside & on_left, side_to_right, np.inf).min(-2))
-        right = np.maximum(right, np.where(inside & ~on_left, side_to_left, -np.inf).max(-2))
-    return left, right
+@compiled
+def _look_ahead(
+    view: FloatArray,
+    heading_rad: FloatArray,
+    lateral_offset_m: FloatArray,
+    path_rows: IntArray,
+    line_heading_rad: FloatArray,
+    left_edge_m: FloatArray,
+    right_edge_m: FloatArray,
+    seen: BoolArray,
+    bodies: OnPath,
+) -> None:
+    """Fill in how the path turns, and the free width beside it."""
+    for g, p in np.ndindex(heading_rad.shape):
+        offset = lateral_offset_m[g, p]
+        view[g, p, _LEFT - 1] = -offset / _SIDE_M
+        for k in range(_COUNT):
+            row = path_rows[g, p, _BEHIND + k]
+            turned = line_heading_rad[row] - heading_rad[g, p]
+            view[g, p, _TURNED + k] = 2.0 * ((turned + np.pi) % (2.0 * np.pi) - np.pi)
+            left, right = left_edge_m[row] - offset, right_edge_m[row] - offset
+            for b in range(seen.shape[2]):
+                near = bodies.ahead_m[g, p, b] - bodies.half_length_m[g, p, b]
+                far = bodies.ahead_m[g, p, b] + bodies.half_length_m[g, p, b]
+                if seen[g, p, b] and far > _EDGES[k] and near < _EDGES[k + 1]:
+                    if bodies.left_m[g, p, b] > 0.0:
+                        left = min(left, bodies.left_m[g, p, b] - bodies.half_width_m[g, p, b])
+                    else:
+                        right = max(right, bodies.left_m[g, p, b] + bodies.half_width_m[g, p, b])
+            view[g, p, _LEFT + k], view[g, p, _RIGHT + k] = left / _SIDE_M, right / _SIDE_M
 
 
-def _see_others(q: Quantities, seen: FloatArray) -> None:
-    """Fill [G, P, OTHERS * 7] with the nearest others, nearest first; zeros stay where there are fewer."""
-    relative, state, bodies = q.relative, q.state, q.bodies
-    distance = np.where(q.seen & (relative.distance_m < _FAR_M), relative.distance_m, np.inf)
-    order = np.argsort(distance, axis=-1, kind="stable")[..., :OTHERS]
-    g, p, k = np.nonzero(np.isfinite(distance).sum(-1)[..., None] > np.arange(order.shape[-1]))
-    b = order[g, p, k]
-    turned = relative.turned_rad[g, p, b]
-    speed = bodies.speed_mps[g, b]
-    entries = (
-        np.ones(len(g)),
-        relative.ahead_m[g, p, b] / _AHEAD_M,
-        relative.left_m[g, p, b] / _SIDE_M,
-        (speed * np.cos(turned) - state.speed_mps[g, p]) / _CLOSING_MPS,
-        speed * np.sin(turned) / _CROSSING_MPS,
-        np.sin(turned),
-        np.cos(turned),
-    )
-    for each, entry in enumerate(entries):
-        seen[g, p, k * len(_OTHER) + each] = entry
+@compiled
+def _look_at_others(
+    view: FloatArray, own_speed_mps: FloatArray, speed_mps: FloatArray, seen: BoolArray, bodies: Relative
+) -> None:
+    """Fill in the nearest others, nearest first; zeros stay where there are fewer."""
+    for g, p in np.ndindex(own_speed_mps.shape):
+        last, last_m = -1, -1.0  # whom the entry before is of
+        for k in range(OTHERS):
+            nearest, nearest_m = -1, _FAR_M
+            for b in range(seen.shape[2]):
+                away = bodies.distance_m[g, p, b]
+                if seen[g, p, b] and away < nearest_m and (away > last_m or (away == last_m and b > last)):
+                    nearest, nearest_m = b, away
+            if nearest < 0:
+                break
+            last, last_m = nearest, nearest_m
+            turned, speed = bodies.turned_rad[g, p, nearest], speed_mps[g, nearest]
+            entry = view[g, p, _FIRST_OTHER + k * _ENTRIES :]
+            entry[0] = 1.0
+            entry[1] = bodies.ahead_m[g, p, nearest] / _AHEAD_M
+            entry[2] = bodies.left_m[g, p, nearest] / _SIDE_M
+            entry[3] = (speed * np.cos(turned) - own_speed_mps[g, p]) / _CLOSING_MPS
+            entry[4] = speed * np.sin(turned) / _CROSSING_MPS
+            entry[5] = np.sin(turned)
+            entry[6] = np.cos(turned)
+
+
+@compiled
+def _within_bounds(view: FloatArray, present: BoolArray) -> FloatArray:
+    bounded = np.zeros(view.shape, dtype=np.float32)
+    for g, p in np.ndindex(present.shape):
+        if present[g, p]:
+            for k in range(view.shape[2]):
+                bounded[g, p, k] = min(max(view[g, p, k], -1.0), 1.0)
+    return bounded

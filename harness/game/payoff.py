@@ -41,11 +41,12 @@ class Term:
 
 def _below(value: FloatArray, limit: float) -> FloatArray:
     """0 at the limit and above, falling to -1 at zero."""
-    return -np.clip(1.0 - value / limit, 0.0, 1.0)
+    return np.minimum(value / limit, 1.0) - 1.0
 
 
 def _ended(outcome: Outcome, sign: float) -> Callable[[Quantities], FloatArray]:
-    return lambda q: sign * (q.state.outcome == outcome)
+    code = int(outcome)  # NumPy would ask the enumeration each time
+    return lambda q: sign * (q.state.outcome == code)
 
 
 TERMS: Mapping[str, Term] = {

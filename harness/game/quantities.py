@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.game import geometry
+from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Actuators, lateral_acceleration_mps2
-from harness.game.geometry import Box
+from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.road import MARGIN_M, SPACING_M, Road
 from harness.game.state import Bodies, State
 
@@ -44,11 +44,7 @@ class World:
 class Path(NamedTuple):
     """The route at `PATH_M` ahead of each player, [G, P, K]; edges are offsets from the route's line."""
 
-    x_m: FloatArray
-    y_m: FloatArray
     heading_rad: FloatArray
-    cos: FloatArray
-    sin: FloatArray
     left_edge_m: FloatArray
     right_edge_m: FloatArray
 
@@ -88,12 +84,15 @@ class Quantities:
         return self.world.road.routes.rows(self.state.station_m)
 
     @cached_property
+    def path_rows(self) -> IntArray:
+        """[G, P, K] the rows of the table of routes at `PATH_M`."""
+        routes = self.world.road.routes
+        return _path_rows(self._rows, routes.first_row, routes.last_row)
+
+    @cached_property
     def path(self) -> Path:
         """The route at `PATH_M`."""
-        routes = self.world.road.routes
-        rows = self._rows[..., None] + _PATH_ROWS
-        rows = np.minimum(np.maximum(rows, routes.first_row[:, None]), routes.last_row[:, None])
-        return Path(*(getattr(routes, name)[rows] for name in Path._fields))
+        return Path(*(getattr(self.world.road.routes, name)[self.path_rows] for name in Path._fields))
 
     @property
     def speed_mps(self) -> FloatArray:
@@ -110,10 +109,7 @@ class Quantities:
 
     @cached_property
     def _lane(self) -> tuple[FloatArray, FloatArray]:
-        routes = self.world.road.routes
-        away = np.abs(routes.lane_offset_m[self._rows] - self.lateral_offset_m[..., None])
-        away[np.isnan(away)] = np.inf
-        return away.min(-1), _at(routes.lane_end_m[self._rows], away.argmin(-1))
+        return self.world.road.routes.nearest_lane(self._rows, self.lateral_offset_m)
 
     @cached_property
     def lane_offset_m(self) -> FloatArray:
@@ -139,9 +135,7 @@ class Quantities:
     @cached_property
     def visible(self) -> BoolArray:
         """[G, P, B] bodies that are there and are not the player itself."""
-        players = self.state.x_m.shape[1]
-        others = np.arange(players)[:, None] != np.arange(self.bodies.x_m.shape[1])
-        return self.bodies.present[:, None, :] & self.state.present[:, :, None] & others
+        return _visible(self.state.present, self.bodies.present)
 
     @cached_property
     def seen(self) -> BoolArray:
@@ -152,35 +146,20 @@ class Quantities:
     def relative(self) -> Relative:
         """Bodies in the player's own frame."""
         state, bodies = self.state, self.bodies
-        cos, sin = np.cos(state.heading_rad)[..., None], np.sin(state.heading_rad)[..., None]
-        dx = bodies.x_m[:, None, :] - state.x_m[..., None]
-        dy = bodies.y_m[:, None, :] - state.y_m[..., None]
-        turned = bodies.heading_rad[:, None, :] - state.heading_rad[..., None]
-        return Relative(dx * cos + dy * sin, dy * cos - dx * sin, np.hypot(dx, dy), turned)
+        own = (state.x_m, state.y_m, state.heading_rad)
+        return Relative(*_relative(*own, bodies.x_m, bodies.y_m, bodies.heading_rad))
 
     @cached_property
     def on_path(self) -> OnPath:
         """Bodies along the player's route, each seen from the nearest of the route's frames at `PATH_M`."""
-        path, bodies = self.path, self.bodies
-        cos, sin = path.cos[:, :, None, :], path.sin[:, :, None, :]
-        dx = bodies.x_m[:, None, :, None] - path.x_m[:, :, None, :]
-        dy = bodies.y_m[:, None, :, None] - path.y_m[:, :, None, :]
-        along = dx * cos + dy * sin
-        nearest = (dx * dx + dy * dy).argmin(-1)
-        left = _at(dy * cos - dx * sin, nearest) - self.lateral_offset_m[..., None]
-        turned = bodies.heading_rad[:, None, :] - _at(
-            np.broadcast_to(path.heading_rad[:, :, None, :], along.shape), nearest
-        )
-        cos, sin = np.abs(np.cos(turned)), np.abs(np.sin(turned))
-        half_length, half_width = 0.5 * bodies.length_m[:, None, :], 0.5 * bodies.width_m[:, None, :]
-        routes = self.world.road.routes
+        bodies, routes = self.bodies, self.world.road.routes
+        lines = (routes.x_m, routes.y_m, routes.heading_rad, routes.cos, routes.sin)
+        boxes = (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
+        ahead, left, half_length, half_width = _on_path(self.path_rows, *lines, *boxes)
         to_row_m = (self._rows - routes.first_row) * SPACING_M - MARGIN_M - self.state.station_m  # the rounding of rows
-        return OnPath(
-            _at(along, nearest) + PATH_M[nearest] + to_row_m[..., None],
-            left,
-            half_length * cos + half_width * sin,
-            half_length * sin + half_width * cos,
-        )
+        ahead += to_row_m[..., None]
+        left -= self.lateral_offset_m[..., None]
+        return OnPath(ahead, left, half_length, half_width)
 
     @cached_property
     def leader_gap_m(self) -> FloatArray:
@@ -199,39 +178,26 @@ class Quantities:
 
     # --- surfaces ------------------------------------------------------------------------------------------------
 
-    def _pairs(self, pairs: BoolArray) -> tuple[IntArray, IntArray, IntArray, Box, Box]:
-        """Game, player and body of the pairs marked in [G, P, B], and their boxes: the player's, the body's."""
-        state, bodies, world = self.state, self.bodies, self.world
-        g, p, b = np.nonzero(pairs)
-        own = Box(state.x_m[g, p], state.y_m[g, p], state.heading_rad[g, p], world.length_m[p], world.width_m[p])
-        other = Box(*(getattr(bodies, name)[g, b] for name in Box._fields))
-        return g, p, b, own, other
+    @cached_property
+    def _cars(self) -> Box:
+        """The players' boxes: places [G, P], sizes [P]."""
+        state, world = self.state, self.world
+        return Box(state.x_m, state.y_m, state.heading_rad, world.length_m, world.width_m)
+
+    @cached_property
+    def _boxes(self) -> Box:
+        """The bodies' boxes, [G, B]."""
+        return Box(*(getattr(self.bodies, name) for name in Box._fields))
 
     @cached_property
     def vehicle_clearance_m(self) -> FloatArray:
         """Distance to the nearest other body; 0 where they touch, never over `REACH_M`."""
-        bodies, world = self.bodies, self.world
-        radii = 0.5 * np.hypot(bodies.length_m, bodies.width_m)[:, None, :]
-        radii = radii + 0.5 * np.hypot(world.length_m, world.width_m)[:, None]
-        g, p, _, own, other = self._pairs(self.visible & (self.relative.distance_m - radii < REACH_M))
-        nearest = np.full(self.state.x_m.shape, REACH_M)
-        np.minimum.at(nearest, (g, p), geometry.box_distance(own, other))
-        return nearest
+        return distance_to_nearest_box(self._cars, self._boxes, self.visible, REACH_M)
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
         """Distance to the nearest edge of the drivable area; 0 where the car is on it, never over `REACH_M`."""
-        state, world = self.state, self.world
-        segments = world.road.rails.near(state.x_m, state.y_m)
-        shape = state.x_m.shape
-        own = Box(
-            state.x_m[..., None],
-            state.y_m[..., None],
-            state.heading_rad[..., None],
-            np.broadcast_to(world.length_m, shape)[..., None],
-            np.broadcast_to(world.width_m, shape)[..., None],
-        )
-        return np.minimum(geometry.box_segment_distance(own, segments).min(-1), REACH_M)
+        return self.world.road.rails.distance_m(self._cars, REACH_M)
 
     @cached_property
     def clearance_m(self) -> FloatArray:
@@ -249,17 +215,77 @@ class Quantities:
     @cached_property
     def time_to_collision_s(self) -> FloatArray:
         """Seconds until contact with another body if all keep heading and speed; inf if none would touch."""
-        state, bodies = self.state, self.bodies
-        g, p, b, own, other = self._pairs(self.visible)
-        own_speed, speed = state.speed_mps[g, p], bodies.speed_mps[g, b]
-        velocity_x = speed * np.cos(other.heading_rad) - own_speed * np.cos(own.heading_rad)
-        velocity_y = speed * np.sin(other.heading_rad) - own_speed * np.sin(own.heading_rad)
-        soonest = np.full(state.x_m.shape, np.inf)
-        np.minimum.at(soonest, (g, p), geometry.time_to_contact(own, other, velocity_x, velocity_y))
-        return soonest
+        return time_to_first_contact(self._cars, self._boxes, self.state.speed_mps, self.bodies.speed_mps, self.visible)
 
 
-def _at(values: FloatArray, chosen: IntArray) -> FloatArray:
-    """[...] the entry chosen [...] of the last axis of values [..., K]."""
-    flat = values.reshape(-1, values.shape[-1])
-    return flat[np.arange(flat.shape[0]), chosen.reshape(-1)].reshape(chosen.shape)
+@compiled
+def _path_rows(rows: IntArray, first_row: IntArray, last_row: IntArray) -> IntArray:
+    found = np.empty((*rows.shape, len(_PATH_ROWS)), dtype=rows.dtype)
+    for g, p in np.ndindex(rows.shape):
+        for k in range(len(_PATH_ROWS)):
+            found[g, p, k] = min(max(rows[g, p] + _PATH_ROWS[k], first_row[p]), last_row[p])
+    return found
+
+
+@compiled
+def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
+    found = np.empty((players.shape[0], players.shape[1], bodies.shape[1]), dtype=np.bool_)
+    for g, p, b in np.ndindex(found.shape):
+        found[g, p, b] = players[g, p] and bodies[g, b] and p != b
+    return found
+
+
+@compiled
+def _relative(
+    own_x_m: FloatArray,
+    own_y_m: FloatArray,
+    own_heading_rad: FloatArray,
+    x_m: FloatArray,
+    y_m: FloatArray,
+    heading_rad: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    shape = (own_x_m.shape[0], own_x_m.shape[1], x_m.shape[1])
+    ahead, left, distance, turned = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
+    for g, p in np.ndindex(own_x_m.shape):
+        cos, sin = np.cos(own_heading_rad[g, p]), np.sin(own_heading_rad[g, p])
+        for b in range(x_m.shape[1]):
+            dx, dy = x_m[g, b] - own_x_m[g, p], y_m[g, b] - own_y_m[g, p]
+            ahead[g, p, b], left[g, p, b] = dx * cos + dy * sin, dy * cos - dx * sin
+            distance[g, p, b] = np.hypot(dx, dy)
+            turned[g, p, b] = heading_rad[g, b] - own_heading_rad[g, p]
+    return ahead, left, distance, turned
+
+
+@compiled
+def _on_path(
+    path_rows: IntArray,
+    line_x_m: FloatArray,
+    line_y_m: FloatArray,
+    line_heading_rad: FloatArray,
+    line_cos: FloatArray,
+    line_sin: FloatArray,
+    x_m: FloatArray,
+    y_m: FloatArray,
+    heading_rad: FloatArray,
+    length_m: FloatArray,
+    width_m: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Where bodies are from the middle row of the path and to the left of its line, and half the room they take."""
+    shape = (path_rows.shape[0], path_rows.shape[1], x_m.shape[1])
+    ahead, left, half_length, half_width = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
+    for g, p, b in np.ndindex(shape):
+        nearest, nearest2 = 0, np.inf
+        for k in range(path_rows.shape[2]):
+            row = path_rows[g, p, k]
+            away2 = (x_m[g, b] - line_x_m[row]) ** 2 + (y_m[g, b] - line_y_m[row]) ** 2
+            if away2 < nearest2:
+                nearest, nearest2 = k, away2
+        row = path_rows[g, p, nearest]
+        dx, dy = x_m[g, b] - line_x_m[row], y_m[g, b] - line_y_m[row]
+        ahead[g, p, b] = dx * line_cos[row] + dy * line_sin[row] + PATH_M[nearest]
+        left[g, p, b] = dy * line_cos[row] - dx * line_sin[row]
+        turned = heading_rad[g, b] - line_heading_rad[row]
+        cos, sin = abs(np.cos(turned)), abs(np.sin(turned))
+        half_length[g, p, b] = 0.5 * (length_m[g, b] * cos + width_m[g, b] * sin)
+        half_width[g, p, b] = 0.5 * (length_m[g, b] * sin + width_m[g, b] * cos)
+    return ahead, left, half_length, half_width

@@ -7,7 +7,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from harness.compiling import compiled
 from harness.game.arrays import FloatArray, IntArray
+from harness.game.geometry import Box, distance_to_nearest_segment
 
 SPACING_M = 0.5  # between stations of a route
 MARGIN_M = 100.0  # how far a route's table goes on, straight, before its start and beyond its end
@@ -83,32 +85,80 @@ class Routes:
 
     def rows(self, station_m: FloatArray) -> IntArray:
         """[G, P] rows of the table nearest to the players' stations [G, P]."""
-        return self.clip(self.first_row + np.rint((station_m + MARGIN_M) / SPACING_M).astype(np.int64))
-
-    def clip(self, rows: IntArray) -> IntArray:
-        """[G, P] rows kept within each player's own route."""
-        return np.minimum(np.maximum(rows, self.first_row), self.last_row)
+        return _rows(station_m, self.first_row, self.last_row)
 
     def locate(self, x_m: FloatArray, y_m: FloatArray, station_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Stations and lateral offsets (m, left positive) of the players at points [G, P], given where they were.
+        """Stations and lateral offsets (m, left positive) of the players at points [G, P], given where they were."""
+        lines = (self.x_m, self.y_m, self.cos, self.sin, self.curvature_per_m)
+        return _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
 
-        Newton's method on the distance to the line: a metre to the inside of a curve is more of its line, a metre to
-        the outside less.
-        """
-        for _ in range(3):
-            rows = self.rows(station_m)
-            dx, dy = x_m - self.x_m[rows], y_m - self.y_m[rows]
-            cos, sin = self.cos[rows], self.sin[rows]
-            offset = dy * cos - dx * sin
-            stretch = np.maximum(1.0 - self.curvature_per_m[rows] * offset, _LEAST_STRETCH)
-            station_m = (rows - self.first_row) * SPACING_M - MARGIN_M + (dx * cos + dy * sin) / stretch
-        return station_m, offset
+    def nearest_lane(self, rows: IntArray, offset_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """[G, P] distance to the centre of the nearest lane, and the station where that lane ends, at rows of the
+        table and lateral offsets."""
+        return _nearest_lane(rows, offset_m, self.lane_offset_m, self.lane_end_m)
 
     def find(self, player: int, x_m: float, y_m: float) -> float:
         """Station of a player of which nothing is known but the point."""
         rows = slice(self.first_row[player], self.last_row[player] + 1)
         nearest = int(((self.x_m[rows] - x_m) ** 2 + (self.y_m[rows] - y_m) ** 2).argmin())
         return nearest * SPACING_M - MARGIN_M
+
+
+@compiled
+def _rows(station_m: FloatArray, first_row: IntArray, last_row: IntArray) -> IntArray:
+    rows = np.empty(station_m.shape, dtype=np.int64)
+    for g, p in np.ndindex(station_m.shape):
+        rows[g, p] = _row(station_m[g, p], first_row[p], last_row[p])
+    return rows
+
+
+@compiled
+def _row(station_m: float, first_row: int, last_row: int) -> int:
+    """The row of a route nearest to a station (its first where there is no telling: NaN)."""
+    onward = (station_m + MARGIN_M) / SPACING_M
+    return first_row + int(min(np.rint(onward), last_row - first_row)) if onward > 0.0 else first_row
+
+
+@compiled
+def _locate(
+    x_m: FloatArray,
+    y_m: FloatArray,
+    station_m: FloatArray,
+    line_x_m: FloatArray,
+    line_y_m: FloatArray,
+    line_cos: FloatArray,
+    line_sin: FloatArray,
+    curvature_per_m: FloatArray,
+    first_row: IntArray,
+    last_row: IntArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Newton's method on the distance to the line: a metre to the inside of a curve is more of its line, a metre to
+    the outside less."""
+    stations, offsets = station_m.copy(), np.empty_like(station_m)
+    for g, p in np.ndindex(x_m.shape):
+        for _ in range(3):
+            row = _row(stations[g, p], first_row[p], last_row[p])
+            dx, dy = x_m[g, p] - line_x_m[row], y_m[g, p] - line_y_m[row]
+            offset = dy * line_cos[row] - dx * line_sin[row]
+            stretch = max(1.0 - curvature_per_m[row] * offset, _LEAST_STRETCH)
+            along = (dx * line_cos[row] + dy * line_sin[row]) / stretch
+            stations[g, p] = (row - first_row[p]) * SPACING_M - MARGIN_M + along
+            offsets[g, p] = offset
+    return stations, offsets
+
+
+@compiled
+def _nearest_lane(
+    rows: IntArray, offset_m: FloatArray, lane_offset_m: FloatArray, lane_end_m: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    nearest, ends = np.full(offset_m.shape, np.inf), np.full(offset_m.shape, np.inf)
+    for g, p in np.ndindex(offset_m.shape):
+        row = rows[g, p]
+        for lane in range(lane_offset_m.shape[1]):
+            away = abs(lane_offset_m[row, lane] - offset_m[g, p])
+            if away < nearest[g, p]:  # never true of NaN: there is no such lane here
+                nearest[g, p], ends[g, p] = away, lane_end_m[row, lane]
+    return nearest, ends
 
 
 def _curvature_per_m(heading_rad: FloatArray) -> FloatArray:
@@ -144,12 +194,29 @@ class Rails:
             cells[place][: len(rows)] = rows
         return cls(padded, low, cells)
 
-    def near(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
-        """[..., K, 2, 2] the segments within reach of points [...]."""
-        last_x, last_y = self.cells.shape[0] - 1, self.cells.shape[1] - 1
-        ix = np.minimum(np.maximum((x_m - self.origin_m[0]) // _CELL_M, 0), last_x).astype(np.int64)
-        iy = np.minimum(np.maximum((y_m - self.origin_m[1]) // _CELL_M, 0), last_y).astype(np.int64)
-        return self.segments[self.cells[ix, iy]]
+    def near(self, x_m: FloatArray, y_m: FloatArray) -> IntArray:
+        """[G, P, K] rows of `segments` that are within reach of points [G, P]."""
+        return _cells_at(x_m, y_m, self.origin_m, self.cells)
+
+    def distance_m(self, cars: Box, limit_m: float) -> FloatArray:
+        """[G, P] distance of cars (places [G, P], sizes [P]) to the nearest rail; never over a limit within reach."""
+        return distance_to_nearest_segment(cars, self.segments, self.near(cars.x_m, cars.y_m), limit_m)
+
+
+@compiled
+def _cells_at(x_m: FloatArray, y_m: FloatArray, origin_m: FloatArray, cells: IntArray) -> IntArray:
+    found = np.empty((*x_m.shape, cells.shape[2]), dtype=cells.dtype)
+    for g, p in np.ndindex(x_m.shape):
+        column = _cell(x_m[g, p] - origin_m[0], cells.shape[0])
+        row = _cell(y_m[g, p] - origin_m[1], cells.shape[1])
+        found[g, p] = cells[column, row]
+    return found
+
+
+@compiled
+def _cell(place_m: float, cells: int) -> int:
+    """The cell at a place, or the nearest one (the first one where there is no telling: NaN)."""
+    return int(min(place_m / _CELL_M, cells - 1.0)) if place_m > 0.0 else 0
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,11 @@ drives in them: arms pair by construction.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from math import atan2, hypot
 
 import numpy as np
 
@@ -28,13 +31,19 @@ class Place:
 
     def pose(self, position_m: float, length_m: float) -> tuple[float, float, float]:
         """x_m, y_m of the body's centre and heading_rad with the front bumper at that position of the lane."""
-        position_m = position_m * self.scale
-        along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(self.line, axis=0).T))))
-        segment = int(np.clip(np.searchsorted(along, position_m, side="right") - 1, 0, len(along) - 2))
-        start, end = self.line[segment], self.line[segment + 1]
-        unit = (end - start) / np.hypot(*(end - start))
-        x, y = start + unit * (position_m - along[segment] - 0.5 * length_m)
-        return float(x), float(y), float(np.arctan2(unit[1], unit[0]))
+        points, along = self._points
+        position_m *= self.scale
+        segment = min(max(bisect_right(along, position_m) - 1, 0), len(along) - 2)
+        (x, y), (end_x, end_y) = points[segment : segment + 2]
+        length = hypot(end_x - x, end_y - y)
+        onward = (position_m - along[segment] - 0.5 * length_m) / length
+        return x + onward * (end_x - x), y + onward * (end_y - y), atan2(end_y - y, end_x - x)
+
+    @cached_property
+    def _points(self) -> tuple[list[list[float]], list[float]]:
+        """The points of the line, and how far along it each is."""
+        lengths = np.hypot(*np.diff(self.line, axis=0).T)
+        return self.line.tolist(), [0.0, *np.cumsum(lengths).tolist()]
 
 
 @dataclass(frozen=True)
@@ -67,17 +76,18 @@ class Chances:
 
 def draw_start(chances: Chances, *parts: str | int) -> Start:
     """Draw one game from named parts."""
-    where = generator_of(*parts, "start")
+    chance = generator_of(*parts, "start")
+    players = range(len(chances.places))
     positions: list[float] = []
     speeds, poses = [], []
-    for place, length in zip(chances.places, chances.length_m, strict=True):
-        position = where.uniform(*place.position_m) + (positions[0] if place.beside_ego else 0.0)
+    for place, length in zip(chances.places, chances.length_m.tolist(), strict=True):
+        position = chance.uniform(*place.position_m) + (positions[0] if place.beside_ego else 0.0)
         positions.append(position)
-        speeds.append(where.uniform(*place.speed_mps))
-        poses.append(place.pose(position, float(length)))
-    company = generator_of(*parts, "company")
-    present = np.array([company.random() < share for share in chances.present_share])
-    players = range(len(chances.places))
+        speeds.append(chance.uniform(*place.speed_mps))
+        poses.append(place.pose(position, length))
+    present = [chance.random() < share for share in chances.present_share]
+    overlooked = [draw_overlooked_m(habits.overlooking, chance) for habits in chances.habits]
+    noise = chance.standard_normal((len(players), chances.steps, 2))
     x, y, heading = np.array(poses).T
     return Start(
         x,
@@ -85,16 +95,16 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
         heading,
         np.array(speeds),
         np.array(positions),
-        present,
-        np.stack([generator_of(*parts, "decisions", p).standard_normal((chances.steps, 2)) for p in players]),
-        tuple(
-            draw_lapses(
-                chances.habits[p].attention, chances.steps, chances.step_s, generator_of(*parts, "attention", p)
-            )
-            for p in players
-        ),
-        np.array(
-            [draw_overlooked_m(chances.habits[p].overlooking, generator_of(*parts, "mirrors", p)) for p in players]
-        ),
+        np.array(present),
+        noise,
+        tuple(_lapses(chances, p, *parts) for p in players),
+        np.array(overlooked),
         seed_of(*parts, "traffic") % 2**31,
     )
+
+
+def _lapses(chances: Chances, player: int, *parts: str | int) -> Lapses:
+    attention = chances.habits[player].attention
+    if attention is None:
+        return Lapses.none(chances.steps)
+    return draw_lapses(attention, chances.steps, chances.step_s, generator_of(*parts, "attention", player))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
@@ -73,7 +73,11 @@ class State:
         return self.present & (self.outcome == Outcome.RUNNING)
 
     def copy(self) -> State:
-        return State(*(getattr(self, field.name).copy() for field in fields(self)))
+        return State(**{name: array.copy() for name, array in vars(self).items()})
+
+    def of(self, games: IntArray) -> State:
+        """A copy of some games [N]."""
+        return State(**{name: array[games] for name, array in vars(self).items()})
 
 
 @dataclass
@@ -87,3 +91,7 @@ class Bodies:
     length_m: FloatArray
     width_m: FloatArray
     present: BoolArray
+
+    def of(self, games: IntArray) -> Bodies:
+        """A copy of some games [N]."""
+        return Bodies(**{name: array[games] for name, array in vars(self).items()})

@@ -45,7 +45,7 @@ class Course:
         }
         quantities = quantities_of(trace, world, sizes)
         players = len(ROLES)
-        bodies = Bodies(*(getattr(quantities.bodies, each.name)[:, :players] for each in fields(Bodies)))
+        bodies = Bodies(*(getattr(quantities.bodies, each.name)[:, :players].copy() for each in fields(Bodies)))
         between = Quantities(world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m)
         drove = drove_in(trace)
         if drove[:, EGO].any():

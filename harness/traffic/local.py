@@ -11,7 +11,7 @@ import tempfile
 import weakref
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import libsumo
@@ -21,7 +21,9 @@ from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
 from harness.game.start import Start
 from harness.game.state import ROLES
+from harness.traffic.angles import compass_deg_of, heading_rad_of
 from harness.traffic.opening import OpenScene
+from harness.traffic.others import Others
 from harness.traffic.route_file import Departure
 from harness.traffic.simulation import Reading
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
@@ -37,11 +39,7 @@ class _Tile:
 
     prefix: str
     offset_m: float
-    step: int = 0
     inside: set[int] = field(default_factory=set)  # players that SUMO knows
-    placed: set[int] = field(default_factory=set)  # those of them that stand and go as the arena says
-    others: dict[str, tuple[str, float, float]] = field(default_factory=dict)  # name -> type, length, width
-    due: list[Departure] = field(default_factory=list)
 
 
 class LocalSimulation:
@@ -52,12 +50,14 @@ class LocalSimulation:
         """Whether this process's libsumo is taken, by one of us or by the user's own code."""
         return libsumo.isLoaded()
 
-    def __init__(self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int) -> None:
+    def __init__(
+        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
+    ) -> None:
         """Load SUMO with a tile for each game. Raises SimulationError if SUMO refuses, or is in use already."""
         if self.in_use():
             raise SimulationError("this process has a libsumo simulation already")
         self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
-        self._players = range(len(self._taken_over))
+        self._recorded = recorded
         self._half_length = 0.5 * scene.world.length_m
         offset = tile_offset_m(scene.net_file, games)
         self._offsets = offset * np.arange(games)
@@ -86,7 +86,18 @@ class LocalSimulation:
             load(options)
         self._tiles = [_Tile(tile_prefix(game, self._games), float(self._offsets[game])) for game in range(self._games)]
         self._routes: set[str] = set()
-        self._owners: dict[str, tuple[_Tile, str]] = {}
+        self._placed: dict[str, int] = {}  # players that stand and go as the arena says; their entry in [G, P]
+        self._self_driven: dict[str, tuple[int, int]] = {}  # the other players; their game and seat
+        self._there = np.zeros((self._games, len(self._taken_over)), dtype=bool)
+        world = self._scene.world
+        self._others = Others(
+            [tile.prefix for tile in self._tiles],
+            self._offsets,
+            world.step_s,
+            float(world.actuators.max_speed_mps.max()),
+            self._recorded,
+            self._enter,
+        )
 
     def reload(self, seed: int) -> None:
         """Start SUMO anew, with its random numbers from `seed`: every game has to be started again."""
@@ -98,46 +109,43 @@ class LocalSimulation:
         with self._asking(f"start game {game}"):
             for player in list(tile.inside):
                 self.remove(game, player)
-            for name in tile.others:
-                libsumo.vehicle.remove(tile.prefix + name)
-                del self._owners[tile.prefix + name]
-            tile.others.clear()
-            tile.step, tile.due = 0, departures
-            for player in np.flatnonzero(start.present):
-                self._add_player(tile, int(player), start)
-            self._depart(tile)
+            for player in np.flatnonzero(start.present).tolist():
+                self._add_player(game, player, start)
+            self._others.begin(game, departures)
 
     def halt(self, game: int, player: int) -> None:
         """Whoever drove a player, from now on it stands where `step` says."""
-        self._tiles[game].placed.add(player)
+        name = self._name(game, player)
+        self._self_driven.pop(name, None)
+        self._placed[name] = game * len(self._taken_over) + player
 
     def remove(self, game: int, player: int) -> None:
         """Take a player out of the traffic."""
-        tile = self._tiles[game]
+        name = self._name(game, player)
         with self._asking(f"remove a player from game {game}"):
-            libsumo.vehicle.remove(tile.prefix + ROLES[player])
-        tile.inside.discard(player)
-        tile.placed.discard(player)
+            libsumo.vehicle.remove(name)
+        self._tiles[game].inside.discard(player)
+        self._there[game, player] = False
+        self._self_driven.pop(name, None)
+        self._placed.pop(name, None)
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
         """Place the players that are taken over at poses [G, P] of their centres, let SUMO step, read the rest."""
-        front_x = (x_m + self._half_length * np.cos(heading_rad)).tolist()
-        front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).tolist()
-        angle = _compass(heading_rad).tolist()
+        front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel().tolist()
+        front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel().tolist()
+        angle = compass_deg_of(heading_rad).ravel().tolist()
         move = libsumo.vehicle.moveToXY
         with self._asking("step"):
-            for game, tile in enumerate(self._tiles):
-                xs, ys, angles = front_x[game], front_y[game], angle[game]
-                for player in tile.placed:
-                    name = tile.prefix + ROLES[player]
-                    move(name, "", -1, xs[player], ys[player], angles[player], _EXACTLY_THERE)
+            for name, k in self._placed.items():
+                move(name, "", -1, front_x[k], front_y[k], angle[k], _EXACTLY_THERE)
             libsumo.simulationStep()
-            self._forget_arrived()
-            for tile in self._tiles:
-                tile.step += 1
-                if tile.due:
-                    self._depart(tile)
-            return self._read()
+            self._others.advance()
+            players = self._read_players()
+            if players is not None:
+                x_m = np.where(np.isnan(players[..., 0]), x_m, players[..., 0])
+                y_m = np.where(np.isnan(players[..., 1]), y_m, players[..., 1])
+            reading = self._others.read(np.where(self._there, x_m, np.nan), y_m)
+            return replace(reading, players=players) if players is not None else reading
 
     def close(self) -> None:
         """Give libsumo back to the process. Closing twice is closing once."""
@@ -152,8 +160,11 @@ class LocalSimulation:
         except _FAILURES as error:
             raise SimulationError(f"SUMO could not {what}: {error}") from error
 
-    def _add_player(self, tile: _Tile, player: int, start: Start) -> None:
-        name, speed = tile.prefix + ROLES[player], float(start.speed_mps[player])
+    def _name(self, game: int, player: int) -> str:
+        return self._tiles[game].prefix + ROLES[player]
+
+    def _add_player(self, game: int, player: int, start: Start) -> None:
+        tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
         vehicle, lane = self._scene.vehicle(player), self._scene.document.players[player].lane
         self._add(
             tile,
@@ -165,17 +176,19 @@ class LocalSimulation:
             str(min(speed, self._fastest_start_mps(player, vehicle.vehicle_type))),
         )
         tile.inside.add(player)
+        self._there[game, player] = True
         ahead = self._half_length[player]
         if self._taken_over[player]:
-            tile.placed.add(player)
+            self._placed[name] = game * len(self._taken_over) + player
             libsumo.vehicle.setSpeedFactor(name, _ANY_SPEED)
         else:
+            self._self_driven[name] = (game, player)
             ahead += speed * self._scene.world.step_s  # SUMO moves nobody in the step it starts them
         heading = float(start.heading_rad[player])
         x = float(start.x_m[player] + ahead * np.cos(heading))
         y = float(start.y_m[player] + ahead * np.sin(heading) + tile.offset_m)
         # Placed there it is in the traffic at once; only added, it would have to wait for room.
-        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(_compass(heading)), _EXACTLY_THERE)
+        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), _EXACTLY_THERE)
 
     def _fastest_start_mps(self, player: int, kind: str) -> float:
         """SUMO refuses to start a vehicle above what its type keeps to on the road it starts on."""
@@ -183,15 +196,8 @@ class LocalSimulation:
         legal = float(routes.speed_limit_mps[routes.first_row[player]])
         return float(min(legal * min(1.0, types.getSpeedFactor(kind)), types.getMaxSpeed(kind)))
 
-    def _depart(self, tile: _Tile) -> None:
-        now = tile.step * self._scene.world.step_s + 1e-9
-        while tile.due and tile.due[0].depart_s <= now:
-            other = tile.due.pop(0)
-            name = tile.prefix + other.name
-            self._add(tile, name, other.edges, other.vehicle_type, other.lane, other.position, other.speed)
-            length, width = libsumo.vehicle.getLength(name), libsumo.vehicle.getWidth(name)
-            tile.others[other.name] = (libsumo.vehicle.getTypeID(name), length, width)
-            self._owners[name] = (tile, other.name)
+    def _enter(self, game: int, name: str, other: Departure) -> None:
+        self._add(self._tiles[game], name, other.edges, other.vehicle_type, other.lane, other.position, other.speed)
 
     def _add(
         self, tile: _Tile, name: str, edges: Sequence[str], kind: str, lane: str, position: str, speed: str
@@ -202,55 +208,17 @@ class LocalSimulation:
             self._routes.add(route)
         libsumo.vehicle.add(name, route, kind, "now", lane, position, speed)
 
-    def _forget_arrived(self) -> None:
-        for name in libsumo.simulation.getArrivedIDList():
-            owner = self._owners.pop(name, None)
-            if owner is None:
-                raise SimulationError(f"SUMO took player {name!r} out of the game")
-            del owner[0].others[owner[1]]
-
-    def _read(self) -> Reading:
-        vehicle = libsumo.vehicle
-        players = np.full((self._games, len(self._players), 4), np.nan)
-        for player in self._players:
-            if not self._taken_over[player]:
-                for game, tile in enumerate(self._tiles):
-                    if player in tile.inside - tile.placed:
-                        players[game, player] = self._state_of(tile.prefix + ROLES[player])
-        most = max(len(tile.others) for tile in self._tiles)
-        values = np.zeros((self._games, most, 6))
-        present = np.zeros((self._games, most), dtype=bool)
-        for game, tile in enumerate(self._tiles):
-            for slot, (name, (_, length, width)) in enumerate(tile.others.items()):
-                known = tile.prefix + name
-                x, y = vehicle.getPosition(known)
-                values[game, slot] = (x, y, vehicle.getAngle(known), vehicle.getSpeed(known), length, width)
-                present[game, slot] = x > -1e6  # not yet inserted: SUMO's invalid value
-        heading = _mathematical(values[..., 2])
-        half = 0.5 * values[..., 4]
-        return Reading(
-            [list(tile.others) for tile in self._tiles],
-            [[kind for kind, _, _ in tile.others.values()] for tile in self._tiles],
-            values[..., 0] - half * np.cos(heading),
-            values[..., 1] - half * np.sin(heading) - self._offsets[:, None],
-            heading,
-            values[..., 3],
-            values[..., 4],
-            values[..., 5],
-            present,
-            self._centred(players),
-        )
-
-    def _state_of(self, name: str) -> tuple[float, float, float, float]:
-        x, y = libsumo.vehicle.getPosition(name)
-        if x < -1e6:
-            raise SimulationError(f"SUMO has not inserted {name!r}")
-        return x, y, libsumo.vehicle.getAngle(name), libsumo.vehicle.getSpeed(name)
-
-    def _centred(self, players: FloatArray) -> FloatArray:
-        if np.isnan(players).all():
-            return players
-        players[..., 2] = _mathematical(players[..., 2])
+    def _read_players(self) -> FloatArray | None:
+        """[G, P, 4] where the players are that SUMO drives; None if it drives none."""
+        if all(self._taken_over):
+            return None
+        players = np.full((*self._there.shape, 4), np.nan)
+        for name, seat in self._self_driven.items():
+            x, y = libsumo.vehicle.getPosition(name)
+            if x < -1e6:
+                raise SimulationError(f"SUMO has not inserted {name!r}")
+            players[seat] = (x, y, libsumo.vehicle.getAngle(name), libsumo.vehicle.getSpeed(name))
+        players[..., 2] = heading_rad_of(players[..., 2])
         players[..., 0] -= self._half_length * np.cos(players[..., 2])
         players[..., 1] -= self._half_length * np.sin(players[..., 2]) + self._offsets[:, None]
         return players
@@ -264,13 +232,3 @@ def _has_others(scene: OpenScene) -> bool:
 def _release(folder: tempfile.TemporaryDirectory[str]) -> None:
     libsumo.close()
     folder.cleanup()
-
-
-def _compass(heading_rad: FloatArray | float) -> FloatArray:
-    """SUMO's compass angle in degrees of a heading in radians."""
-    return (90.0 - np.degrees(heading_rad)) % 360.0
-
-
-def _mathematical(compass_deg: FloatArray) -> FloatArray:
-    """Heading in radians (0 east, counter-clockwise, within ±pi) of SUMO's compass angle."""
-    return (np.radians(90.0 - compass_deg) + np.pi) % (2.0 * np.pi) - np.pi

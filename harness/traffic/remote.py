@@ -34,7 +34,9 @@ _PATIENCE_S = 10.0  # how long a child may take to end
 class RemoteSimulation:
     """A `LocalSimulation` of a child process. The child ends with `close`, or when nobody refers to this any more."""
 
-    def __init__(self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int) -> None:
+    def __init__(
+        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
+    ) -> None:
         """Start the child and load SUMO in it. Raises SimulationError if it can't be started, or SUMO refuses."""
         try:
             self._child = _start_child()
@@ -42,7 +44,7 @@ class RemoteSimulation:
             raise SimulationError(f"no process could be started for another simulation: {error}") from error
         self._end = weakref.finalize(self, _end, self._child)
         try:
-            self._ask(replace(scene, folder=scene.folder.resolve()), games, tuple(taken_over), seed)
+            self._ask(replace(scene, folder=scene.folder.resolve()), games, tuple(taken_over), seed, recorded)
         except BaseException:
             self.close()
             raise
@@ -76,6 +78,8 @@ class RemoteSimulation:
         """The child's answer to a message. A child that was interrupted halfway is of no more use, and is ended."""
         if not self._end.alive:
             raise SimulationError("this simulation was closed")
+        if self._child.poll() is not None:  # or an answer that it left behind would be taken for this one's
+            raise SimulationError(f"the process that SUMO ran in {_how_it_ended(self._child)}")
         assert self._child.stdin is not None
         assert self._child.stdout is not None
         try:
@@ -85,6 +89,7 @@ class RemoteSimulation:
             raise SimulationError(f"the process that SUMO ran in {_how_it_ended(self._child)}") from None
         except BaseException:
             self._child.kill()
+            self._child.wait()
             raise
         if refusal is not None:
             raise SimulationError(refusal)

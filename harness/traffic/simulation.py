@@ -11,10 +11,15 @@ from harness.game.start import Start
 from harness.traffic.opening import OpenScene
 from harness.traffic.route_file import Departure
 
+NOTICED_M = 120.0  # nobody farther than this from every player matters to the game
+
 
 @dataclass
 class Reading:
-    """What SUMO's own vehicles did. Others are [G, M], padded; players left to SUMO are [G, P]."""
+    """What SUMO's own vehicles did. Others are [G, M], padded; players that SUMO drives are [G, P], None without any.
+
+    Of the others there are at least those within `NOTICED_M` of a player, and all where games are recorded.
+    """
 
     names: list[list[str]]  # by game, in the order of the arrays
     types: list[list[str]]
@@ -25,7 +30,7 @@ class Reading:
     length_m: FloatArray
     width_m: FloatArray
     present: BoolArray
-    players: FloatArray  # [G, P, 4] x_m, y_m, heading_rad, speed_mps; NaN where the harness drives
+    players: FloatArray | None = None  # [G, P, 4] x_m, y_m, heading_rad, speed_mps; NaN where the harness drives
 
 
 class Simulation(Protocol):
@@ -51,16 +56,19 @@ class Simulation(Protocol):
         """Give SUMO back. Closing twice is closing once."""
 
 
-def open_simulation(scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int) -> Simulation:
+def open_simulation(
+    scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
+) -> Simulation:
     """Load SUMO with a tile for each game: in this process if its libsumo is free, otherwise in a child process.
 
+    `recorded`: every other is read in every step, near or not, which costs as much as SUMO's own work on it.
     Both give the same numbers; only the second costs a message each way per verb. Raises SimulationError if SUMO
     can't load the scene.
     """
     from harness.traffic.local import LocalSimulation
 
     if not LocalSimulation.in_use():
-        return LocalSimulation(scene, games, taken_over, seed)
+        return LocalSimulation(scene, games, taken_over, seed, recorded)
     from harness.traffic.remote import RemoteSimulation
 
-    return RemoteSimulation(scene, games, taken_over, seed)
+    return RemoteSimulation(scene, games, taken_over, seed, recorded)

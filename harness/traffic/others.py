@@ -1,0 +1,184 @@
+"""The road users that SUMO drives beside the players: when they depart, where they are, when they have arrived.
+
+To ask libsumo for a vehicle's motion costs up to half of what it costs SUMO to move it. So an other that is far from
+every player is looked up again only when it may have come near, at the fastest that it and the players can go.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from itertools import chain
+from typing import Any
+
+import libsumo
+import numpy as np
+from numpy.typing import NDArray
+
+from harness.errors import SimulationError
+from harness.game.arrays import FloatArray, IntArray
+from harness.traffic.angles import heading_rad_of
+from harness.traffic.route_file import Departure
+from harness.traffic.simulation import NOTICED_M, Reading
+
+_LONGEST_WAIT = 50  # steps
+_NEVER = -1
+_ROOM = 8  # others in a game that there is room for at first
+
+
+class _Table:
+    """What is known of every other, [G, N]: a row for each game, in it a place for each vehicle that departed in it."""
+
+    def __init__(self, games: int) -> None:
+        shape = (games, _ROOM)
+        self.count = [0] * games  # places that are taken
+        self.due = np.full(shape, _NEVER)  # the step to look it up in; never: not in the traffic, or no more
+        self.known = np.empty(shape, dtype=object)  # its name in SUMO
+        self.name = np.empty(shape, dtype=object)
+        self.kind = np.empty(shape, dtype=object)
+        self.length_m = np.zeros(shape)
+        self.width_m = np.zeros(shape)
+        self.max_speed_mps = np.zeros(shape)
+
+    def add(self, game: int, **values: Any) -> int:
+        """The place of one more vehicle in a game, which is not to be looked up yet."""
+        place = self.count[game]
+        if place == self.due.shape[1]:
+            self._grow()
+        self.count[game] += 1
+        self.due[game, place] = _NEVER
+        for column, value in values.items():
+            getattr(self, column)[game, place] = value
+        return place
+
+    def clear(self, game: int) -> None:
+        """Forget all vehicles of a game."""
+        self.count[game] = 0
+        self.due[game] = _NEVER
+
+    def _grow(self) -> None:
+        for column, values in vars(self).items():
+            if column != "count":
+                more: NDArray[Any] = np.full_like(values, _NEVER if column == "due" else None if values.dtype == object else 0)
+                setattr(self, column, np.concatenate((values, more), axis=1))
+
+
+class Others:
+    """All others of all games. `enter` starts one in SUMO under a name."""
+
+    def __init__(
+        self,
+        prefixes: Sequence[str],
+        offsets_m: FloatArray,
+        step_s: float,
+        fastest_player_mps: float,
+        recorded: bool,
+        enter: Callable[[int, str, Departure], None],
+    ) -> None:
+        self._prefixes, self._offsets_m, self._step_s = prefixes, offsets_m, step_s
+        self._fastest_player_mps, self._recorded, self._enter = fastest_player_mps, recorded, enter
+        self._step = 0
+        self._began = [0] * len(prefixes)
+        self._waiting: dict[int, list[Departure]] = {}  # by game, the next one last
+        self._there: dict[str, tuple[int, int]] = {}  # the rows and places of all in the traffic, by name in SUMO
+        self._table = _Table(len(prefixes))
+        self._nobody = self._reading(np.zeros(0, dtype=np.int64), np.zeros((0, 6)))
+
+    def begin(self, game: int, departures: Sequence[Departure]) -> None:
+        """A game starts anew: take away who is there, and let others depart as time goes by."""
+        for known in self._table.known[game, : self._table.count[game]].tolist():
+            if self._there.pop(known, None) is not None:
+                libsumo.vehicle.remove(known)
+        self._table.clear(game)
+        self._began[game] = self._step
+        self._waiting.pop(game, None)
+        if departures:
+            self._waiting[game] = list(reversed(departures))
+            self._depart(game)
+
+    def advance(self) -> None:
+        """SUMO has made a step: see who arrived and who has come, and start who is due."""
+        self._step += 1
+        due = self._table.due
+        for name in libsumo.simulation.getArrivedIDList():
+            place = self._there.pop(name, None)
+            if place is None:
+                raise SimulationError(f"SUMO took player {name!r} out of the game")
+            due[place] = _NEVER
+        if self._there:
+            for name in libsumo.simulation.getDepartedIDList():
+                if name in self._there:
+                    due[self._there[name]] = self._step
+        for game in list(self._waiting):
+            self._depart(game)
+
+    def read(self, players_x_m: FloatArray, players_y_m: FloatArray) -> Reading:
+        """Who is near the players [G, P] (NaN: not there), or everyone if games are recorded."""
+        if not self._there:
+            return self._nobody
+        table, vehicle = self._table, libsumo.vehicle
+        due = np.flatnonzero(table.due == self._step)  # by game, and in a game as they departed
+        if not len(due):
+            return self._nobody
+        games, known = due // table.due.shape[1], table.known.ravel()[due]
+        places = chain.from_iterable(map(vehicle.getPosition, known.tolist()))
+        fronts = np.fromiter(places, float, 2 * len(due)).reshape(-1, 2)
+        fronts[:, 1] -= self._offsets_m[games]
+        away = np.hypot(fronts[:, :1] - players_x_m[games], fronts[:, 1:] - players_y_m[games])
+        spare = np.where(np.isnan(away), np.inf, away).min(1) - NOTICED_M
+        spare -= table.length_m.ravel()[due]  # it is the middle of a vehicle that is near or not
+        closing = table.max_speed_mps.ravel()[due] + self._fastest_player_mps
+        waits = np.clip(spare / (closing * self._step_s), 1, 1 if self._recorded else _LONGEST_WAIT).astype(np.int64)
+        table.due.ravel()[due] = self._step + waits
+        near = np.flatnonzero((spare <= 0.0) | self._recorded)
+        found, names = due[near], known[near].tolist()
+        motion = np.empty((len(near), 6))
+        motion[:, :2] = fronts[near]
+        motion[:, 2] = np.fromiter(map(vehicle.getAngle, names), float, len(near))
+        motion[:, 3] = np.fromiter(map(vehicle.getSpeed, names), float, len(near))
+        motion[:, 4], motion[:, 5] = table.length_m.ravel()[found], table.width_m.ravel()[found]
+        return self._reading(found, motion)
+
+    def _depart(self, game: int) -> None:
+        now = (self._step - self._began[game]) * self._step_s + 1e-9
+        waiting = self._waiting[game]
+        while waiting and waiting[-1].depart_s <= now:
+            departure = waiting.pop()
+            known, vehicle = self._prefixes[game] + departure.name, libsumo.vehicle
+            self._enter(game, known, departure)
+            place = self._table.add(
+                game,
+                known=known,
+                name=departure.name,
+                kind=vehicle.getTypeID(known),
+                length_m=vehicle.getLength(known),
+                width_m=vehicle.getWidth(known),
+                max_speed_mps=vehicle.getMaxSpeed(known),
+            )
+            self._there[known] = (game, place)
+        if not waiting:
+            del self._waiting[game]
+
+    def _reading(self, found: IntArray, motion: FloatArray) -> Reading:
+        """Of those found, by their places in the table: front x and y, angle, speed, length and width, [n, 6]."""
+        games = found // self._table.due.shape[1]
+        counts = np.bincount(games, minlength=len(self._prefixes))
+        ends = np.cumsum(counts)
+        first = ends - counts
+        values = np.zeros((len(counts), counts.max(), 6))
+        slots = np.arange(len(games)) - first[games]
+        values[games, slots] = motion
+        present = np.arange(counts.max()) < counts[:, None]
+        bounds = list(zip(first.tolist(), ends.tolist(), strict=True))
+        names, kinds = self._table.name.ravel()[found].tolist(), self._table.kind.ravel()[found].tolist()
+        heading, half = heading_rad_of(values[..., 2]), 0.5 * values[..., 4]
+        return Reading(
+            [names[start:end] for start, end in bounds],
+            [kinds[start:end] for start, end in bounds],
+            values[..., 0] - half * np.cos(heading),
+            values[..., 1] - half * np.sin(heading),
+            heading,
+            values[..., 3].copy(),
+            values[..., 4].copy(),
+            values[..., 5].copy(),
+            present,
+        )
