@@ -1,0 +1,102 @@
+"""SUMO alone: the placements of an arena that was recorded, and SUMO's steps, with nothing of the harness between."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import libsumo
+import numpy as np
+import sumo
+import traci
+from sumolib.miscutils import getFreeSocketPort
+
+from benchmarks.games import Played
+from harness.game.state import ROLES
+from harness.traffic.opening import OpenScene
+from harness.traffic.tiles import tile_offset_m, tile_prefix
+
+EXACTLY_THERE = 2  # moveToXY's keepRoute, as the harness places its players
+
+Placement = tuple[str, float, float, float]
+"""A vehicle, the x and y of its front bumper in metres, its compass angle in degrees."""
+
+
+def record(played: Played, steps: int, restart: bool = True) -> list[list[Placement]]:
+    """Play on, and keep where both players of every game are after each step."""
+    return [_step_and_look(played, restart) for _ in range(steps)]
+
+
+def _step_and_look(played: Played, restart: bool) -> list[Placement]:
+    played.step(restart)
+    arena = played.arena
+    state, games = arena.state, arena.games
+    offset_m = tile_offset_m(arena.scene.net_file, games) * np.arange(games)[:, None]
+    half_m = 0.5 * arena.world.length_m
+    x = (state.x_m + half_m * np.cos(state.heading_rad)).tolist()
+    y = (state.y_m + half_m * np.sin(state.heading_rad) + offset_m).tolist()
+    angle = ((90.0 - np.degrees(state.heading_rad)) % 360.0).tolist()
+    return [
+        (tile_prefix(game, games) + role, x[game][player], y[game][player], angle[game][player])
+        for game in range(games)
+        for player, role in enumerate(ROLES)
+    ]
+
+
+def place_and_step(placements: list[Placement], api: Any = libsumo) -> None:
+    """A step of SUMO alone. `api` is libsumo, or a TraCI connection, which has the same words."""
+    move = api.vehicle.moveToXY
+    for name, x, y, angle in placements:
+        move(name, "", -1, x, y, angle, EXACTLY_THERE)
+    api.simulationStep()
+
+
+@contextlib.contextmanager
+def own_sumo(scene: OpenScene, by_socket: bool) -> Iterator[Any]:
+    """SUMO with one game's two vehicles in it and nothing of the harness: libsumo, or `sumo` reached by TraCI."""
+    with tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
+        types = Path(folder) / "types.rou.xml"
+        types.write_text(scene.routes.types_xml, encoding="utf-8")
+        options = [
+            *("--net-file", str(scene.net_file), "--route-files", str(types)),
+            *("--step-length", str(scene.world.step_s), "--collision.action", "none"),
+            *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
+        ]
+        with _reached_by_socket(options) if by_socket else _in_process(options) as api:
+            for player, role in enumerate(ROLES):
+                api.route.add(f"route {role}", list(scene.edges[player]))
+                lane = scene.document.players[player].lane.rsplit("_", 1)[1]
+                kind = scene.vehicle(player).vehicle_type
+                api.vehicle.add(role, f"route {role}", kind, "now", lane, str(20 + 20 * player), "10")
+            yield api
+
+
+@contextlib.contextmanager
+def _in_process(options: list[str]) -> Iterator[Any]:
+    libsumo.start(["sumo", *options])
+    try:
+        yield libsumo
+    finally:
+        libsumo.close()
+
+
+@contextlib.contextmanager
+def _reached_by_socket(options: list[str]) -> Iterator[Any]:
+    program = shutil.which("sumo", path=str(Path(sumo.SUMO_HOME) / "bin"))
+    assert program is not None, "eclipse-sumo brings it"
+    port = getFreeSocketPort()
+    nowhere = subprocess.DEVNULL
+    process = subprocess.Popen([program, *options, "--remote-port", str(port)], stdout=nowhere, stderr=nowhere)
+    try:
+        with contextlib.redirect_stdout(io.StringIO()):  # traci prints each try
+            connection = traci.connect(port, numRetries=100, proc=process, waitBetweenRetries=0.1)
+        yield connection
+    finally:
+        process.kill()
+        process.wait()

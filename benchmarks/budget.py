@@ -1,0 +1,57 @@
+"""How long is measured: in full for figures that count, in a minute or two to see that everything works."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Budget:
+    """The lengths and repeats of all measurements."""
+
+    stretch_s: float
+    """How long one side of a ratio runs before the other has its turn."""
+    repeats: int
+    """Turns of each side."""
+    training_stretch_s: float
+    traffic_steps: int
+    """Steps of an arena among traffic, from the same start each time."""
+    traffic_repeats: int
+    campaign_share: float
+    """How much of each training of the campaign is really done."""
+    memory_warm_up_steps: int
+    memory_steps: int
+    episodes: int
+    """Of each arm of that campaign."""
+    arms: int
+    """How often an arm of 100 episodes is played, after a first time."""
+    starts: int
+    """How often a command is started."""
+
+
+FULL = Budget(
+    stretch_s=1.0,
+    repeats=11,
+    training_stretch_s=4.0,
+    traffic_steps=100,
+    traffic_repeats=7,
+    campaign_share=0.1,
+    memory_warm_up_steps=262_144,
+    memory_steps=1_000_000,
+    episodes=100,
+    arms=3,
+    starts=9,
+)
+FAST = Budget(
+    stretch_s=0.3,
+    repeats=3,
+    training_stretch_s=0.5,
+    traffic_steps=20,
+    traffic_repeats=2,
+    campaign_share=0.005,
+    memory_warm_up_steps=8_192,
+    memory_steps=32_768,
+    episodes=5,
+    arms=1,
+    starts=3,
+)

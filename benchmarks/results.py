@@ -1,0 +1,48 @@
+"""The results on disk: every figure by its key, the machine, the versions, and the raw numbers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from benchmarks.figures import KEYS
+from harness.files import write_atomically
+
+RESULTS = Path(__file__).resolve().parent / "results.json"
+
+
+def empty(machine: Mapping[str, Any], versions: Mapping[str, str], fast: bool) -> dict[str, Any]:
+    """Results of nothing yet: what was not measured is null."""
+    return {
+        "machine": dict(machine),
+        "versions": dict(versions),
+        **dict.fromkeys(KEYS),
+        "details": {"fast": fast, "load_before": {}},
+    }
+
+
+def begun(file: Path, machine: Mapping[str, Any], versions: Mapping[str, str], fast: bool) -> dict[str, Any]:
+    """The results to add to: the file's, if they come from the same machine, versions and lengths; else none."""
+    fresh = empty(machine, versions, fast)
+    try:
+        found = read(file)
+        same = all(found[key] == fresh[key] for key in ("machine", "versions")) and found["details"]["fast"] == fast
+    except (OSError, ValueError, KeyError, TypeError):
+        return fresh
+    return {**fresh, **{key: found.get(key) for key in (*KEYS, "details")}} if same else fresh
+
+
+def read(file: Path) -> dict[str, Any]:
+    """Results as they were written. Raises OSError or ValueError where there are none."""
+    found = json.loads(file.read_text(encoding="utf-8"))
+    if not isinstance(found, dict):
+        raise ValueError("no results")
+    return found
+
+
+def write(file: Path, results: Mapping[str, Any]) -> None:
+    """Replace the results."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(file, (json.dumps(results, indent=1) + "\n").encode())
