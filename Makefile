@@ -4,11 +4,12 @@ PYTHON ?= python3
 ARGS ?=
 
 CAMPAIGN := campaigns/merge.toml
+DEMO := campaigns/merge-demo.toml
 BIN := .venv/bin
 INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install campaign quick test check lock clean
+.PHONY: help install demo campaign quick test bench check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
@@ -16,6 +17,9 @@ help: ## list the targets
 	    printf '%-12s%s\n' "$$target" "$$text"; done
 
 install: $(INSTALLED) ## set up .venv from requirements.lock (again only when it or pyproject.toml changes)
+
+demo: install ## verify the figures in about a minute: the campaign's games, played by the shipped policies
+	$(BIN)/harness campaign $(DEMO) $(ARGS)
 
 campaign: install ## run the paper's campaign: harness campaign campaigns/merge.toml
 	$(BIN)/harness campaign $(CAMPAIGN) $(ARGS)
@@ -25,6 +29,10 @@ quick: install ## the same campaign with a budget of minutes: every stage, fewer
 
 test: install ## run every test
 	$(BIN)/pytest $(ARGS)
+
+bench: install ## what the harness costs, as ratios measured side by side: benchmarks/results.json, 20 minutes
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -c requirements.lock -e '.[bench]'
+	$(BIN)/python -m benchmarks $(ARGS)
 
 check: install ## lint, formatting and types, in under half a minute
 	$(BIN)/ruff check .

@@ -20,6 +20,7 @@ from harness.documents.campaign import Campaign
 from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.manoeuvre_file import manoeuvres_of
+from harness.model_card import write_model_cards
 from harness.preflight import OpenCampaign
 from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
@@ -93,8 +94,10 @@ class _Ledger:
             "format": FORMAT,
             "name": campaign.document.name,
             "quick": campaign.quick,
-            "campaign": campaign.document.model_dump(mode="json"),
+            "campaign": campaign.document.recorded(),
             "personas": [persona.name for persona in campaign.personas],
+            "ego_persona": campaign.ego_persona.model_dump(mode="json"),
+            "persona_documents": {each.name: each.model_dump(mode="json") for each in campaign.personas},
             "seeds": list(campaign.document.seeds),
             "hashes": dict(campaign.hashes),
             "versions": _versions(),
@@ -142,6 +145,7 @@ def _versions() -> dict[str, str]:
 def write_results(folder: RunFolder, console: Console) -> Outcome:
     """Tables, replays and report of what is done, from the run folder alone."""
     manifest = folder.manifest()
+    folder.check_whole(manifest)
     done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
     episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
@@ -162,6 +166,7 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
             manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres
         )
     write_atomically(folder.path / "report.html", page.encode())
+    write_model_cards(folder, manifest, summary)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] != "done")
     found = results(manifest, episodes, summary, comparisons)
     verdicts = [(persona, found.verdicts(each, persona)) for persona in manifest["personas"] for each in ARMS]

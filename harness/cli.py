@@ -71,9 +71,11 @@ def campaign(
     from harness.workers import cores
 
     opened = open_campaign(file, quick)
-    name = opened.document.name + ("-quick" if quick else "")
+    name = opened.document.name + ("-quick" if opened.quick else "")
     folder = RunFolder(out or Path("reports") / name)
     console = Console()
+    if quick and not opened.quick:
+        console.print("Nothing to shorten: the players were trained before. Every game is played.")
     try:
         outcome = run_campaign(opened, folder, jobs or cores(), console)
     except KeyboardInterrupt:
@@ -100,16 +102,20 @@ def check(file: CampaignFile) -> None:
     stages = plan(opened.document, [persona.name for persona in opened.personas])
     trainings = sum(isinstance(stage, TrainingStage) for stage in stages)
     console = Console()
-    console.print(f"{file} is in order.", highlight=False, markup=False, soft_wrap=True)
-    console.print(
-        f"{trainings} trainings of up to {opened.document.training.steps:,} steps, {len(stages) - trainings} arms of "
-        f"{opened.document.assessment.episodes} episodes:",
-        highlight=False,
-    )
+
+    def say(line: str) -> None:
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+
+    say(f"{file} is in order.")
+    how = f"{trainings} trainings of up to {opened.document.training.steps:,} steps"
+    if opened.policies is not None:
+        how = f"Players trained before, read from {opened.policies}: nothing is trained"
+    say(f"{how}, {len(stages) - trainings} arms of {opened.document.assessment.episodes} episodes:")
     for stage in stages:
         kind = "train" if isinstance(stage, TrainingStage) else "assess"
+        reads = () if isinstance(stage, TrainingStage) else stage.reads
         after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
-        console.print(f"  {kind:6s} {stage.id}{after}", highlight=False)
+        say(f"  {kind:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else ""))
 
 
 @app.command()

@@ -43,17 +43,23 @@ class Policy:
 def write_policy(policy: Policy, folder: Path) -> None:
     """Write a policy's folder. The same policy gives the same bytes."""
     folder.mkdir(parents=True, exist_ok=True)
+    card_file, tensor_file = policy_files(folder)
     card = {"format": FORMAT, "observation": list(LAYOUT), **policy.card}
     write_atomically(
-        folder / "policy.safetensors",
+        tensor_file,
         save_tensors({k: np.ascontiguousarray(v) for k, v in policy.tensors.items()}),
     )
-    write_atomically(folder / "policy.json", (json.dumps(card, indent=2) + "\n").encode())
+    write_atomically(card_file, (json.dumps(card, indent=2) + "\n").encode())
+
+
+def policy_files(folder: Path) -> tuple[Path, Path]:
+    """What a policy is made of: its JSON and its parameters."""
+    return folder / "policy.json", folder / "policy.safetensors"
 
 
 def read_policy(folder: Path) -> Policy:
     """Read a policy's folder. Raises UsageError if it is missing, damaged, or was made for other observations."""
-    card_file, tensor_file = folder / "policy.json", folder / "policy.safetensors"
+    card_file, tensor_file = policy_files(folder)
     for file in (card_file, tensor_file):
         if not file.is_file():
             raise UsageError.of(

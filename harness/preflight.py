@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,10 +12,10 @@ from pydantic import ConfigDict
 
 from harness.documents.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego, Training, resolve
 from harness.documents.persona import Persona
-from harness.documents.reading import Document, read_document
+from harness.documents.reading import Document, nearest, read_document
 from harness.errors import Problem, UsageError, attempt
-from harness.policy_file import read_policy
-from harness.rounds import plan
+from harness.policy_file import policy_files, read_policy
+from harness.rounds import AssessmentStage, plan
 from harness.traffic.opening import OpenScene, open_scene
 
 QUICK_STEPS = 262_144
@@ -34,6 +34,8 @@ class OpenCampaign:
     personas: tuple[Persona, ...]
     ego_policy: Path | None
     """The folder of the ego's policy, where the campaign names one."""
+    policies: Path | None
+    """The folder of the policies trained before, where the campaign names one."""
     hashes: dict[str, str]
     """SHA-256 of every file the campaign rests on, by its path from the campaign's folder."""
 
@@ -43,7 +45,10 @@ class OpenCampaign:
 
 
 def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
-    """Read a campaign and everything it names. Raises UsageError with every problem found."""
+    """Read a campaign and everything it names. Raises UsageError with every problem found.
+
+    Quick makes trainings shorter: a campaign that trains nothing is the same without it.
+    """
     problems: list[Problem] = []
 
     document = attempt(problems, lambda: read_document(file, Campaign))
@@ -55,6 +60,7 @@ def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
     persona_files = [resolve(file, named.ego.persona), *(resolve(file, each) for each in named.personas)]
     personas = [attempt(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
     ego_policy = attempt(problems, lambda: _ego_policy(file, named.ego.driver))
+    policies = attempt(problems, lambda: _policies_folder(file, named.policies))
     for given, persona in zip(named.personas, personas[1:], strict=True):
         names = [each.name for each in personas[1:] if each is not None]
         if persona is not None and names.count(persona.name) > 1:
@@ -68,17 +74,20 @@ def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
             )
     if problems or document is None or scene is None:
         raise UsageError(problems)
-    _check_stage_names(file, document, [persona.name for persona in personas[1:] if persona is not None])
+    names = [persona.name for persona in personas[1:] if persona is not None]
+    _check_stage_names(file, document, names)
     files = [
         file,
+        *(_trained_before(file, document, names, policies) if policies is not None else ()),
         *persona_files,
         *(scene_folder / each for each in ("scene.toml", scene.document.net, scene.document.routes)),
     ]
     hashes = {_from(file, each): hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
     ego, *others = (persona for persona in personas if persona is not None)
+    quick = quick and policies is None
     if quick:
         document = _quickened(document)
-    return OpenCampaign(file, document, quick, scene, ego, tuple(others), ego_policy, hashes)
+    return OpenCampaign(file, document, quick, scene, ego, tuple(others), ego_policy, policies, hashes)
 
 
 def _from(campaign_file: Path, path: Path) -> str:
@@ -97,6 +106,7 @@ class _Named(Document):
     model_config = ConfigDict(extra="ignore")
     scene: DocumentPath
     personas: list[DocumentPath]
+    policies: DocumentPath | None = None
     ego: _NamedByEgo = _NamedByEgo()
 
 
@@ -110,7 +120,7 @@ def _named(file: Path) -> _Named | None:
 def _check_stage_names(file: Path, document: Campaign, personas: Sequence[str]) -> None:
     """Stages are called after personas: a persona called `naive` would be taken for the naive ego."""
     stages: dict[str, list[str]] = {}
-    for stage in plan(document, personas):
+    for stage in plan(document.model_copy(update={"policies": None}), personas):
         stages.setdefault(stage.id, []).append(stage.persona)
     clashes = {tuple(sorted(filter(None, of))): name for name, of in stages.items() if len(of) > 1}
     if clashes:
@@ -138,6 +148,57 @@ def _ego_policy(file: Path, driver: str) -> Path | None:
         )
     read_policy(folder)
     return folder
+
+
+def _policies_folder(file: Path, written: str | None) -> Path | None:
+    if written is None:
+        return None
+    folder = resolve(file, written)
+    if not os.path.isdir(folder):
+        raise UsageError.of(
+            file,
+            "policies",
+            f"{written!r}: there is no such folder",
+            f"name one laid out as <run>/policies/; {_beside(folder)}",
+        )
+    return folder
+
+
+def _beside(folder: Path) -> str:
+    """What there is in the place of a folder that is not there."""
+    if not os.path.isdir(folder.parent):
+        return f"there is no folder {folder.parent}"
+    return nearest(folder.name, [each.name for each in folder.parent.iterdir() if each.is_dir()] or ["(no folder)"])
+
+
+def _trained_before(file: Path, document: Campaign, personas: Sequence[str], folder: Path) -> list[Path]:
+    """The files of every policy that a campaign reads. Raises UsageError for each that is missing or doesn't fit."""
+    arms = [stage for stage in plan(document, personas) if isinstance(stage, AssessmentStage)]
+    there = {each.name for each in folder.iterdir() if each.is_dir()}
+    problems: list[Problem] = []
+    files: list[Path] = []
+    for name in dict.fromkeys(name for arm in arms for name in arm.reads):
+        if name not in there:
+            message = f"{document.policies!r} holds no policy {name!r}"
+            problems.append(Problem(str(file), "policies", message, _instead(name, there)))
+            continue
+        policy = attempt(problems, lambda name=name: read_policy(folder / name))  # type: ignore[misc]
+        if policy is not None and (learned := policy.card.get("stage")) != name:
+            message = f"was learned as {learned!r}, but is called {name!r}"
+            problems.append(Problem(str(folder / name), "stage", message, "give the folder its policy's name"))
+        files += policy_files(folder / name)
+    if problems:
+        raise UsageError(problems)
+    return files
+
+
+def _instead(missing: str, there: Iterable[str]) -> str:
+    """A remedy for a policy that is missing: the seeds that there are of its stage, or the stages that there are."""
+    stage = missing.rpartition("-seed")[0]
+    parts = [each.rpartition("-seed") for each in there]
+    if seeds := sorted(int(seed) for name, _, seed in parts if name == stage and seed.isdecimal()):
+        return f"there is {stage!r} of seed {', '.join(map(str, seeds))}"
+    return nearest(stage, {name for name, _, _ in parts if name} or ["(no policy at all)"])
 
 
 def _quickened(document: Campaign) -> Campaign:

@@ -6,7 +6,8 @@
 | 1 | for each persona: train `<persona>` against the naive ego; assess `<persona>_alone`, `naive_vs_<persona>` |
 | 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
 
-An ego that the campaign does not train has no round 2.
+An ego that the campaign does not train has no round 2. A campaign that names a folder of policies has the same arms
+and no trainings: what they would have made is read from there.
 """
 
 from __future__ import annotations
@@ -22,9 +23,10 @@ from harness.game.state import EGO, NON_EGO
 
 @dataclass(frozen=True)
 class Drives:
-    """Who drives a player: SUMO, the campaign's given ego, or the policy that a training stage made."""
+    """Who drives a player: SUMO, the campaign's given ego, the policy that a training stage made, or the one that
+    such a stage made before, in another run."""
 
-    kind: Literal["sumo", "given", "policy"]
+    kind: Literal["sumo", "given", "policy", "before"]
     stage: str = ""
     persona: str = ""
     """Whose habits it has; empty: the ego's own."""
@@ -74,6 +76,11 @@ class AssessmentStage:
         """The stages that have to be done before."""
         return _stages(None, self.ego, self.non_ego)
 
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The policies trained before that drive in it, each called after the stage that made it."""
+        return tuple(each.stage for each in (self.ego, self.non_ego) if each is not None and each.kind == "before")
+
 
 Stage = TrainingStage | AssessmentStage
 
@@ -84,20 +91,24 @@ def stage_id(name: str, seed: int) -> str:
 
 
 def _stages(initial: str | None, *drivers: Drives | None) -> tuple[str, ...]:
-    named = [initial or "", *(each.stage for each in drivers if each is not None)]
+    named = [initial or "", *(each.stage for each in drivers if each is not None and each.kind == "policy")]
     return tuple(dict.fromkeys(name for name in named if name))
 
 
 def plan(campaign: Campaign, personas: Sequence[str]) -> list[Stage]:
     """Every stage of a campaign against the personas named, each after what it needs."""
-    return [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed)]
+    stages = [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed)]
+    if campaign.policies is not None:
+        return [stage for stage in stages if isinstance(stage, AssessmentStage)]
+    return stages
 
 
 def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
     learned = campaign.ego.driver == LEARNED
+    trained: Literal["policy", "before"] = "policy" if campaign.policies is None else "before"
     naive = stage_id("naive", seed)
     if learned:
-        ego = Drives("policy", naive)
+        ego = Drives(trained, naive)
     else:
         ego = Drives("sumo" if campaign.ego.driver == SUMO else "given")
     stages: list[Stage] = []
@@ -112,14 +123,15 @@ def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int) -> list[S
     stages.append(AssessmentStage("naive_alone", seed, "", ego, None))
     stages.append(AssessmentStage("naive_vs_sumo", seed, "", ego, Drives("sumo")))
     for persona in personas:
-        person = Drives("policy", stage_id(persona, seed), persona)
+        person = Drives(trained, stage_id(persona, seed), persona)
         if learned:
             name = f"retrained_{persona}"
-            stages.append(TrainingStage(name, seed, persona, EGO, person, naive, campaign.retraining.alone_share))
+            begins = naive if campaign.retraining.warm_start else None
+            stages.append(TrainingStage(name, seed, persona, EGO, person, begins, campaign.retraining.alone_share))
         stages.append(AssessmentStage(f"{persona}_alone", seed, persona, None, person))
         stages.append(AssessmentStage(f"naive_vs_{persona}", seed, persona, ego, person))
         if learned:
-            retrained = Drives("policy", stage_id(f"retrained_{persona}", seed))
+            retrained = Drives(trained, stage_id(f"retrained_{persona}", seed))
             stages.append(AssessmentStage(f"retrained_vs_{persona}", seed, persona, retrained, person))
             stages.append(AssessmentStage(f"retrained_alone_{persona}", seed, persona, retrained, None))
     return stages

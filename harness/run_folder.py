@@ -1,7 +1,7 @@
 """A run folder: what one run of a campaign wrote, and how far it has come.
 
     manifest.json            campaign, versions, seeds, hashes, status of every stage
-    policies/<stage>/        policy.safetensors, policy.json
+    policies/<stage>/        policy.safetensors, policy.json, README.md (its model card)
     traces/<stage>.parquet   one file per arm
     scene/                   a copy of the scene's files
     .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, tables, done.json
@@ -111,6 +111,17 @@ class RunFolder:
                 self.manifest_file, "", f"is damaged: {error}", "run the campaign again into another folder, with --out"
             ) from None
         return dict(manifest)
+
+    def check_whole(self, manifest: Mapping[str, Any]) -> None:
+        """Raises UsageError where what the stages wrote is gone, as in a folder that was published without it."""
+        done = [name for name, entry in manifest["stages"].items() if entry["status"] == "done"]
+        if done and not any(self.work(name).is_dir() for name in done):
+            raise UsageError.of(
+                self.path,
+                "",
+                "holds a report and its tables, but not what they are made of",
+                f"read its report.html, or play the games: run campaign {manifest['name']!r} again",
+            )
 
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
         """Replace the manifest."""

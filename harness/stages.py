@@ -23,7 +23,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
 from harness.game.state import ROLES
 from harness.manoeuvre_file import name_manoeuvres
-from harness.policy_file import read_policy, write_policy
+from harness.policy_file import policy_files, read_policy, write_policy
 from harness.preflight import OpenCampaign
 from harness.rounds import AssessmentStage, Drives, Stage, TrainingStage
 from harness.run_folder import RunFolder
@@ -31,7 +31,7 @@ from harness.tables import EPISODE_COLUMNS, TRAINING_COLUMNS, typed, write_csv
 from harness.trace_file import TraceWriter
 from harness.traffic.opening import OpenScene, open_scene
 
-NUMBERS_FORMAT = 1  # to be raised when the same inputs give other numbers, so that no old stage is taken for a new one
+NUMBERS_FORMAT = 2  # to be raised when the same inputs give other numbers, so that no old stage is taken for a new one
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class Conditions:
     ego_persona: Persona
     personas: Mapping[str, Persona]
     ego_policy: Path | None
+    policies: Path | None
     keys: Mapping[str, str]  # of every stage
 
     def persona(self, name: str) -> Persona:
@@ -72,6 +73,11 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
             inputs["training"] = campaign.document.training.model_dump(mode="json")
         else:
             inputs["episodes"] = campaign.document.assessment.episodes
+            if campaign.policies is not None:
+                files_of = {name: policy_files(campaign.policies / name) for name in stage.reads}
+                inputs["policies"] = {
+                    name: [campaign.hash_of(file) for file in files] for name, files in files_of.items()
+                }
         keys[stage.id] = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
     return keys
 
@@ -84,7 +90,14 @@ def conditions_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, 
     """The conditions of a run of a campaign: on the run folder's copy of the scene, which stays what it was."""
     personas = {each.name: each for each in campaign.personas}
     return Conditions(
-        folder.path, folder.scene, campaign.document, campaign.ego_persona, personas, campaign.ego_policy, keys
+        folder.path,
+        folder.scene,
+        campaign.document,
+        campaign.ego_persona,
+        personas,
+        campaign.ego_policy,
+        campaign.policies,
+        keys,
     )
 
 
@@ -187,7 +200,15 @@ def _driver(drives: Drives | None, conditions: Conditions, folder: RunFolder) ->
         return None
     if drives.kind == "sumo":
         return SumoDriver()
-    policy = conditions.ego_policy if drives.kind == "given" else folder.policy(drives.stage)
-    assert policy is not None
     sampled = conditions.persona(drives.persona).decisions == "sampled"
-    return LearnedDriver(read_policy(policy), sampled)
+    return LearnedDriver(read_policy(_policy(drives, conditions, folder)), sampled)
+
+
+def _policy(drives: Drives, conditions: Conditions, folder: RunFolder) -> Path:
+    if drives.kind == "given":
+        assert conditions.ego_policy is not None
+        return conditions.ego_policy
+    if drives.kind == "before":
+        assert conditions.policies is not None
+        return conditions.policies / drives.stage
+    return folder.policy(drives.stage)

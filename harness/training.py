@@ -25,6 +25,7 @@ from harness.convergence import has_converged
 from harness.documents.campaign import Training
 from harness.documents.persona import Persona
 from harness.drivers.protocol import Driver
+from harness.game.attention import Overlooking
 from harness.game.observation import OF_OTHERS
 from harness.game.seeding import seed_of
 from harness.game.start import Chances
@@ -104,7 +105,8 @@ def _environment(lesson: Lesson) -> ArenaVecEnv:
     seats[lesson.learner] = Seat(None, lesson.personas[lesson.learner].payoff)
     seed = seed_of(*lesson.parts, "sumo") % 2**31
     arena = Arena(lesson.scene, lesson.settings.games, seats, seed)
-    return ArenaVecEnv(arena, lesson.learner, _chances(lesson, 0), *lesson.parts)
+    scale = lesson.settings.payoff_scale
+    return ArenaVecEnv(arena, lesson.learner, _chances(lesson, 0), *lesson.parts, payoff_scale=scale)
 
 
 def _chances(lesson: Lesson, steps: int) -> Chances:
@@ -112,6 +114,8 @@ def _chances(lesson: Lesson, steps: int) -> Chances:
     present = [0.0 if lesson.opponent is None else 1.0 - lesson.alone_share] * 2
     present[lesson.learner] = 1.0
     habits = [persona.habits for persona in lesson.personas]
+    # Nobody learns from what was overlooked and went well: a driver learns with open eyes, and drives by habit.
+    habits[lesson.learner] = replace(habits[lesson.learner], overlooking=Overlooking())
     if steps < _attentive_steps(lesson):
         habits = [replace(each, attention=None) for each in habits]
     return lesson.scene.chances(habits, present)
@@ -170,7 +174,8 @@ def _segment(
     model.num_timesteps = progress.steps
     model._last_obs = None  # the games start anew
     try:
-        model.learn(steps, callback=curve, reset_num_timesteps=False)
+        keep = _KeepDeviation(lesson.settings.max_deviation)
+        model.learn(steps, callback=[curve, keep], reset_num_timesteps=False)
     except FloatingPointError as error:
         raise FloatingPointError(f"{error}, after {model.num_timesteps} steps") from error
     for name, value in model.policy.state_dict().items():
@@ -179,6 +184,29 @@ def _segment(
     payoffs = [game.payoff for game in curve.games]
     mean = float(np.mean(payoffs)) if payoffs else float("-inf")
     return Progress(progress.segments + 1, model.num_timesteps, [*progress.segment_payoffs, mean], curve.windows)
+
+
+class _KeepDeviation(BaseCallback):
+    """Keeps the deviation of actions below its bound. Actions end at ±1, so that beyond it the entropy term of PPO
+    goes on paying for a deviation which is no exploration any more, but full throttle and full brake in turn."""
+
+    def __init__(self, most: float) -> None:
+        super().__init__()
+        self._most = float(np.log(most))
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
+        self._bound()
+
+    def _on_training_end(self) -> None:
+        self._bound()  # what is kept is within it as well
+
+    def _bound(self) -> None:
+        deviation: Any = self.model.policy.log_std
+        with torch.no_grad():
+            deviation.clamp_(max=self._most)
 
 
 class _Curve(BaseCallback):

@@ -81,6 +81,13 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
         )
     if found.iloc[0]["error"]:
         raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {found.iloc[0]['error']}", "choose another")
+    if not folder.traces(stage_id(arm, chosen_seed)).is_file():
+        raise UsageError.of(
+            run,
+            f"{arm} {episode}",
+            "was recorded, but the traces are not in this folder",
+            f"watch it in {run / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
+        )
     scene = open_scene(folder.scene)
     trace = read_trace(folder.traces(stage_id(arm, chosen_seed)), episode)
     title = f"{arm}, seed {chosen_seed}, episode {episode}"

@@ -64,7 +64,7 @@ def test_campaign__every_file_is_there(run: Path) -> None:
     assert {each.name for each in (run / "scene").iterdir()} == {"scene.toml", "merge.net.xml", "merge.rou.xml"}
     assert "<html" in (run / "report.html").read_text(encoding="utf-8")
     for policy in (run / "policies").iterdir():
-        assert {each.name for each in policy.iterdir()} == {"policy.safetensors", "policy.json"}
+        assert {each.name for each in policy.iterdir()} == {"policy.safetensors", "policy.json", "README.md"}
         assert read_policy(policy).card["stage"] == policy.name
 
 
@@ -265,8 +265,9 @@ def test_campaign__is_the_same_with_one_worker_from_elsewhere_and_writes_nowhere
     assert done.stderr == ""
     assert tables(again) == tables(run)
     for policy in TRAININGS:
-        file = Path("policies") / f"{policy}-seed1" / "policy.safetensors"
-        assert (again / file).read_bytes() == (run / file).read_bytes()
+        for name in ("policy.safetensors", "policy.json", "README.md"):
+            file = Path("policies") / f"{policy}-seed1" / name
+            assert (again / file).read_bytes() == (run / file).read_bytes()
     assert list(folders["cwd"].iterdir()) == []
     left = {each.name for each in folders["tmp"].iterdir() if not each.name.startswith("torchinductor")}  # torch's
     assert left == set()

@@ -60,7 +60,10 @@ def test_plan__pairings_of_a_learned_ego(tmp_path: Path, personas: list[str]) ->
 
 
 def test_plan__trainings_of_a_learned_ego(tmp_path: Path, personas: list[str]) -> None:
-    shares = {"non_ego_training": {"alone_share": 0.125, "warm_start": True}, "retraining": {"alone_share": 0.5}}
+    shares = {
+        "non_ego_training": {"alone_share": 0.125, "warm_start": True},
+        "retraining": {"alone_share": 0.5, "warm_start": True},
+    }
     stages, _ = planned(tmp_path, personas=personas[:1], **shares)
     naive, anna, retrained = (stages[f"{name}-seed1"] for name in ("naive", "anna", "retrained_anna"))
     assert isinstance(naive, TrainingStage)
@@ -75,14 +78,16 @@ def test_plan__trainings_of_a_learned_ego(tmp_path: Path, personas: list[str]) -
     assert (retrained.opponent.stage, retrained.opponent.persona) == ("anna-seed1", "anna")
 
 
-def test_plan__without_a_warm_start_a_person_begins_from_nothing_but_still_needs_the_ego(
+def test_plan__without_a_warm_start_everyone_begins_from_nothing_but_still_needs_the_opponent(
     tmp_path: Path, personas: list[str]
 ) -> None:
-    stages, _ = planned(tmp_path, personas=personas[:1], non_ego_training={"warm_start": False})
-    anna = stages["anna-seed1"]
+    cold = {"warm_start": False}
+    stages, _ = planned(tmp_path, personas=personas[:1], non_ego_training=cold, retraining=cold)
+    anna, retrained = stages["anna-seed1"], stages["retrained_anna-seed1"]
     assert isinstance(anna, TrainingStage)
-    assert anna.initial is None
-    assert anna.needs == ("naive-seed1",)
+    assert isinstance(retrained, TrainingStage)
+    assert (anna.initial, anna.needs) == (None, ("naive-seed1",))
+    assert (retrained.initial, retrained.needs) == (None, ("anna-seed1",))
 
 
 @pytest.mark.parametrize("driver", ["sumo", "policy"])

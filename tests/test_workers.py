@@ -32,7 +32,7 @@ def stage(name: str, *needs: str) -> Stage:
 
 def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2, finished: tuple[str, ...] = ()) -> list[Event]:
     nobody = Persona.model_construct(name="nobody")
-    conditions = Conditions(folder, folder, Campaign.model_construct(), nobody, {}, None, {})
+    conditions = Conditions(folder, folder, Campaign.model_construct(), nobody, {}, None, None, {})
     events: list[Event] = []
     run_stages(stages, [f"{name}-seed1" for name in finished], conditions, jobs, events.append, work)
     return events

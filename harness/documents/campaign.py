@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, field_validator, model_validator
 
-from harness.documents.reading import Document
-from harness.documents.scene import Name
+from harness.documents.reading import Document, Mistakes
 
 LEARNED, SUMO = "learned", "sumo"  # drivers an ego can have by name
+OF_TRAINING = ("training", "non_ego_training", "retraining")  # the tables that say how players learn
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]
+CampaignName = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
 DocumentPath = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]*$")]
 
 
@@ -48,6 +49,11 @@ class Training(Document):
     """Sizes of the hidden layers, of actor and critic each."""
     initial_deviation: float = Field(0.5, gt=0.0, le=2.0)
     """Standard deviation of a new policy's actions."""
+    max_deviation: float = Field(0.5, gt=0.0, le=2.0)
+    """The greatest it may become: the entropy term raises it for ever where little is left to learn."""
+    payoff_scale: float = Field(0.1, gt=0.0, le=1000.0)
+    """What payoffs are multiplied by where PPO sees them (tables show them as they are): its step is bounded by the
+    gradient of actor and critic together, and the errors of a critic of large payoffs leave the actor little of it."""
     segment_steps: int = Field(131_072, ge=1_024, le=100_000_000)
     """Training is kept on disk and its learning curve judged this often."""
 
@@ -55,6 +61,10 @@ class Training(Document):
     def _divides(self) -> Training:
         if self.buffer % self.games:
             raise ValueError(f"buffer ({self.buffer}) must be a multiple of games ({self.games})")
+        if self.initial_deviation > self.max_deviation:
+            raise ValueError(
+                f"initial_deviation ({self.initial_deviation:g}) must not exceed max_deviation ({self.max_deviation:g})"
+            )
         if self.minibatch > self.buffer:
             raise ValueError(f"minibatch ({self.minibatch}) must not exceed buffer ({self.buffer})")
         return self
@@ -76,6 +86,8 @@ class Retraining(Document):
 
     alone_share: float = Field(0.25, ge=0.0, le=1.0)
     """Share of games without the non-ego, so that nothing is forgotten."""
+    warm_start: bool = False
+    """Begin from the naive ego's parameters, rather than from nothing."""
 
 
 class Assessment(Document):
@@ -88,10 +100,13 @@ class Assessment(Document):
 class Campaign(Document):
     """One document, one command, one run folder."""
 
-    name: Name
+    name: CampaignName
     scene: DocumentPath
     personas: list[DocumentPath] = Field(min_length=1, max_length=50)
     seeds: list[Seed] = Field([1], min_length=1, max_length=100)
+    policies: DocumentPath | None = None
+    """Folder of policies trained before, laid out as a run folder's `policies/`: nothing is trained, every learned
+    player is read from it."""
     ego: Ego = Ego()
     training: Training = Training()
     non_ego_training: NonEgoTraining = NonEgoTraining()
@@ -104,6 +119,17 @@ class Campaign(Document):
         if len(set(seeds)) < len(seeds):
             raise ValueError("a seed stands twice")
         return seeds
+
+    @model_validator(mode="after")
+    def _nothing_is_ignored(self) -> Campaign:
+        if self.policies is not None and (given := [name for name in OF_TRAINING if name in self.model_fields_set]):
+            message = "with `policies` nothing is trained: this table would be ignored"
+            raise Mistakes([(name, message, "leave out this table or `policies`") for name in given])
+        return self
+
+    def recorded(self) -> dict[str, Any]:
+        """Every key that counts with its value, as a manifest holds it: how players learn only where some do."""
+        return self.model_dump(mode="json", exclude=set(OF_TRAINING) if self.policies is not None else None)
 
 
 def resolve(campaign_file: Path, written: str) -> Path:

@@ -137,7 +137,8 @@ class Lapsing(Document):
 
 
 class Perception(Document):
-    """What a person fails to see."""
+    """What a person fails to see. A habit of driving, not of learning: while the person itself is trained, its eyes
+    are open, for nobody has learned from what was overlooked and went well."""
 
     overlooks_share: float = Field(ge=0.0, le=1.0)
     """Share of the drives in which the person does not look into the mirrors and over the shoulder."""

@@ -98,6 +98,7 @@ def render_page(
     page = environment.get_template("report.html.jinja").render(
         name=manifest.get("name", "campaign"),
         quick=QUICK if manifest.get("quick") else "",
+        trained_before=manifest.get("campaign", {}).get("policies") or "",
         unfinished=[_stage(name, stage) for name, stage in stages.items() if stage.get("status") != "done"],
         errored=errored.groupby(["arm", "seed"], sort=False).size().items(),
         errors=len(errored),
@@ -146,6 +147,7 @@ def _facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> 
         ("Personas", str(personas)),
         ("Training seeds", ", ".join(map(str, manifest.get("seeds", seeds)))),
         ("Games per arm and seed", f"{assessment['episodes']:,}" if "episodes" in assessment else ""),
+        ("Players", "trained before" if campaign.get("policies") else ""),
         ("Training budget", f"{steps_text(training['steps'])} steps" if "steps" in training else ""),
         ("Significance", f"{assessment['significance']:g}" if "significance" in assessment else ""),
     ]
