@@ -1,0 +1,154 @@
+"""Sweep levers of the reproduction: each setting is a campaign of its own, run by the real command's own code.
+
+    python docs/reproduction/sweep.py docs/reproduction/levers.toml
+
+reads the levers (which document, which key, which values), runs one campaign per value into a run folder of its own,
+and writes one row per setting and arm, with what was asked of the arm. Interrupted, it goes on where it stopped.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+import pandas as pd
+import tomlkit
+import typer
+from pydantic import Field
+from rich.console import Console
+
+from harness.campaign_run import run_campaign
+from harness.documents.reading import Document, read_document
+from harness.preflight import open_campaign
+from harness.run_folder import RunFolder
+from harness.tables import write_csv
+from harness.workers import cores
+
+COLUMNS = [
+    *("persona", "key", "value", "arm", "episodes", "failure_rate", "mean_speed_mps"),
+    *("non_ego_goal_rate", "non_ego_mean_speed_mps", "training_steps"),
+]
+
+
+class Lever(Document):
+    """One key of one persona, and the values it is given; everything else stays as shipped."""
+
+    persona: str
+    """The persona's file, relative to this document."""
+    key: str
+    """Dotted, as in `safety.terms.collision`; of the campaign itself where it begins with `campaign.`."""
+    values: list[Any] = Field(min_length=1)
+
+
+class Sweep(Document):
+    """What is swept."""
+
+    campaign: str
+    """The campaign that every setting varies, relative to this document."""
+    steps: int = Field(ge=1_000)
+    """Budget of each training, in steps of its player."""
+    levers: list[Lever] = Field(min_length=1)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One value of one lever: a campaign of its own."""
+
+    lever: Lever
+    value: Any
+
+    @property
+    def name(self) -> str:
+        persona = Path(self.lever.persona).stem
+        word = f"{persona}-{self.lever.key}-{self.value}"
+        return "".join(letter if letter.isalnum() or letter in "-." else "_" for letter in word).strip("_")
+
+
+def main(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The levers, such as docs/reproduction/levers.toml.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folders go.")] = Path("reports/sweep"),
+    table: Annotated[Path | None, typer.Option(metavar="FILE", help="The table.  [default: beside FILE]")] = None,
+) -> None:
+    """Run every setting that is not done yet, and write the table of all of them."""
+    console = Console()
+    sweep = read_document(file, Sweep)
+    settings = [Setting(lever, value) for lever in sweep.levers for value in lever.values]
+    rows: list[pd.DataFrame] = []
+    for number, setting in enumerate(settings, 1):
+        console.rule(f"{number} of {len(settings)}: {setting.name}")
+        folder = out / setting.name
+        campaign = _write_campaign(file.parent, sweep, setting, out / "documents" / setting.name)
+        run_campaign(open_campaign(campaign), RunFolder(folder), cores(), console)
+        rows.append(_rows(folder, setting))
+        write_csv(pd.concat(rows)[COLUMNS], table or file.with_suffix(".csv"))
+        for heavy in ("traces", "replays", "tensorboard"):
+            shutil.rmtree(folder / heavy, ignore_errors=True)
+
+
+def _write_campaign(base: Path, sweep: Sweep, setting: Setting, folder: Path) -> Path:
+    """The campaign's documents with one value changed, in a folder of their own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    source = base / sweep.campaign
+    campaign = tomlkit.parse(source.read_text(encoding="utf-8"))
+    persona_file = (base / setting.lever.persona).resolve()
+    persona = tomlkit.parse(persona_file.read_text(encoding="utf-8"))
+    if setting.lever.key.startswith("campaign."):
+        _put(campaign, setting.lever.key.removeprefix("campaign."), setting.value)
+    else:
+        _put(persona, setting.lever.key, setting.value)
+    (folder / persona_file.name).write_text(tomlkit.dumps(persona), encoding="utf-8")
+    campaign["name"] = "sweep"
+    campaign["seeds"] = [1]
+    campaign["personas"] = [persona_file.name]
+    campaign["scene"] = _relative(source, str(campaign["scene"]), folder)
+    ego: Any = campaign["ego"]
+    ego["persona"] = _relative(source, str(ego["persona"]), folder)
+    _put(campaign, "training.steps", sweep.steps)
+    file = folder / "campaign.toml"
+    file.write_text(tomlkit.dumps(campaign), encoding="utf-8")
+    return file
+
+
+def _relative(source: Path, written: str, folder: Path) -> str:
+    return Path(os.path.relpath((source.parent / written).resolve(), folder.resolve())).as_posix()
+
+
+def _put(document: Any, key: str, value: Any) -> None:
+    *tables, last = key.split(".")
+    for name in tables:
+        if name not in document:
+            document[name] = tomlkit.table()
+        document = document[name]
+    document[last] = value
+
+
+def _rows(folder: Path, setting: Setting) -> pd.DataFrame:
+    """What came of a setting, an arm a row, from its run folder's tables."""
+    summary = pd.read_csv(folder / "summary.csv")
+    episodes = pd.read_csv(folder / "episodes.csv")
+    by_arm = episodes.groupby("arm")
+    goals = by_arm["non_ego_outcome"].apply(
+        lambda outcome: (outcome == "goal").mean() if outcome.notna().any() else None
+    )
+    steps = pd.read_csv(folder / "training.csv").groupby("stage")["steps"].max()
+    trained = {"naive_alone": "naive", f"retrained_vs_{_persona(setting)}": f"retrained_{_persona(setting)}"}
+    frame = summary.assign(
+        persona=_persona(setting),
+        key=setting.lever.key,
+        value=str(setting.value),
+        non_ego_goal_rate=summary["arm"].map(goals),
+        non_ego_mean_speed_mps=summary["arm"].map(by_arm["non_ego_mean_speed_mps"].mean()),
+        training_steps=summary["arm"].map(lambda arm: steps.get(trained.get(arm, _persona(setting)))),
+    )
+    return frame
+
+
+def _persona(setting: Setting) -> str:
+    return Path(setting.lever.persona).stem
+
+
+if __name__ == "__main__":
+    typer.run(main)
