@@ -71,7 +71,8 @@ class Played:
         for game in games:
             parts = ("benchmarks", game, self._times_played[game])
             starts[game] = draw_start(self._chances, *parts)
-            departures[game] = self.arena.scene.departures(generator_of(*parts, "others"))
+            if self.arena.scene.has_others:
+                departures[game] = self.arena.scene.departures(generator_of(*parts, "others"))
             self._times_played[game] += 1
         self.arena.start(starts, departures)
 

@@ -190,8 +190,7 @@ class Arena:
                 self.simulation.halt(game, player)
         self.state = self.state.copy()  # `quantities` keeps what was true at the end of the step
         self._stop(ended)
-        way = (quantities.advanced_m, quantities.lateral_offset_m)
-        self.observation = observe(Quantities(self.world, self.state, self._bodies(self.reading), *way))
+        self.observation = observe(quantities.in_places(self.state, self._bodies(self.reading)))
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
@@ -241,7 +240,7 @@ class Arena:
         columns, near = self._nearest(reading)
 
         def beside(own: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
-            return np.concatenate((own, np.take_along_axis(others, columns, 1)), axis=1)
+            return np.concatenate((own, others[self._all_games[:, None], columns]), axis=1)
 
         return Bodies(
             beside(state.x_m, reading.x_m),

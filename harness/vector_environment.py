@@ -103,7 +103,8 @@ class ArenaVecEnv(VecEnv):
         for game in games:
             parts = (*self._parts, game, int(self._played[game]))
             starts[game] = draw_start(self._chances, *parts)
-            departures[game] = scene.departures(generator_of(*parts, "others"))
+            if scene.has_others:
+                departures[game] = scene.departures(generator_of(*parts, "others"))
             self._played[game] += 1
         self.arena.start(starts, departures)
 

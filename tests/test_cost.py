@@ -42,13 +42,13 @@ WHERE_OTHERS_ARE = {"simulation.getDepartedIDList": 1}
 READS_OF_OTHER = ("getPosition", "getAngle", "getSpeed")
 
 # At most: what was measured, and a little more. `python tests/test_cost.py` prints what it is now.
-LIBSUMO_CALLS_PER_RESTART = 12  # of a game that is on: out with both players, in again with both
+LIBSUMO_CALLS_PER_RESTART = 8  # of a game that is on: out with both players, in again with both
 LIBSUMO_CALLS_PER_RESTARTED_OTHER = 6
 FAR_READS_PER_OTHER = 0.2  # a step
 PYTHON_CALLS_PER_STEP = 180  # of all games together
 PYTHON_CALLS_PER_GAME = 2  # what each game adds: its two placements
-PYTHON_CALLS_PER_OTHER = 4.2
-PYTHON_CALLS_PER_RESTART = 195
+PYTHON_CALLS_PER_OTHER = 3.7
+PYTHON_CALLS_PER_RESTART = 190
 BLOCKS_LEFT_BEHIND = 350  # by 500 steps: one that were left by each step would be 500; some 50 to 200 come and go
 
 FEW, MANY = 4, 16  # games

@@ -21,6 +21,7 @@ from harness.game.state import Bodies, State
 PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])  # where the way is looked at, from a player
 SIGHT_M = 60.0  # beyond it a body is not taken for a leader
 REACH_M = 10.0  # clearances are known up to here
+_OF_PLACES = {"_rows", "path_rows", "path", "speed_limit_mps", "_lane", "lane_end_m", "goal_m", "relative", "on_path"}
 _PATH_ROWS = np.rint(PATH_M / SPACING_M).astype(np.int64)
 
 
@@ -76,6 +77,12 @@ class Quantities:
     bodies: Bodies
     advanced_m: FloatArray  # along the route since the step before
     lateral_offset_m: FloatArray  # to the left of the route's line
+
+    def in_places(self, state: State, bodies: Bodies) -> Quantities:
+        """The quantities of the same moment with everyone in the same place, though some are slower, or gone."""
+        others = Quantities(self.world, state, bodies, self.advanced_m, self.lateral_offset_m)
+        vars(others).update((name, kept) for name, kept in vars(self).items() if name in _OF_PLACES)
+        return others
 
     # --- the way ahead -----------------------------------------------------------------------------------------
 

@@ -99,9 +99,20 @@ class Routes:
 
     def find(self, player: int, x_m: float, y_m: float) -> float:
         """Station of a player of which nothing is known but the point."""
-        rows = slice(self.first_row[player], self.last_row[player] + 1)
-        nearest = int(((self.x_m[rows] - x_m) ** 2 + (self.y_m[rows] - y_m) ** 2).argmin())
-        return nearest * SPACING_M - MARGIN_M
+        first, last = self.first_row[player], self.last_row[player]
+        return (_nearest_row(x_m, y_m, self.x_m, self.y_m, first, last) - first) * SPACING_M - MARGIN_M
+
+
+@compiled
+def _nearest_row(
+    x_m: float, y_m: float, line_x_m: FloatArray, line_y_m: FloatArray, first_row: int, last_row: int
+) -> int:
+    nearest, nearest2 = first_row, np.inf
+    for row in range(first_row, last_row + 1):
+        away2 = (line_x_m[row] - x_m) ** 2 + (line_y_m[row] - y_m) ** 2
+        if away2 < nearest2:
+            nearest, nearest2 = row, away2
+    return nearest
 
 
 @compiled

@@ -67,7 +67,7 @@ class LocalSimulation:
         document = scene.document
         # Taken-over cars that leave a junction's lanes may kill SUMO 1.28 (SIGSEGV) if lane changes take time: they
         # do so only where there is somebody whom SUMO drives.
-        smoothly = not all(self._taken_over) or _has_others(scene)
+        smoothly = not all(self._taken_over) or scene.has_others
         self._options = [
             *("--net-file", str(tiled_net(scene.net_file, games)), "--route-files", str(types)),
             *("--step-length", str(document.step_length_s), "--collision.action", "none"),
@@ -89,6 +89,7 @@ class LocalSimulation:
         self._placed: dict[str, int] = {}  # players that stand and go as the arena says; their entry in [G, P]
         self._self_driven: dict[str, tuple[int, int]] = {}  # the other players; their game and seat
         self._there = np.zeros((self._games, len(self._taken_over)), dtype=bool)
+        self._entrances = [self._entrance(player) for player in range(len(self._taken_over))]
         world = self._scene.world
         self._others = Others(
             [tile.prefix for tile in self._tiles],
@@ -165,16 +166,9 @@ class LocalSimulation:
 
     def _add_player(self, game: int, player: int, start: Start) -> None:
         tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
-        vehicle, lane = self._scene.vehicle(player), self._scene.document.players[player].lane
-        self._add(
-            tile,
-            name,
-            self._scene.edges[player],
-            vehicle.vehicle_type,
-            lane.rsplit("_", 1)[1],
-            str(start.position_m[player]),
-            str(min(speed, self._fastest_start_mps(player, vehicle.vehicle_type))),
-        )
+        kind, lane, fastest = self._entrances[player]
+        entering = (kind, lane, str(start.position_m[player]), str(min(speed, fastest)))
+        self._add(tile, name, self._scene.edges[player], *entering)
         tile.inside.add(player)
         self._there[game, player] = True
         ahead = self._half_length[player]
@@ -190,11 +184,14 @@ class LocalSimulation:
         # Placed there it is in the traffic at once; only added, it would have to wait for room.
         libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), _EXACTLY_THERE)
 
-    def _fastest_start_mps(self, player: int, kind: str) -> float:
-        """SUMO refuses to start a vehicle above what its type keeps to on the road it starts on."""
+    def _entrance(self, player: int) -> tuple[str, str, float]:
+        """A player's type, the lane it starts on, and the speed above which SUMO refuses to start it: what its type
+        keeps to on the road there."""
         routes, types = self._scene.world.road.routes, libsumo.vehicletype
+        kind = self._scene.vehicle(player).vehicle_type
+        lane = self._scene.document.players[player].lane.rsplit("_", 1)[1]
         legal = float(routes.speed_limit_mps[routes.first_row[player]])
-        return float(min(legal * min(1.0, types.getSpeedFactor(kind)), types.getMaxSpeed(kind)))
+        return kind, lane, float(min(legal * min(1.0, types.getSpeedFactor(kind)), types.getMaxSpeed(kind)))
 
     def _enter(self, game: int, name: str, other: Departure) -> None:
         self._add(self._tiles[game], name, other.edges, other.vehicle_type, other.lane, other.position, other.speed)
@@ -222,11 +219,6 @@ class LocalSimulation:
         players[..., 0] -= self._half_length * np.cos(players[..., 2])
         players[..., 1] -= self._half_length * np.sin(players[..., 2]) + self._offsets[:, None]
         return players
-
-
-def _has_others(scene: OpenScene) -> bool:
-    players = {player.vehicle for player in scene.document.players}
-    return bool(scene.routes.flows) or bool(set(scene.routes.vehicles) - players)
 
 
 def _release(folder: tempfile.TemporaryDirectory[str]) -> None:

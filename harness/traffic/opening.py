@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 
@@ -43,6 +44,12 @@ class OpenScene:
     @property
     def net_file(self) -> Path:
         return self.folder / self.document.net
+
+    @cached_property
+    def has_others(self) -> bool:
+        """Whether anyone but the players may depart."""
+        players = {player.vehicle for player in self.document.players}
+        return bool(self.routes.flows) or bool(set(self.routes.vehicles) - players)
 
     def vehicle(self, player: int) -> Departure:
         """The player's vehicle in the route file."""

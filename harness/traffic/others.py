@@ -12,7 +12,6 @@ from typing import Any
 
 import libsumo
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray, IntArray
@@ -56,10 +55,11 @@ class _Table:
         self.due[game] = _NEVER
 
     def _grow(self) -> None:
+        """Twice the room, in whose second half nobody is due."""
         for column, values in vars(self).items():
             if column != "count":
-                more: NDArray[Any] = np.full_like(values, _NEVER if column == "due" else None if values.dtype == object else 0)
-                setattr(self, column, np.concatenate((values, more), axis=1))
+                setattr(self, column, np.concatenate((values, values), axis=1))
+        self.due[:, self.due.shape[1] // 2 :] = _NEVER
 
 
 class Others:
