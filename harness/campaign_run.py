@@ -138,7 +138,8 @@ class _Ledger:
 
 
 def _versions() -> dict[str, str]:
-    versions = {"python": platform.python_version(), "platform": platform.platform()}
+    system = " ".join((platform.system(), platform.machine(), *platform.libc_ver())).strip()
+    versions = {"python": platform.python_version(), "platform": system}
     return versions | {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 

@@ -22,14 +22,14 @@ else:
 
 EPISODES = 30
 FAILED: dict[str, tuple[float, float]] = {  # arm -> least and greatest share of EPISODES games that the ego fails
-    "naive_alone": (0.0, 0.05),
+    "naive_alone": (0.0, 0.0),
     "naive_vs_sumo": (0.0, 0.05),
-    "naive_vs_speedy": (0.35, 0.85),
-    "retrained_vs_speedy": (0.0, 0.1),
-    "retrained_alone_speedy": (0.0, 0.05),
-    "naive_vs_distracted": (0.05, 0.4),
-    "retrained_vs_distracted": (0.0, 0.3),
-    "retrained_alone_distracted": (0.0, 0.05),
+    "naive_vs_speedy": (0.15, 0.45),
+    "retrained_vs_speedy": (0.0, 0.05),
+    "retrained_alone_speedy": (0.0, 0.0),
+    "naive_vs_distracted": (0.05, 0.35),
+    "retrained_vs_distracted": (0.0, 0.1),
+    "retrained_alone_distracted": (0.0, 0.0),
 }
 
 

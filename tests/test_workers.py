@@ -181,7 +181,7 @@ def test_campaign__a_worker_that_is_killed_costs_nothing_but_time(tmp_path: Path
     assert process.returncode == 0, printed
     assert "died     speedy-seed1: the worker died of SIGSEGV" in printed
     assert tables(run_folder) == tables(sumo_run())
-    assert not in_session(process.pid)
+    wait_for(lambda: not in_session(process.pid), "no process of it is left", 5.0)
 
 
 @pytest.mark.slow

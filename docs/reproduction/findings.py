@@ -23,7 +23,6 @@ from harness.documents.reading import read_document
 from harness.drivers.learned import LearnedDriver
 from harness.drivers.sumo import SumoDriver
 from harness.policy_file import read_policy
-from harness.tables import write_csv
 from harness.traffic.opening import open_scene
 
 ROOT = Path(__file__).parents[2]
@@ -179,7 +178,7 @@ def main(
         row = {"what": finding.what, "was_to_be": finding.bound}
         rows.append({**row, **{f"seed_{seed}": value for seed, value in values.items()}, "held": held})
     if out is not None:
-        write_csv(pd.DataFrame(rows), out)
+        pd.DataFrame(rows).to_csv(out, index=False)
 
 
 def _lawful(run: Path, seed: int, episodes: int) -> tuple[float, float]:

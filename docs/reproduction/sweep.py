@@ -24,7 +24,6 @@ from harness.campaign_run import run_campaign
 from harness.documents.reading import Document, read_document
 from harness.preflight import open_campaign
 from harness.run_folder import RunFolder
-from harness.tables import write_csv
 from harness.workers import cores
 
 COLUMNS = [
@@ -83,7 +82,7 @@ def main(
         campaign = _write_campaign(file.parent, sweep, setting, out / "documents" / setting.name)
         run_campaign(open_campaign(campaign), RunFolder(folder), cores(), console)
         rows.append(_rows(folder, setting))
-        write_csv(pd.concat(rows)[COLUMNS], table or file.with_suffix(".csv"))
+        pd.concat(rows)[COLUMNS].to_csv(table or file.with_suffix(".csv"), index=False)
         for heavy in ("traces", "replays", "tensorboard"):
             shutil.rmtree(folder / heavy, ignore_errors=True)
 
