@@ -225,6 +225,62 @@ def test_train__attention_lapses_only_after_its_share_of_the_budget(
     assert seen == lapsing
 
 
+@pytest.mark.parametrize("learner", [EGO, NON_EGO])
+def test_train__the_learner_overlooks_nobody_while_it_learns_and_its_opponent_does(
+    learner: int, alone: Lesson, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[list[float]] = []
+    begin = ArenaVecEnv.begin
+
+    def noting(environment: ArenaVecEnv, chances: Chances, *parts: str | int) -> None:
+        seen.append([each.overlooking.share for each in chances.habits])
+        begin(environment, chances, *parts)
+
+    monkeypatch.setattr(ArenaVecEnv, "begin", noting)
+    speedy = alone.personas[1]
+    share = speedy.habits.overlooking.share
+    assert share > 0.0
+    in_one_go(replace(alone, learner=learner, personas=(speedy, speedy)), tmp_path)
+    assert seen
+    assert all(shares[learner] == 0.0 and shares[1 - learner] == share for shares in seen)
+
+
+def test_train__the_deviation_of_actions_keeps_to_its_bound(alone: Lesson, tmp_path: Path) -> None:
+    def deviations(most: float) -> np.ndarray:
+        tempted = settings(steps=1024, learning_rate=0.01, entropy_coefficient=1.0, max_deviation=most)
+        folder = tmp_path / f"{most}"
+        folder.mkdir()
+        return np.exp(in_one_go(replace(alone, settings=tempted), folder).policy.tensors["log_deviation"])
+
+    assert (deviations(2.0) > 0.55).all()  # the entropy term raises it from 0.5
+    assert (deviations(0.5) <= 0.5 + 1e-6).all()
+
+
+def test_train__ppo_sees_scaled_payoffs_and_the_curve_does_not(
+    alone: Lesson, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: dict[float, np.ndarray] = {}
+    curves: dict[float, float] = {}
+    step = ArenaVecEnv.step_wait
+    for scale in (1.0, 0.25):
+        rewards: list[np.ndarray] = []
+
+        def noting(environment: ArenaVecEnv, kept: list[np.ndarray] = rewards) -> Any:
+            result = step(environment)
+            kept.append(result[1])
+            return result
+
+        monkeypatch.setattr(ArenaVecEnv, "step_wait", noting)
+        folder = tmp_path / f"{scale}"
+        folder.mkdir()
+        # one update, at the very end: both play the same games until then
+        lesson = replace(alone, settings=settings(steps=1024, buffer=1024, payoff_scale=scale))
+        curves[scale] = in_one_go(lesson, folder).progress.curve[0].mean_payoff
+        seen[scale] = np.concatenate(rewards)
+    np.testing.assert_allclose(seen[0.25], 0.25 * seen[1.0], rtol=1e-6)
+    assert curves[0.25] == pytest.approx(curves[1.0])
+
+
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_train__a_payoff_that_is_no_number_stops_it_and_is_placed(
     value: float, alone: Lesson, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

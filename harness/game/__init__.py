@@ -1,1 +1,1 @@
-"""The game itself, in NumPy alone, over arrays with a leading axis G (games) and P (players)."""
+"""The game itself, in NumPy and compiled loops, over arrays with a leading axis G (games) and P (players)."""
