@@ -152,6 +152,7 @@ def test_number__a_whole_one_will_do_for_a_fraction(write: Write) -> None:
         (Campaign, CAMPAIGN + "seeds = [1, 2, 1]", "seeds", "a seed stands twice"),
         (Campaign, CAMPAIGN + "[training]\nbuffer = 1000", "training", "must be a multiple of games (64)"),
         (Campaign, CAMPAIGN + "[training]\nminibatch = 4096", "training", "must not exceed buffer (2048)"),
+        (Campaign, CAMPAIGN + "[training]\ninitial_deviation = 0.6", "training", "must not exceed max_deviation (0.5)"),
         (Persona, PERSONA + FUZZY.replace("thrill", "rail"), "human.fuzzy[0].name", "'rail' is a built-in term"),
         (Persona, PERSONA + FUZZY + FUZZY, "human.fuzzy[1].name", "'thrill' stands twice"),
         (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "-0.2, 1.0"), "human.fuzzy[0].sets[0].points", "must rise"),
