@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import isfinite
 
-LATEST = 4
+LATEST = 6
 LEAST = 2 * LATEST
 TOLERANCE = 0.01
 

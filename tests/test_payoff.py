@@ -90,6 +90,9 @@ PER_SECOND = [
     # 15 % over 13.89 m/s
     ("speed_over_limit", None, car(50.0, speed_mps=1.15 * 13.89), FAR, -0.15),
     ("speed_over_limit", None, car(50.0, speed_mps=5.0), FAR, 0.0),
+    # 15 % under it
+    ("speed_under_limit", None, car(50.0, speed_mps=0.85 * 13.89), FAR, -0.15),
+    ("speed_under_limit", None, car(50.0, speed_mps=15.0), FAR, 0.0),
     ("lane_offset", None, car(50.0, -2.3), FAR, -0.7),
     # (4 / 10)^2, braking or speeding up
     ("acceleration", None, car(50.0, acceleration_mps2=-4.0), FAR, -0.16),

@@ -85,6 +85,12 @@ TERMS: Mapping[str, Term] = {
     "goal": Term("operational", "reaching the goal, once", _ended(Outcome.GOAL, 1.0)),
     "timeout": Term("operational", "not reaching the goal in time, once", _ended(Outcome.TIMEOUT, -1.0)),
     "progress": Term("operational", "way along the route, per 100 m", lambda q: q.advanced_m / 100.0),
+    "speed_under_limit": Term(
+        "operational",
+        "speed under the limit, as a share of it",
+        lambda q: np.minimum(q.speed_over_limit, 0.0),
+        True,
+    ),
     "lane_offset": Term("operational", "distance from the nearest lane's centre, m", lambda q: -q.lane_offset_m, True),
     "acceleration": Term(
         "operational",
