@@ -38,7 +38,8 @@ class Lever(Document):
     persona: str
     """The persona's file, relative to this document."""
     key: str
-    """Dotted, as in `safety.terms.collision`; of the campaign itself where it begins with `campaign.`."""
+    """Dotted, as in `safety.terms.collision`; of the campaign itself where it begins with `campaign.`, of the ego's own
+    persona where it begins with `ego.`."""
     values: list[Any] = Field(min_length=1)
 
 
@@ -92,19 +93,22 @@ def _write_campaign(base: Path, sweep: Sweep, setting: Setting, folder: Path) ->
     folder.mkdir(parents=True, exist_ok=True)
     source = base / sweep.campaign
     campaign = tomlkit.parse(source.read_text(encoding="utf-8"))
-    persona_file = (base / setting.lever.persona).resolve()
-    persona = tomlkit.parse(persona_file.read_text(encoding="utf-8"))
-    if setting.lever.key.startswith("campaign."):
-        _put(campaign, setting.lever.key.removeprefix("campaign."), setting.value)
-    else:
-        _put(persona, setting.lever.key, setting.value)
-    (folder / persona_file.name).write_text(tomlkit.dumps(persona), encoding="utf-8")
+    ego: Any = campaign["ego"]
+    files = {"": (base / setting.lever.persona).resolve(), "ego": (source.parent / str(ego["persona"])).resolve()}
+    of, _, key = setting.lever.key.partition(".")
+    changed = of if of in ("campaign", "ego") else ""
+    for name, file in files.items():
+        persona = tomlkit.parse(file.read_text(encoding="utf-8"))
+        if name == changed:
+            _put(persona, key if changed else setting.lever.key, setting.value)
+        (folder / file.name).write_text(tomlkit.dumps(persona), encoding="utf-8")
+    if changed == "campaign":
+        _put(campaign, key, setting.value)
     campaign["name"] = "sweep"
     campaign["seeds"] = [1]
-    campaign["personas"] = [persona_file.name]
+    campaign["personas"] = [files[""].name]
+    ego["persona"] = files["ego"].name
     campaign["scene"] = _relative(source, str(campaign["scene"]), folder)
-    ego: Any = campaign["ego"]
-    ego["persona"] = _relative(source, str(ego["persona"]), folder)
     _put(campaign, "training.steps", sweep.steps)
     file = folder / "campaign.toml"
     file.write_text(tomlkit.dumps(campaign), encoding="utf-8")
