@@ -69,6 +69,7 @@ class Scene(Document):
     """The road, who drives on it, and how a game on it starts and ends."""
 
     name: Name
+    """What the scene is called."""
     net: PlainFile
     """The SUMO net, a file of the scene's folder."""
     routes: PlainFile
