@@ -70,7 +70,7 @@ def wants(portrait: Portrait) -> Iterator[str]:
     if collision == 0.0:
         yield "A collision costs nothing of itself."
     elif progress:
-        yield f"A collision costs as much as {-100.0 * collision / progress:.3g} m of the way are worth."
+        yield f"A collision costs as much as {-100.0 * collision / progress:.3g} m of progress are worth."
     elif goal:
         yield f"A collision costs as much as {-collision / goal:.3g} times the goal is worth."
     for group in GROUPS:
