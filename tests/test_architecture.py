@@ -62,6 +62,9 @@ ALLOWED: dict[str, set[str]] = {
         *("errors", "documents", "traffic", "replay", "rounds", "run_folder", "tables", "trace_file", "manoeuvres"),
     },
     "progress": {"rounds", "workers"},
+    "schema_files": {"errors", "files", "documents"},
+    "persona_template": {"errors", "documents", "game", "rounds"},
+    "portraits": {"errors", "files", "documents", "game", "reports"},  # reports: the style of its figures and pages
     "campaign_run": {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),

@@ -41,10 +41,24 @@ def run_command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[s
 # --- help -------------------------------------------------------------------------------------------------------------
 
 HELP: dict[str, list[str]] = {
-    "": ["campaign", "check", "report", "replay", "harness campaign campaigns/merge.toml", "Exit codes", "130"],
+    "": [
+        "campaign",
+        "check",
+        "report",
+        "replay",
+        "persona",
+        "schema",
+        "harness campaign campaigns/merge.toml",
+        "Exit codes",
+        "130",
+    ],
     "campaign": ["FILE", "--quick", "--out", "--jobs", "reports/NAME", "one per core", "skipped"],
     "check": ["FILE", "nothing is run or written"],
     "report": ["RUN", "report.html", "reports/merge"],
+    "persona": ["new", "show"],
+    "persona new": ["NAME", "--out", "personas/NAME.toml", "Overwrites nothing"],
+    "persona show": ["FILE", "--html", "membership curves"],
+    "schema": ["DOCUMENT", "campaign, persona or scene", "--out"],
     "replay": ["RUN", "ARM", "EPISODE", "--list", "--seed", "naive_vs_speedy", "worst first", "first"],
 }
 
@@ -52,7 +66,7 @@ HELP: dict[str, list[str]] = {
 @pytest.mark.parametrize("command", HELP)
 @pytest.mark.parametrize("option", ["--help", "-h"])
 def test_help__teaches(command: str, option: str, run_command: Callable[..., Said]) -> None:
-    said = run_command(*[command] if command else [], option)
+    said = run_command(*command.split(), option)
     assert said.code == 0
     for word in HELP[command]:
         assert word in said.out, word

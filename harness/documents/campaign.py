@@ -35,14 +35,19 @@ class Training(Document):
     early_convergence: bool = True
     """Stop when the learning curve has settled (the rule is in the manifest)."""
     learning_rate: float = Field(1e-4, gt=0.0, le=1.0)
+    """Step size of PPO's optimiser, Adam."""
     discount: float = Field(0.99, gt=0.0, le=1.0)
+    """Gamma: what a payoff one step later is worth now."""
     clip: float = Field(0.1, gt=0.0, le=1.0)
+    """Epsilon: how far an update may shift the odds of an action, as a share."""
     entropy_coefficient: float = Field(0.02, ge=0.0, le=1.0)
+    """What a varied policy is worth in PPO's loss, so that it goes on exploring."""
     buffer: int = Field(2048, ge=64, le=1_000_000)
     """Steps gathered, over all games, between two updates."""
     games: int = Field(64, ge=1, le=1024)
     """Games played at once."""
     minibatch: int = Field(512, ge=8, le=1_000_000)
+    """Steps in one gradient step; at most the buffer."""
     epochs: int = Field(10, ge=1, le=100)
     """Passes over the buffer in an update."""
     network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)
@@ -94,16 +99,22 @@ class Assessment(Document):
     """How players are judged."""
 
     episodes: int = Field(100, ge=2, le=1_000_000)
+    """Games of each arm; game k starts alike in every arm."""
     significance: float = Field(0.01, gt=0.0, lt=1.0)
+    """The p-value, after Holm's correction, below which a difference is called real."""
 
 
 class Campaign(Document):
     """One document, one command, one run folder."""
 
     name: CampaignName
+    """What it is called; its run folder is reports/<name> if no other is given."""
     scene: DocumentPath
+    """Folder of the scene: a path from this file."""
     personas: list[DocumentPath] = Field(min_length=1, max_length=50)
+    """The people whom the ego meets, one after the other: paths of their files from this file."""
     seeds: list[Seed] = Field([1], min_length=1, max_length=100)
+    """Training seeds: everything is trained and assessed once for each."""
     policies: DocumentPath | None = None
     """Folder of policies trained before, laid out as a run folder's `policies/`: nothing is trained, every learned
     player is read from it."""

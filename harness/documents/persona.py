@@ -20,15 +20,20 @@ class Source(Document):
     """What is known of such people: the statistic the persona rests on, and where it is from."""
 
     statistic: str = Field(min_length=10)
+    """What was counted or measured, with its figure."""
     citation: str = Field(min_length=5)
+    """Who published it, where and when."""
 
 
 class Parametrised(Document):
     """A term that takes a limit: `{ weight = 1.0, within_m = 0.5 }`."""
 
     weight: Weight
+    """What the term counts."""
     within_m: float | None = Field(None, gt=0.0, le=100.0)
+    """The distance from which on the term is nothing."""
     within_s: float | None = Field(None, gt=0.0, le=60.0)
+    """The time from which on the term is nothing."""
 
 
 WeightOrTable = Annotated[
@@ -38,7 +43,7 @@ WeightOrTable = Annotated[
 
 
 class Group(Document):
-    """One of equation 1's three groups of terms."""
+    """One of equation 1's three groups of terms. A term that is left out weighs nothing."""
 
     weight: Weight = 1.0
     """Its coefficient alpha in equation 1."""
@@ -50,7 +55,9 @@ class MembershipFunction(Document):
     """A fuzzy set: linear between points of [input, membership in 0..1], constant outside them."""
 
     name: Name
+    """What the set is called."""
     points: list[tuple[float, Annotated[float, Field(ge=0.0, le=1.0)]]] = Field(min_length=1, max_length=20)
+    """Points of [input in the quantity's unit, membership], the inputs rising."""
     value: float = Field(ge=-1000.0, le=1000.0)
     """What being wholly in this set is worth, per second."""
 
@@ -73,9 +80,13 @@ class Fuzzy(Document):
     """A human term declared by membership functions over one quantity of the game."""
 
     name: Name
+    """What the term is called, in tables too."""
     weight: Weight = 1.0
+    """What the function's value is multiplied by."""
     quantity: str
+    """The quantity of the game that it is a function of."""
     sets: list[MembershipFunction] = Field(min_length=1, max_length=20)
+    """The fuzzy sets. Between them the value is the average of theirs, weighted by membership; outside all, 0."""
 
     @field_validator("quantity")
     @classmethod
@@ -114,6 +125,7 @@ class Human(Group):
     """The human group: besides named terms, any number of fuzzy ones."""
 
     fuzzy: list[Fuzzy] = Field(default_factory=list)
+    """Terms declared by membership functions."""
 
 
 class Lapsing(Document):
@@ -157,8 +169,11 @@ class Persona(Document):
     """A kind of driver, as equation 1 and human limits."""
 
     name: Name
+    """What such a person is called, in stages, arms and tables."""
     description: str = Field(min_length=10)
+    """Who this is, in a sentence."""
     sources: list[Source] = Field(min_length=1)
+    """What is known of such people: no persona without a statistic."""
     safety: Group = Group()
     operational: Group = Group()
     human: Human = Human()

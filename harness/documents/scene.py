@@ -34,11 +34,15 @@ class Actuators(Document):
     """What the players' cars can do beyond what their vehicle type in the route file says."""
 
     max_acceleration_mps2: float = Field(3.0, gt=0.0, le=15.0)
+    """Acceleration at full throttle."""
     max_braking_mps2: float = Field(8.0, gt=0.0, le=15.0)
+    """Deceleration at full brake."""
     max_steering_rad: float = Field(0.6, gt=0.0, le=1.2)
     """Road wheel angle at full lock."""
     max_steering_rate_radps: float = Field(0.8, gt=0.0, le=10.0)
+    """How fast the road wheels turn."""
     wheelbase_m: float = Field(2.7, gt=0.5, le=12.0)
+    """Distance between the axles."""
 
 
 class Player(Document):
@@ -69,6 +73,7 @@ class Scene(Document):
     """The road, who drives on it, and how a game on it starts and ends."""
 
     name: Name
+    """What the scene is called."""
     net: PlainFile
     """The SUMO net, a file of the scene's folder."""
     routes: PlainFile

@@ -20,7 +20,15 @@ from harness.game.quantities import Quantities
 from harness.game.state import Outcome
 
 GROUPS = ("safety", "operational", "human")
-FUZZY_QUANTITIES = ("speed_over_limit", "speed_mps", "time_gap_s", "clearance_m", "lane_offset_m", "goal_m")
+FUZZY_QUANTITIES: Mapping[str, str] = {
+    "speed_over_limit": "speed over the limit, as a share of it; negative below",
+    "speed_mps": "speed",
+    "time_gap_s": "time gap to the vehicle ahead",
+    "clearance_m": "distance to the nearest surface, rail or vehicle",
+    "lane_offset_m": "distance from the centre of the nearest lane",
+    "goal_m": "distance to the goal, along the route",
+}
+"""The quantities that a fuzzy term can be a function of, in words."""
 NEARNESS = ("time_gap_s", "clearance_m")  # those of them that are 0 at contact
 
 
