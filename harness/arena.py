@@ -190,7 +190,9 @@ class Arena:
                 self.simulation.halt(game, player)
         self.state = self.state.copy()  # `quantities` keeps what was true at the end of the step
         self._stop(ended)
-        self.observation = observe(quantities.in_places(self.state, self._bodies(self.reading)))
+        # Everyone is in the same place, though some are slower, or gone.
+        there = (self._bodies(self.reading), quantities.advanced_m, quantities.lateral_offset_m)
+        self.observation = observe(Quantities(self.world, self.state, *there))
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
