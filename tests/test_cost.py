@@ -45,10 +45,10 @@ READS_OF_OTHER = ("getPosition", "getAngle", "getSpeed")
 LIBSUMO_CALLS_PER_RESTART = 8  # of a game that is on: out with both players, in again with both
 LIBSUMO_CALLS_PER_RESTARTED_OTHER = 6
 FAR_READS_PER_OTHER = 0.2  # a step
-PYTHON_CALLS_PER_STEP = 180  # of all games together
-PYTHON_CALLS_PER_GAME = 2  # what each game adds: its two placements
-PYTHON_CALLS_PER_OTHER = 3.7
-PYTHON_CALLS_PER_RESTART = 190
+PYTHON_CALLS_PER_STEP = 150  # of all games together
+PYTHON_CALLS_PER_GAME = 0  # what each game adds: its placements are libsumo's own
+PYTHON_CALLS_PER_OTHER = 0.5
+PYTHON_CALLS_PER_RESTART = 140
 BLOCKS_LEFT_BEHIND = 350  # by 500 steps: one that were left by each step would be 500; some 50 to 200 come and go
 
 FEW, MANY = 4, 16  # games
