@@ -18,10 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from harness.drivers.protocol import Driver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
@@ -190,7 +188,9 @@ class Arena:
                 self.simulation.halt(game, player)
         self.state = self.state.copy()  # `quantities` keeps what was true at the end of the step
         self._stop(ended)
-        self.observation = observe(quantities.in_places(self.state, self._bodies(self.reading)))
+        # Everyone is in the same place, though some are slower, or gone.
+        there = (self._bodies(self.reading), quantities.advanced_m, quantities.lateral_offset_m)
+        self.observation = observe(Quantities(self.world, self.state, *there))
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
@@ -227,34 +227,10 @@ class Arena:
     def _bodies(self, reading: Reading | None) -> Bodies:
         """Players first, then the others nearest to them."""
         state = self.state
+        motion = (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
+        players = Bodies(*motion, self._players_length, self._players_width, state.present.copy())
         if reading is None or not reading.present.size:
-            return Bodies(
-                state.x_m,
-                state.y_m,
-                state.heading_rad,
-                state.speed_mps,
-                self._players_length,
-                self._players_width,
-                state.present.copy(),
-            )
-        columns, near = self._nearest(reading)
-
-        def beside(own: NDArray[Any], others: NDArray[Any]) -> NDArray[Any]:
-            return np.concatenate((own, others[self._all_games[:, None], columns]), axis=1)
-
-        return Bodies(
-            beside(state.x_m, reading.x_m),
-            beside(state.y_m, reading.y_m),
-            beside(state.heading_rad, reading.heading_rad),
-            beside(state.speed_mps, reading.speed_mps),
-            beside(self._players_length, reading.length_m),
-            beside(self._players_width, reading.width_m),
-            beside(state.present, near),
-        )
-
-    def _nearest(self, reading: Reading) -> tuple[IntArray, BoolArray]:
-        """[G, B] columns of the reading with the others nearest to the players; [G, M] which of them are noticed."""
-        state = self.state
-        away = np.hypot(reading.x_m[:, None] - state.x_m[..., None], reading.y_m[:, None] - state.y_m[..., None])
-        away = np.where(state.present[..., None] & reading.present[:, None], away, np.inf).min(1)
-        return np.argsort(away, axis=1, kind="stable")[:, :NEAREST], away <= NOTICED_M
+            return players
+        beside = (reading.x_m, reading.y_m, reading.heading_rad, reading.speed_mps)
+        others = Bodies(*beside, reading.length_m, reading.width_m, reading.present)
+        return players.with_nearest(others, NEAREST, NOTICED_M)

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from types import BuiltinFunctionType, FrameType, FunctionType
+from types import BuiltinFunctionType, FrameType
 from typing import Any
 from unittest.mock import patch
 
@@ -45,10 +45,10 @@ READS_OF_OTHER = ("getPosition", "getAngle", "getSpeed")
 LIBSUMO_CALLS_PER_RESTART = 8  # of a game that is on: out with both players, in again with both
 LIBSUMO_CALLS_PER_RESTARTED_OTHER = 6
 FAR_READS_PER_OTHER = 0.2  # a step
-PYTHON_CALLS_PER_STEP = 180  # of all games together
-PYTHON_CALLS_PER_GAME = 2  # what each game adds: its two placements
-PYTHON_CALLS_PER_OTHER = 3.7
-PYTHON_CALLS_PER_RESTART = 190
+PYTHON_CALLS_PER_STEP = 150  # of all games together
+PYTHON_CALLS_PER_GAME = 0  # what each game adds: its placements are libsumo's own
+PYTHON_CALLS_PER_OTHER = 0.5
+PYTHON_CALLS_PER_RESTART = 140
 BLOCKS_LEFT_BEHIND = 350  # by 500 steps: one that were left by each step would be 500; some 50 to 200 come and go
 
 FEW, MANY = 4, 16  # games
@@ -64,18 +64,16 @@ NEAR_M, FAR_M = 60.0, 210.0  # along the road; the players start at 30 to 40
 
 @contextmanager
 def counted_sumo(counts: Counter[str]) -> Iterator[None]:
-    """Count the calls of every function of libsumo and of its parts, by name."""
-    parts = {name: part for name, part in vars(libsumo).items() if isinstance(part, type) and name[0].islower()}
+    """Count the calls of every function of libsumo, by the name it has there: a part's functions are called in the
+    extension module as `vehicle_getSpeed`, by libsumo's own Python functions and by the harness."""
+    extension = libsumo.libsumo._libsumo
     with ExitStack() as patches:
-        for of, part in {"": libsumo, **{f"{name}.": part for name, part in parts.items()}}.items():
-            for name in [each for each, function in vars(part).items() if callable_by_others(each, function)]:
-                called = counted(getattr(part, name), counts, of + name)
-                patches.enter_context(patch.object(part, name, called if part is libsumo else staticmethod(called)))
+        for name, function in list(vars(extension).items()):
+            part, _, called = name.partition("_")
+            if isinstance(function, BuiltinFunctionType) and isinstance(getattr(libsumo, part, None), type) and called:
+                known = "simulationStep" if name == "simulation_step" else f"{part}.{called}"
+                patches.enter_context(patch.object(extension, name, counted(function, counts, known)))
         yield
-
-
-def callable_by_others(name: str, function: object) -> bool:
-    return name[0].islower() and isinstance(function, FunctionType | BuiltinFunctionType | staticmethod)
 
 
 def counted(function: Callable[..., Any], counts: Counter[str], name: str) -> Callable[..., Any]:

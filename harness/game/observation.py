@@ -9,11 +9,14 @@ ego "seeks to maintain a large distance between itself and nearby objects", sect
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from harness.compiling import compiled
-from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.quantities import PATH_M, OnPath, Quantities, Relative
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.quantities import PATH_M, Quantities, along_route, row_ahead
+from harness.game.road import Routes, lane_at, row_at
 
 _BEHIND = int(np.searchsorted(PATH_M, 0.0))  # how many of them are not ahead
 AHEAD_M = PATH_M[_BEHIND:]
@@ -50,84 +53,115 @@ OF_OTHERS = np.array([name.startswith("other") for name in LAYOUT])
 
 def observe(q: Quantities) -> FloatArray:
     """[G, P, SIZE] float32 in [-1, 1]: what each player sees. Players that are not there see zeros."""
-    state, actuators, routes = q.state, q.world.actuators, q.world.road.routes
-    view = np.zeros((*state.x_m.shape, SIZE))
-    view[..., 0] = state.speed_mps / _SPEED_MPS
-    view[..., 1] = q.speed_over_limit
-    view[..., 2] = state.acceleration_mps2 / _ACCELERATION_MPS2
-    view[..., 3] = state.steering_rad / actuators.max_steering_rad
-    view[..., 4] = q.lane_end_m / _FAR_M
-    view[..., 5] = q.goal_m / (2.0 * _FAR_M)
-    edges = (routes.left_edge_m, routes.right_edge_m)
-    _look_ahead(view, state.heading_rad, q.lateral_offset_m, q.path_rows, routes.heading_rad, *edges, q.seen, q.on_path)
-    _look_at_others(view, state.speed_mps, q.bodies.speed_mps, q.seen, q.relative)
-    return _within_bounds(view, state.present)
+    state, bodies, actuators = q.state, q.bodies, q.world.actuators
+    return _view(
+        *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
+        *(state.station_m, q.lateral_offset_m, state.present, state.overlooked_m),
+        *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
+        *(bodies.present, actuators.max_steering_rad, tuple(q.world.road.routes)),
+    )
 
 
 @compiled
-def _look_ahead(
-    view: FloatArray,
+def _view(
+    x_m: FloatArray,
+    y_m: FloatArray,
     heading_rad: FloatArray,
-    lateral_offset_m: FloatArray,
-    path_rows: IntArray,
-    line_heading_rad: FloatArray,
-    left_edge_m: FloatArray,
-    right_edge_m: FloatArray,
-    seen: BoolArray,
-    bodies: OnPath,
-) -> None:
-    """Fill in how the path turns, and the free width beside it."""
-    for g, p in np.ndindex(heading_rad.shape):
-        offset = lateral_offset_m[g, p]
-        view[g, p, _LEFT - 1] = -offset / _SIDE_M
-        for k in range(_COUNT):
-            row = path_rows[g, p, _BEHIND + k]
-            turned = line_heading_rad[row] - heading_rad[g, p]
-            view[g, p, _TURNED + k] = 2.0 * ((turned + np.pi) % (2.0 * np.pi) - np.pi)
-            left, right = left_edge_m[row] - offset, right_edge_m[row] - offset
-            for b in range(seen.shape[2]):
-                near = bodies.ahead_m[g, p, b] - bodies.half_length_m[g, p, b]
-                far = bodies.ahead_m[g, p, b] + bodies.half_length_m[g, p, b]
-                if seen[g, p, b] and far > _EDGES[k] and near < _EDGES[k + 1]:
-                    if bodies.left_m[g, p, b] > 0.0:
-                        left = min(left, bodies.left_m[g, p, b] - bodies.half_width_m[g, p, b])
-                    else:
-                        right = max(right, bodies.left_m[g, p, b] + bodies.half_width_m[g, p, b])
-            view[g, p, _LEFT + k], view[g, p, _RIGHT + k] = left / _SIDE_M, right / _SIDE_M
-
-
-@compiled
-def _look_at_others(
-    view: FloatArray, own_speed_mps: FloatArray, speed_mps: FloatArray, seen: BoolArray, bodies: Relative
-) -> None:
-    """Fill in the nearest others, nearest first; zeros stay where there are fewer."""
-    for g, p in np.ndindex(own_speed_mps.shape):
-        last, last_m = -1, -1.0  # whom the entry before is of
-        for k in range(OTHERS):
-            nearest, nearest_m = -1, _FAR_M
-            for b in range(seen.shape[2]):
-                away = bodies.distance_m[g, p, b]
-                if seen[g, p, b] and away < nearest_m and (away > last_m or (away == last_m and b > last)):
-                    nearest, nearest_m = b, away
-            if nearest < 0:
-                break
-            last, last_m = nearest, nearest_m
-            turned, speed = bodies.turned_rad[g, p, nearest], speed_mps[g, nearest]
-            entry = view[g, p, _FIRST_OTHER + k * _ENTRIES :]
-            entry[0] = 1.0
-            entry[1] = bodies.ahead_m[g, p, nearest] / _AHEAD_M
-            entry[2] = bodies.left_m[g, p, nearest] / _SIDE_M
-            entry[3] = (speed * np.cos(turned) - own_speed_mps[g, p]) / _CLOSING_MPS
-            entry[4] = speed * np.sin(turned) / _CROSSING_MPS
-            entry[5] = np.sin(turned)
-            entry[6] = np.cos(turned)
-
-
-@compiled
-def _within_bounds(view: FloatArray, present: BoolArray) -> FloatArray:
-    bounded = np.zeros(view.shape, dtype=np.float32)
+    speed_mps: FloatArray,
+    acceleration_mps2: FloatArray,
+    steering_rad: FloatArray,
+    station_m: FloatArray,
+    offset_m: FloatArray,
+    present: BoolArray,
+    overlooked_m: FloatArray,
+    body_x_m: FloatArray,
+    body_y_m: FloatArray,
+    body_heading_rad: FloatArray,
+    body_speed_mps: FloatArray,
+    body_length_m: FloatArray,
+    body_width_m: FloatArray,
+    body_present: BoolArray,
+    max_steering_rad: FloatArray,
+    table: tuple[Any, ...],
+) -> FloatArray:
+    """All of it at once: in games that begin anew there is too little to look at for the price of several calls."""
+    routes = Routes(*table)
+    bounded = np.zeros((*present.shape, SIZE), dtype=np.float32)
+    view = np.empty(SIZE)
+    bodies = body_present.shape[1]
+    seen, distance_m = np.empty(bodies, dtype=np.bool_), np.empty(bodies)
+    ahead_m, left_m = np.empty(bodies), np.empty(bodies)
     for g, p in np.ndindex(present.shape):
         if present[g, p]:
-            for k in range(view.shape[2]):
-                bounded[g, p, k] = min(max(view[g, p, k], -1.0), 1.0)
+            first, last = routes.first_row[p], routes.last_row[p]
+            station, offset, heading = station_m[g, p], offset_m[g, p], heading_rad[g, p]
+            row = row_at(station, first, last)
+            _, lane_end = lane_at(row, offset, routes.lane_offset_m, routes.lane_end_m)
+            view[:] = 0.0
+            view[0] = speed_mps[g, p] / _SPEED_MPS
+            view[1] = speed_mps[g, p] / routes.speed_limit_mps[row] - 1.0
+            view[2] = acceleration_mps2[g, p] / _ACCELERATION_MPS2
+            view[3] = steering_rad[g, p] / max_steering_rad[p]
+            view[4] = np.maximum(lane_end - station, 0.0) / _FAR_M
+            view[5] = (routes.goal_m[p] - station) / (2.0 * _FAR_M)
+            view[_LEFT - 1] = -offset / _SIDE_M
+            for k in range(_COUNT):
+                ahead = row_ahead(row, _BEHIND + k, first, last)
+                turned = routes.heading_rad[ahead] - heading
+                view[_TURNED + k] = 2.0 * ((turned + np.pi) % (2.0 * np.pi) - np.pi)
+                view[_LEFT + k] = routes.left_edge_m[ahead] - offset
+                view[_RIGHT + k] = routes.right_edge_m[ahead] - offset
+            cosine, sine = np.cos(heading), np.sin(heading)
+            for b in range(bodies):
+                dx, dy = body_x_m[g, b] - x_m[g, p], body_y_m[g, b] - y_m[g, p]
+                ahead_m[b], left_m[b] = dx * cosine + dy * sine, dy * cosine - dx * sine
+                distance_m[b] = np.hypot(dx, dy)
+                seen[b] = body_present[g, b] and b != p and ahead_m[b] >= overlooked_m[g, p]
+                if seen[b]:
+                    pose = (body_x_m[g, b], body_y_m[g, b], body_heading_rad[g, b])
+                    room = along_route(row, station, offset, p, routes, *pose, body_length_m[g, b], body_width_m[g, b])
+                    _narrow(view, *room)
+            for k in range(_COUNT):
+                view[_LEFT + k] /= _SIDE_M
+                view[_RIGHT + k] /= _SIDE_M
+            last_seen, last_m = -1, -1.0  # whom the entry before is of
+            for k in range(OTHERS):  # nearest first; zeros stay where there are fewer
+                nearest = _next_nearest(seen, distance_m, last_seen, last_m)
+                if nearest < 0:
+                    break
+                last_seen, last_m = nearest, distance_m[nearest]
+                turned, speed = body_heading_rad[g, nearest] - heading, body_speed_mps[g, nearest]
+                entry = view[_FIRST_OTHER + k * _ENTRIES :]
+                entry[0] = 1.0
+                entry[1] = ahead_m[nearest] / _AHEAD_M
+                entry[2] = left_m[nearest] / _SIDE_M
+                entry[3] = (speed * np.cos(turned) - speed_mps[g, p]) / _CLOSING_MPS
+                entry[4] = speed * np.sin(turned) / _CROSSING_MPS
+                entry[5] = np.sin(turned)
+                entry[6] = np.cos(turned)
+            for k in range(SIZE):
+                bounded[g, p, k] = min(max(view[k], -1.0), 1.0)
     return bounded
+
+
+@compiled
+def _narrow(view: FloatArray, ahead_m: float, left_m: float, half_length_m: float, half_width_m: float) -> None:
+    """Take the room that a body takes along the route from the free width beside it."""
+    near, far = ahead_m - half_length_m, ahead_m + half_length_m
+    for k in range(_COUNT):
+        if far > _EDGES[k] and near < _EDGES[k + 1]:
+            if left_m > 0.0:
+                view[_LEFT + k] = min(view[_LEFT + k], left_m - half_width_m)
+            else:
+                view[_RIGHT + k] = max(view[_RIGHT + k], left_m + half_width_m)
+
+
+@compiled
+def _next_nearest(seen: BoolArray, distance_m: FloatArray, last: int, last_m: float) -> int:
+    """The nearest body that is farther away than the last one, or as far and listed behind it; -1: there is none."""
+    nearest, nearest_m = -1, _FAR_M
+    for b in range(len(seen)):
+        away = distance_m[b]
+        if seen[b] and away < nearest_m and (away > last_m or (away == last_m and b > last)):
+            nearest, nearest_m = b, away
+    return nearest

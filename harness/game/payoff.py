@@ -11,10 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import IntEnum
+from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from harness.game.arrays import FloatArray
+from harness.compiling import compiled
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction
 from harness.game.quantities import Quantities
 from harness.game.state import Outcome
@@ -32,87 +37,100 @@ FUZZY_QUANTITIES: Mapping[str, str] = {
 NEARNESS = ("time_gap_s", "clearance_m")  # those of them that are 0 at contact
 
 
+class Form(IntEnum):
+    """What a term makes of its quantity."""
+
+    BELOW = 0  # 0 at the parameter and above, falling to -1 at zero
+    OVER = 1  # how far it is above zero, negative
+    UNDER = 2  # how far it is below zero, negative
+    LESS = 3  # negative
+    LESS_SQUARED = 4  # as a share of 10 m/s2, squared, negative
+    PER_100 = 5
+    GAINED = 6  # 1 where it is the parameter
+    LOST = 7  # -1 where it is the parameter
+    ALWAYS = 8  # -1
+
+
 @dataclass(frozen=True)
 class Term:
     """A named term of equation 1.
 
-    `value` gives [G, P]; with `parameter`, a limit in that unit, as its second argument. `per_second` terms are
-    rates and are multiplied by the step length; the others are events, counted in the step they happen.
+    `quantity` gives [G, P]. `per_second` terms are rates and are multiplied by the step length; the others are events,
+    counted in the step they happen.
     """
 
     group: str
     meaning: str
-    value: Callable[..., FloatArray]
+    quantity: Callable[[Quantities], NDArray[Any]]
+    form: Form
     per_second: bool = False
     parameter: str = ""
+    """The name of the form's parameter, where a persona gives it: a limit in the quantity's unit."""
+    outcome: Outcome = Outcome.RUNNING
+    """The form's parameter, where it is an outcome."""
 
 
-def _below(value: FloatArray, limit: float) -> FloatArray:
-    """0 at the limit and above, falling to -1 at zero."""
-    return np.minimum(value / limit, 1.0) - 1.0
-
-
-def _ended(outcome: Outcome, sign: float) -> Callable[[Quantities], FloatArray]:
-    code = int(outcome)  # NumPy would ask the enumeration each time
-    return lambda q: sign * (q.state.outcome == code)
+def _ended(group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
+    return Term(group, meaning, lambda q: q.state.outcome, form, outcome=outcome)
 
 
 TERMS: Mapping[str, Term] = {
-    "collision": Term("safety", "touching a vehicle or person, once", _ended(Outcome.COLLISION, -1.0)),
-    "rail": Term("safety", "touching the edge of the road, once", _ended(Outcome.RAIL, -1.0)),
+    "collision": _ended("safety", "touching a vehicle or person, once", Form.LOST, Outcome.COLLISION),
+    "rail": _ended("safety", "touching the edge of the road, once", Form.LOST, Outcome.RAIL),
     "clearance": Term(
         "safety",
         "nearness to the nearest surface, rail or vehicle",
-        lambda q, m: _below(q.clearance_m, m),
+        lambda q: q.clearance_m,
+        Form.BELOW,
         True,
         "within_m",
     ),
     "vehicle_clearance": Term(
         "safety",
         "nearness to the nearest vehicle",
-        lambda q, m: _below(q.vehicle_clearance_m, m),
+        lambda q: q.vehicle_clearance_m,
+        Form.BELOW,
         True,
         "within_m",
     ),
     "time_gap": Term(
-        "safety", "following closer than a time gap", lambda q, s: _below(q.time_gap_s, s), True, "within_s"
+        "safety", "following closer than a time gap", lambda q: q.time_gap_s, Form.BELOW, True, "within_s"
     ),
     "time_to_collision": Term(
         "safety",
         "being on a course to contact sooner than this",
-        lambda q, s: _below(q.time_to_collision_s, s),
+        lambda q: q.time_to_collision_s,
+        Form.BELOW,
         True,
         "within_s",
     ),
     "speed_over_limit": Term(
-        "safety",
-        "speed over the limit, as a share of it",
-        lambda q: -np.maximum(q.speed_over_limit, 0.0),
-        True,
+        "safety", "speed over the limit, as a share of it", lambda q: q.speed_over_limit, Form.OVER, True
     ),
-    "goal": Term("operational", "reaching the goal, once", _ended(Outcome.GOAL, 1.0)),
-    "timeout": Term("operational", "not reaching the goal in time, once", _ended(Outcome.TIMEOUT, -1.0)),
-    "progress": Term("operational", "way along the route, per 100 m", lambda q: q.advanced_m / 100.0),
+    "goal": _ended("operational", "reaching the goal, once", Form.GAINED, Outcome.GOAL),
+    "timeout": _ended("operational", "not reaching the goal in time, once", Form.LOST, Outcome.TIMEOUT),
+    "progress": Term("operational", "way along the route, per 100 m", lambda q: q.advanced_m, Form.PER_100),
     "speed_under_limit": Term(
-        "operational",
-        "speed under the limit, as a share of it",
-        lambda q: np.minimum(q.speed_over_limit, 0.0),
-        True,
+        "operational", "speed under the limit, as a share of it", lambda q: q.speed_over_limit, Form.UNDER, True
     ),
-    "lane_offset": Term("operational", "distance from the nearest lane's centre, m", lambda q: -q.lane_offset_m, True),
+    "lane_offset": Term(
+        "operational", "distance from the nearest lane's centre, m", lambda q: q.lane_offset_m, Form.LESS, True
+    ),
     "acceleration": Term(
         "operational",
         "squared acceleration or braking, as a share of 10 m/s2",
-        lambda q: -((q.state.acceleration_mps2 / 10.0) ** 2),
+        lambda q: q.state.acceleration_mps2,
+        Form.LESS_SQUARED,
         True,
     ),
     "lateral_acceleration": Term(
         "operational",
         "squared lateral acceleration, as a share of 10 m/s2",
-        lambda q: -((q.lateral_acceleration_mps2 / 10.0) ** 2),
+        lambda q: q.lateral_acceleration_mps2,
+        Form.LESS_SQUARED,
         True,
     ),
-    "time_pressure": Term("human", "every second on the way", lambda q: np.full(q.state.x_m.shape, -1.0), True),
+    "time_pressure": Term("human", "every second on the way", lambda q: q.state.speed_mps, Form.ALWAYS, True),
 }
 
 
@@ -135,17 +153,78 @@ class Payoff:
 
     def evaluate(self, q: Quantities, player: int) -> dict[str, FloatArray]:
         """Each term's share of the step's payoff, [G], weights applied; their sum is the payoff."""
-        shares: dict[str, FloatArray] = {}
-        for each in self.terms:
-            term = TERMS[each.name]
-            value = term.value(q) if each.parameter is None else term.value(q, each.parameter)
-            scale = self.alpha[term.group] * each.weight * (q.world.step_s if term.per_second else 1.0)
-            shares[each.name] = scale * value[:, player]
-        for name, (weight, function) in self.fuzzy.items():
-            value = getattr(q, function.quantity)[:, player]
-            shares[name] = self.alpha["human"] * weight * q.world.step_s * function(value)
-        return shares
+        return dict(zip((*(each.name for each in self.terms), *self.fuzzy), self._shares(q, player), strict=True))
 
     def total(self, q: Quantities, player: int) -> FloatArray:
         """[G] the step's payoff of one player."""
-        return sum(self.evaluate(q, player).values(), np.zeros(len(q.state.step)))
+        return _summed(self._shares(q, player))
+
+    def _shares(self, q: Quantities, player: int) -> FloatArray:
+        """[T, G] the terms' shares, the fuzzy ones last."""
+        shares = np.empty((len(self.terms) + len(self.fuzzy), len(q.state.step)))
+        for row, quantity in enumerate(self._quantities):
+            shares[row] = quantity(q)[:, player]
+        _weigh(shares, *self._weights, q.world.step_s)
+        for row, (weight, function) in enumerate(self.fuzzy.values(), len(self.terms)):
+            value = getattr(q, function.quantity)[:, player]
+            shares[row] = self.alpha["human"] * weight * q.world.step_s * function(value)
+        return shares
+
+    @cached_property
+    def _quantities(self) -> list[Callable[[Quantities], NDArray[Any]]]:
+        return [TERMS[each.name].quantity for each in self.terms]
+
+    @cached_property
+    def _weights(self) -> tuple[IntArray, FloatArray, FloatArray, BoolArray]:
+        """Of each term that is not fuzzy: form, the form's parameter, weight with alpha, and whether it is a rate."""
+        terms = [TERMS[each.name] for each in self.terms]
+        parameters = [
+            float(term.outcome if each.parameter is None else each.parameter)
+            for term, each in zip(terms, self.terms, strict=True)
+        ]
+        weights = [self.alpha[term.group] * each.weight for term, each in zip(terms, self.terms, strict=True)]
+        forms = np.array([int(term.form) for term in terms], dtype=np.int64)
+        rates = np.array([term.per_second for term in terms], dtype=bool)
+        return forms, np.array(parameters, dtype=float), np.array(weights, dtype=float), rates
+
+
+@compiled
+def _weigh(
+    values: FloatArray, form: IntArray, parameter: FloatArray, weight: FloatArray, per_second: BoolArray, step_s: float
+) -> None:
+    """Make terms' shares of the payoff of their quantities, in place: of the first rows of [T, G]."""
+    for row in range(len(form)):
+        scale = weight[row] * (step_s if per_second[row] else 1.0)
+        for g in range(values.shape[1]):
+            values[row, g] = scale * _worth(values[row, g], form[row], parameter[row])
+
+
+@compiled
+def _worth(value: float, form: int, parameter: float) -> float:
+    if form == Form.BELOW:
+        return np.minimum(value / parameter, 1.0) - 1.0
+    if form == Form.OVER:
+        return -np.maximum(value, 0.0)
+    if form == Form.UNDER:
+        return np.minimum(value, 0.0)
+    if form == Form.LESS:
+        return -value
+    if form == Form.LESS_SQUARED:
+        return -((value / 10.0) * (value / 10.0))
+    if form == Form.PER_100:
+        return value / 100.0
+    if form == Form.GAINED:
+        return 1.0 if value == parameter else 0.0
+    if form == Form.LOST:
+        return -1.0 if value == parameter else -0.0
+    return -1.0
+
+
+@compiled
+def _summed(shares: FloatArray) -> FloatArray:
+    """[G] sums over the rows of [T, G], from the first to the last."""
+    found = np.zeros(shares.shape[1])
+    for row in range(shares.shape[0]):
+        for g in range(shares.shape[1]):
+            found[g] += shares[row, g]
+    return found

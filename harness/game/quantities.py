@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,13 +15,12 @@ from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Actuators, lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
-from harness.game.road import MARGIN_M, SPACING_M, Road
+from harness.game.road import MARGIN_M, SPACING_M, Road, Routes, row_at
 from harness.game.state import Bodies, State
 
 PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])  # where the way is looked at, from a player
 SIGHT_M = 60.0  # beyond it a body is not taken for a leader
 REACH_M = 10.0  # clearances are known up to here
-_OF_PLACES = {"_rows", "path_rows", "path", "speed_limit_mps", "_lane", "lane_end_m", "goal_m", "relative", "on_path"}
 _PATH_ROWS = np.rint(PATH_M / SPACING_M).astype(np.int64)
 
 
@@ -50,15 +49,6 @@ class Path(NamedTuple):
     right_edge_m: FloatArray
 
 
-class Relative(NamedTuple):
-    """Bodies in each player's own frame, [G, P, B]."""
-
-    ahead_m: FloatArray
-    left_m: FloatArray
-    distance_m: FloatArray
-    turned_rad: FloatArray
-
-
 class OnPath(NamedTuple):
     """Bodies along each player's route, [G, P, B]: centres from the player's, and half the room they take."""
 
@@ -77,12 +67,6 @@ class Quantities:
     bodies: Bodies
     advanced_m: FloatArray  # along the route since the step before
     lateral_offset_m: FloatArray  # to the left of the route's line
-
-    def in_places(self, state: State, bodies: Bodies) -> Quantities:
-        """The quantities of the same moment with everyone in the same place, though some are slower, or gone."""
-        others = Quantities(self.world, state, bodies, self.advanced_m, self.lateral_offset_m)
-        vars(others).update((name, kept) for name, kept in vars(self).items() if name in _OF_PLACES)
-        return others
 
     # --- the way ahead -----------------------------------------------------------------------------------------
 
@@ -145,28 +129,11 @@ class Quantities:
         return _visible(self.state.present, self.bodies.present)
 
     @cached_property
-    def seen(self) -> BoolArray:
-        """[G, P, B] visible bodies that the player does not overlook."""
-        return self.visible & (self.relative.ahead_m >= self.state.overlooked_m[..., None])
-
-    @cached_property
-    def relative(self) -> Relative:
-        """Bodies in the player's own frame."""
-        state, bodies = self.state, self.bodies
-        own = (state.x_m, state.y_m, state.heading_rad)
-        return Relative(*_relative(*own, bodies.x_m, bodies.y_m, bodies.heading_rad))
-
-    @cached_property
     def on_path(self) -> OnPath:
         """Bodies along the player's route, each seen from the nearest of the route's frames at `PATH_M`."""
-        bodies, routes = self.bodies, self.world.road.routes
-        lines = (routes.x_m, routes.y_m, routes.heading_rad, routes.cos, routes.sin)
+        bodies = self.bodies
         boxes = (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
-        ahead, left, half_length, half_width = _on_path(self.path_rows, *lines, *boxes)
-        to_row_m = (self._rows - routes.first_row) * SPACING_M - MARGIN_M - self.state.station_m  # the rounding of rows
-        ahead += to_row_m[..., None]
-        left -= self.lateral_offset_m[..., None]
-        return OnPath(ahead, left, half_length, half_width)
+        return OnPath(*_on_path(self.state.station_m, self.lateral_offset_m, tuple(self.world.road.routes), *boxes))
 
     @cached_property
     def leader_gap_m(self) -> FloatArray:
@@ -226,11 +193,17 @@ class Quantities:
 
 
 @compiled
+def row_ahead(row: int, k: int, first_row: int, last_row: int) -> int:
+    """The row of a route at `PATH_M[k]` from a row of it."""
+    return min(max(row + _PATH_ROWS[k], first_row), last_row)
+
+
+@compiled
 def _path_rows(rows: IntArray, first_row: IntArray, last_row: IntArray) -> IntArray:
     found = np.empty((*rows.shape, len(_PATH_ROWS)), dtype=rows.dtype)
     for g, p in np.ndindex(rows.shape):
         for k in range(len(_PATH_ROWS)):
-            found[g, p, k] = min(max(rows[g, p] + _PATH_ROWS[k], first_row[p]), last_row[p])
+            found[g, p, k] = row_ahead(rows[g, p], k, first_row[p], last_row[p])
     return found
 
 
@@ -243,56 +216,57 @@ def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
 
 
 @compiled
-def _relative(
-    own_x_m: FloatArray,
-    own_y_m: FloatArray,
-    own_heading_rad: FloatArray,
-    x_m: FloatArray,
-    y_m: FloatArray,
-    heading_rad: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    shape = (own_x_m.shape[0], own_x_m.shape[1], x_m.shape[1])
-    ahead, left, distance, turned = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    for g, p in np.ndindex(own_x_m.shape):
-        cos, sin = np.cos(own_heading_rad[g, p]), np.sin(own_heading_rad[g, p])
-        for b in range(x_m.shape[1]):
-            dx, dy = x_m[g, b] - own_x_m[g, p], y_m[g, b] - own_y_m[g, p]
-            ahead[g, p, b], left[g, p, b] = dx * cos + dy * sin, dy * cos - dx * sin
-            distance[g, p, b] = np.hypot(dx, dy)
-            turned[g, p, b] = heading_rad[g, b] - own_heading_rad[g, p]
-    return ahead, left, distance, turned
-
-
-@compiled
 def _on_path(
-    path_rows: IntArray,
-    line_x_m: FloatArray,
-    line_y_m: FloatArray,
-    line_heading_rad: FloatArray,
-    line_cos: FloatArray,
-    line_sin: FloatArray,
+    station_m: FloatArray,
+    lateral_offset_m: FloatArray,
+    table: tuple[Any, ...],
     x_m: FloatArray,
     y_m: FloatArray,
     heading_rad: FloatArray,
     length_m: FloatArray,
     width_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Where bodies are from the middle row of the path and to the left of its line, and half the room they take."""
-    shape = (path_rows.shape[0], path_rows.shape[1], x_m.shape[1])
+    routes = Routes(*table)
+    shape = (station_m.shape[0], station_m.shape[1], x_m.shape[1])
     ahead, left, half_length, half_width = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    for g, p, b in np.ndindex(shape):
-        nearest, nearest2 = 0, np.inf
-        for k in range(path_rows.shape[2]):
-            row = path_rows[g, p, k]
-            away2 = (x_m[g, b] - line_x_m[row]) ** 2 + (y_m[g, b] - line_y_m[row]) ** 2
-            if away2 < nearest2:
-                nearest, nearest2 = k, away2
-        row = path_rows[g, p, nearest]
-        dx, dy = x_m[g, b] - line_x_m[row], y_m[g, b] - line_y_m[row]
-        ahead[g, p, b] = dx * line_cos[row] + dy * line_sin[row] + PATH_M[nearest]
-        left[g, p, b] = dy * line_cos[row] - dx * line_sin[row]
-        turned = heading_rad[g, b] - line_heading_rad[row]
-        cos, sin = abs(np.cos(turned)), abs(np.sin(turned))
-        half_length[g, p, b] = 0.5 * (length_m[g, b] * cos + width_m[g, b] * sin)
-        half_width[g, p, b] = 0.5 * (length_m[g, b] * sin + width_m[g, b] * cos)
+    for g, p in np.ndindex(station_m.shape):
+        station, offset = station_m[g, p], lateral_offset_m[g, p]
+        row = row_at(station, routes.first_row[p], routes.last_row[p])
+        for b in range(x_m.shape[1]):
+            box = (x_m[g, b], y_m[g, b], heading_rad[g, b], length_m[g, b], width_m[g, b])
+            room = along_route(row, station, offset, p, routes, *box)
+            ahead[g, p, b], left[g, p, b], half_length[g, p, b], half_width[g, p, b] = room
     return ahead, left, half_length, half_width
+
+
+@compiled
+def along_route(
+    row: int,
+    station_m: float,
+    offset_m: float,
+    player: int,
+    routes: Routes,
+    x_m: float,
+    y_m: float,
+    heading_rad: float,
+    length_m: float,
+    width_m: float,
+) -> tuple[float, float, float, float]:
+    """A body along the route of a player at a row, station and lateral offset: how far its centre is ahead and to the
+    left, and half the room it takes, in the nearest of the route's frames at `PATH_M`."""
+    first, last = routes.first_row[player], routes.last_row[player]
+    nearest, nearest2 = 0, np.inf
+    for k in range(len(_PATH_ROWS)):
+        there = row_ahead(row, k, first, last)
+        away2 = (x_m - routes.x_m[there]) ** 2 + (y_m - routes.y_m[there]) ** 2
+        if away2 < nearest2:
+            nearest, nearest2 = k, away2
+    there = row_ahead(row, nearest, first, last)
+    dx, dy = x_m - routes.x_m[there], y_m - routes.y_m[there]
+    cosine, sine = routes.cos[there], routes.sin[there]
+    ahead, left = dx * cosine + dy * sine + PATH_M[nearest], dy * cosine - dx * sine
+    to_row_m = (row - first) * SPACING_M - MARGIN_M - station_m  # the rounding of rows
+    turned = heading_rad - routes.heading_rad[there]
+    along, across = abs(np.cos(turned)), abs(np.sin(turned))
+    half_length = 0.5 * (length_m * along + width_m * across)
+    return ahead + to_row_m, left - offset_m, half_length, 0.5 * (length_m * across + width_m * along)

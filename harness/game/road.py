@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,8 +39,7 @@ class Route:
     goal_m: float
 
 
-@dataclass(frozen=True)
-class Routes:
+class Routes(NamedTuple):
     """The routes of all players in one table, so that a look-up serves them all: rows of player p begin at
     `first_row[p]`. Columns are as in `Route`."""
 
@@ -100,11 +100,11 @@ class Routes:
     def find(self, player: int, x_m: float, y_m: float) -> float:
         """Station of a player of which nothing is known but the point."""
         first, last = self.first_row[player], self.last_row[player]
-        return (_nearest_row(x_m, y_m, self.x_m, self.y_m, first, last) - first) * SPACING_M - MARGIN_M
+        return (_nearestrow_at(x_m, y_m, self.x_m, self.y_m, first, last) - first) * SPACING_M - MARGIN_M
 
 
 @compiled
-def _nearest_row(
+def _nearestrow_at(
     x_m: float, y_m: float, line_x_m: FloatArray, line_y_m: FloatArray, first_row: int, last_row: int
 ) -> int:
     nearest, nearest2 = first_row, np.inf
@@ -119,12 +119,12 @@ def _nearest_row(
 def _rows(station_m: FloatArray, first_row: IntArray, last_row: IntArray) -> IntArray:
     rows = np.empty(station_m.shape, dtype=np.int64)
     for g, p in np.ndindex(station_m.shape):
-        rows[g, p] = _row(station_m[g, p], first_row[p], last_row[p])
+        rows[g, p] = row_at(station_m[g, p], first_row[p], last_row[p])
     return rows
 
 
 @compiled
-def _row(station_m: float, first_row: int, last_row: int) -> int:
+def row_at(station_m: float, first_row: int, last_row: int) -> int:
     """The row of a route nearest to a station (its first where there is no telling: NaN)."""
     onward = (station_m + MARGIN_M) / SPACING_M
     return first_row + int(min(np.rint(onward), last_row - first_row)) if onward > 0.0 else first_row
@@ -148,7 +148,7 @@ def _locate(
     stations, offsets = station_m.copy(), np.empty_like(station_m)
     for g, p in np.ndindex(x_m.shape):
         for _ in range(3):
-            row = _row(stations[g, p], first_row[p], last_row[p])
+            row = row_at(stations[g, p], first_row[p], last_row[p])
             dx, dy = x_m[g, p] - line_x_m[row], y_m[g, p] - line_y_m[row]
             offset = dy * line_cos[row] - dx * line_sin[row]
             stretch = max(1.0 - curvature_per_m[row] * offset, _LEAST_STRETCH)
@@ -162,13 +162,20 @@ def _locate(
 def _nearest_lane(
     rows: IntArray, offset_m: FloatArray, lane_offset_m: FloatArray, lane_end_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    nearest, ends = np.full(offset_m.shape, np.inf), np.full(offset_m.shape, np.inf)
+    nearest, ends = np.empty(offset_m.shape), np.empty(offset_m.shape)
     for g, p in np.ndindex(offset_m.shape):
-        row = rows[g, p]
-        for lane in range(lane_offset_m.shape[1]):
-            away = abs(lane_offset_m[row, lane] - offset_m[g, p])
-            if away < nearest[g, p]:  # never true of NaN: there is no such lane here
-                nearest[g, p], ends[g, p] = away, lane_end_m[row, lane]
+        nearest[g, p], ends[g, p] = lane_at(rows[g, p], offset_m[g, p], lane_offset_m, lane_end_m)
+    return nearest, ends
+
+
+@compiled
+def lane_at(row: int, offset_m: float, lane_offset_m: FloatArray, lane_end_m: FloatArray) -> tuple[float, float]:
+    """Distance to the centre of the nearest lane, and the station where it ends, at a row and a lateral offset."""
+    nearest, ends = np.inf, np.inf
+    for lane in range(lane_offset_m.shape[1]):
+        away = abs(lane_offset_m[row, lane] - offset_m)
+        if away < nearest:  # never true of NaN: there is no such lane here
+            nearest, ends = away, lane_end_m[row, lane]
     return nearest, ends
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
+from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 
 EGO, NON_EGO = 0, 1
@@ -26,6 +28,9 @@ class Outcome(IntEnum):
     @property
     def word(self) -> str:
         return "" if self is Outcome.RUNNING else self.name.lower()
+
+
+_RUNNING = int(Outcome.RUNNING)  # NumPy would ask the enumeration each time
 
 
 @dataclass
@@ -70,7 +75,7 @@ class State:
     @property
     def running(self) -> BoolArray:
         """[G, P] players that still drive."""
-        return self.present & (self.outcome == Outcome.RUNNING)
+        return self.present & (self.outcome == _RUNNING)
 
     def copy(self) -> State:
         return State(**{name: array.copy() for name, array in vars(self).items()})
@@ -95,3 +100,52 @@ class Bodies:
     def of(self, games: IntArray) -> Bodies:
         """A copy of some games [N]."""
         return Bodies(**{name: array[games] for name, array in vars(self).items()})
+
+    def with_nearest(self, others: Bodies, most: int, within_m: float) -> Bodies:
+        """These, the players, and behind them so many of the others as are nearest to one of them, the nearest first;
+        who is farther from all players than `within_m` is not present."""
+        players, beside = (
+            (each.x_m, each.y_m, each.heading_rad, each.speed_mps, each.length_m, each.width_m)
+            for each in (self, others)
+        )
+        columns, present = _with_nearest(players, self.present, beside, others.present, most, within_m)
+        return Bodies(*columns, present)
+
+
+@compiled
+def _with_nearest(
+    players: tuple[Any, ...],
+    players_present: BoolArray,
+    others: tuple[Any, ...],
+    others_present: BoolArray,
+    most: int,
+    within_m: float,
+) -> tuple[FloatArray, BoolArray]:
+    games, seats = players_present.shape
+    taken = min(most, others_present.shape[1])
+    columns = np.empty((len(players), games, seats + taken))
+    present = np.empty((games, seats + taken), dtype=np.bool_)
+    nearest, nearest_m = np.empty(most + 1, dtype=np.int64), np.empty(most + 1)
+    for g in range(games):
+        count = 0
+        for other in range(others_present.shape[1]):
+            away_m = np.inf
+            if others_present[g, other]:
+                for p in range(seats):
+                    if players_present[g, p]:
+                        dx, dy = others[0][g, other] - players[0][g, p], others[1][g, other] - players[1][g, p]
+                        away_m = min(away_m, np.hypot(dx, dy))
+            place = count  # behind those that are as near
+            while place > 0 and away_m < nearest_m[place - 1]:
+                nearest[place], nearest_m[place] = nearest[place - 1], nearest_m[place - 1]
+                place -= 1
+            nearest[place], nearest_m[place] = other, away_m
+            count = min(count + 1, most)
+        present[g, :seats] = players_present[g]
+        for k in range(taken):
+            present[g, seats + k] = nearest_m[k] <= within_m
+        for column in range(len(players)):
+            columns[column, g, :seats] = players[column][g]
+            for k in range(taken):
+                columns[column, g, seats + k] = others[column][g, nearest[k]]
+    return columns, present

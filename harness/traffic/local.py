@@ -16,6 +16,7 @@ from pathlib import Path
 
 import libsumo
 import numpy as np
+from libsumo import _libsumo  # its functions without the Python function around each: for what is called most
 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
@@ -135,7 +136,7 @@ class LocalSimulation:
         front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel().tolist()
         front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel().tolist()
         angle = compass_deg_of(heading_rad).ravel().tolist()
-        move = libsumo.vehicle.moveToXY
+        move = _libsumo.vehicle_moveToXY
         with self._asking("step"):
             for name, k in self._placed.items():
                 move(name, "", -1, front_x[k], front_y[k], angle[k], _EXACTLY_THERE)

@@ -12,6 +12,7 @@ from typing import Any
 
 import libsumo
 import numpy as np
+from libsumo import _libsumo  # its functions without the Python function around each: for what is called most
 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray, IntArray
@@ -115,12 +116,12 @@ class Others:
         """Who is near the players [G, P] (NaN: not there), or everyone if games are recorded."""
         if not self._there:
             return self._nobody
-        table, vehicle = self._table, libsumo.vehicle
+        table = self._table
         due = np.flatnonzero(table.due == self._step)  # by game, and in a game as they departed
         if not len(due):
             return self._nobody
         games, known = due // table.due.shape[1], table.known.ravel()[due]
-        places = chain.from_iterable(map(vehicle.getPosition, known.tolist()))
+        places = chain.from_iterable(map(_libsumo.vehicle_getPosition, known.tolist()))
         fronts = np.fromiter(places, float, 2 * len(due)).reshape(-1, 2)
         fronts[:, 1] -= self._offsets_m[games]
         away = np.hypot(fronts[:, :1] - players_x_m[games], fronts[:, 1:] - players_y_m[games])
@@ -133,8 +134,8 @@ class Others:
         found, names = due[near], known[near].tolist()
         motion = np.empty((len(near), 6))
         motion[:, :2] = fronts[near]
-        motion[:, 2] = np.fromiter(map(vehicle.getAngle, names), float, len(near))
-        motion[:, 3] = np.fromiter(map(vehicle.getSpeed, names), float, len(near))
+        motion[:, 2] = np.fromiter(map(_libsumo.vehicle_getAngle, names), float, len(near))
+        motion[:, 3] = np.fromiter(map(_libsumo.vehicle_getSpeed, names), float, len(near))
         motion[:, 4], motion[:, 5] = table.length_m.ravel()[found], table.width_m.ravel()[found]
         return self._reading(found, motion)
 
