@@ -29,10 +29,10 @@ from harness.errors import StageFailed, UsageError
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.observation import LAYOUT, observe
-from harness.game.payoff import FUZZY_QUANTITIES, TERMS
+from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS, Payoff, Weighted
 from harness.game.plausibility import ImpossibleNumber, check_observation, check_step, slack_m
 from harness.game.quantities import Quantities
-from harness.game.state import EGO, NON_EGO, ROLES, Outcome, State
+from harness.game.state import EGO, NON_EGO, ROLES, Bodies, Outcome, State
 from harness.metrics import OF_EGO, OF_NON_EGO, Drive
 from harness.preflight import open_campaign
 from harness.rounds import plan
@@ -311,12 +311,11 @@ def test_observation__out_of_its_bounds_is_an_error_row_with_entry_and_step(
     )
 
 
-def test_observation__a_quantity_that_is_no_number_is_not_clipped_into_one(
-    merge: OpenScene, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(Quantities, "lane_end_m", broken(Quantities.lane_end_m, np.nan))
-    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
-    assert game.record["error"] == f"ImpossibleNumber: ego sees lane_end_m as nan in step {STEP}, not from -1 to 1"
+def test_observation__a_quantity_that_is_no_number_is_not_clipped_into_one(road: OpenScene) -> None:
+    scene = open_scene(road.folder)
+    scene.world.road.routes.goal_m[EGO] = np.nan
+    (game,) = play(arm(scene, Steady(), SumoDriver()), 1)
+    assert game.record["error"] == "ImpossibleNumber: ego sees goal_m as nan in step 0, not from -1 to 1"
 
 
 def test_observation__of_a_start_is_looked_at_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -371,26 +370,25 @@ def everywhere(request: pytest.FixtureRequest) -> Quantities:
     size = (np.tile(each, (len(state.step), 1)) for each in (scene.world.length_m, scene.world.width_m))
     poses = (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
     state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
-    return Quantities(
-        scene.world, state, harness.arena.Bodies(*poses, *size, state.present), np.zeros_like(offset), offset
-    )
+    return Quantities(scene.world, state, Bodies(*poses, *size, state.present), np.zeros_like(offset), offset)
 
 
 @pytest.mark.parametrize("name", TERMS)
 def test_term__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
-    term = TERMS[name]
-    values = term.value(everywhere, 2.0) if term.parameter else term.value(everywhere)
-    assert values.shape == everywhere.state.x_m.shape
-    assert np.isfinite(values).all()
+    payoff = Payoff(dict.fromkeys(GROUPS, 1.0), (Weighted(name, 1.0, 2.0 if TERMS[name].parameter else None),), {})
+    for player in (EGO, NON_EGO):
+        (share,) = payoff.evaluate(everywhere, player).values()
+        assert share.shape == everywhere.state.step.shape
+        assert np.isfinite(share).all()
 
 
 @pytest.mark.parametrize("name", FUZZY_QUANTITIES)
-def test_fuzzy_quantity__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
-    values = getattr(everywhere, name)
-    assert values.shape == everywhere.state.x_m.shape
-    assert not np.isnan(values).any()  # nobody ahead is an infinite gap: a fuzzy set knows what that is worth
+def test_fuzzy_term__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
+    assert not np.isnan(getattr(everywhere, name)).any()  # nobody ahead is an infinite gap, which is worth what is far
     sets = (FuzzySet("low", (0.0, 1.0), (1.0, 0.0), -1.0), FuzzySet("high", (0.0, 1.0), (0.0, 1.0), 2.0))
-    assert np.isfinite(FuzzyFunction(name, sets)(values)).all()
+    payoff = Payoff(dict.fromkeys(GROUPS, 1.0), (), {"fuzzy": (1.0, FuzzyFunction(name, sets))})
+    for player in (EGO, NON_EGO):
+        assert np.isfinite(payoff.total(everywhere, player)).all()
 
 
 def test_observation__can_be_made_at_every_place_of_every_route(everywhere: Quantities) -> None:
@@ -431,8 +429,8 @@ def test_scene__without_a_speed_limit_on_a_players_route_is_refused(limit: str, 
     with pytest.raises(UsageError) as raised:
         open_campaign(campaign)
     for problem in raised.value.problems:
-        assert (Path(problem.file), problem.key) == (net, "speed")
-        assert re.match(r"is \S+ m/s [\d.]+ m along the route of vehicle '(non_)?ego'", problem.message)
+        assert Path(problem.file) == net
+        assert problem.key.endswith("speed")
         assert problem.remedy
 
 
