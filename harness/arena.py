@@ -11,6 +11,9 @@
 | 7 | who reached the goal leaves; who crashed stays as an obstacle | here |
 | 8 | everyone looks | `game.observation` |
 
+What can't be right ends the step with an error (`game.plausibility`): decisions before 3, motion and payoffs before 7,
+observations after 8.
+
 A game's chance is drawn when it starts (`game.start`). Training and assessment are two thin uses of this loop.
 """
 
@@ -26,6 +29,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import drive, requests
 from harness.game.observation import SIZE, observe
 from harness.game.payoff import Payoff
+from harness.game.plausibility import check_observation, check_step, checked_decisions, slack_m
 from harness.game.quantities import Quantities
 from harness.game.start import Start
 from harness.game.state import Bodies, Outcome, State
@@ -69,6 +73,7 @@ class Arena:
         """
         self.scene, self.world, self.games, self.seats = scene, scene.world, games, tuple(seats)
         self._taken_over = np.array([seat.driver is None or seat.driver.takes_over for seat in seats])
+        self._slack_m = slack_m(self._taken_over)
         self.simulation = open_simulation(scene, games, self._taken_over.tolist(), seed, recorded)
         players = len(self.seats)
         self.state = State.empty(games, players)
@@ -104,8 +109,13 @@ class Arena:
         self.reading = None
 
     def step(self, actions: FloatArray | None = None) -> Step:
-        """Play one step of every game. `actions` [G, P, 2] are the learners'; other seats' entries are ignored."""
-        state = self.state = self.state.copy()  # the quantities of the step before stay what they were
+        """Play one step of every game. `actions` [G, P, 2] are the learners'; other seats' entries are ignored.
+
+        Raises ImpossibleNumber where what came of it can't be right (`game.plausibility`), SimulationError where SUMO
+        fails.
+        """
+        before = self.state
+        state = self.state = before.copy()  # the quantities of the step before stay what they were
         drove = state.running
         acceleration, steering = self._decide(actions, drove)
         drive(state, acceleration, steering, drove & self._taken_over, self.world.actuators, self.world.step_s)
@@ -116,7 +126,9 @@ class Arena:
         state.step = state.step + 1
         self._judge(quantities, drove)
         payoff = self._pay(quantities, drove)
+        check_step(before, quantities, drove, payoff, self._slack_m)
         self._settle(quantities, drove)
+        check_observation(self.observation, self._all_games, state.step)
         return Step(payoff, drove, quantities)
 
     def close(self) -> None:
@@ -135,7 +147,8 @@ class Arena:
                 games = np.flatnonzero(drove[:, player])
                 if seat.driver.takes_over and len(games):
                     noise = self._noise[games, player, now[games]]
-                    chosen[games, player] = seat.driver.decide(games, self.observation[games, player], noise)
+                    decided = seat.driver.decide(games, self.observation[games, player], noise)
+                    chosen[games, player] = checked_decisions(decided, seat.driver, player, games, state.step)
         acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)
         lapsed = self._lapsed[self._all_games, :, now] & drove
         state.lapsed = lapsed
@@ -216,7 +229,8 @@ class Arena:
 
     def _look(self, games: IntArray) -> None:
         """Look again in games where somebody came or left."""
-        self.observation[games] = observe(self.quantities_of(games))
+        seen = self.observation[games] = observe(self.quantities_of(games))
+        check_observation(seen, games, self.state.step)
 
     def quantities_of(self, games: IntArray) -> Quantities:
         """The quantities of some games [N], as they are now."""

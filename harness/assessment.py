@@ -44,7 +44,8 @@ class Game:
 
 
 def assess(arm: Arm, episodes: int, report: Callable[[int, int], None] = lambda done, total: None) -> Iterator[Game]:
-    """Play episodes 0 to `episodes` - 1. A game that can't be played is a record with outcome `error`.
+    """Play episodes 0 to `episodes` - 1. A game that can't be played, or has numbers that can't be right, is a record
+    with outcome `error`.
 
     Raises SimulationError if SUMO can't load the scene at all.
     """
@@ -92,8 +93,6 @@ def _play(arena: Arena, arm: Arm, chances: Chances, episode: int) -> Game:
         there = arena.state.present[0].copy()
         step = arena.step()
         steps.append(step)
-        if not np.isfinite(step.payoff).all():
-            raise FloatingPointError(f"a payoff is not finite in step {len(steps)}")
         trace.add_players(there, step)
         trace.add_others()
     return Game(_record(arm, arena, episode, steps), trace.columns)

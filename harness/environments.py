@@ -119,7 +119,8 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
         return self._game.seen(self._player), self._game.info(self._player)
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, Info]:
-        """Drive one step. Raises ResetNeeded if no game is running, ValueError if the action is not finite."""
+        """Drive one step. Raises ResetNeeded if no game is running, ValueError if the action is not finite,
+        ImpossibleNumber where what came of it can't be right."""
         if not self._running:
             raise gymnasium.error.ResetNeeded("no game is running: call reset first")
         step = self._game.play({self._player: action})
@@ -191,7 +192,8 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
     def step(
         self, actions: Mapping[str, FloatArray]
     ) -> tuple[dict[str, FloatArray], dict[str, float], dict[str, bool], dict[str, bool], dict[str, Info]]:
-        """Drive one step with an action for each of `agents`. Raises KeyError where one has none."""
+        """Drive one step with an action for each of `agents`. Raises KeyError where one has none, and as
+        `DrivingEnv.step` does."""
         if not self.agents:
             return {}, {}, {}, {}, {}
         players = {agent: ROLES.index(agent) for agent in self.agents}

@@ -75,8 +75,9 @@ def train(
 ) -> Trained:
     """Train to convergence or to the end of the budget, going on from `checkpoint` if it was made with this `key`.
 
-    `report` is told steps done and steps in all, several times a second. Raises FloatingPointError where a payoff
-    or a parameter is not finite, SimulationError where SUMO fails, ValueError where the initial policy doesn't fit.
+    `report` is told steps done and steps in all, several times a second. Raises FloatingPointError where a parameter
+    is not finite or a number of the game can't be right (`game.plausibility`), SimulationError where SUMO fails,
+    ValueError where the initial policy doesn't fit.
     """
     torch.set_num_threads(1)
     environment = _environment(lesson)

@@ -65,12 +65,12 @@ class ArenaVecEnv(VecEnv):
         self._actions[:, self._learner] = actions
 
     def step_wait(self) -> tuple[FloatArray, FloatArray, Any, list[dict[str, Any]]]:
-        """Play a step; ended games restart at once, their last observation in `infos` as SB3 expects it."""
+        """Play a step; ended games restart at once, their last observation in `infos` as SB3 expects it.
+
+        Raises as `Arena.step` does.
+        """
         step = self.arena.step(self._actions)
         payoff = step.payoff[:, self._learner].astype(np.float32)
-        if not np.isfinite(payoff).all():
-            game = int(np.flatnonzero(~np.isfinite(payoff))[0])
-            raise FloatingPointError(f"the payoff is {payoff[game]} in step {self.arena.state.step[game]} of a game")
         self._payoff += payoff
         done = ~self.arena.state.running[:, self._learner]
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]

@@ -33,7 +33,7 @@ class FuzzyFunction:
     sets: tuple[FuzzySet, ...]
 
     def __call__(self, value: FloatArray) -> FloatArray:
-        """[...] value of the function; 0 where the input belongs to no set."""
+        """[...] value of the function; 0 where the input belongs to no set, NaN where it is NaN."""
         value = np.asarray(value, dtype=float)
         return _inferred(value.ravel(), *self._points, self._values).reshape(value.shape)
 
@@ -61,6 +61,6 @@ def _inferred(value: FloatArray, inputs: FloatArray, memberships: FloatArray, va
             membership = np.interp(value[n], inputs[k], memberships[k])
             total += membership
             weighted += membership * values[k]
-        if total > 0.0:
+        if not total <= 0.0:
             found[n] = weighted / total
     return found

@@ -21,7 +21,7 @@ from harness.game.arrays import FloatArray
 from harness.game.attention import Habits
 from harness.game.bicycle import Actuators
 from harness.game.quantities import REACH_M, World
-from harness.game.road import Road, Route, Routes
+from harness.game.road import MARGIN_M, SPACING_M, Road, Route, Routes
 from harness.game.start import Chances, Place
 from harness.game.state import ROLES
 from harness.traffic import network
@@ -129,9 +129,21 @@ def _open_player(
         raise UsageError.of(
             routes.path, f"vehicle {vehicle.name}", f"its route {error}", "mend the route's edges"
         ) from None
+    _has_limits(file.parent / document.net, table, vehicle)
     kind = routes.types[vehicle.vehicle_type]
     _room_beyond_goal(file, document, table, kind)
     return place, table, tuple(edge.getID() for edge in onward), kind
+
+
+def _has_limits(net_file: Path, table: Route, vehicle: Departure) -> None:
+    """What a player sees and is paid for is a share of the speed limit: there has to be one, all along its route."""
+    limit = table.speed_limit_mps
+    without = np.flatnonzero(~((limit > 0.0) & np.isfinite(limit)))
+    if len(without):
+        along = np.clip(without[0] * SPACING_M - MARGIN_M, 0.0, table.length_m)
+        where = f"{along:g} m along the route of vehicle {vehicle.name!r}"
+        remedy = "give the lanes there a speed in m/s, greater than 0"
+        raise UsageError.of(net_file, "speed", f"is {limit[without[0]]:g} m/s {where}", remedy)
 
 
 def _room_beyond_goal(file: Path, document: Scene, table: Route, kind: VehicleType) -> None:
