@@ -222,7 +222,7 @@ def _fail(message: str, code: int) -> NoReturn:
 
 def main() -> None:
     """The `harness` command: the user's mistakes are printed without a traceback."""
-    from harness.errors import HarnessError, UsageError
+    from harness.errors import HarnessError, UsageError, is_of_memory
 
     try:
         app()
@@ -230,10 +230,10 @@ def main() -> None:
         _fail("\n".join(str(problem) for problem in error.problems), USERS_MISTAKE)
     except HarnessError as error:
         _fail(f"{type(error).__name__}: {error}", GAMES_ERRORED)
-    except MemoryError as error:
-        _fail(f"the machine is short of memory: {error or 'none is left'}; what was done is kept", GAMES_ERRORED)
-    except OSError as error:
-        if error.errno not in _OF_THE_MACHINE:
+    except Exception as error:
+        if is_of_memory(error):
+            _fail(f"the machine is short of memory: {error or 'none is left'}; what was done is kept", GAMES_ERRORED)
+        if not isinstance(error, OSError) or error.errno not in _OF_THE_MACHINE:
             raise
         _fail(f"{error.filename or 'the run folder'}: {error.strerror}; what was done is kept", GAMES_ERRORED)
 

@@ -17,7 +17,7 @@ import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -26,7 +26,8 @@ from typing import Any, Literal
 
 from harness.attempts import Attempt, Begin, Report
 from harness.deaths import Deaths
-from harness.errors import HarnessError
+from harness.errors import HarnessError, is_of_memory
+from harness.files import make_folder
 from harness.locking import share
 from harness.rounds import Stage
 from harness.run_folder import RunFolder
@@ -228,22 +229,23 @@ def _replace(worker: _Worker, hire: Hire) -> None:
 def _work(connection: Connection, work: Work, conditions: Conditions) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    folder = RunFolder(conditions.folder)
-    _keep_to(folder.scratch)
-    share(folder.workers_lock)
-    while True:
-        try:
+    try:
+        while True:
             stage, attempt = connection.recv()
-        except (EOFError, OSError):
-            return
-        connection.send(_carry_out(stage, attempt, connection, work, conditions))
+            connection.send(_carry_out(stage, attempt, connection, work, conditions))
+    except (EOFError, OSError):  # the parent is gone
+        return
 
 
-def _keep_to(scratch: Path) -> None:
-    """Make temporary files in the run folder: what a worker that was killed leaves there is taken away."""
-    scratch.mkdir(parents=True, exist_ok=True)
-    os.environ["TMPDIR"] = str(scratch.resolve())
+@cache
+def _settle_in(run: Path) -> None:
+    """Be known as a worker in a run folder, and make temporary files in it: of a worker that was killed they are taken
+    away by the next command."""
+    folder = RunFolder(run)
+    make_folder(folder.scratch)
+    os.environ["TMPDIR"] = str(folder.scratch.resolve())
     tempfile.tempdir = None
+    share(folder.workers_lock)
 
 
 def _carry_out(stage: Stage, attempt: Attempt, connection: Connection, work: Work, conditions: Conditions) -> Event:
@@ -260,11 +262,14 @@ def _carry_out(stage: Stage, attempt: Attempt, connection: Connection, work: Wor
         connection.send(Event("began", stage.id, place))
 
     try:
+        _settle_in(conditions.folder)
         return Event("done", stage.id, info=work(stage, conditions, report, begin, attempt))
-    except (HarnessError, OSError, MemoryError) as error:
-        return Event("failed", stage.id, message=str(error) or type(error).__name__)
-    except Exception:  # a bug: its traceback is the message
-        return Event("failed", stage.id, message=traceback.format_exc())
+    except (HarnessError, OSError) as error:
+        return Event("failed", stage.id, message=str(error))
+    except Exception as error:
+        if is_of_memory(error):
+            return Event("failed", stage.id, message=f"the machine is short of memory: {error or 'none is left'}")
+        return Event("failed", stage.id, message=traceback.format_exc())  # a bug: its traceback is the message
 
 
 def _end_with_parent() -> None:

@@ -62,7 +62,7 @@ ALLOWED: dict[str, set[str]] = {
         *("attempts", "versions"),
     },
     "deaths": {"rounds", "attempts"},
-    "workers": {"errors", "rounds", "locking", "run_folder", "attempts", "deaths", "stages"},
+    "workers": {"errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "stages"},
     "reports": {"errors", "comparison", "tables", "manoeuvres"},
     "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},

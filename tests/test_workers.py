@@ -155,6 +155,35 @@ def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path:
     assert sorted(told(events, "done")) == ["a", "b", "c"]
 
 
+def need_too_much(
+    stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt
+) -> dict[str, Any]:
+    """Ask the system itself for more memory than it may give, by NumPy and by torch."""
+    import resource
+
+    import numpy as np
+    import torch
+
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + 2**28, resource.RLIM_INFINITY))
+    try:
+        ask = torch.ones if stage.id == "b-seed1" else np.ones
+        ask(2**28 if stage.id < "c" else 1)
+        return {}
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+
+
+def test_run_stages__short_of_memory_is_one_message_and_the_rest_goes_on(tmp_path: Path) -> None:
+    events = run(tmp_path, [stage("a"), stage("b"), stage("c")], need_too_much, jobs=1)
+    failed = {event.stage: event.message for event in events if event.kind == "failed"}
+    assert set(failed) == {"a-seed1", "b-seed1"}
+    for message in failed.values():
+        assert message.startswith("the machine is short of memory: ")
+        assert "Traceback" not in message
+    assert told(events, "done") == ["c"]
+
+
 # --- the real command -------------------------------------------------------------------------------------------------
 
 
