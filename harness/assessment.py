@@ -5,8 +5,9 @@ Each game has a simulation of its own load, seeded by the episode alone: episode
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -43,10 +44,16 @@ class Game:
     trace: Mapping[str, Sequence[Any]] | None
 
 
-def assess(arm: Arm, episodes: int, report: Callable[[int, int], None] = lambda done, total: None) -> Iterator[Game]:
-    """Play episodes 0 to `episodes` - 1. A game that can't be played, or has numbers that can't be right, is a record
-    with outcome `error`.
+def assess(
+    arm: Arm,
+    episodes: int | Iterable[int],
+    begin: Callable[[int], None] = lambda episode: None,
+    given_up: Mapping[int, str] = MappingProxyType({}),
+) -> Iterator[Game]:
+    """Play episodes: so many from 0 on, or those given. A game that can't be played, or has numbers that can't be right,
+    is a record with outcome `error`.
 
+    `begin` is told of each before it is played. Those `given_up` are not played, and why is the error of their record.
     Raises SimulationError if SUMO can't load the scene at all.
     """
     present = [0.0 if driver is None else 1.0 for driver in arm.drivers]
@@ -56,14 +63,17 @@ def assess(arm: Arm, episodes: int, report: Callable[[int, int], None] = lambda 
     ]
     arena = Arena(arm.scene, 1, seats, recorded=True)
     try:
-        for episode in range(episodes):
+        for episode in range(episodes) if isinstance(episodes, int) else episodes:
+            if episode in given_up:
+                yield Game(_failed(arm, episode, given_up[episode]), None)
+                continue
+            begin(episode)
             try:
                 yield _play(arena, arm, chances, episode)
             except MemoryError:
                 raise
             except Exception as error:  # a driver may raise whatever it likes: the other games are played
-                yield Game(_failed(arm, episode, error), None)
-            report(episode + 1, episodes)
+                yield Game(_failed(arm, episode, f"{type(error).__name__}: {error}"), None)
     finally:
         arena.close()
 
@@ -131,12 +141,12 @@ def _drive(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> Dr
     )
 
 
-def _failed(arm: Arm, episode: int, error: Exception) -> dict[str, Any]:
+def _failed(arm: Arm, episode: int, error: str) -> dict[str, Any]:
     return {
         "episode": episode,
         "ego_outcome": Outcome.ERROR.word if arm.drivers[EGO] is not None else "",
         "non_ego_outcome": Outcome.ERROR.word if arm.drivers[NON_EGO] is not None else "",
-        "error": f"{type(error).__name__}: {error}",
+        "error": error,
     }
 
 

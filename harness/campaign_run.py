@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-import platform
 import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,6 +24,7 @@ from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay import choose_games, replay_name, worst_first, write_replay
 from harness.reports.page import render_page
+from harness.reports.provenance import mixed_versions
 from harness.reports.results import results
 from harness.reports.wording import ARMS, Verdicts
 from harness.rounds import AssessmentStage, Stage, TrainingStage, plan, questions, stage_id
@@ -42,12 +41,8 @@ from harness.tables import (
 )
 from harness.trace_file import read_trace
 from harness.traffic.opening import OpenScene, open_scene
+from harness.versions import versions, versions_of_numbers
 from harness.workers import Event, run_stages
-
-_PACKAGES = (
-    *("harness", "eclipse-sumo", "libsumo", "sumolib", "numpy", "scipy", "pandas", "torch"),
-    *("stable-baselines3", "gymnasium", "pyarrow", "safetensors"),
-)
 
 
 @dataclass(frozen=True)
@@ -66,21 +61,23 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
     """
     folder.claim(campaign.document.name, campaign.quick)
-    scene = campaign.scene.document
-    folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
-    stages = plan(campaign.document, [persona.name for persona in campaign.personas])
-    keys = stage_keys(campaign, stages)
-    ledger = _Ledger(campaign, folder, stages, keys)
-    finished = [stage.id for stage in stages if ledger.status(stage) == "done"]
-    if len(finished) < len(stages):
-        with StageProgress(stages, len(finished), console) as progress:
+    with folder.held():
+        stages = plan(campaign.document, [persona.name for persona in campaign.personas])
+        keys = stage_keys(campaign, stages)
+        ledger = _Ledger(campaign, folder, stages, keys)
+        scene = campaign.scene.document
+        folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
+        finished = [stage.id for stage in stages if ledger.status(stage) == "done"]
+        if len(finished) < len(stages):
+            ledger.warn_of_versions(console)
+            with StageProgress(stages, len(finished), console) as progress:
 
-            def tell(event: Event) -> None:
-                ledger.note(event)
-                progress.tell(event)
+                def tell(event: Event) -> None:
+                    ledger.note(event)
+                    progress.tell(event)
 
-            run_stages(stages, finished, conditions_of(campaign, folder, keys), jobs, tell)
-    return write_results(folder, console)
+                run_stages(stages, finished, conditions_of(campaign, folder, keys), jobs, tell)
+        return write_results(folder, console)
 
 
 class _Ledger:
@@ -100,7 +97,7 @@ class _Ledger:
             "persona_documents": {each.name: each.model_dump(mode="json") for each in campaign.personas},
             "seeds": list(campaign.document.seeds),
             "hashes": dict(campaign.hashes),
-            "versions": _versions(),
+            "versions": versions(),
             "stages": {stage.id: self._entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages},
         }
         self._folder.write_manifest(self._manifest)
@@ -108,6 +105,11 @@ class _Ledger:
     def status(self, stage: Stage) -> str:
         """done, failed or pending."""
         return str(self._manifest["stages"][stage.id]["status"])
+
+    def warn_of_versions(self, console: Console) -> None:
+        """Say if what is left is about to be made by other versions than what is done."""
+        now = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
+        _warn(mixed_versions(self._manifest["stages"] | now), console)
 
     def note(self, event: Event) -> None:
         """Write down what happened to a stage."""
@@ -137,12 +139,6 @@ class _Ledger:
         return {**entry, **info, "status": "done"} if info is not None else entry
 
 
-def _versions() -> dict[str, str]:
-    system = " ".join((platform.system(), platform.machine(), *platform.libc_ver())).strip()
-    versions = {"python": platform.python_version(), "platform": system}
-    return versions | {name: importlib.metadata.version(name) for name in _PACKAGES}
-
-
 def write_results(folder: RunFolder, console: Console) -> Outcome:
     """Tables, replays and report of what is done, from the run folder alone."""
     manifest = folder.manifest()
@@ -168,10 +164,16 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
         )
     write_atomically(folder.path / "report.html", page.encode())
     write_model_cards(folder, manifest, summary)
+    _warn(mixed_versions(manifest["stages"]), console)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] != "done")
     found = results(manifest, episodes, summary, comparisons)
     verdicts = [(persona, found.verdicts(each, persona)) for persona in manifest["personas"] for each in ARMS]
     return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))
+
+
+def _warn(sentences: Sequence[str], console: Console) -> None:
+    for sentence in sentences:
+        console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)
 
 
 def questions_of(manifest: Mapping[str, Any]) -> list[Any]:

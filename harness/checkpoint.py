@@ -5,7 +5,9 @@ With it a training goes on as if it had never stopped; opening it runs no code.
 
 from __future__ import annotations
 
+import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -47,11 +49,12 @@ def write_checkpoint(model: PPO, progress: Progress, key: str, path: Path) -> No
     for index, state in model.policy.optimizer.state_dict()["state"].items():
         for name, value in state.items():
             tensors[f"optimizer/{index}/{name}"] = torch.as_tensor(value)
-    write_atomically(path, save(tensors, metadata={"progress": json.dumps(asdict(progress)), "key": key}))
+    metadata = {"progress": json.dumps(asdict(progress)), "key": key}
+    write_atomically(path, save(tensors, metadata={**metadata, "digest": _digest(tensors, metadata["progress"])}))
 
 
 def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
-    """Put a checkpoint into a freshly made learner. None if there is none, or it is from other inputs."""
+    """Put a checkpoint into a freshly made learner. None if there is none, it is damaged, or from other inputs."""
     if not path.is_file():
         return None
     try:
@@ -60,7 +63,12 @@ def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
             if metadata.get("key") != key:
                 return None
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    except SafetensorError:
+        if metadata.get("digest") not in (
+            _digest(tensors, metadata["progress"]),
+            None,
+        ):  # None: of before there were any
+            return None
+    except (SafetensorError, OSError, KeyError):
         return None
     model.policy.load_state_dict({k.removeprefix("policy/"): v for k, v in tensors.items() if k.startswith("policy/")})
     optimizer = model.policy.optimizer.state_dict()
@@ -77,6 +85,15 @@ def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
         stored["segment_payoffs"],
         [Window(**window) for window in stored["curve"]],
     )
+
+
+def _digest(tensors: Mapping[str, torch.Tensor], progress: str) -> str:
+    """Of all that a checkpoint holds: a file that a power cut tore can have its old length."""
+    digest = hashlib.sha256(progress.encode())
+    for name, tensor in sorted(tensors.items()):
+        digest.update(f"\n{name} {tensor.dtype} {tuple(tensor.shape)}\n".encode())
+        digest.update(tensor.detach().contiguous().numpy().tobytes())
+    return digest.hexdigest()
 
 
 _LAYERS = {"actor": ("mlp_extractor.policy_net", "action_net"), "critic": ("mlp_extractor.value_net", "value_net")}

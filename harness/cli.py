@@ -4,13 +4,24 @@ from __future__ import annotations
 
 import errno
 import io
+import signal
 import sys
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
 
-_OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.EMFILE, errno.ENOMEM)
+_OF_THE_MACHINE = (
+    errno.ENOSPC,
+    errno.EDQUOT,
+    errno.EACCES,
+    errno.EPERM,
+    errno.EROFS,
+    errno.EMFILE,
+    errno.ENOMEM,
+    errno.EFBIG,
+    errno.EIO,
+)
 GAMES_ERRORED, USERS_MISTAKE, INTERRUPTED = 1, 2, 130
 
 app = typer.Typer(
@@ -26,8 +37,8 @@ statistics what changed:
 
 `harness campaign campaigns/merge.toml --quick`
 """,
-    epilog="Exit codes: 0 done, 1 done but games or stages errored, 2 your mistake, 130 interrupted (what was done "
-    "is kept).",
+    epilog="Exit codes: 0 done, 1 done but games or stages errored, 2 your mistake, 130 interrupted, 143 "
+    "terminated (what was done is kept).",
 )
 
 CampaignFile = Annotated[Path, typer.Argument(metavar="FILE", help="The campaign's TOML document.", show_default=False)]
@@ -77,11 +88,12 @@ def campaign(
     console = Console()
     if quick and not opened.quick:
         console.print("Nothing to shorten: the players were trained before. Every game is played.")
+    _end_when_asked_to()
     try:
         outcome = run_campaign(opened, folder, jobs or cores(), console)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as interrupt:
         console.print("Interrupted. What was done is kept: run the same command again to go on.")
-        raise typer.Exit(INTERRUPTED) from None
+        raise typer.Exit(interrupt.code if isinstance(interrupt, _AskedToEnd) else INTERRUPTED) from None
     _show(outcome.verdicts, folder.path, console)
     if outcome.failed_stages:
         console.print(f"Not finished: {', '.join(outcome.failed_stages)}", style="red", highlight=False)
@@ -127,8 +139,10 @@ def report(run: RunPath) -> None:
     from harness.campaign_run import write_results
     from harness.run_folder import RunFolder
 
-    console = Console()
-    outcome = write_results(RunFolder(run), console)
+    console, folder = Console(), RunFolder(run)
+    folder.manifest()
+    with folder.held():
+        outcome = write_results(folder, console)
     _show(outcome.verdicts, run, console)
 
 
@@ -258,6 +272,23 @@ def schema(
         )
 
 
+class _AskedToEnd(KeyboardInterrupt):
+    """SIGTERM or SIGHUP: ends the command as Ctrl-C does, but for its exit code."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.code = 128 + number
+
+
+def _end_when_asked_to() -> None:
+    def ask(number: int, frame: object) -> NoReturn:
+        raise _AskedToEnd(number)
+
+    for name in ("SIGTERM", "SIGHUP"):
+        if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:  # not with nohup
+            signal.signal(getattr(signal, name), ask)
+
+
 def _show(verdicts: Any, run: Path, console: Any) -> None:
     styles = {"harm": "red", "mended": "green", "open": "yellow"}
     for persona, verdict in verdicts:
@@ -276,7 +307,7 @@ def _fail(message: str, code: int) -> NoReturn:
 
 def main() -> None:
     """The `harness` command: the user's mistakes are printed without a traceback."""
-    from harness.errors import HarnessError, UsageError
+    from harness.errors import HarnessError, UsageError, is_of_memory
 
     try:
         app()
@@ -284,8 +315,10 @@ def main() -> None:
         _fail("\n".join(str(problem) for problem in error.problems), USERS_MISTAKE)
     except HarnessError as error:
         _fail(f"{type(error).__name__}: {error}", GAMES_ERRORED)
-    except OSError as error:
-        if error.errno not in _OF_THE_MACHINE:
+    except Exception as error:
+        if is_of_memory(error):
+            _fail(f"the machine is short of memory: {error or 'none is left'}; what was done is kept", GAMES_ERRORED)
+        if not isinstance(error, OSError) or error.errno not in _OF_THE_MACHINE:
             raise
         _fail(f"{error.filename or 'the run folder'}: {error.strerror}; what was done is kept", GAMES_ERRORED)
 

@@ -53,6 +53,14 @@ class SimulationError(HarnessError):
     """SUMO refused a command, died, or lost a vehicle it was given."""
 
 
+_OUT_OF_MEMORY = ("allocate memory", "failed to map segment", "can't start new thread", "bad_alloc")
+
+
+def is_of_memory(error: BaseException) -> bool:
+    """Whether an error says that the machine is short of memory: libraries have each their own for it."""
+    return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
+
+
 def attempt(problems: list[Problem], action: Callable[[], T]) -> T | None:
     """The action's result, or None: the user's mistakes in it join `problems`, so that the rest is looked at too."""
     try:

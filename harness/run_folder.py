@@ -4,27 +4,36 @@
     policies/<stage>/        policy.safetensors, policy.json, README.md (its model card)
     traces/<stage>.parquet   one file per arm
     scene/                   a copy of the scene's files
-    .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, tables, done.json
+    .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, segments, tables, done.json
+    .stages/{lock,workers}   whose the folder is at the moment: one command's and its workers'
+    .stages/scratch/         temporary files of the workers
 
-A stage is done when `done.json` is there with the key of its inputs; it is written last.
+A stage is done when `done.json` is there, the seal (`harness.seals`) of all that its numbers are read from, with the
+key of its inputs; it is written last. A folder is a run folder from its manifest on.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
+import os
 import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.errors import UsageError
-from harness.files import write_atomically
+from harness.errors import Problem, UsageError
+from harness.files import drop_scratch, make_folder, write_atomically
+from harness.locking import InUse, only_one, wait_for_all
 from harness.rounds import stage_id
+from harness.seals import broken, read_seal, write_seal
 
 FORMAT = 1
 MANIFEST = "manifest.json"
+_PATIENCE_S = 10.0  # how long workers of a command that was killed may take to notice
 _STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
 
 
@@ -43,6 +52,17 @@ def _check(manifest: Any) -> None:
             raise ValueError(f"{name!r} is no stage")
         if entry["kind"] not in ("training", "assessment") or not isinstance(entry["status"], str):
             raise ValueError(f"says nothing of stage {name!r}")
+
+
+def _only_begun(folder: Path) -> bool:
+    """Whether all that there is in a folder are other folders, and locks: as a command leaves it that was killed in
+    its first moment."""
+    begun = ("lock", "workers")
+    return all(name in begun or name.startswith(f".{MANIFEST}.") for _, _, files in os.walk(folder) for name in files)
+
+
+def _is_one_of(file: Path, hashes: Mapping[str, str]) -> bool:
+    return hashlib.sha256(file.read_bytes()).hexdigest() in hashes.values()
 
 
 @dataclass(frozen=True)
@@ -79,21 +99,52 @@ class RunFolder:
         """What a stage keeps for itself."""
         return self.path / ".stages" / stage
 
+    @property
+    def scratch(self) -> Path:
+        """Where workers keep temporary files."""
+        return self.path / ".stages" / "scratch"
+
+    @property
+    def workers_lock(self) -> Path:
+        """What every worker shares as long as it lives."""
+        return self.path / ".stages" / "workers"
+
+    def segments(self, stage: str) -> Path:
+        """The segments of an arm that is not done."""
+        return self.work(stage) / "segments"
+
     # --- stages --------------------------------------------------------------------------------------------------
 
-    def finished(self, stage: str, key: str) -> dict[str, Any] | None:
-        """What a stage said when it was done from these very inputs; None if it is not done, or its work is gone."""
-        try:
-            done = json.loads((self.work(stage) / "done.json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return None
-        made = (self.policy(stage) / "policy.safetensors").is_file() or self.traces(stage).is_file()
-        return done["info"] if made and isinstance(done, dict) and done.get("key") == key else None
+    def done(self, stage: str) -> dict[str, Any] | None:
+        """What the seal of a stage says, whether it holds or not; None if there is none."""
+        said = read_seal(self.work(stage) / "done.json")
+        return said if said is not None and isinstance(said.get("info"), dict) else None
 
-    def finish(self, stage: str, key: str, info: Mapping[str, Any]) -> None:
-        """A stage is done: everything it wrote is there."""
-        content = json.dumps({"key": key, "info": info}, indent=2)
-        write_atomically(self.work(stage) / "done.json", content.encode())
+    def finished(self, stage: str, key: str) -> dict[str, Any] | None:
+        """What came of a stage when it was done from these very inputs, without an error; None if it is not done, or
+        its work is gone or damaged."""
+        said = self.done(stage)
+        made = (self.policy(stage) / "policy.safetensors").is_file() or self.traces(stage).is_file()
+        if said is None or said.get("key") != key or said["info"].get("errors") or not made:
+            return None
+        return None if broken(said, self.path) else dict(said["info"])
+
+    def begin(self, stage: str, key: str) -> None:
+        """A stage is begun, or gone on with: it is not done any more. What it wrote from other inputs is dropped."""
+        work = self.work(stage)
+        (work / "done.json").unlink(missing_ok=True)
+        if not (work / "key").is_file() or (work / "key").read_bytes() != key.encode():
+            self.forget(stage)
+            make_folder(work)
+            write_atomically(work / "key", key.encode())
+
+    def finish(self, stage: str, key: str, info: Mapping[str, Any], files: Sequence[Path] = ()) -> None:
+        """A stage is done: everything it wrote is there, and `files` are what its numbers are read from."""
+        write_seal(self.work(stage) / "done.json", self.path, files, {"key": key, "info": dict(info)})
+
+    def drop_segments(self, stage: str) -> None:
+        """Drop the segments of an arm that is done: its files hold them."""
+        shutil.rmtree(self.segments(stage), ignore_errors=True)
 
     # --- the manifest --------------------------------------------------------------------------------------------
 
@@ -113,7 +164,8 @@ class RunFolder:
         return dict(manifest)
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
-        """Raises UsageError where what the stages wrote is gone, as in a folder that was published without it."""
+        """Raises UsageError where what the stages wrote is gone, as in a folder that was published without it, or is
+        not what they wrote."""
         done = [name for name, entry in manifest["stages"].items() if entry["status"] == "done"]
         if done and not any(self.work(name).is_dir() for name in done):
             raise UsageError.of(
@@ -122,6 +174,18 @@ class RunFolder:
                 "holds a report and its tables, but not what they are made of",
                 f"read its report.html, or play the games: run campaign {manifest['name']!r} again",
             )
+        damaged = [file for name in done for file in self._damaged(name, manifest["stages"][name])]
+        if isinstance(hashes := manifest.get("hashes"), dict):
+            damaged += [file for file in sorted(self.scene.glob("*")) if not _is_one_of(file, hashes)]
+        if damaged:
+            message = "is gone, or is not what the campaign wrote"
+            raise UsageError(Problem(str(file), "", message, "run the campaign again") for file in damaged)
+
+    def _damaged(self, stage: str, entry: Mapping[str, Any]) -> list[Path]:
+        said = self.done(stage)
+        if said is None:  # a manifest that names no versions is of before stages with errors had a seal
+            return [self.work(stage) / "done.json"] if "versions" in entry else []
+        return broken(said, self.path)
 
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
         """Replace the manifest."""
@@ -133,7 +197,7 @@ class RunFolder:
         try:
             self._check_owner(campaign, quick)
             for name in ("policies", "traces", "tensorboard", ".stages"):
-                (self.path / name).mkdir(parents=True, exist_ok=True)
+                make_folder(self.path / name)
         except OSError as error:
             raise UsageError.of(
                 self.path, "", f"can't be written: {error.strerror}", "choose a folder with --out"
@@ -152,12 +216,36 @@ class RunFolder:
                 wrong = f"holds {kinds[not quick]} would overwrite"
             if wrong:
                 raise UsageError.of(self.path, "", wrong, "choose another folder with --out")
-        elif self.path.is_dir() and any(self.path.iterdir()):
+        elif self.path.is_dir() and not _only_begun(self.path):
             raise UsageError.of(self.path, "", "is not empty and not a run folder", "choose another folder with --out")
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Nobody else writes into the folder meanwhile. What killed commands left half written is taken away.
+
+        Raises UsageError if another command is at it.
+        """
+        lock = self.path / ".stages" / "lock"
+        if not lock.parent.is_dir():  # a folder that was published: there is nothing in it to write from
+            yield
+            return
+        try:
+            with only_one(lock):
+                wait_for_all(self.workers_lock, _PATIENCE_S)
+                drop_scratch(self.path)
+                shutil.rmtree(self.scratch, ignore_errors=True)
+                try:
+                    yield
+                finally:
+                    shutil.rmtree(self.scratch, ignore_errors=True)
+        except InUse as who:
+            raise UsageError.of(
+                self.path, "", f"is in use by {who}", "wait until it has ended, or choose another folder with --out"
+            ) from None
 
     def keep_scene(self, folder: Path, files: tuple[str, ...]) -> None:
         """Copy a scene's files, so that the run can be looked at when the scene has changed."""
-        self.scene.mkdir(exist_ok=True)
+        make_folder(self.scene)
         for name in files:
             write_atomically(self.scene / name, (folder / name).read_bytes())
 

@@ -8,30 +8,30 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from harness.attempts import FIRST, Attempt, Begin, Report
 from harness.documents.campaign import Campaign
 from harness.documents.persona import Persona
 from harness.drivers.learned import LearnedDriver
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
+from harness.files import make_folder, write_atomically
 from harness.game.state import ROLES
-from harness.manoeuvre_file import name_manoeuvres
+from harness.manoeuvre_file import EPISODES, MANOEUVRES
 from harness.policy_file import policy_files, read_policy, write_policy
 from harness.preflight import OpenCampaign
 from harness.rounds import AssessmentStage, Drives, Stage, TrainingStage
 from harness.run_folder import RunFolder
-from harness.tables import EPISODE_COLUMNS, TRAINING_COLUMNS, typed, write_csv
-from harness.trace_file import TraceWriter
+from harness.tables import TRAINING_COLUMNS, typed, write_csv
 from harness.traffic.opening import OpenScene, open_scene
-
-NUMBERS_FORMAT = 2  # to be raised when the same inputs give other numbers, so that no old stage is taken for a new one
+from harness.versions import NUMBERS_FORMAT, versions_of_numbers
 
 
 @dataclass(frozen=True)
@@ -101,23 +101,37 @@ def conditions_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, 
     )
 
 
-def carry_out(stage: Stage, conditions: Conditions, report: Callable[[int, int], None]) -> dict[str, Any]:
-    """Do a stage, mark it done if all went well, say what came of it. What it wrote from other inputs is dropped."""
+def carry_out(
+    stage: Stage,
+    conditions: Conditions,
+    report: Report,
+    begin: Begin = lambda place: None,
+    attempt: Attempt = FIRST,
+) -> dict[str, Any]:
+    """Do a stage, seal what it made, say what came of it. What it wrote from other inputs is dropped."""
     folder, key = RunFolder(conditions.folder), conditions.keys[stage.id]
-    work = folder.work(stage.id)
-    started_from = work / "key"
-    if not started_from.is_file() or started_from.read_text() != key:
-        folder.forget(stage.id)
-        work.mkdir(parents=True)
-        started_from.write_text(key)
+    folder.begin(stage.id, key)
     scene = open_scene(conditions.scene_folder)
     began = time.monotonic()
     do = _train if isinstance(stage, TrainingStage) else _assess
-    info = do(stage, conditions, folder, scene, report)  # type: ignore[arg-type]
+    info, files = do(stage, conditions, folder, scene, report, begin, attempt)  # type: ignore[arg-type]
     info["seconds"] = round(time.monotonic() - began, 1)
-    if not info.get("errors"):  # failures are not kept: the next run tries those games again
-        folder.finish(stage.id, key, info)
+    folder.finish(stage.id, key, info, files)
+    if not info.get("errors"):  # failures are not kept: the next run tries those games again, and only those segments
+        folder.drop_segments(stage.id)
     return info
+
+
+def _made_by(checkpoint: Path) -> list[dict[str, str]]:
+    """The versions that a training is made by: more than one, if it went on where others had stopped."""
+    file, now = checkpoint.with_name("versions.json"), versions_of_numbers()
+    try:
+        before = json.loads(file.read_text(encoding="utf-8")) if checkpoint.is_file() else []
+    except (OSError, ValueError):
+        before = []
+    made_by = [*before, now] if isinstance(before, list) and now not in before else before or [now]
+    write_atomically(file, json.dumps(made_by).encode())
+    return made_by
 
 
 def _train(
@@ -125,8 +139,10 @@ def _train(
     conditions: Conditions,
     folder: RunFolder,
     scene: OpenScene,
-    report: Callable[[int, int], None],
-) -> dict[str, Any]:
+    report: Report,
+    begin: Begin,
+    attempt: Attempt,
+) -> tuple[dict[str, Any], list[Path]]:
     from harness.convergence import RULE
     from harness.training import Lesson, train  # torch is slow to import, and assessment does without
 
@@ -154,20 +170,25 @@ def _train(
     }
     key = conditions.keys[stage.id]
     checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
+    made_by = _made_by(checkpoint)
     try:
-        trained = train(lesson, checkpoint, key, card, folder.tensorboard(stage.id), report)
+        trained = train(lesson, checkpoint, key, card, folder.tensorboard(stage.id), report, begin)
     except (FloatingPointError, ValueError) as error:
         raise StageFailed(f"{stage.id}: {error}") from error
+    make_folder(folder.policy(stage.id))
     write_policy(trained.policy, folder.policy(stage.id))
     curve = pd.DataFrame([asdict(window) for window in trained.progress.curve])
     curve = curve.assign(stage=stage.name, persona=stage.persona, seed=stage.seed)
-    write_csv(typed(curve.reindex(columns=list(TRAINING_COLUMNS))), folder.work(stage.id) / "training.csv")
-    return {
+    table = folder.work(stage.id) / "training.csv"
+    write_csv(typed(curve.reindex(columns=list(TRAINING_COLUMNS))), table)
+    info = {
         "steps": trained.progress.steps,
         "budget_steps": settings.steps,
         "stopped": trained.stopped,
         "rule": RULE if settings.early_convergence else "",
+        "versions": made_by,
     }
+    return info, [*policy_files(folder.policy(stage.id)), table]
 
 
 def _assess(
@@ -175,24 +196,25 @@ def _assess(
     conditions: Conditions,
     folder: RunFolder,
     scene: OpenScene,
-    report: Callable[[int, int], None],
-) -> dict[str, Any]:
-    from harness.assessment import Arm, assess
+    report: Report,
+    begin: Begin,
+    attempt: Attempt,
+) -> tuple[dict[str, Any], list[Path]]:
+    from harness.assessment import Arm  # the parent, who plays nothing, does without
+    from harness.segments import join_segments, play_segments, segments_of
 
     drivers = tuple(_driver(each, conditions, folder) for each in (stage.ego, stage.non_ego))
     habits = stage.non_ego.persona if stage.non_ego else ""
     personas = (conditions.ego_persona, conditions.persona(habits))
     arm = Arm(stage.arm, scene, drivers, personas, stage.seed)  # type: ignore[arg-type]
-    records = []
-    with TraceWriter(folder.traces(stage.id)) as traces:
-        for game in assess(arm, conditions.document.assessment.episodes, report):
-            records.append({**game.record, "arm": stage.arm, "persona": stage.persona, "seed": stage.seed})
-            if game.trace is not None:
-                traces.add(game.trace)
-    frame = typed(pd.DataFrame(records).reindex(columns=list(EPISODE_COLUMNS)))
-    write_csv(frame, folder.work(stage.id) / "episodes.csv")
-    name_manoeuvres(folder, stage.id, scene)
-    return {"episodes": len(records), "errors": sum(bool(record["error"]) for record in records)}
+    segments = segments_of(folder.segments(stage.id), conditions.document.assessment.episodes)
+    labels = {"arm": stage.arm, "persona": stage.persona, "seed": stage.seed}
+    errors = play_segments(arm, segments, labels, attempt, begin, report)
+    work = folder.work(stage.id)
+    files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
+    join_segments(segments, *files)
+    info = {"episodes": segments[-1].episodes.stop, "errors": errors, "versions": [versions_of_numbers()]}
+    return info, files
 
 
 def _driver(drives: Drives | None, conditions: Conditions, folder: RunFolder) -> Driver | None:

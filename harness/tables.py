@@ -9,8 +9,8 @@ lines end in a line feed. A table is known by its columns, which are declared he
 from __future__ import annotations
 
 import csv
-import os
-from collections.abc import Iterable, Mapping
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from scipy import stats
 
 from harness.comparison import COMPARISON_COLUMNS, CONFIDENCE, mean_interval
 from harness.errors import UsageError
+from harness.files import replace_durably, scratch_beside, write_atomically
 
 EPISODE_COLUMNS = {
     "arm": "object",
@@ -218,16 +219,23 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
     cells = [[_text(cell) for cell in table[name].tolist()] for name in table.columns]
     lines = [list(table.columns), *zip(*cells, strict=True)]
     text = "".join(",".join(line) + "\n" for line in lines)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    # an error message from elsewhere may hold what is no Unicode: never lose a table to it
+    write_atomically(path, text.encode("utf-8", errors="backslashreplace"))
+
+
+def join_csv(parts: Sequence[Path], path: Path) -> None:
+    """Put tables with the same columns, each a file of `write_csv`, under one another: as if written at once."""
+    scratch = scratch_beside(path)
     try:
-        # an error message from elsewhere may hold what is no Unicode: never lose a table to it
-        with unfinished.open("w", encoding="utf-8", errors="backslashreplace", newline="") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(unfinished, path)
+        with scratch.open("wb") as whole:
+            for number, part in enumerate(parts):
+                with part.open("rb") as lines:
+                    header = lines.readline()
+                    whole.write(b"" if number else header)
+                    shutil.copyfileobj(lines, whole)
+        replace_durably(scratch, path)
     finally:
-        unfinished.unlink(missing_ok=True)
+        scratch.unlink(missing_ok=True)
 
 
 def _text(cell: object) -> str:

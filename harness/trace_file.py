@@ -1,9 +1,12 @@
-"""The traces of an arm as one Parquet file, written game by game."""
+"""The traces of an arm as one Parquet file: the games of a segment are a row group of it.
+
+A segment's file is such a file too, and an arm's is its segments' row groups one after the other: the same bytes
+whether the segments were played in one go or not.
+"""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -12,7 +15,7 @@ import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from harness.files import sync_folder
+from harness.files import replace_durably, scratch_beside
 
 _TEXT = pa.dictionary(pa.int32(), pa.string())
 SCHEMA = pa.schema(
@@ -33,37 +36,72 @@ SCHEMA = pa.schema(
 
 
 class TraceWriter:
-    """Writes an arm's traces; the file is there when all games are in it, or not at all."""
+    """Writes the games of a segment; the file is there when all games are in it, or not at all."""
 
     def __init__(self, path: Path) -> None:
-        self._path, self._scratch = path, path.with_name(f".{path.name}.part")
-        self._writer = pq.ParquetWriter(self._scratch, SCHEMA, compression="zstd")
+        self._path = path
+        self._games: list[pa.Table] = []
 
     def __enter__(self) -> TraceWriter:
         return self
 
     def add(self, columns: Mapping[str, Sequence[Any]]) -> None:
         """Add one game, as columns of its trace."""
-        self._writer.write_table(
-            pa.table({name: pa.array(columns[name], SCHEMA.field(name).type) for name in SCHEMA.names})
-        )
+        arrays = {name: pa.array(columns[name], SCHEMA.field(name).type) for name in SCHEMA.names}
+        self._games.append(pa.table(arrays, SCHEMA))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
-        self._writer.close()
         if kind is None:
-            with self._scratch.open("rb") as file:
-                os.fsync(file.fileno())
-            os.replace(self._scratch, self._path)
-            sync_folder(self._path.parent)
-        else:
-            self._scratch.unlink(missing_ok=True)
+            games = pa.concat_tables(self._games) if self._games else SCHEMA.empty_table()
+            _write([games.unify_dictionaries().combine_chunks()], self._path)
+
+
+def join_traces(parts: Sequence[Path], path: Path) -> None:
+    """Put the traces of segments into one file, one after the other."""
+    _write((group for part in parts for group in _row_groups(part)), path)
 
 
 def read_trace(path: Path, episode: int) -> pd.DataFrame:
     """One game's trace; empty if the file has none of that episode."""
-    frame = pq.read_table(path, filters=[("episode", "==", episode)]).to_pandas()
+    return _frame(pq.read_table(path, filters=[("episode", "==", episode)]))
+
+
+def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
+    """The games of a file in order, each with its episode, as `read_trace` gives them; read a segment at a time."""
+    rest = SCHEMA.empty_table().to_pandas()
+    for group in _row_groups(path):
+        rows = _frame(group)
+        rows = pd.concat((rest, rows)) if len(rest) else rows
+        games = [(int(episode), game) for episode, game in rows.groupby("episode", sort=False)]
+        for episode, game in games[:-1]:
+            yield episode, game.reset_index(drop=True)
+        rest = games[-1][1] if games else rows  # the next row group may go on with it
+    if len(rest):
+        yield int(rest["episode"].iloc[0]), rest.reset_index(drop=True)
+
+
+def _write(groups: Iterable[pa.Table], path: Path) -> None:
+    scratch = scratch_beside(path)
+    try:
+        with pq.ParquetWriter(scratch, SCHEMA, compression="zstd") as writer:
+            for group in groups:
+                if group.num_rows:
+                    writer.write_table(group)
+        replace_durably(scratch, path)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+def _row_groups(path: Path) -> Iterator[pa.Table]:
+    with pq.ParquetFile(path) as file:
+        for number in range(file.num_row_groups):
+            yield file.read_row_group(number)
+
+
+def _frame(table: pa.Table) -> pd.DataFrame:
+    frame = table.to_pandas()
     for name in ("player", "vehicle_type", "outcome"):
         frame[name] = frame[name].astype(str)
     return frame

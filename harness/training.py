@@ -72,12 +72,13 @@ def train(
     card: dict[str, Any],
     tensorboard: Path | None = None,
     report: Callable[[int, int], None] = lambda done, total: None,
+    begin: Callable[[int], None] = lambda segment: None,
 ) -> Trained:
     """Train to convergence or to the end of the budget, going on from `checkpoint` if it was made with this `key`.
 
-    `report` is told steps done and steps in all, several times a second. Raises FloatingPointError where a parameter
-    is not finite or a number of the game can't be right (`game.plausibility`), SimulationError where SUMO fails,
-    ValueError where the initial policy doesn't fit.
+    `report` is told steps done and steps in all, several times a second, `begin` the number of each segment before it.
+    Raises FloatingPointError where a parameter is not finite or a number of the game can't be right
+    (`game.plausibility`), SimulationError where SUMO fails, ValueError where the initial policy doesn't fit.
     """
     torch.set_num_threads(1)
     environment = _environment(lesson)
@@ -85,6 +86,7 @@ def train(
         model = _learner(lesson, environment, tensorboard)
         progress = read_checkpoint(model, key, checkpoint) or Progress(0, 0, [], [])
         while (stopped := _why_to_stop(lesson, progress)) is None:
+            begin(progress.segments)
             progress = _segment(lesson, model, environment, progress, report)
             write_checkpoint(model, progress, key, checkpoint)
         return Trained(policy_of(model, card), progress, stopped)

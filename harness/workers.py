@@ -1,8 +1,8 @@
 """Carrying the plan out in processes: independent stages side by side, libsumo only ever in a worker.
 
-A worker that dies takes nothing with it: its stage is begun again (a training goes on from its last segment), and
-after `TRIES` deaths the stage has failed, by name, while stages that don't need it go on. Workers end when the parent
-does, however it ends.
+A worker that dies takes nothing with it: its stage goes on from its last segment in another. After `TRIES` deaths in
+the same segment a training has failed, by name, while stages that don't need it go on; after as many in the same game
+an arm goes on without that game, which is an error. Workers end when the parent does, however it ends.
 """
 
 from __future__ import annotations
@@ -10,35 +10,43 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
+import tempfile
 import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cache, partial
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from pathlib import Path
 from typing import Any, Literal
 
-from harness.errors import HarnessError
+from harness.attempts import Attempt, Begin, Report
+from harness.deaths import Deaths
+from harness.errors import HarnessError, is_of_memory
+from harness.files import make_folder
+from harness.locking import share
 from harness.rounds import Stage
+from harness.run_folder import RunFolder
 from harness.stages import Conditions, carry_out
 
-TRIES = 3
 _REPORT_EVERY_S = 0.25
+_REQUESTS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _CONTEXT = multiprocessing.get_context("spawn")
 
 
-Work = Callable[[Stage, Conditions, Callable[[int, int], None]], dict[str, Any]]
+Work = Callable[[Stage, Conditions, Report, Begin, Attempt], dict[str, Any]]
 
 
 @dataclass(frozen=True)
 class Event:
     """Something that happened to a stage."""
 
-    kind: Literal["started", "progress", "done", "failed", "died", "skipped"]
+    kind: Literal["started", "progress", "began", "done", "failed", "died", "skipped"]
+    """began: a segment of a training or a game of an arm, whose number is `done`; this is told to nobody."""
     stage: str
     done: int = 0
     total: int = 0
@@ -75,12 +83,12 @@ def run_stages(
     """
     done, lost = set(finished), set[str]()
     waiting = [stage for stage in stages if stage.id not in done]
-    tries: dict[str, int] = {}
+    deaths = Deaths()
     hire = partial(_start, work, conditions)
     with _workers(min(jobs, len(waiting)), hire) as workers:
         while waiting or any(worker.stage for worker in workers):
             _skip_what_cannot_be(waiting, lost, tell)
-            _hand_out(waiting, workers, done, hire, tell)
+            _hand_out(waiting, workers, done, deaths, hire, tell)
             busy = [worker for worker in workers if worker.stage]
             if not busy:
                 continue
@@ -91,12 +99,14 @@ def run_stages(
                 event = _listen(worker)
                 if event is None or worker.stage is None:
                     continue
+                if event.kind == "began":
+                    deaths.note_begin(event.stage, event.done)
+                    continue
                 if event.kind == "died":
-                    tries[event.stage] = tries.get(event.stage, 0) + 1
-                    if tries[event.stage] < TRIES:
+                    verdict = deaths.note(worker.stage, event.message)
+                    event = Event("failed" if verdict.stage_fails else "died", event.stage, message=verdict.message)
+                    if not verdict.stage_fails:
                         waiting.insert(0, worker.stage)
-                    else:
-                        event = Event("failed", event.stage, message=f"{event.message}, {TRIES} times over")
                     _replace(worker, hire)
                 if event.kind == "done":
                     done.add(event.stage)
@@ -120,6 +130,7 @@ def _hand_out(
     waiting: list[Stage],
     workers: list[_Worker],
     done: set[str],
+    deaths: Deaths,
     hire: Hire,
     tell: Callable[[Event], None],
 ) -> None:
@@ -130,11 +141,12 @@ def _hand_out(
             stage = max(ready, key=lambda one: sum(one.id in other.needs for other in waiting))
             waiting.remove(stage)
             worker.stage = stage
+            task = (stage, deaths.attempt_at(stage))
             try:
-                worker.connection.send(stage)
+                worker.connection.send(task)
             except OSError:  # it died while it had nothing to do
                 _replace(worker, hire)
-                worker.connection.send(stage)
+                worker.connection.send(task)
             tell(Event("started", stage.id))
 
 
@@ -187,21 +199,22 @@ def _start(work: Work, conditions: Conditions) -> _Worker:
 
 @contextmanager
 def _interrupts_held_back() -> Iterator[None]:
-    """Ctrl-C waits until a process is started whole, and the process is deaf to it from its first moment."""
+    """Ctrl-C and requests to end wait until a process is started whole; it is deaf to Ctrl-C from its first moment."""
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "pthread_sigmask"):
         yield
         return
     came: list[int] = []
     resource_tracker.ensure_running()  # starting it would undo the mask
-    before = signal.signal(signal.SIGINT, lambda number, frame: came.append(number))
+    before = {each: signal.signal(each, lambda number, frame: came.append(number)) for each in _REQUESTS}
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which the process inherits
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        signal.signal(signal.SIGINT, before)
-    if came:
-        raise KeyboardInterrupt
+        for number, handler in before.items():
+            signal.signal(number, handler)
+    for number in came:
+        signal.raise_signal(number)
 
 
 def _replace(worker: _Worker, hire: Hire) -> None:
@@ -216,15 +229,26 @@ def _replace(worker: _Worker, hire: Hire) -> None:
 def _work(connection: Connection, work: Work, conditions: Conditions) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    while True:
-        try:
-            stage: Stage = connection.recv()
-        except (EOFError, OSError):
-            return
-        connection.send(_carry_out(stage, connection, work, conditions))
+    try:
+        while True:
+            stage, attempt = connection.recv()
+            connection.send(_carry_out(stage, attempt, connection, work, conditions))
+    except (EOFError, OSError):  # the parent is gone
+        return
 
 
-def _carry_out(stage: Stage, connection: Connection, work: Work, conditions: Conditions) -> Event:
+@cache
+def _settle_in(run: Path) -> None:
+    """Be known as a worker in a run folder, and make temporary files in it: of a worker that was killed they are taken
+    away by the next command."""
+    folder = RunFolder(run)
+    make_folder(folder.scratch)
+    os.environ["TMPDIR"] = str(folder.scratch.resolve())
+    tempfile.tempdir = None
+    share(folder.workers_lock)
+
+
+def _carry_out(stage: Stage, attempt: Attempt, connection: Connection, work: Work, conditions: Conditions) -> Event:
     last = 0.0
 
     def report(done: int, total: int) -> None:
@@ -234,12 +258,18 @@ def _carry_out(stage: Stage, connection: Connection, work: Work, conditions: Con
             last = now
             connection.send(Event("progress", stage.id, done, total))
 
+    def begin(place: int) -> None:
+        connection.send(Event("began", stage.id, place))
+
     try:
-        return Event("done", stage.id, info=work(stage, conditions, report))
-    except (HarnessError, OSError, MemoryError) as error:
-        return Event("failed", stage.id, message=str(error) or type(error).__name__)
-    except Exception:  # a bug: its traceback is the message
-        return Event("failed", stage.id, message=traceback.format_exc())
+        _settle_in(conditions.folder)
+        return Event("done", stage.id, info=work(stage, conditions, report, begin, attempt))
+    except (HarnessError, OSError) as error:
+        return Event("failed", stage.id, message=str(error))
+    except Exception as error:
+        if is_of_memory(error):
+            return Event("failed", stage.id, message=f"the machine is short of memory: {error or 'none is left'}")
+        return Event("failed", stage.id, message=traceback.format_exc())  # a bug: its traceback is the message
 
 
 def _end_with_parent() -> None:

@@ -23,6 +23,9 @@ PACKAGE = REPOSITORY / "harness"
 ALLOWED: dict[str, set[str]] = {
     "errors": set(),
     "files": set(),
+    "versions": set(),
+    "locking": set(),
+    "attempts": set(),
     "compiling": set(),
     "game": {"compiling"},
     "documents": {"errors", "game"},  # game: payoff terms and what a persona is made of
@@ -40,20 +43,26 @@ ALLOWED: dict[str, set[str]] = {
     },
     "metrics": {"game"},
     "assessment": {"errors", "documents", "game", "traffic", "drivers", "arena", "metrics"},
-    "trace_file": {"errors", "files"},
+    "trace_file": {"files"},
+    "seals": {"files"},
     "comparison": set(),
     "tables": {"errors", "files", "comparison"},
     "rounds": {"documents", "game", "comparison"},
     "preflight": {"errors", "documents", "traffic", "policy_file", "rounds"},
-    "run_folder": {"errors", "files", "rounds"},
+    "run_folder": {"errors", "files", "rounds", "locking", "seals"},
     "series": {"game"},
     "manoeuvres": {"game", "series"},
     "manoeuvre_file": {"traffic", "manoeuvres", "tables", "run_folder", "trace_file"},
-    "stages": {
-        *("errors", "documents", "game", "traffic", "drivers", "policy_file", "convergence", "training"),
-        *("assessment", "trace_file", "tables", "preflight", "rounds", "run_folder", "manoeuvre_file"),
+    "segments": {
+        *("files", "assessment", "trace_file", "tables", "seals", "versions", "attempts", "manoeuvre_file"),
     },
-    "workers": {"errors", "rounds", "stages"},
+    "stages": {
+        *("errors", "files", "documents", "game", "traffic", "drivers", "policy_file", "convergence", "training"),
+        *("assessment", "segments", "tables", "preflight", "rounds", "run_folder", "manoeuvre_file"),
+        *("attempts", "versions"),
+    },
+    "deaths": {"rounds", "attempts"},
+    "workers": {"errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "stages"},
     "reports": {"errors", "comparison", "tables", "manoeuvres"},
     "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
@@ -68,7 +77,7 @@ ALLOWED: dict[str, set[str]] = {
     "campaign_run": {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
-        *("manoeuvre_file", "model_card"),
+        *("manoeuvre_file", "model_card", "versions"),
     },
 }
 ALLOWED["cli"] = set(ALLOWED)

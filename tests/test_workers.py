@@ -6,21 +6,20 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tiny import BY_SUMO, begin, end, harness, in_session, sumo_run, tables, wait_for, workers_of, write_campaign
 
+from harness.attempts import Attempt, Begin, Report
+from harness.deaths import TRIES
 from harness.documents.campaign import Campaign
 from harness.documents.persona import Persona
 from harness.errors import StageFailed
 from harness.rounds import Drives, Stage, TrainingStage
 from harness.stages import Conditions
-from harness.workers import TRIES, Event, run_stages
-
-Report = Callable[[int, int], None]
+from harness.workers import Event, run_stages
 
 
 def stage(name: str, *needs: str) -> Stage:
@@ -45,19 +44,19 @@ def told(events: list[Event], kind: str) -> list[str]:
 # What the workers do here. They are in the processes that run_stages starts, which import this module.
 
 
-def note(stage: Stage, conditions: Conditions, report: Report) -> dict[str, Any]:
+def note(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
     with (conditions.folder / "done").open("a") as file:
         file.write(f"{stage.id}\n")
     return {"pid": os.getpid(), "deaf": signal.getsignal(signal.SIGINT) == signal.SIG_IGN}
 
 
-def report_much(stage: Stage, conditions: Conditions, report: Report) -> dict[str, Any]:
+def report_much(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
     for done in range(1, 1001):
         report(done, 1000)
     return {}
 
 
-def raise_in_b(stage: Stage, conditions: Conditions, report: Report) -> dict[str, Any]:
+def raise_in_b(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
     if stage.id == "b-seed1":
         raise StageFailed("b-seed1: a payoff is not finite")
     if stage.id == "bug-seed1":
@@ -65,13 +64,13 @@ def raise_in_b(stage: Stage, conditions: Conditions, report: Report) -> dict[str
     return {}
 
 
-def die_in_b(stage: Stage, conditions: Conditions, report: Report) -> dict[str, Any]:
+def die_in_b(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
     if stage.id == "b-seed1":
         os.kill(os.getpid(), signal.SIGSEGV)
     return {}
 
 
-def die_once(stage: Stage, conditions: Conditions, report: Report) -> dict[str, Any]:
+def die_once(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
     mark = conditions.folder / stage.id
     if not mark.exists():
         mark.touch()
@@ -79,7 +78,9 @@ def die_once(stage: Stage, conditions: Conditions, report: Report) -> dict[str, 
     return {}
 
 
-def die_when_idle(stage: Stage, conditions: Conditions, report: Report) -> dict[str, Any]:
+def die_when_idle(
+    stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt
+) -> dict[str, Any]:
     """Kill whoever else works for the same parent: it has nothing to do."""
     if stage.id == "a-seed1":
         time.sleep(0.5)  # until the other worker waits for its first stage
@@ -152,6 +153,35 @@ def test_run_stages__a_stage_whose_worker_was_killed_is_done_again(tmp_path: Pat
 def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path: Path) -> None:
     events = run(tmp_path, [stage("a"), stage("b", "a"), stage("c", "a")], die_when_idle)
     assert sorted(told(events, "done")) == ["a", "b", "c"]
+
+
+def need_too_much(
+    stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt
+) -> dict[str, Any]:
+    """Ask the system itself for more memory than it may give, by NumPy and by torch."""
+    import resource
+
+    import numpy as np
+    import torch
+
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + 2**28, resource.RLIM_INFINITY))
+    try:
+        ask = torch.ones if stage.id == "b-seed1" else np.ones
+        ask(2**28 if stage.id < "c" else 1)
+        return {}
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+
+
+def test_run_stages__short_of_memory_is_one_message_and_the_rest_goes_on(tmp_path: Path) -> None:
+    events = run(tmp_path, [stage("a"), stage("b"), stage("c")], need_too_much, jobs=1)
+    failed = {event.stage: event.message for event in events if event.kind == "failed"}
+    assert set(failed) == {"a-seed1", "b-seed1"}
+    for message in failed.values():
+        assert message.startswith("the machine is short of memory: ")
+        assert "Traceback" not in message
+    assert told(events, "done") == ["c"]
 
 
 # --- the real command -------------------------------------------------------------------------------------------------

@@ -17,6 +17,7 @@ from harness.reports.figures import steps_text
 from harness.reports.games import RecordedGame, SceneDrawing, key
 from harness.reports.learning import learning, stopped
 from harness.reports.manoeuvres import failures_by_pair, marks_of
+from harness.reports.provenance import mixed_versions
 from harness.reports.replays import keys, replay_list, worst_game
 from harness.reports.results import results, unplayed
 from harness.tables import typed
@@ -100,6 +101,7 @@ def render_page(
         quick=QUICK if manifest.get("quick") else "",
         trained_before=manifest.get("campaign", {}).get("policies") or "",
         unfinished=[_stage(name, stage) for name, stage in stages.items() if stage.get("status") != "done"],
+        mixed=mixed_versions(stages),
         errored=errored.groupby(["arm", "seed"], sort=False).size().items(),
         errors=len(errored),
         facts=_facts(manifest, found.seeds, len(personas)),

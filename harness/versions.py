@@ -1,0 +1,27 @@
+"""Which programs a run's numbers were made by."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from functools import cache
+
+_PACKAGES = (
+    *("harness", "eclipse-sumo", "libsumo", "sumolib", "numpy", "scipy", "numba", "pandas", "torch"),
+    *("stable-baselines3", "gymnasium", "pyarrow", "safetensors"),
+)
+NUMBERS_FORMAT = 2  # to be raised when the same inputs give other numbers, so that no old stage is taken for a new one
+_OF_NUMBERS = ("python", "platform", "harness", "libsumo", "numpy", "numba", "torch", "stable-baselines3")
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Every program a run uses, and the system it runs on."""
+    system = " ".join((platform.system(), platform.machine(), *platform.libc_ver())).strip()
+    found = {"python": platform.python_version(), "platform": system}
+    return found | {name: importlib.metadata.version(name) for name in _PACKAGES}
+
+
+def versions_of_numbers() -> dict[str, str]:
+    """Those that a stage's numbers depend on: with any other, they are not promised to be the same."""
+    return {name: versions()[name] for name in _OF_NUMBERS} | {"numbers": str(NUMBERS_FORMAT)}
