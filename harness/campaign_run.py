@@ -40,7 +40,7 @@ from harness.tables import (
     typed,
     write_csv,
 )
-from harness.trace_file import read_trace
+from harness.trace_file import check_traces, read_trace
 from harness.traffic.opening import OpenScene, open_scene
 from harness.workers import Event, run_stages
 
@@ -154,9 +154,12 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     asked = questions_of(manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
+    scene = open_scene(folder.scene)
+    for name, entry in done.items():
+        if entry["kind"] == "assessment":
+            check_traces(folder.traces(name))
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
-    scene = open_scene(folder.scene)
     with console.status("naming manoeuvres"):
         manoeuvres = _manoeuvres(folder, done, scene)
     write_csv(manoeuvres, folder.path / "manoeuvres.csv")
@@ -214,8 +217,12 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
     games = list(zip(chosen.itertuples(), names, strict=True))
     quiet = not console.is_terminal
     for game, name in track(games, "writing replays", console=console, transient=True, disable=quiet):
+        traces = folder.traces(stage_id(game.arm, game.seed))
+        trace = read_trace(traces, game.episode)
+        if trace.empty:
+            raise UsageError.of(traces, "", f"has no trace of episode {game.episode}", "run the campaign again")
         write_replay(
-            read_trace(folder.traces(stage_id(game.arm, game.seed)), game.episode),
+            trace,
             scene.net_file,
             scene.routes.path,
             folder.replays / name,

@@ -8,11 +8,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from harness.errors import UsageError
+from harness.file_content import check_file
 from harness.files import sync_folder
+
+_MOST_BYTES = 10**12
+_LARGEST, _MOST_STEPS = 1e8, 1_000_000
 
 _TEXT = pa.dictionary(pa.int32(), pa.string())
 SCHEMA = pa.schema(
@@ -62,8 +68,49 @@ class TraceWriter:
 
 
 def read_trace(path: Path, episode: int) -> pd.DataFrame:
-    """One game's trace; empty if the file has none of that episode."""
-    frame = pq.read_table(path, filters=[("episode", "==", episode)]).to_pandas()
+    """One game's trace; empty if the file has none of that episode. Raises UsageError if it is no file of traces, or
+    holds what no game can be."""
+    try:
+        check_file(path, _MOST_BYTES)
+        table = pq.read_table(path, filters=[("episode", "==", episode)])
+        _check_schema(table.schema)
+        frame = table.to_pandas()
+        _check_game(frame)
+    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+        raise _damaged(path, error) from None
     for name in ("player", "vehicle_type", "outcome"):
         frame[name] = frame[name].astype(str)
     return frame
+
+
+def check_traces(path: Path) -> None:
+    """Raise UsageError unless this is a file of traces, as far as its head says."""
+    try:
+        check_file(path, _MOST_BYTES)
+        _check_schema(pq.read_schema(path))
+    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+        raise _damaged(path, error) from None
+
+
+def _check_schema(schema: pa.Schema) -> None:
+    if not schema.equals(SCHEMA):
+        wrong = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]
+        raise ValueError(f"its columns are not those of a trace: {', '.join(wrong)[:200]}")
+
+
+def _check_game(frame: pd.DataFrame) -> None:
+    numbers = frame[[field.name for field in SCHEMA if field.type == pa.float64()]].to_numpy(float)
+    if not (np.abs(numbers) <= _LARGEST).all():  # never true of NaN
+        raise ValueError("it holds numbers that are none, or too large to be of a game")
+    steps = frame["step"]
+    if frame.isna().any(axis=None) or (len(frame) and not (0 <= steps.min() <= steps.max() <= _MOST_STEPS)):
+        raise ValueError("it has empty cells, or steps that no game has")
+    if frame.duplicated(["step", "player"]).any():
+        raise ValueError("somebody is in two places at once")
+
+
+def _damaged(path: Path, error: Exception) -> UsageError:
+    text = (error.strerror or error) if isinstance(error, OSError) else error
+    return UsageError.of(
+        path, "", f"is not a file of traces: {text}", "run the campaign again: it plays its games anew"
+    )

@@ -23,11 +23,12 @@ PACKAGE = REPOSITORY / "harness"
 ALLOWED: dict[str, set[str]] = {
     "errors": set(),
     "files": set(),
+    "file_content": set(),
     "compiling": set(),
     "game": {"compiling"},
-    "documents": {"errors", "game"},  # game: payoff terms and what a persona is made of
-    "traffic": {"errors", "documents", "game"},
-    "policy_file": {"errors", "files", "game"},
+    "documents": {"errors", "file_content", "game"},  # game: payoff terms and what a persona is made of
+    "traffic": {"errors", "file_content", "documents", "game"},
+    "policy_file": {"errors", "files", "file_content", "documents", "game"},
     "drivers": {"errors", "documents", "game", "policy_file"},
     "arena": {"errors", "documents", "game", "traffic", "drivers"},
     "environments": {"errors", "documents", "game", "traffic", "drivers", "policy_file", "arena"},
@@ -40,12 +41,12 @@ ALLOWED: dict[str, set[str]] = {
     },
     "metrics": {"game"},
     "assessment": {"errors", "documents", "game", "traffic", "drivers", "arena", "metrics"},
-    "trace_file": {"errors", "files"},
+    "trace_file": {"errors", "files", "file_content"},
     "comparison": set(),
-    "tables": {"errors", "files", "comparison"},
+    "tables": {"errors", "file_content", "comparison"},
     "rounds": {"documents", "game", "comparison"},
     "preflight": {"errors", "documents", "traffic", "policy_file", "rounds"},
-    "run_folder": {"errors", "files", "rounds"},
+    "run_folder": {"errors", "files", "file_content", "documents", "rounds"},
     "series": {"game"},
     "manoeuvres": {"game", "series"},
     "manoeuvre_file": {"traffic", "manoeuvres", "tables", "run_folder", "trace_file"},
@@ -57,7 +58,7 @@ ALLOWED: dict[str, set[str]] = {
     "reports": {"errors", "comparison", "tables", "manoeuvres"},
     "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
-    "model_card": {"documents", "files", "game", "policy_file", "reports", "rounds", "run_folder"},
+    "model_card": {"errors", "documents", "files", "game", "policy_file", "reports", "rounds", "run_folder"},
     "watching": {
         *("errors", "documents", "traffic", "replay", "rounds", "run_folder", "tables", "trace_file", "manoeuvres"),
     },

@@ -14,13 +14,15 @@ from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
+Input = Annotated[float, Field(ge=-1e6, le=1e6)]
+Membership = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Source(Document):
     """What is known of such people: the statistic the persona rests on, and where it is from."""
 
-    statistic: str = Field(min_length=10)
-    citation: str = Field(min_length=5)
+    statistic: str = Field(min_length=10, max_length=2000)
+    citation: str = Field(min_length=5, max_length=2000)
 
 
 class Parametrised(Document):
@@ -50,7 +52,9 @@ class MembershipFunction(Document):
     """A fuzzy set: linear between points of [input, membership in 0..1], constant outside them."""
 
     name: Name
-    points: list[tuple[float, Annotated[float, Field(ge=0.0, le=1.0)]]] = Field(min_length=1, max_length=20)
+    points: list[tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=0.0, le=1.0)]]] = Field(
+        min_length=1, max_length=20
+    )
     value: float = Field(ge=-1000.0, le=1000.0)
     """What being wholly in this set is worth, per second."""
 
@@ -113,7 +117,7 @@ class Fuzzy(Document):
 class Human(Group):
     """The human group: besides named terms, any number of fuzzy ones."""
 
-    fuzzy: list[Fuzzy] = Field(default_factory=list)
+    fuzzy: list[Fuzzy] = Field(default_factory=list, max_length=50)
 
 
 class Lapsing(Document):
@@ -157,8 +161,8 @@ class Persona(Document):
     """A kind of driver, as equation 1 and human limits."""
 
     name: Name
-    description: str = Field(min_length=10)
-    sources: list[Source] = Field(min_length=1)
+    description: str = Field(min_length=10, max_length=2000)
+    sources: list[Source] = Field(min_length=1, max_length=50)
     safety: Group = Group()
     operational: Group = Group()
     human: Human = Human()
