@@ -155,9 +155,8 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
     scene = open_scene(folder.scene)
-    for name, entry in done.items():
-        if entry["kind"] == "assessment":
-            check_traces(folder.traces(name))
+    _check_traces(folder, episodes)
+    write_model_cards(folder, manifest, summary)
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
     with console.status("naming manoeuvres"):
@@ -170,7 +169,6 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
             manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres
         )
     write_atomically(folder.path / "report.html", page.encode())
-    write_model_cards(folder, manifest, summary)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] != "done")
     found = results(manifest, episodes, summary, comparisons)
     verdicts = [(persona, found.verdicts(each, persona)) for persona in manifest["personas"] for each in ARMS]
@@ -204,6 +202,12 @@ def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, c
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))
 
 
+def _check_traces(folder: RunFolder, episodes: pd.DataFrame) -> None:
+    played = episodes[episodes["error"] == ""]
+    for (arm, seed), games in played.groupby(["arm", "seed"], sort=False):
+        check_traces(folder.traces(stage_id(str(arm), seed)), games["episode"])
+
+
 def _manoeuvres(folder: RunFolder, done: Mapping[str, Any], scene: OpenScene) -> pd.DataFrame:
     arms = [name for name, entry in done.items() if entry["kind"] == "assessment"]
     frames = [manoeuvres_of(folder, name, scene) for name in arms]
@@ -217,12 +221,8 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
     games = list(zip(chosen.itertuples(), names, strict=True))
     quiet = not console.is_terminal
     for game, name in track(games, "writing replays", console=console, transient=True, disable=quiet):
-        traces = folder.traces(stage_id(game.arm, game.seed))
-        trace = read_trace(traces, game.episode)
-        if trace.empty:
-            raise UsageError.of(traces, "", f"has no trace of episode {game.episode}", "run the campaign again")
         write_replay(
-            trace,
+            read_trace(folder.traces(stage_id(game.arm, game.seed)), game.episode),
             scene.net_file,
             scene.routes.path,
             folder.replays / name,

@@ -46,10 +46,13 @@ def write_model_cards(folder: RunFolder, manifest: Mapping[str, Any], summary: p
     """Write the card of every policy that a run trained. A run of before there were cards gets none."""
     if "persona_documents" not in manifest:
         return
-    for stage, entry in manifest["stages"].items():
-        if entry["kind"] == "training" and entry["status"] == "done":
-            card = model_card(stage, manifest, summary, _policy_card(folder.policy(stage)))
-            write_atomically(folder.policy(stage) / CARD, card.encode())
+    cards = {
+        folder.policy(stage) / CARD: model_card(stage, manifest, summary, _policy_card(folder.policy(stage)))
+        for stage, entry in manifest["stages"].items()
+        if entry["kind"] == "training" and entry["status"] == "done"
+    }
+    for file, card in cards.items():
+        write_atomically(file, card.encode())
 
 
 class _PolicyCard(Document):

@@ -7,7 +7,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ FORMAT = 1
 ACTIONS = 2
 _MOST_TENSOR_BYTES, _MOST_CARD_BYTES = 100_000_000, 1_000_000
 _MOST = 1e6  # no parameter of a network that learned anything is larger
+_PARAMETER = re.compile(r"(actor|critic)\.(\d{1,2})\.(weight|bias)", re.ASCII)
 _NAMED = "name the folder of a policy, as under <run>/policies/"
 
 
@@ -104,10 +106,7 @@ def _content(file: Path, most_bytes: int) -> bytes:
 
 
 def _check_shapes(policy: Policy) -> None:
-    parts = {part: [weight for weight, _ in policy.layers(part)] for part in ("actor", "critic")}
-    names = {f"{part}.{k}.{each}" for part, of in parts.items() for k in range(len(of)) for each in ("weight", "bias")}
-    if unknown := sorted(set(policy.tensors) - names - {"log_deviation"}):
-        raise ValueError(f"unknown parameters {unknown[0][:100]!r}: {nearest(unknown[0], {*names, 'log_deviation'})}")
+    _check_names(policy.tensors)
     for part, outputs in (("actor", ACTIONS), ("critic", 1)):
         width = len(LAYOUT)
         for weight, bias in policy.layers(part):
@@ -125,3 +124,17 @@ def _check_shapes(policy: Policy) -> None:
             raise ValueError(f"{name} is not finite")
         if np.abs(tensor).max() > _MOST:
             raise ValueError(f"{name} has parameters over {_MOST:g}")
+
+
+def _check_names(given: Iterable[str]) -> None:
+    """Raises ValueError for a parameter that no policy has, and for one that is missing between those there are."""
+    matches = {name: _PARAMETER.fullmatch(name) for name in given}
+    layers = {(match[1], int(match[2])) for match in matches.values() if match}
+    parts = {part: max((k for of, k in layers if of == part), default=0) for part in ("actor", "critic")}
+    expected = {f"{part}.{k}.{each}" for part, k in layers for each in ("weight", "bias")} | {"log_deviation"}
+    for name, match in matches.items():
+        if match is None and name != "log_deviation":
+            raise ValueError(f"unknown parameters {name[:100]!r}: {nearest(name, expected)}")
+    expected |= {f"{part}.{k}.{each}" for part, n in parts.items() for k in range(n + 1) for each in ("weight", "bias")}
+    if missing := sorted(expected - matches.keys()):
+        raise ValueError(f"there are no parameters {missing[0]!r}")

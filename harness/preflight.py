@@ -74,7 +74,7 @@ def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
                     "give each persona a name of its own",
                 )
             )
-    if scene is not None:
+    if not problems and scene is not None:
         attempt(problems, lambda: try_scene(scene))
     if problems or document is None or scene is None:
         raise UsageError(problems)

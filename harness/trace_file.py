@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -16,6 +16,7 @@ import pyarrow.parquet as pq
 from harness.errors import UsageError
 from harness.file_content import check_file
 from harness.files import sync_folder
+from harness.game.arrays import FloatArray
 
 _MOST_BYTES = 10**12
 _LARGEST, _MOST_STEPS = 1e8, 1_000_000
@@ -36,6 +37,8 @@ SCHEMA = pa.schema(
         ("outcome", _TEXT),
     ]
 )
+
+_NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
 class TraceWriter:
@@ -83,13 +86,20 @@ def read_trace(path: Path, episode: int) -> pd.DataFrame:
     return frame
 
 
-def check_traces(path: Path) -> None:
-    """Raise UsageError unless this is a file of traces, as far as its head says."""
+def check_traces(path: Path, episodes: Iterable[int]) -> None:
+    """Raise UsageError unless this is a file of traces, whose numbers can be a game's, with all these episodes."""
+    missing = set(episodes)
     try:
         check_file(path, _MOST_BYTES)
-        _check_schema(pq.read_schema(path))
+        with pq.ParquetFile(path) as file:
+            _check_schema(file.schema_arrow)
+            for batch in file.iter_batches(columns=["episode", *_NUMBERS]):
+                _check_numbers(np.stack([batch.column(name).to_numpy(False) for name in _NUMBERS]))
+                missing.difference_update(np.unique(batch.column("episode").to_numpy(False)).tolist())
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         raise _damaged(path, error) from None
+    if missing:
+        raise _damaged(path, ValueError(f"it has no trace of episode {min(missing)}"))
 
 
 def _check_schema(schema: pa.Schema) -> None:
@@ -99,14 +109,17 @@ def _check_schema(schema: pa.Schema) -> None:
 
 
 def _check_game(frame: pd.DataFrame) -> None:
-    numbers = frame[[field.name for field in SCHEMA if field.type == pa.float64()]].to_numpy(float)
-    if not (np.abs(numbers) <= _LARGEST).all():  # never true of NaN
-        raise ValueError("it holds numbers that are none, or too large to be of a game")
+    _check_numbers(frame[_NUMBERS].to_numpy(float))
     steps = frame["step"]
     if frame.isna().any(axis=None) or (len(frame) and not (0 <= steps.min() <= steps.max() <= _MOST_STEPS)):
         raise ValueError("it has empty cells, or steps that no game has")
     if frame.duplicated(["step", "player"]).any():
         raise ValueError("somebody is in two places at once")
+
+
+def _check_numbers(numbers: FloatArray) -> None:
+    if not (np.abs(numbers) <= _LARGEST).all():  # never true of NaN
+        raise ValueError("it holds numbers that are none, or too large to be of a game")
 
 
 def _damaged(path: Path, error: Exception) -> UsageError:

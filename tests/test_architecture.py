@@ -41,7 +41,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     "metrics": {"game"},
     "assessment": {"errors", "documents", "game", "traffic", "drivers", "arena", "metrics"},
-    "trace_file": {"errors", "files", "file_content"},
+    "trace_file": {"errors", "files", "file_content", "game"},
     "comparison": set(),
     "tables": {"errors", "file_content", "comparison"},
     "rounds": {"documents", "game", "comparison"},
