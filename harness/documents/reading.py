@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -36,8 +37,10 @@ class Mistakes(ValueError):
         super().__init__("; ".join(f"{key}: {message}" for key, message, _ in found))
 
 
-_MOST_BYTES = 1_000_000
+_MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
 _NAMES_SHOWN, _COMPARED = 40, 200
+_QUOTED = re.compile(r""""[^"\n]*"|'[^'\n]*'""")
+_ENDLESS_KEY = re.compile(r"(?<![\w.-])(?:[\w-]+[ \t]*\.[ \t]*){50}")
 NUMBER, TABLE = "<number>", "<table>"  # tags of what may be either; not part of any key
 
 D = TypeVar("D", bound=Document)
@@ -56,6 +59,8 @@ def read_document(path: Path, model: type[D]) -> D:
         raise UsageError.of(path, "", f"cannot be read: {error}", remedy) from None
     if text.startswith("\ufeff"):
         raise UsageError.of(path, "", "begins with a byte order mark", "save it as UTF-8 without one")
+    if _ENDLESS_KEY.search(_QUOTED.sub("q", text)):  # it would be read for minutes
+        raise UsageError.of(path, "", "has tables in tables without end", "no key has more than a few dots")
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: besides bad TOML, a number of thousands of digits
@@ -67,7 +72,8 @@ def _validated(path: Path, table: dict[str, Any], model: type[D]) -> D:
     try:
         return model.model_validate_json(json.dumps(table, default=str))
     except ValidationError as error:
-        raise UsageError(found for each in error.errors() for found in _problems(path, model, each)) from None
+        first = error.errors(include_url=False)[:_MOST_MISTAKES]
+        raise UsageError(found for each in first for found in _problems(path, model, each)) from None
     except RecursionError:
         raise UsageError.of(path, "", "has tables in tables without end", "no key has more than a few dots") from None
     except ValueError as error:  # NaN and infinity have no place in JSON
