@@ -105,6 +105,11 @@ def edit(file: str, old: str, new: str) -> Spoil:
     return spoil
 
 
+def several(*spoils: Spoil) -> Spoil:
+    """One after another."""
+    return lambda project: [spoil(project) for spoil in spoils]
+
+
 def put(file: str, content: bytes | str) -> Spoil:
     """Other content altogether."""
     return lambda project: (project / file).write_bytes(content.encode() if isinstance(content, str) else content)

@@ -26,14 +26,11 @@ from hostile import (
     moved_out,
     no_numbers,
     put,
+    several,
     whole_file,
 )
 from safetensors.numpy import save
 from test_policy_file import some_policy
-
-
-def several(*spoils: Spoil) -> Spoil:
-    return lambda project: [spoil(project) for spoil in spoils]
 
 
 def bombs(file: str) -> list[Bad]:

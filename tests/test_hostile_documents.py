@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hostile import CHECK, Bad, Desk
 from hostile_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
+from hostile_roads import NETS, ROUTE_FILES
 
 
 @pytest.fixture
@@ -18,6 +19,6 @@ def test_project__is_in_order_before_it_is_spoiled(desk: Desk) -> None:
     assert desk.run(CHECK).code == 0
 
 
-@pytest.mark.parametrize("bad", [*CAMPAIGNS, *PERSONAS, *SCENES, *POLICIES], ids=repr)
+@pytest.mark.parametrize("bad", [*CAMPAIGNS, *PERSONAS, *SCENES, *NETS, *ROUTE_FILES, *POLICIES], ids=repr)
 def test_document__that_is_wrong(bad: Bad, desk: Desk) -> None:
     desk.refuses(bad)

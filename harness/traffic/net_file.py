@@ -43,6 +43,8 @@ def check_net(path: Path) -> None:
 
 
 def _numbers(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    if not np.isfinite(number_of(root.get("version", ""))):
+        yield "net.version", "is no number"
     location = root.find("location")
     boundary = (location.get("convBoundary", "0,0,0,0") if location is not None else "0,0,0,0").split(",")
     if len(boundary) != 4 or not np.isfinite([number_of(each) for each in boundary]).all():
@@ -86,6 +88,9 @@ def _references(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
                     remedy = nearest(edge.get(end, ""), junctions or ["(there is no junction)"])
                     yield f"edge {name}.{end}", f"there is no junction {edge.get(end)!r}; {remedy}"
     known = set(chain.from_iterable(lanes.values()))
+    for beside in root.iter("neigh"):
+        if beside.get("lane") not in known:
+            yield "neigh.lane", f"there is no lane {beside.get('lane')!r}; {nearest(beside.get('lane', ''), known)}"
     onward: dict[str, list[str]] = {}
     for link in root.findall("connection"):
         key = f"connection from {link.get('from')} to {link.get('to')}"

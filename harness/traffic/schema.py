@@ -15,6 +15,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import sumo
+from sumolib.net.lane import SUMO_VEHICLE_CLASSES
 
 from harness.documents.reading import nearest
 from harness.errors import Problem
@@ -24,6 +25,8 @@ _FOLDER = Path(sumo.SUMO_HOME) / "data" / "xsd"
 _MOST_PROBLEMS = 20
 _OF_OTHER_FILES = ("file", "output", "device", "has.")  # in a param's key: files and what writes them
 _FOLLOWING = "carFollowing-"
+CLASSES = {*SUMO_VEHICLE_CLASSES, "all", "ignoring", "drone", "aircraft"}  # of vehicles, in permissions and types
+_OF_CLASSES = ("allow", "disallow", "prefer", "vClass")
 
 
 @dataclass(frozen=True)
@@ -93,6 +96,11 @@ def _problems(
     for name, required in allowed.attributes.items():
         if required and name not in element.attrib:
             yield Problem(path, where, f"has no {name!r}", f"give every {element.tag} its {name}")
+    for name in _OF_CLASSES:
+        for each in element.get(name, "").split():
+            if each not in CLASSES:
+                message = f"SUMO knows no class of vehicles {each[:60]!r}"
+                yield Problem(path, f"{where}.{name}", message, nearest(each, CLASSES))
     if element.tag == "param" and any(part in element.get("key", "").lower() for part in _OF_OTHER_FILES):
         message = f"a param {element.get('key')!r} makes SUMO read or write other files"
         yield Problem(path, where, message, "leave it out: the harness records every game itself")

@@ -24,6 +24,7 @@ from harness.traffic.opening import OpenScene
 PATIENCE_S, PATIENCE_S_PER_BYTE = 15.0, 2e-6
 _APART_S, _AFTERWARDS_S = 5, 30
 _PLACE = re.compile(r"At line/column (\d+)/(\d+)")
+_OF_VEHICLES = re.compile(r"vtype|vehicle|car.following", re.IGNORECASE)
 _MOST_SAID = 500
 
 
@@ -48,7 +49,7 @@ def try_scene(scene: OpenScene) -> None:
         said = {program: _said(process, patience_s) for program, process in _started(commands, folder).items()}
     complaint = said["sumo"] or said["netconvert"]
     if complaint:
-        of_net = str(types) not in complaint and str(vehicles) not in complaint
+        of_net = not (str(types) in complaint or str(vehicles) in complaint or _OF_VEHICLES.search(complaint))
         raise UsageError([_problem(complaint, net if of_net else routes, of_net)])
 
 
