@@ -50,8 +50,8 @@ def assess(
     begin: Callable[[int], None] = lambda episode: None,
     given_up: Mapping[int, str] = MappingProxyType({}),
 ) -> Iterator[Game]:
-    """Play episodes: so many from 0 on, or those given. A game that can't be played, or has numbers that can't be right,
-    is a record with outcome `error`.
+    """Play episodes: so many from 0 on, or those given. A game that can't be played, or has numbers that can't be
+    right, is a record with outcome `error`.
 
     `begin` is told of each before it is played. Those `given_up` are not played, and why is the error of their record.
     Raises SimulationError if SUMO can't load the scene at all.

@@ -39,7 +39,7 @@ from harness.tables import (
     typed,
     write_csv,
 )
-from harness.trace_file import read_trace
+from harness.trace_file import check_traces, read_trace
 from harness.traffic.opening import OpenScene, open_scene
 from harness.versions import versions, versions_of_numbers
 from harness.workers import Event, run_stages
@@ -150,9 +150,11 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     asked = questions_of(manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
+    scene = open_scene(folder.scene)
+    _check_traces(folder, episodes)
+    write_model_cards(folder, manifest, summary)
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
-    scene = open_scene(folder.scene)
     with console.status("naming manoeuvres"):
         manoeuvres = _manoeuvres(folder, done, scene)
     write_csv(manoeuvres, folder.path / "manoeuvres.csv")
@@ -163,7 +165,6 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
             manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres
         )
     write_atomically(folder.path / "report.html", page.encode())
-    write_model_cards(folder, manifest, summary)
     _warn(mixed_versions(manifest["stages"]), console)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] != "done")
     found = results(manifest, episodes, summary, comparisons)
@@ -201,6 +202,12 @@ def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, c
                 raise UsageError.of(file, "", f"has rows that are not of {name}", "run the campaign again")
             frames.append(frame)
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))
+
+
+def _check_traces(folder: RunFolder, episodes: pd.DataFrame) -> None:
+    played = episodes[episodes["error"] == ""]
+    for (arm, seed), games in played.groupby(["arm", "seed"], sort=False):
+        check_traces(folder.traces(stage_id(str(arm), seed)), games["episode"])
 
 
 def _manoeuvres(folder: RunFolder, done: Mapping[str, Any], scene: OpenScene) -> pd.DataFrame:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 T = TypeVar("T")
+_LONGEST = 2_000  # characters of what is said of one problem
 
 
 class HarnessError(Exception):
@@ -29,8 +30,23 @@ class Problem:
     remedy: str = ""
 
     def __str__(self) -> str:
-        where = f"{self.file}: {self.key}" if self.key else self.file
-        return f"{where}: {self.message}" + (f" ({self.remedy})" if self.remedy else "")
+        """One line, whatever the names in it: what a document says can't steer a terminal or feign another message."""
+        key, message, remedy = (_shortened(part) for part in (self.key, self.message, self.remedy))
+        where = f"{self.file}: {key}" if key else self.file
+        return plain(f"{where}: {message}" + (f" ({remedy})" if remedy else ""))
+
+
+def plain(text: str) -> str:
+    """The text with everything but letters, signs and plain spaces escaped: line ends, controls, invisible marks."""
+    if text.isprintable():
+        return text
+    return "".join(
+        each if each.isprintable() else each.encode("unicode_escape", "surrogatepass").decode() for each in text
+    )
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]} ..."
 
 
 class UsageError(HarnessError):

@@ -6,20 +6,23 @@ campaign gives the same card.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal
 
 import pandas as pd
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from pydantic import ConfigDict, Field, ValidationError
 
 from harness.documents.campaign import Campaign
 from harness.documents.persona import Parametrised, Persona
+from harness.documents.reading import Document
+from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.game.payoff import GROUPS, TERMS
 from harness.game.state import NON_EGO, ROLES
-from harness.policy_file import policy_files
+from harness.policy_file import policy_files, read_card
 from harness.reports.wording import interval, number, percent
 from harness.rounds import AssessmentStage, plan
 from harness.run_folder import RunFolder
@@ -43,11 +46,35 @@ def write_model_cards(folder: RunFolder, manifest: Mapping[str, Any], summary: p
     """Write the card of every policy that a run trained. A run of before there were cards gets none."""
     if "persona_documents" not in manifest:
         return
-    for stage, entry in manifest["stages"].items():
-        if entry["kind"] == "training" and entry["status"] == "done":
-            policy = json.loads(policy_files(folder.policy(stage))[0].read_text(encoding="utf-8"))
-            card = model_card(stage, manifest, summary, policy)
-            write_atomically(folder.policy(stage) / CARD, card.encode())
+    cards = {
+        folder.policy(stage) / CARD: model_card(stage, manifest, summary, _policy_card(folder.policy(stage)))
+        for stage, entry in manifest["stages"].items()
+        if entry["kind"] == "training" and entry["status"] == "done"
+    }
+    for file, card in cards.items():
+        write_atomically(file, card.encode())
+
+
+class _PolicyCard(Document):
+    """What a card tells of a policy's JSON."""
+
+    model_config = ConfigDict(extra="ignore")
+    player: Literal["ego", "non_ego"]
+    scene: str = Field(max_length=1000)
+    against: str | None = Field(max_length=1000)
+    began_from: str | None = Field(max_length=1000)
+    training: dict[str, bool | int | float | str | list[int] | None]
+
+
+def _policy_card(folder: Path) -> dict[str, Any]:
+    """The content of a policy's JSON. Raises UsageError where it is not what a training wrote."""
+    card = read_card(folder)
+    try:
+        _PolicyCard.model_validate(card)
+    except ValidationError as error:
+        key, said = ".".join(map(str, error.errors()[0]["loc"])), error.errors()[0]["msg"]
+        raise UsageError.of(policy_files(folder)[0], key, f"is damaged: {said}", "train the policy again") from None
+    return card
 
 
 def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, policy: Mapping[str, Any]) -> str:

@@ -7,7 +7,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,14 +18,19 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_tensors
 from safetensors.numpy import save as save_tensors
 
+from harness.documents.reading import nearest
 from harness.errors import UsageError
+from harness.file_content import content_of
 from harness.files import write_atomically
 from harness.game.arrays import FloatArray
 from harness.game.observation import LAYOUT
 
 FORMAT = 1
 ACTIONS = 2
-_LARGEST_BYTES = 100_000_000
+_MOST_TENSOR_BYTES, _MOST_CARD_BYTES = 100_000_000, 1_000_000
+_MOST = 1e6  # no parameter of a network that learned anything is larger
+_PARAMETER = re.compile(r"(actor|critic)\.(\d{1,2})\.(weight|bias)", re.ASCII)
+_NAMED = "name the folder of a policy, as under <run>/policies/"
 
 
 @dataclass(frozen=True)
@@ -59,40 +65,52 @@ def policy_files(folder: Path) -> tuple[Path, Path]:
 
 def read_policy(folder: Path) -> Policy:
     """Read a policy's folder. Raises UsageError if it is missing, damaged, or was made for other observations."""
-    card_file, tensor_file = policy_files(folder)
-    for file in (card_file, tensor_file):
-        if not file.is_file():
-            raise UsageError.of(
-                file, "", "there is no such file", "name the folder of a policy, as under <run>/policies/"
-            )
-        if file.stat().st_size > _LARGEST_BYTES:
-            raise UsageError.of(file, "", "is too large to be a policy of ours", "name the folder of a policy")
-    try:
-        card = json.loads(card_file.read_text(encoding="utf-8"))
-        version, layout = card["format"], card["observation"]
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise UsageError.of(card_file, "", f"is damaged: {error!r}", "train the policy again") from None
-    if version != FORMAT or layout != list(LAYOUT):
+    card = read_card(folder)
+    if card["format"] != FORMAT or card["observation"] != list(LAYOUT):
         raise UsageError.of(
-            card_file,
+            policy_files(folder)[0],
             "observation",
             "was learned from other observations than this version's",
             "train it again",
         )
+    tensor_file = policy_files(folder)[1]
     try:
-        tensors = load_tensors(tensor_file.read_bytes())
-        policy = Policy(tensors, card)
+        policy = Policy(load_tensors(_content(tensor_file, _MOST_TENSOR_BYTES)), card)
         _check_shapes(policy)
-    except (SafetensorError, ValueError, KeyError, IndexError) as error:
+    except (SafetensorError, ValueError, LookupError, TypeError, AttributeError, OverflowError, MemoryError) as error:
         raise UsageError.of(tensor_file, "", f"is damaged: {error}", "train the policy again") from None
     return policy
 
 
+def read_card(folder: Path) -> dict[str, Any]:
+    """What a policy's JSON says. Raises UsageError if it is missing or damaged."""
+    file = policy_files(folder)[0]
+    try:
+        card = json.loads(_content(file, _MOST_CARD_BYTES).decode("utf-8"))
+        if not isinstance(card, dict):
+            raise TypeError("it holds no table")
+        if missing := [key for key in ("format", "observation") if key not in card]:
+            raise ValueError(f"it has no {missing[0]!r}")
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise UsageError.of(file, "", f"is damaged: {error}", "train the policy again") from None
+    return card
+
+
+def _content(file: Path, most_bytes: int) -> bytes:
+    try:
+        return content_of(file, most_bytes)
+    except (FileNotFoundError, NotADirectoryError):
+        raise UsageError.of(file, "", "there is no such file", _NAMED) from None
+    except OSError as error:
+        raise UsageError.of(file, "", str(error.strerror), _NAMED) from None
+
+
 def _check_shapes(policy: Policy) -> None:
+    _check_names(policy.tensors)
     for part, outputs in (("actor", ACTIONS), ("critic", 1)):
         width = len(LAYOUT)
         for weight, bias in policy.layers(part):
-            if weight.ndim != 2 or weight.shape[1] != width or bias.shape != weight.shape[:1]:
+            if weight.ndim != 2 or not weight.size or weight.shape[1] != width or bias.shape != weight.shape[:1]:
                 raise ValueError(f"the {part}'s layers do not fit each other")
             width = weight.shape[0]
         if width != outputs:
@@ -104,3 +122,19 @@ def _check_shapes(policy: Policy) -> None:
             raise ValueError(f"{name} is {tensor.dtype}, not float32")
         if not np.isfinite(tensor).all():
             raise ValueError(f"{name} is not finite")
+        if np.abs(tensor).max() > _MOST:
+            raise ValueError(f"{name} has parameters over {_MOST:g}")
+
+
+def _check_names(given: Iterable[str]) -> None:
+    """Raises ValueError for a parameter that no policy has, and for one that is missing between those there are."""
+    matches = {name: _PARAMETER.fullmatch(name) for name in given}
+    layers = {(match[1], int(match[2])) for match in matches.values() if match}
+    parts = {part: max((k for of, k in layers if of == part), default=0) for part in ("actor", "critic")}
+    expected = {f"{part}.{k}.{each}" for part, k in layers for each in ("weight", "bias")} | {"log_deviation"}
+    for name, match in matches.items():
+        if match is None and name != "log_deviation":
+            raise ValueError(f"unknown parameters {name[:100]!r}: {nearest(name, expected)}")
+    expected |= {f"{part}.{k}.{each}" for part, n in parts.items() for k in range(n + 1) for each in ("weight", "bias")}
+    if missing := sorted(expected - matches.keys()):
+        raise ValueError(f"there are no parameters {missing[0]!r}")

@@ -17,7 +17,9 @@ from harness.errors import Problem, UsageError, attempt
 from harness.policy_file import policy_files, read_policy
 from harness.rounds import AssessmentStage, plan
 from harness.traffic.opening import OpenScene, open_scene
+from harness.traffic.trial import try_scene
 
+_ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
 
@@ -72,6 +74,8 @@ def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
                     "give each persona a name of its own",
                 )
             )
+    if not problems and scene is not None:
+        attempt(problems, lambda: try_scene(scene))
     if problems or document is None or scene is None:
         raise UsageError(problems)
     names = [persona.name for persona in personas[1:] if persona is not None]
@@ -139,6 +143,7 @@ def _ego_policy(file: Path, driver: str) -> Path | None:
     if driver in (LEARNED, SUMO):
         return None
     folder = resolve(file, driver)
+    _check_no_archive(file, "ego.driver", driver, folder)
     if not os.path.isdir(folder):
         raise UsageError.of(
             file,
@@ -150,10 +155,23 @@ def _ego_policy(file: Path, driver: str) -> Path | None:
     return folder
 
 
+def _check_no_archive(file: Path, key: str, written: str, named: Path) -> None:
+    """A learner's own archive is not opened, not even to look into it: pickles in it are programs."""
+    if named.suffix.lower() in _ARCHIVES or os.path.isfile(named):
+        raise UsageError.of(
+            file,
+            key,
+            f"{written!r} is a file: archives such as .zip, .pt and .pkl can carry pickles, which run code when they "
+            "are opened, so they are not read",
+            "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/",
+        )
+
+
 def _policies_folder(file: Path, written: str | None) -> Path | None:
     if written is None:
         return None
     folder = resolve(file, written)
+    _check_no_archive(file, "policies", written, folder)
     if not os.path.isdir(folder):
         raise UsageError.of(
             file,

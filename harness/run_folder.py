@@ -25,7 +25,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from harness.documents.manifest import StageEntry, check_manifest, problems_for_report
 from harness.errors import Problem, UsageError
+from harness.file_content import content_of, leads_out
 from harness.files import drop_scratch, make_folder, write_atomically
 from harness.locking import InUse, only_one, wait_for_all
 from harness.rounds import stage_id
@@ -34,24 +36,18 @@ from harness.seals import broken, read_seal, write_seal
 FORMAT = 1
 MANIFEST = "manifest.json"
 _PATIENCE_S = 10.0  # how long workers of a command that was killed may take to notice
+_MOST_MANIFEST_BYTES = 50_000_000
+_ANY_STAGE = {"kind": "training", "name": "", "seed": 0, "status": "done"}
 _STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
 
 
-def _check(manifest: Any) -> None:
-    """Whether a manifest is one of ours, as far as others rely on it; names in it become names of files."""
-    if manifest["format"] != FORMAT:
-        raise ValueError(f"has format {manifest['format']!r}, not {FORMAT}")
-    if not isinstance(manifest["name"], str) or not isinstance(manifest["campaign"], dict):
-        raise ValueError("names no campaign")
-    if not manifest["seeds"] or not all(isinstance(seed, int) for seed in manifest["seeds"]):
-        raise ValueError("has no seeds")
-    if not all(isinstance(persona, str) for persona in manifest["personas"]):
-        raise ValueError("has no personas")
-    for name, entry in manifest["stages"].items():
-        if name != stage_id(entry["name"], entry["seed"]) or not _STAGE.fullmatch(name):
+def _check(content: bytes) -> dict[str, Any]:
+    """A manifest that is one of ours, as far as others rely on it; names in it become names of files."""
+    manifest = check_manifest(content, FORMAT)
+    for name, entry in manifest.stages.items():
+        if name != stage_id(entry.name, entry.seed) or not _STAGE.fullmatch(name):
             raise ValueError(f"{name!r} is no stage")
-        if entry["kind"] not in ("training", "assessment") or not isinstance(entry["status"], str):
-            raise ValueError(f"says nothing of stage {name!r}")
+    return dict(json.loads(content))
 
 
 def _only_begun(folder: Path) -> bool:
@@ -118,7 +114,11 @@ class RunFolder:
     def done(self, stage: str) -> dict[str, Any] | None:
         """What the seal of a stage says, whether it holds or not; None if there is none."""
         said = read_seal(self.work(stage) / "done.json")
-        return said if said is not None and isinstance(said.get("info"), dict) else None
+        try:
+            StageEntry.model_validate({**_ANY_STAGE, **(said or {})["info"]})
+        except (ValueError, LookupError, TypeError):
+            return None
+        return said
 
     def finished(self, stage: str, key: str) -> dict[str, Any] | None:
         """What came of a stage when it was done from these very inputs, without an error; None if it is not done, or
@@ -151,21 +151,32 @@ class RunFolder:
     def manifest(self) -> dict[str, Any]:
         """The manifest. Raises UsageError if the folder has none that can be read."""
         try:
-            manifest = json.loads(self.manifest_file.read_text(encoding="utf-8"))
-            _check(manifest)
+            manifest = _check(content_of(self.manifest_file, _MOST_MANIFEST_BYTES))
         except (FileNotFoundError, NotADirectoryError):
             raise UsageError.of(
                 self.path, "", f"is not a run folder: it has no {MANIFEST}", "name the folder a campaign wrote"
             ) from None
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
+        except (OSError, ValueError, RecursionError) as error:
+            text = error.strerror if isinstance(error, OSError) else error
             raise UsageError.of(
-                self.manifest_file, "", f"is damaged: {error}", "run the campaign again into another folder, with --out"
+                self.manifest_file, "", f"is damaged: {text}", "run the campaign again into another folder, with --out"
             ) from None
-        return dict(manifest)
+        self._check_links()
+        return manifest
+
+    def _check_links(self) -> None:
+        """Raises UsageError where the folder has a link that leads out of it: what is behind it is not the run's, to
+        be read or to be written over."""
+        for folder, folders, files in os.walk(self.path):
+            for name in (*folders, *files):
+                place = Path(folder) / name
+                if place.is_symlink() and leads_out(place, self.path):
+                    message = "is a link that leads out of the run folder"
+                    raise UsageError.of(place, "", message, "put there what it points to")
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
         """Raises UsageError where what the stages wrote is gone, as in a folder that was published without it, or is
-        not what they wrote."""
+        not what they wrote, or the manifest says what no campaign can be."""
         done = [name for name, entry in manifest["stages"].items() if entry["status"] == "done"]
         if done and not any(self.work(name).is_dir() for name in done):
             raise UsageError.of(
@@ -174,12 +185,17 @@ class RunFolder:
                 "holds a report and its tables, but not what they are made of",
                 f"read its report.html, or play the games: run campaign {manifest['name']!r} again",
             )
+        remedy = "run the campaign again"
+        found = [
+            Problem(str(self.manifest_file), key, f"is damaged: {message}", remedy)
+            for key, message in problems_for_report(manifest)
+        ]
         damaged = [file for name in done for file in self._damaged(name, manifest["stages"][name])]
         if isinstance(hashes := manifest.get("hashes"), dict):
             damaged += [file for file in sorted(self.scene.glob("*")) if not _is_one_of(file, hashes)]
-        if damaged:
-            message = "is gone, or is not what the campaign wrote"
-            raise UsageError(Problem(str(file), "", message, "run the campaign again") for file in damaged)
+        found += [Problem(str(file), "", "is gone, or is not what the campaign wrote", remedy) for file in damaged]
+        if found:
+            raise UsageError(found)
 
     def _damaged(self, stage: str, entry: Mapping[str, Any]) -> list[Path]:
         said = self.done(stage)

@@ -12,7 +12,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from harness.file_content import content_of
 from harness.files import sync_file, sync_folder, write_atomically
+
+_MOST_BYTES = 50_000_000
 
 
 def write_seal(seal: Path, top: Path, files: Iterable[Path], facts: Mapping[str, Any]) -> None:
@@ -28,7 +31,7 @@ def write_seal(seal: Path, top: Path, files: Iterable[Path], facts: Mapping[str,
 def read_seal(seal: Path) -> dict[str, Any] | None:
     """What a seal says; None where there is none that can be read."""
     try:
-        said = json.loads(seal.read_text(encoding="utf-8"))
+        said = json.loads(content_of(seal, _MOST_BYTES))
     except (OSError, ValueError, RecursionError):
         return None
     return said if isinstance(said, dict) else None

@@ -9,6 +9,7 @@ lines end in a line feed. A table is known by its columns, which are declared he
 from __future__ import annotations
 
 import csv
+import io
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -19,6 +20,7 @@ from scipy import stats
 
 from harness.comparison import COMPARISON_COLUMNS, CONFIDENCE, mean_interval
 from harness.errors import UsageError
+from harness.file_content import content_of
 from harness.files import replace_durably, scratch_beside, write_atomically
 
 EPISODE_COLUMNS = {
@@ -106,6 +108,7 @@ TABLES = {
     "manoeuvres": MANOEUVRE_COLUMNS,
 }
 
+_MOST_BYTES = 500_000_000
 _TRUTH = {"true": True, "false": False}
 
 
@@ -254,9 +257,9 @@ def read_csv(path: Path) -> pd.DataFrame:
     """
     remedy = "run the campaign again: it writes its tables anew"
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.reader(file, strict=True)
-            header, lines = next(reader, []), list(reader)
+        text = content_of(path, _MOST_BYTES).decode("utf-8")
+        reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+        header, lines = next(reader, []), list(reader)
         columns = _columns_of(header)
         cells = list(zip(*lines, strict=True)) if lines else [()] * len(header)
         if len(cells) != len(header):
@@ -266,7 +269,7 @@ def read_csv(path: Path) -> pd.DataFrame:
         )
     except OSError as error:
         raise UsageError.of(path, "", f"can't be read: {error.strerror}", remedy) from error
-    except (ValueError, csv.Error) as error:
+    except (ValueError, OverflowError, csv.Error) as error:
         raise UsageError.of(path, "", f"is not a table of this harness: {error}", remedy) from error
 
 

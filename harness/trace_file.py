@@ -11,11 +11,18 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import numpy as np
 import pandas as pd
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from harness.errors import UsageError
+from harness.file_content import check_file
 from harness.files import replace_durably, scratch_beside
+from harness.game.arrays import FloatArray
+
+_MOST_BYTES = 10**12
+_LARGEST, _MOST_STEPS = 1e8, 1_000_000
 
 _TEXT = pa.dictionary(pa.int32(), pa.string())
 SCHEMA = pa.schema(
@@ -33,6 +40,8 @@ SCHEMA = pa.schema(
         ("outcome", _TEXT),
     ]
 )
+
+_NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
 class TraceWriter:
@@ -64,8 +73,17 @@ def join_traces(parts: Sequence[Path], path: Path) -> None:
 
 
 def read_trace(path: Path, episode: int) -> pd.DataFrame:
-    """One game's trace; empty if the file has none of that episode."""
-    return _frame(pq.read_table(path, filters=[("episode", "==", episode)]))
+    """One game's trace; empty if the file has none of that episode. Raises UsageError if it is no file of traces, or
+    holds what no game can be."""
+    try:
+        check_file(path, _MOST_BYTES)
+        table = pq.read_table(path, filters=[("episode", "==", episode)])
+        _check_schema(table.schema)
+        frame = table.to_pandas()
+        _check_game(frame)
+    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+        raise _damaged(path, error) from None
+    return _worded(frame)
 
 
 def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
@@ -101,7 +119,53 @@ def _row_groups(path: Path) -> Iterator[pa.Table]:
 
 
 def _frame(table: pa.Table) -> pd.DataFrame:
-    frame = table.to_pandas()
+    return _worded(table.to_pandas())
+
+
+def _worded(frame: pd.DataFrame) -> pd.DataFrame:
     for name in ("player", "vehicle_type", "outcome"):
         frame[name] = frame[name].astype(str)
     return frame
+
+
+def check_traces(path: Path, episodes: Iterable[int]) -> None:
+    """Raise UsageError unless this is a file of traces, whose numbers can be a game's, with all these episodes."""
+    missing = set(episodes)
+    try:
+        check_file(path, _MOST_BYTES)
+        with pq.ParquetFile(path) as file:
+            _check_schema(file.schema_arrow)
+            for batch in file.iter_batches(columns=["episode", *_NUMBERS]):
+                _check_numbers(np.stack([batch.column(name).to_numpy(False) for name in _NUMBERS]))
+                missing.difference_update(np.unique(batch.column("episode").to_numpy(False)).tolist())
+    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+        raise _damaged(path, error) from None
+    if missing:
+        raise _damaged(path, ValueError(f"it has no trace of episode {min(missing)}"))
+
+
+def _check_schema(schema: pa.Schema) -> None:
+    if not schema.equals(SCHEMA):
+        wrong = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]
+        raise ValueError(f"its columns are not those of a trace: {', '.join(wrong)[:200]}")
+
+
+def _check_game(frame: pd.DataFrame) -> None:
+    _check_numbers(frame[_NUMBERS].to_numpy(float))
+    steps = frame["step"]
+    if frame.isna().any(axis=None) or (len(frame) and not (0 <= steps.min() <= steps.max() <= _MOST_STEPS)):
+        raise ValueError("it has empty cells, or steps that no game has")
+    if frame.duplicated(["step", "player"]).any():
+        raise ValueError("somebody is in two places at once")
+
+
+def _check_numbers(numbers: FloatArray) -> None:
+    if not (np.abs(numbers) <= _LARGEST).all():  # never true of NaN
+        raise ValueError("it holds numbers that are none, or too large to be of a game")
+
+
+def _damaged(path: Path, error: Exception) -> UsageError:
+    text = (error.strerror or error) if isinstance(error, OSError) else error
+    return UsageError.of(
+        path, "", f"is not a file of traces: {text}", "run the campaign again: it plays its games anew"
+    )

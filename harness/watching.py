@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.documents.reading import nearest
-from harness.errors import UsageError
+from harness.errors import UsageError, plain
 from harness.manoeuvres import pairs_in
 from harness.replay import follow_in_sumo_gui, replay_name, worst_first, write_film, write_replay
 from harness.rounds import stage_id
@@ -48,7 +48,7 @@ def game_table(run: Path, arm: str | None) -> Table:
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
         pair = pairs.get((game.arm, game.seed, game.episode))
         words = (str(game.seed), str(game.episode), game.ego_outcome, game.non_ego_outcome, pair.words if pair else "")
-        table.add_row(game.arm, *words, ttc)
+        table.add_row(*(Text(plain(cell)) for cell in (game.arm, *words, ttc)))  # text, whatever the table says
     return table
 
 
@@ -64,7 +64,8 @@ class FoundGame:
 
 @contextmanager
 def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
-    """A game with its replay folder; one that has none yet gets one from its trace, for as long as the block lasts.
+    """A game with a replay folder, made of its trace for as long as the block lasts. What lies under `replays/` is for
+    SUMO alone: a configuration there could have SUMO read and write anything, so it is not opened here.
 
     Raises UsageError if there is no such game, or it could not be played.
     """
@@ -92,19 +93,20 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
     trace = read_trace(folder.traces(stage_id(arm, chosen_seed)), episode)
     title = f"{arm}, seed {chosen_seed}, episode {episode}"
     name = replay_name(arm, chosen_seed, episode)
+    if trace.empty:
+        traces = folder.traces(stage_id(arm, chosen_seed))
+        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
     with TemporaryDirectory(prefix="harness-replay-") as scratch:
-        replay = folder.replays / name
-        if not replay.is_dir():
-            replay = Path(scratch) / name
-            write_replay(
-                trace,
-                scene.net_file,
-                scene.routes.path,
-                replay,
-                title=title,
-                step_length_s=scene.world.step_s,
-                rails=scene.rail_lines,
-            )
+        replay = Path(scratch) / name
+        write_replay(
+            trace,
+            scene.net_file,
+            scene.routes.path,
+            replay,
+            title=title,
+            step_length_s=scene.world.step_s,
+            rails=scene.rail_lines,
+        )
         yield FoundGame(replay, trace, title, scene.world.step_s)
 
 

@@ -25,7 +25,8 @@ PAGE = REPOSITORY / "docs" / "reproduction.md"
 def script(name: str) -> ModuleType:
     """A script of the folder, as a module."""
     spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # dataclasses look their module up
     spec.loader.exec_module(module)

@@ -137,7 +137,7 @@ def test_departures__in_order_of_time_without_the_players(write: Write) -> None:
         ('<flow id="f" route="through" number="3"/>', "flow f: has no rate"),
         ('<flow id="f" route="through" begin="5" end="4" number="3"/>', "flow f.end: does not lie after its begin"),
         ('<vehicle id="v" route="through"/><vehicle id="v" route="through"/>', "vehicle v: stands twice"),
-        ('<trip id="t" from="a" to="b"/>', "trip: is not understood here (use vType"),
+        ('<trip id="t" from="a" to="b"/>', "trip: is not understood here (valid: flow, route, vType"),
     ],
 )
 def test_mistake__is_named_with_its_place_and_remedy(write: Write, inside: str, said: str) -> None:

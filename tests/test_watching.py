@@ -67,7 +67,18 @@ def test_report__names_what_an_older_run_has_not(run: Path) -> None:
     assert (run / "manoeuvres.csv").read_bytes() == before
 
 
-def test_game__with_and_without_a_replay_folder(run: Path) -> None:
+def test_game__is_made_of_its_trace_and_not_of_what_lies_under_replays(run: Path) -> None:
+    name = replay_name("naive_alone", 1, 3)
+    with found_game(run, "naive_alone", 3, None) as game:
+        before = {file.name: file.read_bytes() for file in game.replay.iterdir()}
+    (run / "replays" / name).mkdir(exist_ok=True)
+    # a configuration can have SUMO write anywhere: whoever sent the folder may have put one there
+    (run / "replays" / name / "scene.sumocfg").write_text("<configuration><log value='/tmp/mine'/></configuration>")
+    with found_game(run, "naive_alone", 3, 1) as game:
+        assert {file.name: file.read_bytes() for file in game.replay.iterdir()} == before
+
+
+def test_game__needs_no_replay_folder(run: Path) -> None:
     name = replay_name("naive_alone", 1, 3)
     shutil.rmtree(run / "replays")
     with found_game(run, "naive_alone", 3, None) as game:
@@ -76,10 +87,7 @@ def test_game__with_and_without_a_replay_folder(run: Path) -> None:
         assert game.title == "naive_alone, seed 1, episode 3"
         assert not (run / "replays").exists()
         scratch = game.replay.parent
-        shutil.copytree(game.replay, run / "replays" / name)
     assert not scratch.exists()
-    with found_game(run, "naive_alone", 3, 1) as game:
-        assert game.replay == run / "replays" / name
 
 
 def test_watch__without_a_screen_names_the_film(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,14 +14,16 @@ from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
+Input = Annotated[float, Field(ge=-1e6, le=1e6)]
+Membership = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Source(Document):
     """What is known of such people: the statistic the persona rests on, and where it is from."""
 
-    statistic: str = Field(min_length=10)
+    statistic: str = Field(min_length=10, max_length=2000)
     """What was counted or measured, with its figure."""
-    citation: str = Field(min_length=5)
+    citation: str = Field(min_length=5, max_length=2000)
     """Who published it, where and when."""
 
 
@@ -56,7 +58,9 @@ class MembershipFunction(Document):
 
     name: Name
     """What the set is called."""
-    points: list[tuple[float, Annotated[float, Field(ge=0.0, le=1.0)]]] = Field(min_length=1, max_length=20)
+    points: list[tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=0.0, le=1.0)]]] = Field(
+        min_length=1, max_length=20
+    )
     """Points of [input in the quantity's unit, membership], the inputs rising."""
     value: float = Field(ge=-1000.0, le=1000.0)
     """What being wholly in this set is worth, per second."""
@@ -124,7 +128,7 @@ class Fuzzy(Document):
 class Human(Group):
     """The human group: besides named terms, any number of fuzzy ones."""
 
-    fuzzy: list[Fuzzy] = Field(default_factory=list)
+    fuzzy: list[Fuzzy] = Field(default_factory=list, max_length=50)
     """Terms declared by membership functions."""
 
 
@@ -170,9 +174,9 @@ class Persona(Document):
 
     name: Name
     """What such a person is called, in stages, arms and tables."""
-    description: str = Field(min_length=10)
+    description: str = Field(min_length=10, max_length=2000)
     """Who this is, in a sentence."""
-    sources: list[Source] = Field(min_length=1)
+    sources: list[Source] = Field(min_length=1, max_length=50)
     """What is known of such people: no persona without a statistic."""
     safety: Group = Group()
     operational: Group = Group()

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import difflib
 import json
+import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
 from harness.errors import Problem, UsageError
+from harness.file_content import content_of
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -35,6 +37,10 @@ class Mistakes(ValueError):
         super().__init__("; ".join(f"{key}: {message}" for key, message, _ in found))
 
 
+_MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
+_NAMES_SHOWN, _COMPARED = 40, 200
+_QUOTED = re.compile(r""""[^"\n]*"|'[^'\n]*'""")
+_ENDLESS_KEY = re.compile(r"(?<![\w.-])(?:[\w-]+[ \t]*\.[ \t]*){50}")
 NUMBER, TABLE = "<number>", "<table>"  # tags of what may be either; not part of any key
 
 D = TypeVar("D", bound=Document)
@@ -42,29 +48,46 @@ D = TypeVar("D", bound=Document)
 
 def read_document(path: Path, model: type[D]) -> D:
     """Read a TOML file into a model. Raises UsageError naming file, key and remedy for each mistake in it."""
+    remedy = "a UTF-8 TOML file is needed"
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = content_of(path, _MOST_BYTES).decode("utf-8")
     except FileNotFoundError:
         raise UsageError.of(path, "", "there is no such file", _similar_file(path)) from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError.of(path, "", f"cannot be read: {error}", "a UTF-8 TOML file is needed") from None
+    except OSError as error:
+        raise UsageError.of(path, "", f"cannot be read: {error.strerror}", remedy) from None
+    except UnicodeDecodeError as error:
+        raise UsageError.of(path, "", f"cannot be read: {error}", remedy) from None
+    if text.startswith("\ufeff"):
+        raise UsageError.of(path, "", "begins with a byte order mark", "save it as UTF-8 without one")
+    if _ENDLESS_KEY.search(_QUOTED.sub("q", text)):  # it would be read for minutes
+        raise UsageError.of(path, "", "has tables in tables without end", "no key has more than a few dots")
     try:
         table = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: besides bad TOML, a number of thousands of digits
         raise UsageError.of(path, "", f"is not valid TOML: {error}", "mend it at the line named") from None
+    return _validated(path, table, model)
+
+
+def _validated(path: Path, table: dict[str, Any], model: type[D]) -> D:
     try:
         return model.model_validate_json(json.dumps(table, default=str))
     except ValidationError as error:
-        raise UsageError(found for each in error.errors() for found in _problems(path, model, each)) from None
+        first = error.errors(include_url=False)[:_MOST_MISTAKES]
+        raise UsageError(found for each in first for found in _problems(path, model, each)) from None
+    except RecursionError:
+        raise UsageError.of(path, "", "has tables in tables without end", "no key has more than a few dots") from None
     except ValueError as error:  # NaN and infinity have no place in JSON
         raise UsageError.of(path, "", str(error), "numbers must be finite") from None
 
 
-def nearest(word: str, words: Any) -> str:
-    """A remedy naming the valid word nearest to a misspelt one, or all of them."""
+def nearest(word: str, words: Iterable[str]) -> str:
+    """A remedy naming the valid word nearest to a misspelt one, or all of them, if they are not too many."""
     words = sorted(words)
-    close = difflib.get_close_matches(word, words, n=1, cutoff=0.5)
-    return f"did you mean {close[0]!r}?" if close else f"valid: {', '.join(words)}"
+    close = difflib.get_close_matches(word[:_COMPARED], words, n=1, cutoff=0.5)
+    if close:
+        return f"did you mean {close[0]!r}?"
+    more = f" and {len(words) - _NAMES_SHOWN} more" if len(words) > _NAMES_SHOWN else ""
+    return f"valid: {', '.join(words[:_NAMES_SHOWN])}{more}"
 
 
 def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Problem]:

@@ -95,8 +95,8 @@ def rails(lines: Sequence[FloatArray], reach_m: float) -> Rails:
 
 def find_edge(net: Net, path: Path, key: str, name: str) -> Edge:
     """The edge of that name; UsageError with the nearest one otherwise."""
-    names = [edge.getID() for edge in net.getEdges(withInternal=False)]
-    if name not in names:
+    if not net.hasEdge(name) or net.getEdge(name).isSpecial():
+        names = [edge.getID() for edge in net.getEdges(withInternal=False)]
         raise UsageError.of(path, key, f"the net has no edge {name!r}", nearest(name, names))
     return net.getEdge(name)
 

@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from pydantic import ConfigDict
 from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
-from harness.documents.reading import nearest, read_document
-from harness.documents.scene import Player, Scene, scene_file
+from harness.documents.reading import Document, nearest, read_document
+from harness.documents.scene import PlainFile, Player, Scene, scene_file
 from harness.errors import Problem, UsageError, attempt
+from harness.file_content import leads_out
 from harness.game.arrays import FloatArray
 from harness.game.attention import Habits
 from harness.game.bicycle import Actuators
@@ -25,8 +26,12 @@ from harness.game.road import MARGIN_M, SPACING_M, Road, Route, Routes
 from harness.game.start import Chances, Place
 from harness.game.state import ROLES
 from harness.traffic import network
-from harness.traffic.route_file import Departure, RouteFile, VehicleType, parse_xml, read_route_file
+from harness.traffic.departures import check_departures, edges_of
+from harness.traffic.net_file import check_net
+from harness.traffic.route_file import Departure, RouteFile, VehicleType, read_route_file
 from harness.traffic.route_table import route_table
+
+_LONGEST_ROUTE_M = 50_000.0
 
 
 @dataclass(frozen=True)
@@ -65,24 +70,37 @@ class OpenScene:
         return Chances(self.places, self.world.length_m, habits, present_share, self.world.steps, self.world.step_s)
 
 
+class _NamedFiles(Document):
+    """The files that a scene names: what is wrong with the rest of it keeps nobody from looking at them."""
+
+    model_config = ConfigDict(extra="ignore")
+    net: PlainFile
+    routes: PlainFile
+
+
 def open_scene(folder: Path) -> OpenScene:
     """Read a scene's folder. Raises UsageError with every problem found in it."""
     document_file = scene_file(folder)
-    document = read_document(document_file, Scene)
-    net_file, route_path = folder / document.net, folder / document.routes
     problems: list[Problem] = []
-    net, routes = (
-        attempt(problems, lambda: _checked_net(net_file)),
-        attempt(problems, lambda: read_route_file(route_path)),
-    )
-    if net is None or routes is None:
+    attempt(problems, lambda: _check_within(document_file, folder))
+    if problems:
+        raise UsageError(problems)
+    document = attempt(problems, lambda: read_document(document_file, Scene))
+    named = document or attempt([], lambda: read_document(document_file, _NamedFiles))
+    if named is None:
+        raise UsageError(problems)
+    net_file, route_path = folder / named.net, folder / named.routes
+    net = attempt(problems, lambda: _checked_net(net_file, folder))
+    routes = attempt(problems, lambda: _checked_routes(route_path, folder))
+    if document is None or net is None or routes is None:
         raise UsageError(problems)
     area = network.drivable_area(net)
     opened = [
         attempt(problems, lambda k=k: _open_player(document_file, document, ROLES[k], net, area, routes))  # type: ignore[misc]
         for k in range(len(ROLES))
     ]
-    attempt(problems, lambda: _check_traffic(document, net, routes))
+    players = {player.vehicle for player in document.players}
+    attempt(problems, lambda: check_departures(players, net, routes))
     if problems or None in opened:
         raise UsageError(problems)
     places, tables, edges, types = zip(*opened, strict=True)
@@ -98,9 +116,20 @@ def open_scene(folder: Path) -> OpenScene:
     return OpenScene(folder, document, world, routes, places, edges, tuple(lines))
 
 
-def _checked_net(path: Path) -> Net:
-    parse_xml(path)
+def _check_within(path: Path, folder: Path) -> None:
+    if leads_out(path, folder):
+        raise UsageError.of(path, "", "is a link that leads out of the scene's folder", "copy there what it points to")
+
+
+def _checked_net(path: Path, folder: Path) -> Net:
+    _check_within(path, folder)
+    check_net(path)
     return network.read_net(path)
+
+
+def _checked_routes(path: Path, folder: Path) -> RouteFile:
+    _check_within(path, folder)
+    return read_route_file(path)
 
 
 def _open_player(
@@ -111,7 +140,7 @@ def _open_player(
     lane = attempt(problems, lambda: network.find_lane(net, file, f"{role}.lane", player.lane))
     goal = attempt(problems, lambda: _goal(file, document, net))
     vehicle = attempt(problems, lambda: _vehicle(file, role, player, routes))
-    edges = attempt(problems, lambda: _edges(vehicle, net, routes)) if vehicle else None
+    edges = attempt(problems, lambda: edges_of(vehicle, net, routes)) if vehicle else None
     place = attempt(problems, lambda: _place(file, document, role, player, lane, net)) if lane else None
     if lane is None or goal is None or vehicle is None or edges is None or place is None:
         raise UsageError(problems)
@@ -123,6 +152,10 @@ def _open_player(
             "choose a lane of one of its edges",
         )
     onward = edges[edges.index(lane.getEdge()) :]
+    length_m = sum(each.getLength() for each in onward)
+    if length_m > _LONGEST_ROUTE_M:
+        message = f"its route is {length_m / 1e3:,.0f} km long, up to {_LONGEST_ROUTE_M / 1e3:g} km are possible"
+        raise UsageError.of(routes.path, f"vehicle {vehicle.name}", message, "leave out edges")
     try:
         table = route_table(net, area, onward, goal, document.goal.position_m)
     except ValueError as error:
@@ -200,11 +233,6 @@ def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Depart
     return vehicle
 
 
-def _edges(departure: Departure, net: Net, routes: RouteFile) -> list[Edge]:
-    key = f"vehicle {departure.name}"
-    return [network.find_edge(net, routes.path, key, name) for name in departure.edges]
-
-
 def _place(file: Path, document: Scene, role: str, player: Player, lane: Lane, net: Net) -> Place:
     if player.beside_ego_m is None:
         reach, key = player.position_m, "position_m"
@@ -240,24 +268,6 @@ def _beside_ego(
         )
     assert document.ego.position_m is not None, "the document says that the ego has one"
     return document.ego.position_m[0] + beside_m[0], document.ego.position_m[1] + beside_m[1]
-
-
-def _check_traffic(document: Scene, net: Net, routes: RouteFile) -> None:
-    """Raise UsageError for what SUMO would refuse of the others in the middle of a game."""
-    players = {player.vehicle for player in document.players}
-    others = [each for name, each in routes.vehicles.items() if name not in players]
-    problems: list[Problem] = []
-    for other in [*others, *(flow.departure for flow in routes.flows)]:
-        where = (str(routes.path), f"vehicle {other.name}")
-        if other.name in ROLES and players <= routes.vehicles.keys():
-            problems.append(Problem(*where, "has a player's name without being it", "call it something else"))
-        edges = attempt(problems, lambda other=other: _edges(other, net, routes)) or []  # type: ignore[misc]
-        for edge, following in pairwise(edges):
-            if not edge.getConnections(following):
-                text = f"its route has no connection from edge {edge.getID()!r} to {following.getID()!r}"
-                problems.append(Problem(*where, text, "mend the route's edges"))
-    if problems:
-        raise UsageError(problems)
 
 
 def _actuators(document: Scene, types: Sequence[VehicleType]) -> Actuators:

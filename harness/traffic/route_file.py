@@ -6,21 +6,37 @@ often they restart, see the same traffic. XML is parsed with entities and extern
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
-from defusedxml import ElementTree as SafeElementTree
-from defusedxml.common import DefusedXmlException
 
 from harness.documents.reading import nearest
-from harness.errors import UsageError
+from harness.errors import Problem, UsageError, attempt
 from harness.game.arrays import FloatArray
+from harness.traffic.schema import Kind, kinds, problems_in
+from harness.traffic.xml_file import number_of, parse_xml
 
 _DEFAULT_TYPE = "DEFAULT_VEHTYPE"
 _FLOW_RATES = ("number", "period", "vehsPerHour", "probability")
+_DEPARTS = ("type", "route", "departLane", "departPos", "departSpeed")
+_NAME = re.compile(r"[^\s|\\'\";,<>&:!?*]{1,200}")
+_LEAST_PERIOD_S = 0.05
+# What makes sense of each number: above (or from, where it may be 0) and up to
+_RANGES = {
+    "length": (0.0, 100.0),
+    "width": (0.0, 10.0),
+    "maxSpeed": (0.0, 200.0),
+    "vehsPerHour": (0.0, 3600.0 / _LEAST_PERIOD_S),
+    "period": (_LEAST_PERIOD_S * 0.999, 1e7),
+    "probability": (-0.001, 1.0),
+}
+_TIMES = (-0.001, 1e7)
+_EMISSIONS = re.compile(r"(HBEFA[234]|Energy)/\w+|zero|default")  # others are read from files beside the scene
 
 
 @dataclass(frozen=True)
@@ -75,35 +91,18 @@ class RouteFile:
         return sorted((each for each in found if each.depart_s < until_s), key=lambda each: (each.depart_s, each.name))
 
 
-def parse_xml(path: Path) -> ElementTree.Element:
-    """The root of an XML file. Raises UsageError where it is missing, malformed or carries entities."""
-    try:
-        return SafeElementTree.parse(path).getroot()
-    except FileNotFoundError:
-        siblings = [each.name for each in path.parent.glob("*.xml")] or ["(no XML file in the folder)"]
-        raise UsageError.of(path, "", "there is no such file", nearest(path.name, siblings)) from None
-    except DefusedXmlException as error:
-        raise UsageError.of(path, "", f"carries XML entities: {error}", "remove them") from None
-    except (ElementTree.ParseError, OSError, ValueError, LookupError, RecursionError) as error:
-        raise UsageError.of(path, "", f"is not readable XML: {error}", "open it in netedit and save it again") from None
-
-
 def read_route_file(path: Path) -> RouteFile:
     """Read a `.rou.xml`. Raises UsageError for what can't be understood."""
     root = parse_xml(path)
-    types = {_DEFAULT_TYPE: VehicleType(_DEFAULT_TYPE)}
+    _check_names(path, root)
     only_types = ElementTree.Element("routes")
-    for element in root:
-        if element.tag in ("vType", "vTypeDistribution"):
-            only_types.append(element)
+    only_types.extend(element for element in root if element.tag in ("vType", "vTypeDistribution"))
+    problems: list[Problem] = []
+    types = {_DEFAULT_TYPE: VehicleType(_DEFAULT_TYPE)}
     for element in only_types.iter("vType"):
-        name = _attribute(path, element, "id")
-        types[name] = VehicleType(
-            name,
-            _number(path, element, "length", 5.0),
-            _number(path, element, "width", 1.8),
-            _number(path, element, "maxSpeed", 55.55),
-        )
+        kind = attempt(problems, lambda element=element: _vehicle_type(path, element))  # type: ignore[misc]
+        if kind is not None:
+            types[kind.name] = kind
     distributions = {_attribute(path, element, "id") for element in root.iter("vTypeDistribution")}
     routes = {
         _attribute(path, element, "id"): tuple(element.get("edges", "").split())
@@ -111,24 +110,78 @@ def read_route_file(path: Path) -> RouteFile:
         if element.tag == "route"
     }
     vehicles: dict[str, Departure] = {}
-    flows: list[Flow] = []
+    flows: dict[str, Flow] = {}
     for element in root:
         if element.tag in ("vehicle", "flow"):
-            departure = _departure(path, element, routes, set(types) | distributions)
-            if departure.name in vehicles or departure.name in (flow.departure.name for flow in flows):
-                raise UsageError.of(path, f"{element.tag} {departure.name}", "stands twice", "call one something else")
-            if element.tag == "vehicle":
+            departure = attempt(
+                problems,
+                lambda element=element: _departure(path, element, routes, set(types) | distributions),  # type: ignore[misc]
+            )
+            if departure is None:
+                continue
+            if departure.name in vehicles or departure.name in flows:
+                where = f"{element.tag} {departure.name}"
+                problems.append(Problem(str(path), where, "stands twice", "call one something else"))
+            elif element.tag == "vehicle":
                 vehicles[departure.name] = departure
             else:
-                flows.append(_flow(path, element, departure))
-        elif element.tag not in ("vType", "vTypeDistribution", "route"):
-            raise UsageError.of(
-                path,
-                element.tag,
-                "is not understood here",
-                "use vType, vTypeDistribution, route, vehicle or flow",
-            )
-    return RouteFile(path, types, vehicles, tuple(flows), ElementTree.tostring(only_types, encoding="unicode"))
+                flow = attempt(problems, lambda e=element, d=departure: _flow(path, e, d))  # type: ignore[misc]
+                if flow is not None:
+                    flows[departure.name] = flow
+    if problems:
+        raise UsageError(problems)
+    types_xml = ElementTree.tostring(only_types, encoding="unicode")
+    return RouteFile(path, types, vehicles, tuple(flows.values()), types_xml)
+
+
+def _check_names(path: Path, root: ElementTree.Element) -> None:
+    """Raise UsageError for every element and attribute that nothing here would act upon, and for odd names."""
+    if root.tag != "routes":
+        raise UsageError.of(path, str(root.tag), "is not a SUMO route file: its root is not routes", "name a .rou.xml")
+    problems = list(problems_in(path, root, _understood(), "routesType"))
+    for element in root.iter():
+        name = element.get("id")
+        if name and not _NAME.fullmatch(name):
+            message = f"{name[:60]!r} can't be a name in SUMO"
+            problems.append(Problem(str(path), f"{element.tag}.id", message, "use letters, digits and _"))
+        if not _EMISSIONS.fullmatch(element.get("emissionClass", "default")):
+            message = f"{element.get('emissionClass')!r} may make SUMO read other files"
+            problems.append(Problem(str(path), f"{element.tag} {name}.emissionClass", message, "leave it out"))
+    if problems:
+        raise UsageError(problems)
+
+
+@cache
+def _understood() -> Mapping[str, Kind]:
+    """Of SUMO's schema, what the harness acts upon or hands to SUMO; of that, nothing that names files."""
+    known = kinds("routes_file.xsd")
+    files = ("imgFile", "osgFile")
+    types = {
+        name: Kind({each: must for each, must in kind.attributes.items() if each not in files}, kind.children)
+        for name, kind in known.items()
+    }
+    inside = {"route": "route within"}
+    rates = dict.fromkeys(("begin", "end", *_FLOW_RATES), False)
+    return types | {
+        "routesType": Kind(
+            children={name: name for name in ("vType", "vTypeDistribution", "route", "vehicle", "flow")}
+        ),
+        "vType": types["vTypeType"],
+        "vTypeDistribution": types["vTypeDistributionType"],
+        "route": Kind({"id": True, "edges": True, "color": False}),
+        "route within": Kind({"edges": True}),
+        "vehicle": Kind({"id": True, "depart": False, **dict.fromkeys(_DEPARTS, False)}, inside),
+        "flow": Kind({"id": True, **rates, **dict.fromkeys(_DEPARTS, False)}, inside),
+    }
+
+
+def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
+    return VehicleType(
+        _attribute(path, element, "id"),
+        _number(path, element, "length", 5.0),
+        _number(path, element, "width", 1.8),
+        _number(path, element, "maxSpeed", 55.55),
+    )
 
 
 def _departure(
@@ -163,6 +216,8 @@ def _flow(path: Path, element: ElementTree.Element, departure: Departure) -> Flo
     given = [name for name in _FLOW_RATES if element.get(name) is not None]
     if not given or (given == ["number"] and element.get("end") is None):
         raise UsageError.of(path, f"flow {departure.name}", "has no rate", f"give one of {', '.join(_FLOW_RATES[1:])}")
+    if len(set(given) - {"number"}) > 1:
+        raise UsageError.of(path, f"flow {departure.name}", f"has its rate twice: {', '.join(given)}", "give one")
     end = _number(path, element, "end", np.inf)
     if end <= departure.depart_s:
         raise UsageError.of(path, f"flow {departure.name}.end", "does not lie after its begin", "give a later end")
@@ -174,6 +229,9 @@ def _flow(path: Path, element: ElementTree.Element, departure: Departure) -> Flo
         period = _number(path, element, "period", 1.0)
     elif "number" in given:
         period = (end - departure.depart_s) / max(number or 1, 1)
+        if period < _LEAST_PERIOD_S:
+            text = f"one vehicle every {period:g} s is more than a lane takes"
+            raise UsageError.of(path, f"flow {departure.name}.number", text, "give a smaller number")
     probability = _number(path, element, "probability", 0.0) if "probability" in given else None
     return Flow(departure, end, period, probability, number)
 
@@ -213,21 +271,14 @@ def _number(path: Path, element: ElementTree.Element, name: str, default: float)
     value = element.get(name)
     if value is None:
         return default
-    try:
-        number = float(value)
-    except ValueError:
-        number = np.nan
-    if (
-        not np.isfinite(number)
-        or number < 0.0
-        or (name in ("length", "width", "maxSpeed", "vehsPerHour", "period") and number == 0.0)
-        or (name == "probability" and number > 1.0)
-    ):
+    number = number_of(value)
+    above, most = _RANGES.get(name, _TIMES)
+    if not above < number <= most or (name == "number" and number != int(number)):
         where = f"{element.tag} {element.get('id', '')}.{name}"
         raise UsageError.of(
             path,
             where,
-            f"{value!r} is not a number that makes sense here",
-            "give a number of seconds, metres or m/s",
+            f"{value[:60]!r} is not a number that makes sense here",
+            f"give a number of seconds, metres or m/s, up to {most:g}",
         )
     return number

@@ -16,7 +16,7 @@ import platformdirs
 import sumo
 
 from harness.errors import SimulationError
-from harness.traffic.route_file import parse_xml
+from harness.traffic.xml_file import parse_xml
 
 _GAP_M = 200.0
 

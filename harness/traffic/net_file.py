@@ -1,0 +1,144 @@
+"""Looking through a net file before anything else reads it: its names, its numbers, and what refers to what.
+
+SUMO takes the numbers of a net as they are, and may die of them (SIGSEGV) rather than complain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import chain, islice
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from harness.documents.reading import nearest
+from harness.errors import Problem, UsageError
+from harness.game.arrays import FloatArray
+from harness.traffic.schema import kinds, problems_in
+from harness.traffic.xml_file import number_of, parse_xml
+
+_REMEDY = "build it with netconvert or netedit"
+_MOST_PROBLEMS = 20
+_FARTHEST_M = 2e7  # from the origin of any map projection
+_WIDEST_M = 100_000.0
+_MOST_CELLS, _CELL_M = 4e6, 20.0  # of the grid that rails are found by
+_MOST_LANES = 63
+
+
+def check_net(path: Path) -> None:
+    """Raise UsageError, with file and element, for a net that can't be one, or that makes SUMO use other files."""
+    root = parse_xml(path)
+    if root.tag != "net":
+        raise UsageError.of(path, str(root.tag), "is not a SUMO net: its root is not net", _REMEDY)
+    named = list(problems_in(path, root, kinds("net_file.xsd"), "netType"))
+    if named:
+        raise UsageError(named)
+    found = chain(_numbers(root), _references(root))
+    problems = [Problem(str(path), key, message, _REMEDY) for key, message in islice(found, _MOST_PROBLEMS)]
+    if problems:
+        raise UsageError(problems)
+    if too_large := _too_large(root):
+        raise UsageError.of(path, "", too_large, "cut the part out of it that the scene is about")
+
+
+def _numbers(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    if not np.isfinite(number_of(root.get("version", ""))):
+        yield "net.version", "is no number"
+    location = root.find("location")
+    boundary = (location.get("convBoundary", "0,0,0,0") if location is not None else "0,0,0,0").split(",")
+    if len(boundary) != 4 or not np.isfinite([number_of(each) for each in boundary]).all():
+        yield "location.convBoundary", "is not four numbers"
+    for lane in root.iter("lane"):
+        key, internal = f"lane {lane.get('id')}", lane.get("id", "").startswith(":")
+        for name, usual, least, most in (
+            ("length", "", 0.0, _WIDEST_M),
+            ("speed", "", 0.0, 1000.0),
+            ("width", "3.2", 0.01, 200.0),
+        ):
+            given = lane.get(name, usual)
+            if not least < number_of(given) <= most:
+                yield f"{key}.{name}", f"{given[:60]!r} is not above {least:g} and up to {most:g}"
+        points = _points(lane.get("shape", ""))
+        if points is None or len(points) < 2:
+            yield f"{key}.shape", f"{lane.get('shape', '')[:60]!r} is not a line of points x,y"
+        elif not internal and not np.ptp(points, axis=0).any():
+            yield f"{key}.shape", "is a single place: the lane has no length"
+    for junction in root.findall("junction"):
+        key = f"junction {junction.get('id')}"
+        if not np.isfinite([number_of(junction.get(name, "")) for name in "xy"]).all():
+            yield key, "its place is not two numbers"
+        if junction.get("shape") and _points(junction.get("shape", "")) is None:
+            yield f"{key}.shape", f"{junction.get('shape', '')[:60]!r} is not points x,y"
+
+
+def _references(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    junctions = {each.get("id", "") for each in root.findall("junction")}
+    lanes: dict[str, list[str]] = {}
+    for edge in root.findall("edge"):
+        name = edge.get("id", "")
+        if name in lanes:
+            yield f"edge {name}", "stands twice"
+        lanes[name] = [lane.get("id", "") for lane in edge.findall("lane")]
+        if lanes[name] != [f"{name}_{k}" for k in range(len(lanes[name]))] or not 0 < len(lanes[name]) <= _MOST_LANES:
+            yield f"edge {name}", f"its lanes are not called {name}_0, {name}_1 and so on"
+        if not edge.get("function") or edge.get("function") == "normal":
+            for end in ("from", "to"):
+                if edge.get(end) not in junctions:
+                    remedy = nearest(edge.get(end, ""), junctions or ["(there is no junction)"])
+                    yield f"edge {name}.{end}", f"there is no junction {edge.get(end)!r}; {remedy}"
+    known = set(chain.from_iterable(lanes.values()))
+    for beside in root.iter("neigh"):
+        if beside.get("lane") not in known:
+            yield "neigh.lane", f"there is no lane {beside.get('lane')!r}; {nearest(beside.get('lane', ''), known)}"
+    onward: dict[str, list[str]] = {}
+    for link in root.findall("connection"):
+        key = f"connection from {link.get('from')} to {link.get('to')}"
+        for end in ("from", "to"):
+            lane = f"{link.get(end)}_{link.get(f'{end}Lane')}"
+            if lane not in known:
+                yield f"{key}.{end}", f"there is no lane {lane!r}; {nearest(lane, known or ['(there is no lane)'])}"
+        via = link.get("via")
+        if via and via not in known:
+            yield f"{key}.via", f"there is no lane {via!r}; {nearest(via, known or ['(there is no lane)'])}"
+        if via:
+            onward.setdefault(f"{link.get('from')}_{link.get('fromLane')}", []).append(via)
+    for first in onward:
+        if first.startswith(":") and _returns(first, onward):
+            yield f"lane {first}", "leads back to itself inside a junction"
+
+
+def _returns(first: str, onward: dict[str, list[str]]) -> bool:
+    seen, waiting = set(), list(onward[first])
+    while waiting:
+        lane = waiting.pop()
+        if lane == first:
+            return True
+        if lane not in seen and lane.startswith(":"):
+            seen.add(lane)
+            waiting += onward.get(lane, [])
+    return False
+
+
+def _points(shape: str) -> FloatArray | None:
+    """[n, 2] the points of a shape; None if it holds anything but numbers that can be places."""
+    parts = [point.split(",") for point in shape.split()]
+    if not parts or not all(len(part) in (2, 3) for part in parts):
+        return None
+    numbers: Sequence[Sequence[float]] = [[number_of(each) for each in part] for part in parts]
+    points = np.array([part[:2] for part in numbers])
+    within = all(abs(each) <= _FARTHEST_M for part in numbers for each in part)  # never true of NaN
+    return points if within else None
+
+
+def _too_large(root: ElementTree.Element) -> str:
+    lines = [_points(lane.get("shape", "")) for lane in root.iter("lane")]
+    drawn = [line for line in lines if line is not None]
+    if not drawn:
+        return ""
+    everywhere = np.concatenate(drawn)
+    width_m, height_m = np.ptp(everywhere, axis=0)
+    if width_m * height_m > _MOST_CELLS * _CELL_M**2 or max(width_m, height_m) > _WIDEST_M:
+        return f"is too large for a scene: {width_m / 1e3:,.0f} by {height_m / 1e3:,.0f} km"
+    cells = sum(float(np.prod(np.abs(np.diff(line, axis=0)) / _CELL_M + 1.0, axis=1).sum()) for line in drawn)
+    return f"has lines that are too long for a scene: {cells:,.0f} fields of 20 m" if cells > _MOST_CELLS else ""

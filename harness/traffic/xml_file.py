@@ -1,0 +1,65 @@
+"""Reading SUMO's XML files: UTF-8, no entities, no document type, nothing that names a schema of its own."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from xml.etree import ElementTree
+
+from defusedxml import ElementTree as SafeElementTree
+from defusedxml.common import DefusedXmlException
+
+from harness.documents.reading import nearest
+from harness.errors import UsageError
+from harness.file_content import content_of
+
+_MOST_BYTES = 200_000_000
+_REMEDY = "open it in netedit and save it again"
+_ENCODING = re.compile(r"""^<\?xml[^>]*?encoding\s*=\s*["']([^"']*)["']""")
+_SCHEMA = re.compile(r"https?://((www\.)?sumo-sim\.org|sumo\.dlr\.de)/xsd/\w+\.xsd")
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
+
+
+def parse_xml(path: Path) -> ElementTree.Element:
+    """The root of an XML file. Raises UsageError where it is missing, malformed or carries entities."""
+    try:
+        content = content_of(path, _MOST_BYTES)
+    except FileNotFoundError:
+        siblings = [each.name for each in path.parent.glob("*.xml")] or ["(no XML file in the folder)"]
+        raise UsageError.of(path, "", "there is no such file", nearest(path.name, siblings)) from None
+    except OSError as error:
+        raise UsageError.of(path, "", f"is not readable XML: {error.strerror}", _REMEDY) from None
+    try:
+        # SUMO's parser must see what ours sees: in any other encoding the two could differ
+        text = content.decode("utf-8-sig")
+        declared = _ENCODING.match(text)
+        if declared and declared[1].lower() not in ("utf-8", "us-ascii"):
+            raise ValueError(f"it says that it is written in {declared[1]}")
+        root: ElementTree.Element = SafeElementTree.fromstring(content, forbid_dtd=True)
+    except DefusedXmlException as error:
+        message = f"carries XML entities or a document type: {error}"
+        raise UsageError.of(path, "", message, "remove them") from None
+    except UnicodeDecodeError as error:
+        raise UsageError.of(path, "", f"is not readable XML: not UTF-8: {error}", "save it as UTF-8") from None
+    except (ElementTree.ParseError, ValueError, LookupError, RecursionError) as error:
+        raise UsageError.of(path, "", f"is not readable XML: {error}", _REMEDY) from None
+    _check_schema_names(path, root)
+    return root
+
+
+def _check_schema_names(path: Path, root: ElementTree.Element) -> None:
+    """A validating parser reads what these name: SUMO's own schemas, from the installed SUMO, and nothing else."""
+    for element in root.iter():
+        for name, value in element.attrib.items():
+            ours = name == f"{_XSI}noNamespaceSchemaLocation" and element is root and _SCHEMA.fullmatch(value)
+            if name.startswith(_XSI) and not ours:
+                key = f"{element.tag}.{name.removeprefix(_XSI)}"
+                raise UsageError.of(path, key, f"names the schema {value!r}", "leave it out, or name SUMO's own")
+
+
+def number_of(text: str) -> float:
+    """A number as SUMO reads one; NaN for what is none, is infinite or says that it is not a number."""
+    number = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan
+    return number if math.isfinite(number) else math.nan
