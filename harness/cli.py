@@ -29,6 +29,14 @@ statistics what changed:
     "is kept).",
 )
 
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code",
+        help="Let a driver run that is code which comes as a file: a program, an FMU, a file of Stable-Baselines3. "
+        "It can do whatever you can: use this for files you trust.",
+    ),
+]
 CampaignFile = Annotated[Path, typer.Argument(metavar="FILE", help="The campaign's TOML document.", show_default=False)]
 RunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
@@ -57,6 +65,7 @@ def campaign(
             min=1, metavar="N", help="Stages carried out at once.  [default: one per core]", show_default=False
         ),
     ] = None,
+    allow_code: AllowCode = False,
 ) -> None:
     """Train, assess, retrain, compare: run a campaign into its run folder.
 
@@ -70,7 +79,7 @@ def campaign(
     from harness.run_folder import RunFolder
     from harness.workers import cores
 
-    opened = open_campaign(file, quick)
+    opened = open_campaign(file, quick, allow_code)
     name = opened.document.name + ("-quick" if opened.quick else "")
     folder = RunFolder(out or Path("reports") / name)
     console = Console()
@@ -91,14 +100,14 @@ def campaign(
 
 
 @app.command()
-def check(file: CampaignFile) -> None:
+def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
     """Check a campaign and everything it names, and say what it would do; nothing is run or written."""
     from rich.console import Console
 
     from harness.preflight import open_campaign
     from harness.rounds import TrainingStage, plan
 
-    opened = open_campaign(file)
+    opened = open_campaign(file, allow_code=allow_code)
     stages = plan(opened.document, [persona.name for persona in opened.personas])
     trainings = sum(isinstance(stage, TrainingStage) for stage in stages)
     console = Console()
@@ -107,6 +116,8 @@ def check(file: CampaignFile) -> None:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     say(f"{file} is in order.")
+    if opened.ego_driver is not None:
+        say(f"The ego: {opened.ego_driver.in_words}. There is nothing to train in it: rounds 0 and 1.")
     how = f"{trainings} trainings of up to {opened.document.training.steps:,} steps"
     if opened.policies is not None:
         how = f"Players trained before, read from {opened.policies}: nothing is trained"

@@ -44,7 +44,7 @@ ALLOWED: dict[str, set[str]] = {
     "comparison": set(),
     "tables": {"errors", "files", "comparison"},
     "rounds": {"documents", "game", "comparison"},
-    "preflight": {"errors", "documents", "traffic", "policy_file", "rounds"},
+    "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds"},
     "run_folder": {"errors", "files", "rounds"},
     "series": {"game"},
     "manoeuvres": {"game", "series"},

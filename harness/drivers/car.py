@@ -43,6 +43,6 @@ class Car:
 
 def car_of(world: World, player: int) -> Car:
     """A player's car."""
-    *arrays, friction = world.actuators
-    own = Actuators(*(each[player : player + 1] for each in arrays), friction)
+    arrays = {name: value for name, value in world.actuators._asdict().items() if name != "friction"}
+    own = world.actuators._replace(**{name: value[player : player + 1] for name, value in arrays.items()})
     return Car(world.step_s, float(world.length_m[player]), float(world.width_m[player]), own)

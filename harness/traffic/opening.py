@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -65,15 +65,18 @@ class OpenScene:
         return Chances(self.places, self.world.length_m, habits, present_share, self.world.steps, self.world.step_s)
 
 
-def open_scene(folder: Path) -> OpenScene:
-    """Read a scene's folder. Raises UsageError with every problem found in it."""
+def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
+    """Read a scene's folder. Raises UsageError with every problem found in it.
+
+    `ego_type`: a vehicle type of the route file that the ego's car is of, instead of the one it has there.
+    """
     document_file = scene_file(folder)
     document = read_document(document_file, Scene)
     net_file, route_path = folder / document.net, folder / document.routes
     problems: list[Problem] = []
     net, routes = (
         attempt(problems, lambda: _checked_net(net_file)),
-        attempt(problems, lambda: read_route_file(route_path)),
+        attempt(problems, lambda: _of_type(read_route_file(route_path), document, ego_type)),
     )
     if net is None or routes is None:
         raise UsageError(problems)
@@ -96,6 +99,16 @@ def open_scene(folder: Path) -> OpenScene:
         document.time_limit_s,
     )
     return OpenScene(folder, document, world, routes, places, edges, tuple(lines))
+
+
+def _of_type(routes: RouteFile, document: Scene, ego_type: str | None) -> RouteFile:
+    if ego_type is None or document.ego.vehicle not in routes.vehicles:
+        return routes
+    if ego_type not in routes.types:
+        message, remedy = f"has no vehicle type {ego_type!r} for the ego to be of", nearest(ego_type, routes.types)
+        raise UsageError.of(routes.path, "vType", message, remedy)
+    ego = replace(routes.vehicles[document.ego.vehicle], vehicle_type=ego_type)
+    return replace(routes, vehicles={**routes.vehicles, document.ego.vehicle: ego})
 
 
 def _checked_net(path: Path) -> Net:
