@@ -204,8 +204,8 @@ def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car:
     counts = (
         "path = os.path.join(os.getcwd(), 'games'); n = (len(open(path).read()) if os.path.exists(path) else 0);"
         "message['type'] == 'begin' and open(path, 'a').write('x');"
-        "globals().__setitem__('decided', 0 if message['type'] == 'begin' else globals().get('decided', 0) + 1);"
-        "n == 2 and message['type'] == 'decide' and decided == 4 and sys.exit('flat tyre')"
+        "globals().__setitem__('steps', 0 if message['type'] == 'begin' else globals().get('steps', 0) + 1);"
+        "n == 2 and message['type'] == 'decide' and steps == 4 and sys.exit('flat tyre')"
     )
     mine, careful = driver(tmp_path, car, counts), read_document(CAREFUL, Persona)
     arm = Arm("naive_alone", merge, (mine, None), (careful, careful), 1)

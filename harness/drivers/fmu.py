@@ -59,7 +59,8 @@ def wiring(document: Fmu, file: Path) -> Wiring:
         description = fmpy.read_model_description(str(file))
         platforms = fmpy.supported_platforms(str(file))
     except Exception as error:  # fmpy raises what zipfile, lxml and its own checks do
-        raise UsageError.of(file, "", f"can't be read as an FMU: {error}", "export it again") from None
+        what = " ".join(f"can't be read as an FMU: {error}".split())
+        raise UsageError.of(file, "", what, "export it again") from None
     problems = []
     if description.coSimulation is None or not str(description.fmiVersion).startswith(("2.", "3.")):
         kinds = ("coSimulation", "modelExchange", "scheduledExecution")
