@@ -12,6 +12,7 @@ from pydantic import ConfigDict, Field, field_validator
 
 from harness.documents.campaign import DocumentPath
 from harness.documents.reading import Document, nearest, read_document
+from harness.documents.rules import Rules
 from harness.errors import UsageError
 from harness.game.observation import LAYOUT
 
@@ -100,7 +101,7 @@ class Python(Document):
     """Keyword arguments of the entry point."""
 
 
-DriverDocument: TypeAlias = Sumo | Process | Fmu | StableBaselines3 | Python
+DriverDocument: TypeAlias = Sumo | Rules | Process | Fmu | StableBaselines3 | Python
 
 KINDS: dict[str, type[Document]] = {
     get_args(model.model_fields["kind"].annotation)[0]: model for model in get_args(DriverDocument)

@@ -26,12 +26,14 @@ import numpy as np
 from harness.documents.campaign import LEARNED, SUMO, resolve
 from harness.documents.driver import DriverDocument, Fmu, Process, Python, StableBaselines3, Sumo, read_driver
 from harness.documents.reading import nearest
+from harness.documents.rules import Rules
 from harness.drivers.car import Car
 from harness.drivers.fmu import fmu_driver
 from harness.drivers.installed import entry_point, installed_driver, installed_names, version_of
 from harness.drivers.learned import LearnedDriver
 from harness.drivers.process import ProcessDriver
 from harness.drivers.protocol import Driver
+from harness.drivers.rules import RulesDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import DriverError, UsageError
 from harness.game.observation import SIZE
@@ -99,6 +101,8 @@ class GivenDriver:
                 return f"the policy {self.written}"
             case Sumo(vehicle_type=name):
                 return f"SUMO's own models of vehicle type {name} ({self.written})"
+            case Rules(name=name):
+                return f"the rules {name} ({self.written})"
             case Process(command=command):
                 return f"the program {' '.join(command)} ({self.written})"
             case Fmu(file=file):
@@ -121,6 +125,8 @@ class GivenDriver:
                 return LearnedDriver(read_policy(self.place), sampled)
             case Sumo():
                 return SumoDriver()
+            case Rules():
+                return RulesDriver(self.document, car)
             case Process(units=units, deadline_s=deadline_s, start_deadline_s=start_s):
                 return ProcessDriver(self.command, self.place, car, units, deadline_s, start_s)
             case Fmu(file=file):
