@@ -129,6 +129,36 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
         say(f"  {kind:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else ""))
 
 
+@app.command("check-driver")
+def check_driver(
+    driver: Annotated[
+        str,
+        typer.Argument(
+            metavar="DRIVER", help="A driver document, a policy's folder, or an installed driver.", show_default=False
+        ),
+    ],
+    scene: Annotated[
+        Path, typer.Option(metavar="DIR", help="The scene it drives on.  [default: networks/merge]", show_default=False)
+    ] = Path("networks/merge"),
+    games: Annotated[int, typer.Option(min=2, max=1000, metavar="N", help="Games to play.")] = 3,
+    allow_code: AllowCode = False,
+) -> None:
+    """Check that a driver keeps to the protocol, and say in words where it does not.
+
+    Plays seeded games twice, and shows them again all at once. Exit code 1: it does not keep to it.
+    """
+    from rich.console import Console
+
+    from harness.conformance import check_named
+
+    found = check_named(driver, scene, games, allow_code)
+    console = Console()
+    for line in found.lines():
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    if found.wrong:
+        raise typer.Exit(GAMES_ERRORED)
+
+
 @app.command()
 def report(run: RunPath) -> None:
     """Write the tables, replays and report.html of a run anew, from its folder alone."""

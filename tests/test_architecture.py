@@ -30,6 +30,7 @@ ALLOWED: dict[str, set[str]] = {
     "policy_file": {"errors", "files", "game"},
     "drivers": {"errors", "documents", "game", "policy_file"},
     "arena": {"errors", "documents", "game", "traffic", "drivers"},
+    "conformance": {"errors", "game", "traffic", "drivers", "arena"},
     "environments": {"errors", "documents", "game", "traffic", "drivers", "policy_file", "arena"},
     "vector_environment": {"game", "policy_file", "arena"},
     "convergence": set(),
