@@ -44,8 +44,8 @@ class Process(Document):
     units: Literal["si", "scaled"] = "si"
     """`si`: it sees metres, seconds and radians, and asks for acceleration_mps2 and steering_rad. `scaled`: it sees
     and acts as learned policies do, in -1 to 1."""
-    deadline_s: DeadlineS = 1.0
-    """How long a decision may take."""
+    deadline_s: DeadlineS = 10.0
+    """How long a decision may take. Not how quick it has to be: a busy machine must not change what comes of a game."""
     start_deadline_s: DeadlineS = 20.0
     """How long it may take to start."""
 
@@ -62,8 +62,8 @@ class Fmu(Document):
     """Which output of the FMU is `acceleration_mps2` and which `steering_rad`, where they are called otherwise."""
     start: dict[VariableName, float] = Field({}, max_length=1000)
     """Start values: of parameters, and of inputs that nothing is given to."""
-    deadline_s: DeadlineS = 1.0
-    """How long a decision may take."""
+    deadline_s: DeadlineS = 10.0
+    """How long a decision may take. Not how quick it has to be: a busy machine must not change what comes of a game."""
     start_deadline_s: DeadlineS = 60.0
     """How long it may take to load and to initialise."""
 
