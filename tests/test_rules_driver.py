@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,14 @@ def test_tunable__nothing_of_a_table_that_is_not_there_or_of_a_reference_driver(
         rules().tuned({"emergency_braking.brakes_ttc_s": 1.0})
     with pytest.raises(ValidationError):
         rules().tuned({"cruise.time_gap_s": 0.1})
+
+
+def test_page__tells_every_parameter_with_its_default(repository: Path) -> None:
+    page = (repository / "docs" / "egos-by-rules.md").read_text(encoding="utf-8")
+    for name in ("cruise", "lane_keeping", *REACTIONS):
+        table = page.split(f"### `[{name}]`")[1].split("###")[0]
+        told = dict(re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", table, re.MULTILINE))
+        assert {key: float(value) for key, value in told.items()} == getattr(rules(**{name: {}}), name).model_dump()
 
 
 # --- what is seen --------------------------------------------------------------------------------------------------

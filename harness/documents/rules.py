@@ -58,8 +58,9 @@ class EmergencyBraking(Document):
     """Time to collision at which it brakes with all it has."""
     warns_before_s: float = Field(0.8, ge=0.0, le=2.0)
     """UN R152, 5.2.1.1: the warning comes at the latest 0.8 s before the emergency braking. Nobody is there to heed
-    it: what is left of it is that the car rolls, with `warning_braking_mps2`."""
+    it: what is left of it is that the car slows by `warning_braking_mps2`."""
     warning_braking_mps2: float = Field(1.0, ge=0.0, le=4.0)
+    """Braking while it warns: a jolt and the brakes made ready."""
     braking_mps2: float = Field(9.0, ge=5.0, le=12.0)
     """UN R152, 5.2.1.2: at least 5 m/s^2. The car gives what it has."""
     build_up_mps3: float = Field(30.0, ge=5.0, le=200.0)
