@@ -104,6 +104,7 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
     """Check a campaign and everything it names, and say what it would do; nothing is run or written."""
     from rich.console import Console
 
+    from harness.documents.campaign import LEARNED
     from harness.preflight import open_campaign
     from harness.rounds import TrainingStage, plan
 
@@ -116,8 +117,9 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     say(f"{file} is in order.")
-    if opened.ego_driver is not None:
-        say(f"The ego: {opened.ego_driver.in_words}. There is nothing to train in it: rounds 0 and 1.")
+    if opened.document.ego.driver != LEARNED:
+        ego = opened.ego_driver.in_words if opened.ego_driver is not None else "SUMO's own models"
+        say(f"The ego: {ego}. There is nothing to train in it: rounds 0 and 1.")
     how = f"{trainings} trainings of up to {opened.document.training.steps:,} steps"
     if opened.policies is not None:
         how = f"Players trained before, read from {opened.policies}: nothing is trained"

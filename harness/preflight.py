@@ -66,7 +66,8 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
     personas = [attempt(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
     if ego_driver is not None and scene is not None:
         sampled = personas[0] is not None and personas[0].decisions == "sampled"
-        attempt(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled))
+        games = document.training.games if document is not None and document.policies is None else 1
+        attempt(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, games))
     policies = attempt(problems, lambda: _policies_folder(file, named.policies))
     for given, persona in zip(named.personas, personas[1:], strict=True):
         names = [each.name for each in personas[1:] if each is not None]

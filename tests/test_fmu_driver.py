@@ -194,6 +194,20 @@ def test_fmu__native_code_that_fails_costs_a_game_and_not_the_process(
     assert driver.decide(GAMES[:1], 0.0 * view, np.zeros((1, 2))).shape == (1, 2)
 
 
+def test_fmu__that_plays_one_game_at_a_time_says_so(tmp_path: Path, car: Car, twins: dict[int, Path]) -> None:
+    with zipfile.ZipFile(twins[2]) as whole, zipfile.ZipFile(tmp_path / "single.fmu", "w") as single:
+        for name in whole.namelist():
+            content = whole.read(name)
+            once = b'<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '
+            single.writestr(name, content.replace(b"<CoSimulation ", once) if name.endswith(".xml") else content)
+    driver = fmu_driver(document(), tmp_path / "single.fmu", car)
+    for _ in range(2):  # one after the other is well
+        driver.begin(GAMES[:1])
+        driver.decide(GAMES[:1], np.zeros((1, SIZE), dtype=np.float32), np.zeros((1, 2)))
+    with pytest.raises(DriverError, match=r"one game at a time only: give the campaign training\.games = 1"):
+        driver.begin(GAMES)
+
+
 def test_fmu__an_error_status_is_named(tmp_path: Path, car: Car) -> None:
     build = example()
     source = build.SOURCE.read_text().replace("step(twin, step_s);\n    return fmi2OK;", "return fmi2Error;")

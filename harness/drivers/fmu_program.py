@@ -48,7 +48,9 @@ class _Twin:
         inputs, outputs, _ = self._wiring
         self._set([vr for vr, _ in inputs], [seen[entry] for _, entry in inputs])
         now_s = self._steps * self._step_s
-        self._fmu.doStep(currentCommunicationPoint=now_s, communicationStepSize=self._step_s)
+        came = self._fmu.doStep(currentCommunicationPoint=now_s, communicationStepSize=self._step_s)
+        if not self._second and came[1]:
+            raise RuntimeError("the FMU asks for the end of the simulation")
         self._steps += 1
         return [float(value) for value in (self._fmu.getReal if self._second else self._fmu.getFloat64)(outputs)]
 
@@ -92,6 +94,8 @@ def _answer(
         for game in games:
             if game in twins:
                 twins.pop(game).close()
+            if twins and description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
+                raise RuntimeError("the FMU can play one game at a time only: give the campaign training.games = 1")
             twins[game] = _Twin(spec, description, folder, game)
         return {}
     return {"actions": [twins[game].decide(seen) for game, seen in zip(games, message["observation"], strict=True)]}

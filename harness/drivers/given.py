@@ -79,7 +79,7 @@ class GivenDriver:
         if self.document is None:
             return self.files[str(policy_files(self.place)[1])]
         document = self.document.model_dump(mode="json")
-        return {"document": document, "files": sorted(self.files.values()), "package": dict(self.package)}
+        return {"document": document, "files": list(self.files.values()), "package": dict(self.package)}
 
     @property
     def recorded(self) -> dict[str, Any]:
@@ -138,14 +138,13 @@ class GivenDriver:
             case Python(entry_point=name, parameters=parameters):
                 return installed_driver(entry_point(name, self.written, "entry_point"), car, parameters)
 
-    def try_out(self, car: Car, sampled: bool) -> None:
-        """Make it, begin a game and decide once. Raises UsageError where that fails."""
+    def try_out(self, car: Car, sampled: bool, games: int = 1) -> None:
+        """Make it, begin so many games at once and decide once. Raises UsageError where that fails."""
         try:
             driver = self.make(car, sampled)
             if driver.takes_over:
-                games = np.zeros(1, dtype=np.int64)
-                driver.begin(games)
-                driver.decide(games, np.zeros((1, SIZE), dtype=np.float32), np.zeros((1, 2)))
+                driver.begin(np.arange(games))
+                driver.decide(np.arange(games), np.zeros((games, SIZE), dtype=np.float32), np.zeros((games, 2)))
         except UsageError:
             raise
         except Exception as error:  # a driver may raise what it likes
