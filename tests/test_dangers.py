@@ -212,8 +212,10 @@ def crashes(
 ) -> BoolArray:
     """[K] who crashes: a car in the next lane moves over at `approach_mps`, from each of these gaps; one's own keeps
     to its speed until it reacts, and to what is left of it afterwards. Stepped like the programme."""
-    gap, offset = gaps_m.astype(float), np.full(len(gaps_m), LANE_M)
-    own, before = np.full(len(gaps_m), own_kmh * KMH), np.full(len(gaps_m), own_kmh * KMH)
+    gap: FloatArray = gaps_m.astype(float)
+    offset: FloatArray = np.full(len(gaps_m), LANE_M)
+    own: FloatArray = np.full(len(gaps_m), own_kmh * KMH)
+    before = own
     other, crashed = np.full(len(gaps_m), other_kmh * KMH), np.zeros(len(gaps_m), dtype=bool)
     gap, offset = gap + STEP_S * (other - own), offset - STEP_S * approach_mps  # as its first sample is
     alert = Alert(*np.zeros((3, len(gaps_m))))
@@ -276,7 +278,7 @@ PUBLISHED = [
 def test_cut_in__is_avoided_from_the_gap_that_the_published_programme_needs(
     driver: str, approach_mps: float, own_kmh: int, other_kmh: int, last_crash_m: int
 ) -> None:
-    gaps_m = np.arange(1, 60)
+    gaps_m = np.arange(1.0, 60.0)
     crashed = crashes(own_kmh, other_kmh, gaps_m, approach_mps, *REACTIONS[driver])
     assert abs(int(gaps_m[crashed].max()) - last_crash_m) <= 1
 

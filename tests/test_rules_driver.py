@@ -272,7 +272,7 @@ def test_driver__brakes_for_a_standing_car_as_its_document_says(car: Car) -> Non
     """A standing car 10 m ahead at 10 m/s: time to collision 1 s."""
     views = [seeing(10.0, ahead_m=14.6, ahead_mps=-10.0)] * 16
     asked = {
-        name: decided(begun(rules(**{name: {}} if name else {}), car), car, *views)  # type: ignore[arg-type]
+        name: decided(begun(rules(**{name: {}} if name else {}), car), car, *views)
         for name in ("", "emergency_braking", "careful_and_competent", "rss", "fuzzy")
     }
     assert asked[""][-1] == pytest.approx(-3.5), "cruising knows no emergency"
@@ -350,7 +350,7 @@ BENT = "".join(
 
 def test_games__a_bend_is_driven_slower_and_in_the_lane(repository: Path, tmp_path: Path) -> None:
     """Some 110 m of radius are 2.5 m/s^2 to the side at the limit of 16.67 m/s: the cruise control slows for it."""
-    places = {"ego": ("ab bc", "ab_0"), "non_ego": ("ab bc", "ab_1"), "goal": "bc"}
+    places: dict[str, object] = {"ego": ("ab bc", "ab_0"), "non_ego": ("ab bc", "ab_1"), "goal": "bc"}
     bent = build_scene(tmp_path / "bent", BENDS, BENT, places, goal_m=140.0, time_limit_s=40.0)
     for record in play(repository, bent, "adas", None, 3):
         assert (record["ego_outcome"], record["error"]) == ("goal", "")
