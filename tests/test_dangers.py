@@ -223,8 +223,8 @@ def crashes(
         clearance = np.abs(offset) - WIDTH_M
         crashed |= (clearance < 0.0) & (gap < 0.0) & (gap > -2.0 * LENGTH_M)
         moving = np.where(offset > 1e-9, approach_mps, 0.0)
-        columns = (gap > -1e9, gap + LENGTH_M, gap, offset, clearance, other, moving, np.full_like(gap, LENGTH_M))
-        met = Encounters(*(column[:, None] for column in columns))
+        columns = (gap + LENGTH_M, gap, offset, clearance, other, moving, np.full_like(gap, LENGTH_M))
+        met = Encounters(np.ones((len(gap), 1), dtype=bool), *(column[:, None] for column in columns))
         began = alert.braking_mps2[:, None]
         each, demand = reaction(met, own[:, None], ((own - before) / STEP_S)[:, None], began)
         alert, _, braking = react(alert, each[:, 0], demand[:, 0], manner, STEP_S)
