@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 import re
@@ -12,7 +13,7 @@ from typing import Any
 import pandas as pd
 import pytest
 from test_policy_file import some_policy
-from tiny import CAREFUL, MERGE, REPOSITORY, SPEEDY, harness, write_campaign
+from tiny import CAREFUL, MERGE, REPOSITORY, SPEEDY, TRAINING, harness, write_campaign
 
 from harness.documents.driver import KINDS
 from harness.documents.reading import tomllib
@@ -205,7 +206,8 @@ def test_plan__an_ego_with_nothing_to_train_gets_rounds_0_and_1(driver: object, 
 
 
 def played(folder: Path, driver: object, *options: object, **changes: Any) -> tuple[Path, dict[str, Any], pd.DataFrame]:
-    campaign = write_campaign(folder, ego=ego(driver), assessment={"episodes": 2}, **changes)
+    training = {**TRAINING, "steps": 1024}
+    campaign = write_campaign(folder, ego=ego(driver), training=training, assessment={"episodes": 2}, **changes)
     run = folder / "run"
     done = harness("campaign", campaign, "--out", run, *options)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -224,7 +226,7 @@ def check_rounds(run: Path, manifest: dict[str, Any], episodes: pd.DataFrame, in
     assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy"}
     assert set(episodes["error"]) == {""}
     assert manifest["ego_driver"]["in_words"] == in_words
-    page = (run / "report.html").read_text()
+    page = html.unescape((run / "report.html").read_text())
     assert in_words in page
     assert "0 and 1: there is nothing to train in this ego" in page
     assert "Round 2 was not played: this ego was not retrained." in page
@@ -266,7 +268,7 @@ def test_campaign__of_sumos_models(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_campaign__a_program_that_dies_costs_games_that_are_counted(tmp_path: Path) -> None:
-    """It dies whenever it drives faster than 13.5 m/s; the persona can't learn against it, and is named for that."""
+    """It dies of 12.5 m/s, in every game: the persona can't learn against it, and the training says why."""
     dies = (PERL / "drive.pl").read_text().replace("my $steering", "die 'too fast' if $speed > 12.5; my $steering", 1)
     shutil.copytree(PERL, tmp_path / "perl")
     (tmp_path / "perl" / "drive.pl").write_text(dies)
@@ -277,7 +279,9 @@ def test_campaign__a_program_that_dies_costs_games_that_are_counted(tmp_path: Pa
     manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
     assert "too fast" in manifest["stages"]["speedy-seed1"]["message"]
     assert manifest["stages"]["speedy-seed1"]["status"] == "failed"
-    assert episodes.empty or set(episodes["error"]) > {""}
+    assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo"}
+    assert set(episodes["ego_outcome"]) == {"error"}
+    assert episodes["error"].str.contains("DriverError: .*too fast").all()
 
 
 # --- the page about egos ---
