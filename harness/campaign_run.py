@@ -94,6 +94,7 @@ class _Ledger:
             "campaign": campaign.document.recorded(),
             "personas": [persona.name for persona in campaign.personas],
             "ego_persona": campaign.ego_persona.model_dump(mode="json"),
+            "ego_driver": campaign.ego_driver.recorded if campaign.ego_driver is not None else None,
             "persona_documents": {each.name: each.model_dump(mode="json") for each in campaign.personas},
             "seeds": list(campaign.document.seeds),
             "hashes": dict(campaign.hashes),

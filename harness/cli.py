@@ -41,6 +41,14 @@ statistics what changed:
     "terminated (what was done is kept).",
 )
 
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code",
+        help="Let a driver run that is code which comes as a file: a program, an FMU, a file of Stable-Baselines3. "
+        "It can do whatever you can: use this for files you trust.",
+    ),
+]
 CampaignFile = Annotated[Path, typer.Argument(metavar="FILE", help="The campaign's TOML document.", show_default=False)]
 RunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
@@ -69,6 +77,7 @@ def campaign(
             min=1, metavar="N", help="Stages carried out at once.  [default: one per core]", show_default=False
         ),
     ] = None,
+    allow_code: AllowCode = False,
 ) -> None:
     """Train, assess, retrain, compare: run a campaign into its run folder.
 
@@ -82,7 +91,7 @@ def campaign(
     from harness.run_folder import RunFolder
     from harness.workers import cores
 
-    opened = open_campaign(file, quick)
+    opened = open_campaign(file, quick, allow_code)
     name = opened.document.name + ("-quick" if opened.quick else "")
     folder = RunFolder(out or Path("reports") / name)
     console = Console()
@@ -104,14 +113,15 @@ def campaign(
 
 
 @app.command()
-def check(file: CampaignFile) -> None:
+def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
     """Check a campaign and everything it names, and say what it would do; nothing is run or written."""
     from rich.console import Console
 
+    from harness.documents.campaign import LEARNED
     from harness.preflight import open_campaign
     from harness.rounds import TrainingStage, plan
 
-    opened = open_campaign(file)
+    opened = open_campaign(file, allow_code=allow_code)
     stages = plan(opened.document, [persona.name for persona in opened.personas])
     trainings = sum(isinstance(stage, TrainingStage) for stage in stages)
     console = Console()
@@ -120,6 +130,9 @@ def check(file: CampaignFile) -> None:
         console.print(line, highlight=False, markup=False, soft_wrap=True)
 
     say(f"{file} is in order.")
+    if opened.document.ego.driver != LEARNED:
+        ego = opened.ego_driver.in_words if opened.ego_driver is not None else "SUMO's own models"
+        say(f"The ego: {ego}. There is nothing to train in it: rounds 0 and 1.")
     how = f"{trainings} trainings of up to {opened.document.training.steps:,} steps"
     if opened.policies is not None:
         how = f"Players trained before, read from {opened.policies}: nothing is trained"
@@ -129,6 +142,36 @@ def check(file: CampaignFile) -> None:
         reads = () if isinstance(stage, TrainingStage) else stage.reads
         after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
         say(f"  {kind:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else ""))
+
+
+@app.command("check-driver")
+def check_driver(
+    driver: Annotated[
+        str,
+        typer.Argument(
+            metavar="DRIVER", help="A driver document, a policy's folder, or an installed driver.", show_default=False
+        ),
+    ],
+    scene: Annotated[
+        Path, typer.Option(metavar="DIR", help="The scene it drives on.  [default: networks/merge]", show_default=False)
+    ] = Path("networks/merge"),
+    games: Annotated[int, typer.Option(min=2, max=1000, metavar="N", help="Games to play.")] = 3,
+    allow_code: AllowCode = False,
+) -> None:
+    """Check that a driver keeps to the protocol, and say in words where it does not.
+
+    Plays seeded games twice, and shows them again all at once. Exit code 1: it does not keep to it.
+    """
+    from rich.console import Console
+
+    from harness.conformance import check_named
+
+    found = check_named(driver, scene, games, allow_code)
+    console = Console()
+    for line in found.lines():
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    if found.wrong:
+        raise typer.Exit(GAMES_ERRORED)
 
 
 @app.command()

@@ -3,7 +3,8 @@
 HarnessError                 anything the harness itself raises
 ├── UsageError               the user's mistake: printed without a traceback, exit code 2
 ├── StageFailed              a training or an assessment could not be finished, named by its stage
-└── SimulationError          SUMO refused, died or lost a vehicle
+├── SimulationError          SUMO refused, died or lost a vehicle
+└── DriverError              a driver that somebody brought died, was late or gave no answer that is one
 """
 
 from __future__ import annotations
@@ -67,6 +68,10 @@ class StageFailed(HarnessError):
 
 class SimulationError(HarnessError):
     """SUMO refused a command, died, or lost a vehicle it was given."""
+
+
+class DriverError(HarnessError):
+    """A driver that somebody brought died, was late, or gave no answer that is one."""
 
 
 _OUT_OF_MEMORY = ("allocate memory", "failed to map segment", "can't start new thread", "bad_alloc")

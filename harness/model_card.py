@@ -127,7 +127,7 @@ def _facts(
     yield "player", policy["player"]
     yield "persona", f"`{persona.name}`"
     yield "scene", f"`{policy['scene']}`"
-    partner = {None: "nobody", "sumo": "SUMO's own driver", "given": f"the policy `{campaign.ego.driver}`"}
+    partner = {None: "nobody", "sumo": "SUMO's own driver", "given": _given(manifest, campaign)}
     yield "against", partner.get(against, f"`{against}`")
     if against is not None:
         how = campaign.retraining if entry["name"] != entry["persona"] else campaign.non_ego_training
@@ -147,6 +147,11 @@ def _facts(
     if persona.perception is not None:
         share, up_to_m = percent(persona.perception.overlooks_share), persona.perception.overlooked_up_to_m
         yield "overlooks", f"in {share} of drives, others whose centre is less than {up_to_m:g} m ahead of its own"
+
+
+def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
+    recorded = manifest.get("ego_driver")
+    return str(recorded["in_words"]) if recorded else f"the policy `{campaign.ego.driver}`"
 
 
 def _terms(persona: Persona) -> Iterator[_Term]:

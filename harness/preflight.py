@@ -13,7 +13,10 @@ from pydantic import ConfigDict
 from harness.documents.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego, Training, resolve
 from harness.documents.persona import Persona
 from harness.documents.reading import Document, nearest, read_document
+from harness.drivers.car import car_of
+from harness.drivers.given import GivenDriver, find_driver
 from harness.errors import Problem, UsageError, attempt
+from harness.game.state import EGO
 from harness.policy_file import policy_files, read_policy
 from harness.rounds import AssessmentStage, plan
 from harness.traffic.opening import OpenScene, open_scene
@@ -34,8 +37,8 @@ class OpenCampaign:
     scene: OpenScene
     ego_persona: Persona
     personas: tuple[Persona, ...]
-    ego_policy: Path | None
-    """The folder of the ego's policy, where the campaign names one."""
+    ego_driver: GivenDriver | None
+    """The ego's driver, where it is neither learned nor plainly SUMO's own."""
     policies: Path | None
     """The folder of the policies trained before, where the campaign names one."""
     hashes: dict[str, str]
@@ -46,10 +49,11 @@ class OpenCampaign:
         return self.hashes[_from(self.file, path)]
 
 
-def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
+def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> OpenCampaign:
     """Read a campaign and everything it names. Raises UsageError with every problem found.
 
-    Quick makes trainings shorter: a campaign that trains nothing is the same without it.
+    Quick makes trainings shorter: a campaign that trains nothing is the same without it. `allow_code`: an ego that is
+    code which comes as a file may be run (`harness.drivers.given` says why a document can't decide that).
     """
     problems: list[Problem] = []
 
@@ -58,10 +62,14 @@ def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
     if named is None:
         raise UsageError(problems)
     scene_folder = resolve(file, named.scene)
-    scene = attempt(problems, lambda: open_scene(scene_folder))
+    ego_driver = attempt(problems, lambda: _ego_driver(file, named.ego.driver, allow_code))
+    scene = attempt(problems, lambda: open_scene(scene_folder, ego_driver.vehicle_type if ego_driver else None))
     persona_files = [resolve(file, named.ego.persona), *(resolve(file, each) for each in named.personas)]
     personas = [attempt(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
-    ego_policy = attempt(problems, lambda: _ego_policy(file, named.ego.driver))
+    if ego_driver is not None and scene is not None:
+        sampled = personas[0] is not None and personas[0].decisions == "sampled"
+        games = document.training.games if document is not None and document.policies is None else 1
+        attempt(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, games))
     policies = attempt(problems, lambda: _policies_folder(file, named.policies))
     for given, persona in zip(named.personas, personas[1:], strict=True):
         names = [each.name for each in personas[1:] if each is not None]
@@ -86,12 +94,14 @@ def open_campaign(file: Path, quick: bool = False) -> OpenCampaign:
         *persona_files,
         *(scene_folder / each for each in ("scene.toml", scene.document.net, scene.document.routes)),
     ]
+    if ego_driver is not None:
+        files += map(Path, ego_driver.files)
     hashes = {_from(file, each): hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
     ego, *others = (persona for persona in personas if persona is not None)
     quick = quick and policies is None
     if quick:
         document = _quickened(document)
-    return OpenCampaign(file, document, quick, scene, ego, tuple(others), ego_policy, policies, hashes)
+    return OpenCampaign(file, document, quick, scene, ego, tuple(others), ego_driver, policies, hashes)
 
 
 def _from(campaign_file: Path, path: Path) -> str:
@@ -139,20 +149,8 @@ def _check_stage_names(file: Path, document: Campaign, personas: Sequence[str]) 
         )
 
 
-def _ego_policy(file: Path, driver: str) -> Path | None:
-    if driver in (LEARNED, SUMO):
-        return None
-    folder = resolve(file, driver)
-    _check_no_archive(file, "ego.driver", driver, folder)
-    if not os.path.isdir(folder):
-        raise UsageError.of(
-            file,
-            "ego.driver",
-            f"{driver!r} is neither a driver nor the folder of a policy",
-            f"use {LEARNED!r}, {SUMO!r} or a folder",
-        )
-    read_policy(folder)
-    return folder
+def _ego_driver(file: Path, driver: str, allow_code: bool) -> GivenDriver | None:
+    return None if driver in (LEARNED, SUMO) else find_driver(driver, file, "ego.driver", allow_code)
 
 
 def _check_no_archive(file: Path, key: str, written: str, named: Path) -> None:

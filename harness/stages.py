@@ -18,12 +18,14 @@ import pandas as pd
 from harness.attempts import FIRST, Attempt, Begin, Report
 from harness.documents.campaign import Campaign
 from harness.documents.persona import Persona
+from harness.drivers.car import car_of
+from harness.drivers.given import GivenDriver
 from harness.drivers.learned import LearnedDriver
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
 from harness.files import make_folder, write_atomically
-from harness.game.state import ROLES
+from harness.game.state import EGO, ROLES
 from harness.manoeuvre_file import EPISODES, MANOEUVRES
 from harness.policy_file import policy_files, read_policy, write_policy
 from harness.preflight import OpenCampaign
@@ -43,7 +45,7 @@ class Conditions:
     document: Campaign
     ego_persona: Persona
     personas: Mapping[str, Persona]
-    ego_policy: Path | None
+    ego_driver: GivenDriver | None
     policies: Path | None
     keys: Mapping[str, str]  # of every stage
 
@@ -58,7 +60,7 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
     files = ("scene.toml", scene.net, scene.routes)
     rests_on = {name: campaign.hash_of(campaign.scene.folder / name) for name in files}
     personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
-    given = _given_policy_hash(campaign.ego_policy)
+    given = campaign.ego_driver.identity if campaign.ego_driver is not None else ""
     keys: dict[str, str] = {}
     for stage in stages:
         inputs: dict[str, Any] = {
@@ -82,10 +84,6 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
     return keys
 
 
-def _given_policy_hash(folder: Path | None) -> str:
-    return hashlib.sha256((folder / "policy.safetensors").read_bytes()).hexdigest() if folder else ""
-
-
 def conditions_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str]) -> Conditions:
     """The conditions of a run of a campaign: on the run folder's copy of the scene, which stays what it was."""
     personas = {each.name: each for each in campaign.personas}
@@ -95,7 +93,7 @@ def conditions_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, 
         campaign.document,
         campaign.ego_persona,
         personas,
-        campaign.ego_policy,
+        campaign.ego_driver,
         campaign.policies,
         keys,
     )
@@ -111,7 +109,7 @@ def carry_out(
     """Do a stage, seal what it made, say what came of it. What it wrote from other inputs is dropped."""
     folder, key = RunFolder(conditions.folder), conditions.keys[stage.id]
     folder.begin(stage.id, key)
-    scene = open_scene(conditions.scene_folder)
+    scene = open_scene(conditions.scene_folder, conditions.ego_driver.vehicle_type if conditions.ego_driver else None)
     began = time.monotonic()
     do = _train if isinstance(stage, TrainingStage) else _assess
     info, files = do(stage, conditions, folder, scene, report, begin, attempt)  # type: ignore[arg-type]
@@ -151,7 +149,7 @@ def _train(
         scene,
         stage.learner,
         (conditions.ego_persona, conditions.persona(stage.persona)),
-        _driver(stage.opponent, conditions, folder),
+        _driver(stage.opponent, conditions, folder, scene),
         stage.alone_share,
         stage.attentive_share,
         read_policy(folder.policy(stage.initial)) if stage.initial else None,
@@ -203,7 +201,7 @@ def _assess(
     from harness.assessment import Arm  # the parent, who plays nothing, does without
     from harness.segments import join_segments, play_segments, segments_of
 
-    drivers = tuple(_driver(each, conditions, folder) for each in (stage.ego, stage.non_ego))
+    drivers = tuple(_driver(each, conditions, folder, scene) for each in (stage.ego, stage.non_ego))
     habits = stage.non_ego.persona if stage.non_ego else ""
     personas = (conditions.ego_persona, conditions.persona(habits))
     arm = Arm(stage.arm, scene, drivers, personas, stage.seed)  # type: ignore[arg-type]
@@ -217,19 +215,19 @@ def _assess(
     return info, files
 
 
-def _driver(drives: Drives | None, conditions: Conditions, folder: RunFolder) -> Driver | None:
+def _driver(drives: Drives | None, conditions: Conditions, folder: RunFolder, scene: OpenScene) -> Driver | None:
     if drives is None:
         return None
     if drives.kind == "sumo":
         return SumoDriver()
     sampled = conditions.persona(drives.persona).decisions == "sampled"
+    if drives.kind == "given":
+        assert conditions.ego_driver is not None
+        return conditions.ego_driver.make(car_of(scene.world, EGO), sampled)
     return LearnedDriver(read_policy(_policy(drives, conditions, folder)), sampled)
 
 
 def _policy(drives: Drives, conditions: Conditions, folder: RunFolder) -> Path:
-    if drives.kind == "given":
-        assert conditions.ego_policy is not None
-        return conditions.ego_policy
     if drives.kind == "before":
         assert conditions.policies is not None
         return conditions.policies / drives.stage

@@ -145,7 +145,7 @@ def test_open_campaign__the_folder_of_a_policy(tmp_path: Path) -> None:
     write_policy(some_policy(), tmp_path / "policies" / "mine")
     ego = {"driver": "policies/mine", "persona": str(CAREFUL)}
     file = write_campaign(tmp_path, ego=ego)
-    assert open_campaign(file).ego_policy == tmp_path / "policies" / "mine"
+    assert open_campaign(file).ego_driver.place == tmp_path / "policies" / "mine"
     (tmp_path / "policies" / "mine" / "policy.safetensors").write_bytes(b"PK")
     (problem,) = problems_of(file)
     assert Path(problem.file).name == "policy.safetensors"
@@ -153,4 +153,4 @@ def test_open_campaign__the_folder_of_a_policy(tmp_path: Path) -> None:
 
 def test_open_campaign__sumo_needs_no_policy(tmp_path: Path) -> None:
     file = write_campaign(tmp_path, ego={"driver": "sumo", "persona": str(CAREFUL)}, personas=[str(SPEEDY)])
-    assert open_campaign(file).ego_policy is None
+    assert open_campaign(file).ego_driver is None

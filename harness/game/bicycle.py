@@ -61,6 +61,19 @@ def requests(action: FloatArray, speed_mps: FloatArray, actuators: Actuators) ->
     return acceleration, steering
 
 
+def actions(
+    acceleration_mps2: FloatArray, steering_rad: FloatArray, speed_mps: FloatArray, actuators: Actuators
+) -> FloatArray:
+    """The action [..., 2] whose `requests` ask this acceleration (m/s^2) and steering angle (rad) of the car, or as
+    much of them as it can. Arguments [..., P]; the result is in [-1, 1]."""
+    strongest = np.where(acceleration_mps2 >= 0.0, actuators.max_acceleration_mps2, actuators.max_braking_mps2)
+    share = np.clip(steering_rad / steering_range_rad(speed_mps, actuators), -1.0, 1.0)
+    # the real root of share = wheel (c + (1 - c) wheel^2), a depressed cubic with one
+    stretch = np.sqrt(WHEEL_CENTRE / (3.0 * (1.0 - WHEEL_CENTRE)))
+    wheel = 2.0 * stretch * np.sinh(np.arcsinh(1.5 * share / (WHEEL_CENTRE * stretch)) / 3.0)
+    return np.clip(np.stack((acceleration_mps2 / strongest, wheel), axis=-1), -1.0, 1.0)
+
+
 def drive(
     state: State,
     acceleration_mps2: FloatArray,

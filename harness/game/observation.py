@@ -50,6 +50,24 @@ _RIGHT = _LEFT + _COUNT
 _FIRST_OTHER = _RIGHT + _COUNT
 OF_OTHERS = np.array([name.startswith("other") for name in LAYOUT])
 
+_SCALES = np.array(
+    [
+        *(_SPEED_MPS, 1.0, _ACCELERATION_MPS2, 1.0, _FAR_M, 2.0 * _FAR_M),
+        *(0.5,) * _COUNT,  # radians
+        *(_SIDE_M,) * (1 + 2 * _COUNT),
+        *(1.0, _AHEAD_M, _SIDE_M, _CLOSING_MPS, _CROSSING_MPS, 1.0, 1.0) * OTHERS,
+    ]
+)
+_LOCK = LAYOUT.index("steering_rad")
+
+
+def in_units(observation: FloatArray, max_steering_rad: float) -> FloatArray:
+    """[..., SIZE] float64: what is seen, in the units that the entries' names in `LAYOUT` say. An entry that is at
+    its bound stands for whatever lies beyond it as well: a goal 200 m ahead may be farther."""
+    seen = np.asarray(observation, dtype=np.float64) * _SCALES
+    seen[..., _LOCK] *= max_steering_rad
+    return seen
+
 
 def observe(q: Quantities) -> FloatArray:
     """[G, P, SIZE] float32 in [-1, 1]: what each player sees. Players that are not there see zeros."""

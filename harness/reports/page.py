@@ -143,9 +143,11 @@ def _source(environment: Environment, name: str) -> str:
 def _facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
     campaign = manifest.get("campaign", {})
     assessment, training = campaign.get("assessment", {}), campaign.get("training", {})
+    ego = str(campaign.get("ego", {}).get("driver", ""))
     facts = [
         ("Scene", str(campaign.get("scene", "")).rstrip("/").rsplit("/", 1)[-1]),
-        ("Ego", str(campaign.get("ego", {}).get("driver", ""))),
+        ("Ego", str((manifest.get("ego_driver") or {}).get("in_words") or ego)),
+        ("Rounds", "" if ego in ("", "learned") else "0 and 1: there is nothing to train in this ego"),
         ("Personas", str(personas)),
         ("Training seeds", ", ".join(map(str, manifest.get("seeds", seeds)))),
         ("Games per arm and seed", f"{assessment['episodes']:,}" if "episodes" in assessment else ""),

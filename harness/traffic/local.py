@@ -30,6 +30,7 @@ from harness.traffic.simulation import Reading
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
 _EXACTLY_THERE = 2  # moveToXY's keepRoute: the position as given, even off the road
+_LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
 _ANY_SPEED = 100.0  # a speed factor: SUMO would show the others no speed above the limit times this
 _FAILURES = (libsumo.TraCIException, libsumo.FatalTraCIError)
 
@@ -69,10 +70,13 @@ class LocalSimulation:
         # Taken-over cars that leave a junction's lanes may kill SUMO 1.28 (SIGSEGV) if lane changes take time: they
         # do so only where there is somebody whom SUMO drives.
         smoothly = not all(self._taken_over) or scene.has_others
+        lateral = ["--lanechange.duration", str(document.lane_change_duration_s if smoothly else 0.0)]
+        if self._by_sublanes():
+            lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO takes one of the two options
         self._options = [
             *("--net-file", str(tiled_net(scene.net_file, games)), "--route-files", str(types)),
             *("--step-length", str(document.step_length_s), "--collision.action", "none"),
-            *("--lanechange.duration", str(document.lane_change_duration_s if smoothly else 0.0)),
+            *lateral,
             *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
         ]
         self._release = weakref.finalize(self, _release, folder)
@@ -81,6 +85,14 @@ class LocalSimulation:
         except SimulationError:
             self.close()
             raise
+
+    def _by_sublanes(self) -> bool:
+        """Whether a player that SUMO drives changes lanes by SL2015, which without sublanes never would."""
+        types = self._scene.routes.types
+        kinds = [
+            types[self._scene.vehicle(player).vehicle_type] for player in np.flatnonzero(~np.array(self._taken_over))
+        ]
+        return any(kind.lane_changes == "SL2015" for kind in kinds)
 
     def _load(self, options: list[str], load: Callable[[list[str]], object]) -> None:
         with self._asking(f"load scene {self._scene.document.name!r}"):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -78,8 +78,11 @@ class _NamedFiles(Document):
     routes: PlainFile
 
 
-def open_scene(folder: Path) -> OpenScene:
-    """Read a scene's folder. Raises UsageError with every problem found in it."""
+def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
+    """Read a scene's folder. Raises UsageError with every problem found in it.
+
+    `ego_type`: a vehicle type of the route file that the ego's car is of, instead of the one it has there.
+    """
     document_file = scene_file(folder)
     problems: list[Problem] = []
     attempt(problems, lambda: _check_within(document_file, folder))
@@ -91,7 +94,7 @@ def open_scene(folder: Path) -> OpenScene:
         raise UsageError(problems)
     net_file, route_path = folder / named.net, folder / named.routes
     net = attempt(problems, lambda: _checked_net(net_file, folder))
-    routes = attempt(problems, lambda: _checked_routes(route_path, folder))
+    routes = attempt(problems, lambda: _checked_routes(route_path, folder, document, ego_type))
     if document is None or net is None or routes is None:
         raise UsageError(problems)
     area = network.drivable_area(net)
@@ -116,6 +119,16 @@ def open_scene(folder: Path) -> OpenScene:
     return OpenScene(folder, document, world, routes, places, edges, tuple(lines))
 
 
+def _of_type(routes: RouteFile, document: Scene | None, ego_type: str | None) -> RouteFile:
+    if ego_type is None or document is None or document.ego.vehicle not in routes.vehicles:
+        return routes
+    if ego_type not in routes.types:
+        message, remedy = f"has no vehicle type {ego_type!r} for the ego to be of", nearest(ego_type, routes.types)
+        raise UsageError.of(routes.path, "vType", message, remedy)
+    ego = replace(routes.vehicles[document.ego.vehicle], vehicle_type=ego_type)
+    return replace(routes, vehicles={**routes.vehicles, document.ego.vehicle: ego})
+
+
 def _check_within(path: Path, folder: Path) -> None:
     if leads_out(path, folder):
         raise UsageError.of(path, "", "is a link that leads out of the scene's folder", "copy there what it points to")
@@ -127,9 +140,9 @@ def _checked_net(path: Path, folder: Path) -> Net:
     return network.read_net(path)
 
 
-def _checked_routes(path: Path, folder: Path) -> RouteFile:
+def _checked_routes(path: Path, folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
     _check_within(path, folder)
-    return read_route_file(path)
+    return _of_type(read_route_file(path), document, ego_type)
 
 
 def _open_player(

@@ -47,6 +47,8 @@ class VehicleType:
     length_m: float = 5.0
     width_m: float = 1.8
     max_speed_mps: float = 55.55
+    lane_changes: str = ""
+    """Its laneChangeModel; empty: SUMO's default."""
 
 
 @dataclass(frozen=True)
@@ -181,6 +183,7 @@ def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
         _number(path, element, "length", 5.0),
         _number(path, element, "width", 1.8),
         _number(path, element, "maxSpeed", 55.55),
+        element.get("laneChangeModel", ""),
     )
 
 
