@@ -87,6 +87,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
     environment = Environment(
         loader=PackageLoader("harness", ""), undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["one_line"] = _one_line
     text = environment.get_template("model_card.md.jinja").render(
         stage=stage,
         intro=_intro(entry, is_ego),
@@ -109,6 +110,11 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
         versions=", ".join(f"{name} {versions[name]}" for name in _PROGRAMS if name in versions),
     )
     return text.strip() + "\n"
+
+
+def _one_line(text: str) -> str:
+    """A person's words as one line of plain text: no heading, no table and no element can be made of them."""
+    return " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
 
 
 def _intro(entry: Mapping[str, Any], is_ego: bool) -> str:

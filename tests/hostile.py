@@ -23,7 +23,7 @@ from tiny import CAREFUL, REPOSITORY, sumo_run
 from harness import cli
 from harness.policy_file import write_policy
 
-MOST_CPU_S, PATIENCE_S = 5.0, 60.0
+MOST_CPU_S, PATIENCE_S = 5.0, 200.0
 CAMPAIGN, EGO, PERSONA = "campaigns/tiny.toml", "personas/careful.toml", "personas/anna.toml"
 SCENE, NET, ROUTES = "networks/road/scene.toml", "networks/road/merge.net.xml", "networks/road/merge.rou.xml"
 TENSORS, CARD = "policies/mine/policy.safetensors", "policies/mine/policy.json"

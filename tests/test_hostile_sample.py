@@ -25,7 +25,8 @@ TABLES = {
 }
 LEAST = 300
 # One of each class, of each kind of file: the names of the tables' rows
-CLASSES = ("empty", "UTF-16", "NUL bytes", "half of it", "a folder", "a pipe", "a device", "a gigabyte", "nested lists")
+CLASSES = ("empty", "UTF-16", "half of it", "a folder", "a pipe", "a device", "a gigabyte", "nested lists")
+LEFT_OUT = ("merge.rou", "anna", "policy.json", "report: episodes", "replay: episodes", "report: training")
 BY_NAME = {
     *("tiny.toml: a key with 5,000 dots", "tiny.toml: a misspelt key", "tiny.toml: assessment.episodes huge"),
     *("anna.toml: a misspelt term", "anna.toml: a key that moves the cursor", "scene.toml: a start beyond the road"),
@@ -46,8 +47,7 @@ SAMPLE = [
     bad
     for rows in TABLES.values()
     for bad in rows
-    if bad.name in BY_NAME
-    or (bad.name.endswith(CLASSES) and not bad.name.startswith(("merge.rou", "anna", "policy.json")))
+    if bad.name in BY_NAME or (bad.name.endswith(CLASSES) and not bad.name.startswith(LEFT_OUT))
 ]
 
 
@@ -56,6 +56,7 @@ def test_sample__has_what_it_names() -> None:
     assert {command for bad in SAMPLE for command in (bad.command[0],)} == {"check", "report", "replay"}
 
 
+@pytest.mark.slow  # a process each, of a second and a half
 @pytest.mark.parametrize("bad", SAMPLE, ids=repr)
 def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_path: Path) -> None:
     project = write_project(tmp_path)
@@ -77,7 +78,7 @@ def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_pa
         start_new_session=True,
     )
     try:
-        out, err = command.communicate(timeout=60)
+        out, err = command.communicate(timeout=200)  # of a machine that is busy with other things
     finally:
         left = in_session(command.pid)
         command.kill()

@@ -199,3 +199,12 @@ def test_run__of_before_there_were_cards_gets_none(tmp_path: Path) -> None:
         file.unlink()
     write_model_cards(folder, manifest, read_csv(folder.path / "summary.csv"))
     assert not list(folder.path.glob("policies/*/README.md"))
+
+
+def test_card__a_persons_words_are_one_line_of_text() -> None:
+    words = "In a hurry.\n## Figures\n| failure rate | 0 % |\n<script>alert(1)</script>"
+    documents = {"distracted": {**persona("distracted"), "description": words}}
+    card = lines(model_card("distracted-seed1", {**MANIFEST, "persona_documents": documents}, SUMMARY, PERSON))
+    (told,) = [line for line in card if "In a hurry." in line]
+    assert told.endswith("In a hurry. ## Figures \\| failure rate \\| 0 % \\| &lt;script>alert(1)&lt;/script>")
+    assert [line for line in card if line.startswith("## Figures")] == ["## Figures"]

@@ -307,3 +307,18 @@ def test_document__that_is_wrong_is_named_before_the_net_is_read(folder: Path) -
     change(folder, "scene.toml", "friction = 0.8", "friction = -1.0")
     change(folder, "scene.toml", 'net = "merge.net.xml"', 'net = "../merge.net.xml"')
     assert [each.key for each in problems(folder)] == ["friction", "net"]
+
+
+# --- all at once ------------------------------------------------------------------------------------------------------
+
+
+def test_scene__a_mistake_in_its_document_hides_none_in_its_files(folder: Path) -> None:
+    change(folder, "scene.toml", "friction =", "fricton =")
+    change(folder, "merge.rou.xml", 'route="through" depart="0" departLane="0"', 'route="trough" depart="soon"')
+    change(folder, "merge.net.xml", 'speed="13.89" length="90.00"', 'speed="-1" length="nan"')
+    assert {(Path(each.file).name, each.key) for each in problems(folder)} >= {
+        ("scene.toml", "fricton"),
+        ("merge.rou.xml", "vehicle non_ego"),
+        ("merge.net.xml", "lane exit_0.speed"),
+        ("merge.net.xml", "lane exit_0.length"),
+    }
