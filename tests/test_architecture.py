@@ -82,9 +82,10 @@ ALLOWED: dict[str, set[str]] = {
         *("manoeuvre_file", "model_card", "versions"),
     },
 }
+ALLOWED["cli_documents"] = set(ALLOWED)
 ALLOWED["cli"] = set(ALLOWED)
 ALLOWED["__main__"] = {"cli"}
-ALLOWED["harness"] = set(ALLOWED) - {"cli", "__main__"}
+ALLOWED["harness"] = set(ALLOWED) - {"cli", "cli_documents", "__main__"}
 
 SUMO = {"libsumo", "sumo", "sumolib", "traci"}
 LEARNERS = {"torch", "stable_baselines3"}
