@@ -109,7 +109,8 @@ class Bodies:
             for each in (self, others)
         )
         columns, present = _with_nearest(players, self.present, beside, others.present, most, within_m)
-        return Bodies(*columns, present)
+        x_m, y_m, heading_rad, speed_mps, length_m, width_m = columns
+        return Bodies(x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
 
 
 @compiled
