@@ -21,14 +21,17 @@ from harness.traffic import drawing
 from harness.traffic.network import read_net
 from harness.traffic.opening import OpenScene
 
+TAKE_TURNS = 20  # games of an arm and seed: where not all fit on a page, there are some of each, good ones too
+
 
 def recorded_games(
     episodes: pd.DataFrame, traces: Callable[[str, int], Path], scene: OpenScene
 ) -> Iterator[RecordedGame]:
     """Every game that was played, the ones to watch first on top, each read when it is asked for.
 
-    Those that became replays come first, worst first, each followed by the game of the same episode that it is
-    compared with; then the rest. `traces` is where the traces of an arm and seed are.
+    Those that became replays come first, `TAKE_TURNS` of every arm and seed before more of any, worst first, each
+    followed by the game of the same episode that it is compared with; then the rest. `traces` is where the traces of an
+    arm and seed are.
     """
     for game in watching_order(episodes).itertuples():
         trace = read_trace(traces(game.arm, game.seed), game.episode)
@@ -41,7 +44,10 @@ def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
     played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
     rows = {(game.arm, game.seed, game.episode): game.Index for game in played.itertuples()}
     order: dict[Any, None] = {}
-    for game in worst_first(choose_games(played)).itertuples():
+    chosen = worst_first(choose_games(played))
+    turn = chosen.groupby(["arm", "seed"]).cumcount() // TAKE_TURNS
+    turn[chosen["ego_outcome"].where(chosen["ego_outcome"] != "", chosen["non_ego_outcome"]) == "goal"] = 0
+    for game in chosen.loc[turn.sort_values(kind="stable").index].itertuples():
         order[game.Index] = None
         counterpart = rows.get((_counterpart(game.arm), game.seed, game.episode))
         if counterpart is not None:

@@ -1,4 +1,5 @@
-"""Long work in a process of its own, weighed as it goes: memory, open files and threads stay what they were.
+"""Long work in a process of its own, weighed as it goes: memory, open files and threads stay what they were. And a
+report of ten thousand episodes, which opens all the same.
 
 libsumo itself keeps about a kilobyte each time a simulation is loaded, in one process and however it is closed. It is
 weighed beside the harness, so that what the harness adds is known.
@@ -16,12 +17,18 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import libsumo
 import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
+from chromium import launched, opener, until
 from scenes import build_scene, drawn
-from test_assessment import Steady, arm
+from test_assessment import Steady, arm, play
+from test_page import campaign
 from tiny import MERGE, SPEEDY
 
 from harness.arena import Arena, Seat
@@ -30,12 +37,15 @@ from harness.documents.persona import Persona
 from harness.documents.reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.game.state import Outcome
-from harness.trace_file import TraceWriter
-from harness.traffic.opening import open_scene
+from harness.recorded_games import recorded_games, scene_drawing
+from harness.replay.choice import MOST_FAILURES_PER_ARM, choose_games, replay_name
+from harness.reports.manoeuvres import MOST_LISTED
+from harness.reports.page import PAGE_BYTES, render_page
+from harness.tables import MANOEUVRE_COLUMNS, summarise, typed
+from harness.trace_file import SCHEMA, TraceWriter
+from harness.traffic.opening import OpenScene, open_scene
 
-pytestmark = pytest.mark.skipif(
-    not Path("/proc/self/statm").is_file(), reason="the system does not tell what it weighs"
-)
+weighing = pytest.mark.skipif(not Path("/proc/self/statm").is_file(), reason="the system does not say what it weighs")
 
 GAMES = 64  # as many as campaigns train on
 GAME_STEPS = 1_000_000
@@ -156,6 +166,7 @@ def growth_mb(weights: list[Weight]) -> float:
 # --- what must be true ------------------------------------------------------------------------------------------------
 
 
+@weighing
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_soak__a_million_game_steps_leave_memory_as_it_was() -> None:
@@ -164,6 +175,7 @@ def test_soak__a_million_game_steps_leave_memory_as_it_was() -> None:
     assert growth_mb(weights) <= SOAK_MB
 
 
+@weighing
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_assessment__thousands_of_games_add_no_memory_beyond_what_libsumo_keeps() -> None:
@@ -173,6 +185,7 @@ def test_assessment__thousands_of_games_add_no_memory_beyond_what_libsumo_keeps(
     assert growth_mb(ours) - growth_mb(theirs) <= games * ASSESSMENT_KB_PER_GAME / 1000.0
 
 
+@weighing
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("work", ["soak", "assessment"])
@@ -180,6 +193,86 @@ def test_long_work__opens_no_files_and_starts_no_threads(work: str) -> None:
     weights = weighed(work)
     assert len({each.files for each in weights}) == 1
     assert len({each.threads for each in weights}) == 1
+
+
+# --- a report of ten thousand episodes --------------------------------------------------------------------------------
+
+EPISODES = 10_000
+LARGE = ("naive_vs_speedy", "retrained_vs_speedy")
+READY_MS = 3_000  # until the page's player can be used
+
+
+@pytest.fixture(scope="module")
+def large() -> dict[str, Any]:
+    """The tables of a campaign in which two arms have ten thousand episodes: a hundred, again and again."""
+    found = campaign(personas=["speedy"], games=100)
+    rows = found["episodes"]
+    some = rows[rows["arm"].isin(LARGE)]
+    again = [some.assign(episode=some["episode"] + 100 * k) for k in range(EPISODES // 100)]
+    episodes = typed(pd.concat([rows[~rows["arm"].isin(LARGE)], *again], ignore_index=True))
+    chosen = choose_games(episodes)[["arm", "seed", "episode"]]
+    replays = [replay_name(*game) for game in chosen.itertuples(index=False)]
+    return found | {"episodes": episodes, "summary": summarise(episodes), "replays": replays}
+
+
+@pytest.fixture(scope="module")
+def traces(merge: OpenScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The traces of that many episodes, fifty to a row group: some that were really played, again and again."""
+    file = tmp_path_factory.mktemp("traces") / "traces.parquet"
+    games = [pa.table(dict(game.trace or {})) for game in play(arm(merge, Steady(), SumoDriver()), 5)]
+    with pq.ParquetWriter(file, SCHEMA, compression="zstd") as writer:
+        for first in range(0, EPISODES, GAMES_PER_FILE):
+            numbered = []
+            for episode in range(first, first + GAMES_PER_FILE):
+                game = games[episode % len(games)]
+                numbered.append(game.set_column(0, "episode", pa.array([episode] * len(game))))
+            writer.write_table(pa.concat_tables(numbered).select(SCHEMA.names).cast(SCHEMA))
+    return file
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
+    large: dict[str, Any], traces: Path, merge: OpenScene, tmp_path: Path
+) -> None:
+    episodes = large["episodes"]
+    assert int((episodes["ego_failed"] == 1).sum()) > 1_000
+    assert len(large["replays"]) < 3 * MOST_FAILURES_PER_ARM
+
+    games = recorded_games(episodes[episodes["arm"].isin(LARGE)], lambda arm, seed: traces, merge)
+    html = render_page(**large, games=games, scene=scene_drawing(merge))
+    assert PAGE_BYTES / 2 < len(html.encode()) <= PAGE_BYTES  # the room there is, is used
+    assert f"{len(episodes)} games are too many for a page" in html
+    assert "300 of the 10,000 episodes are drawn" in html
+    assert "more failed games have no folder of their own" in html
+
+    file = tmp_path / "report.html"
+    file.write_text(html, encoding="utf-8")
+    with launched() as browser, opener(browser, file) as open_page:
+        page = open_page()
+        page.wait_for_selector(".player[data-ready]")
+        assert int(page.locator(".player").get_attribute("data-ready")) < READY_MS
+        listed = page.locator("[data-is=game] option").all_inner_texts()
+        assert len(listed) >= 100
+        intro = page.locator("#player-intro").inner_text()
+        assert intro.startswith(f"{len(listed)} recorded games")
+        assert f"{len(episodes) - len(listed)} more games are too many for a page" in intro
+        for outcome in ("collision", "rail", "timeout", "goal"):  # every way to fail, and what went well
+            assert any(outcome in each for each in listed), outcome
+        for name in LARGE:
+            assert any(name in each for each in listed), name
+        before = page.locator(".player").get_attribute("data-time")
+        page.locator(".player").focus()
+        page.keyboard.press("End")
+        until(page, "before => document.querySelector('.player').dataset.time !== before", before)
+        assert page.seen == []
+
+
+def test_report__a_pair_of_manoeuvres_lists_no_more_games_than_can_be_read(large: dict[str, Any]) -> None:
+    html = render_page(**large, manoeuvres=pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
+    listed = html.split('id="pair-1"')[1].split("</details>")[0]
+    assert listed.count("<li>") == MOST_LISTED
+    assert "more: <a" in listed
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.recorded_games import recorded_game, scene_drawing, watching_order
+from harness.recorded_games import TAKE_TURNS, recorded_game, scene_drawing, watching_order
 from harness.traffic.drawing import lane_marks
 from harness.traffic.network import read_net
 from harness.traffic.opening import open_scene
@@ -29,6 +29,19 @@ def test_order__a_failure_is_followed_by_the_game_it_is_compared_with():
     )
     assert in_order(table)[:2] == [("naive_vs_speedy", 3), ("retrained_vs_speedy", 3)]
     assert sorted(in_order(table)) == sorted(zip(table["arm"], table["episode"], strict=True))
+
+
+def test_order__arms_take_turns_so_that_each_is_on_a_page_that_not_all_fit_on():
+    table = episodes(
+        *(("naive_vs_speedy", episode, "collision" if episode < 60 else "goal") for episode in range(70)),
+        *(("naive_vs_texting", episode, "rail" if episode < 60 else "goal") for episode in range(70)),
+    )
+    first = in_order(table)[: 2 * TAKE_TURNS + 4]
+    assert first[:TAKE_TURNS] == [("naive_vs_speedy", episode) for episode in range(TAKE_TURNS)]
+    assert first[TAKE_TURNS : 2 * TAKE_TURNS] == [("naive_vs_texting", episode) for episode in range(TAKE_TURNS)]
+    assert sorted(first[2 * TAKE_TURNS :]) == [
+        (arm, episode) for arm in ("naive_vs_speedy", "naive_vs_texting") for episode in (60, 61)
+    ]
 
 
 def test_order__what_was_not_played_is_not_in_it():

@@ -16,6 +16,7 @@ from defusedxml import ElementTree
 from harness.errors import UsageError
 from harness.replay import choose_games, open_in_sumo_gui, replay_name, worst_first, write_replay
 from harness.replay import desktop as desktop_module
+from harness.replay.choice import MOST_FAILURES_PER_ARM
 from harness.replay.contact import contacts
 from harness.replay.desktop import find_sumo_gui
 from harness.replay.lanes import Lanes
@@ -376,6 +377,15 @@ def test_choose_games__every_failure_and_the_first_two_others() -> None:
         ("x_alone", 1, 1),
         ("naive_alone", 1, 0),
     ]
+
+
+def test_choose_games__of_very_many_failures_the_worst_of_each_arm_and_seed() -> None:
+    row = {"arm": "naive_vs_x", "ego_outcome": "rail", "ego_failed": 1.0, "non_ego_outcome": "goal"}
+    rails = [{**row, "seed": seed, "episode": k, "ego_min_ttc_s": k / 100} for seed in (1, 2) for k in range(150)]
+    crashes = [{**row, "seed": 1, "episode": 150 + k, "ego_outcome": "collision"} for k in range(30)]
+    chosen = choose_games(pd.DataFrame([*rails, *crashes]))
+    first = [("naive_vs_x", 1, k) for k in (*range(MOST_FAILURES_PER_ARM - 30), *range(150, 180))]
+    assert sorted(key(chosen)) == [*first, *[("naive_vs_x", 2, k) for k in range(MOST_FAILURES_PER_ARM)]]
 
 
 def test_choose_games__doesnt_depend_on_the_order_of_rows() -> None:

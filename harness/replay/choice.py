@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
+MOST_FAILURES_PER_ARM = 100  # and training seed: a replay is a folder with a copy of the scene in it
 SAMPLE_PER_ARM = 2  # games that went well, per arm and training seed: what normal looks like
 _FAILURES = ("collision", "rail", "timeout")  # worst first
 _WELL, _UNPLAYED = len(_FAILURES), len(_FAILURES) + 1
@@ -15,13 +16,15 @@ def replay_name(arm: str, seed: int, episode: int) -> str:
 
 
 def choose_games(episodes: pd.DataFrame) -> pd.DataFrame:
-    """The rows of `episodes` that become replays: every failed game, and a few others of each arm and seed.
+    """The rows of `episodes` that become replays: of each arm and seed the failed games, the worst
+    `MOST_FAILURES_PER_ARM` of them if there are more, and a few others.
 
     Who is judged is the ego, or the non-ego where it drives alone. The others are those of the lowest episode
     numbers. A game that could not be played has no trace and is left out. Rows keep their order and index.
     """
     severity = _severity(episodes)
-    failed = severity < _WELL
+    worst = worst_first(episodes[severity < _WELL]).groupby(["arm", "seed"], sort=False).head(MOST_FAILURES_PER_ARM)
+    failed = episodes.index.isin(worst.index)
     well = episodes[severity == _WELL].sort_values(["arm", "seed", "episode"], kind="stable")
     sample = well.groupby(["arm", "seed"], sort=False).head(SAMPLE_PER_ARM).index
     return episodes[failed | episodes.index.isin(sample)]

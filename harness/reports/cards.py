@@ -9,7 +9,7 @@ from markupsafe import Markup
 
 from harness.comparison import Verdict
 from harness.reports import wording
-from harness.reports.distributions import paired_figure, pairs_of, spread_figure, spreads_of
+from harness.reports.distributions import MOST_LINES, paired_figure, pairs_of, spread_figure, spreads_of
 from harness.reports.figures import Column, Point, rate_figure, speed_figure
 from harness.reports.results import Results
 from harness.reports.wording import Row, Verdicts, failures, failures_of, interval, percent, played
@@ -65,6 +65,8 @@ class Card:
     speed_figure: Markup
     paired_figure: Markup | None
     """None where the ego was not retrained."""
+    paired_note: str
+    """How many of the episodes are drawn in it, if not all."""
     spread_figure: Markup
     worst: tuple[str, str] | None
     """Key and description of the game to show: the worst that is embedded."""
@@ -81,6 +83,7 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
     if retrained:
         arms.append((f"retrained ego, against {persona}", "retrained", f"retrained_vs_{persona}"))
     columns = _columns(persona, retrained, found)
+    paired, note = _paired(persona, place, found) if retrained else (None, "")
     return Card(
         persona,
         f"persona-{place}",
@@ -99,7 +102,8 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
             "Average speed of the ego. "
             + _alternative(columns, found, "mean_speed_mps", lambda speed: f"{wording.number(speed, 1)} m/s"),
         ),
-        _paired(persona, place, found) if retrained else None,
+        paired,
+        note,
         spread_figure(
             spreads_of(columns, found.games),
             f"spread{place}",
@@ -110,7 +114,7 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
     )
 
 
-def _paired(persona: str, place: int, found: Results) -> Markup:
+def _paired(persona: str, place: int, found: Results) -> tuple[Markup, str]:
     pairs = pairs_of(persona, found.games)
     mended = int((pairs[0].before_failed & ~pairs[0].after_failed).sum())
     broken = int((~pairs[0].before_failed & pairs[0].after_failed).sum())
@@ -118,7 +122,9 @@ def _paired(persona: str, place: int, found: Results) -> Markup:
         f"Average speed and least time to collision of {len(pairs[0].before)} episodes against {persona}, naive and "
         f"retrained: {mended} failed before and no longer, {broken} fail only after retraining."
     )
-    return paired_figure(pairs, f"paired{place}", alternative)
+    count = len(pairs[0].before)
+    note = f"{MOST_LINES} of the {count:,} episodes are drawn, evenly chosen." if count > MOST_LINES else ""
+    return paired_figure(pairs, f"paired{place}", alternative), note
 
 
 def _rate(label: str, series: str, rows: Mapping[int, Row]) -> Rate:

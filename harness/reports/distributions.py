@@ -26,6 +26,8 @@ QUANTITIES = {
 PAIRED = ("ego_mean_speed_mps", "ego_min_ttc_s")
 MOST_DOTS = 600
 """Games of an arm that are drawn one by one; of more, the middle half and the median alone."""
+MOST_LINES = 300
+"""Pairs that are drawn; of more, so many, spread evenly over the episodes."""
 _FAILED_ALPHA, _WELL_ALPHA = 0.95, 0.45
 
 
@@ -81,9 +83,11 @@ def _failed(column: pd.Series) -> NDArray[np.bool_]:
 
 
 def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str) -> Markup:
-    """A line per episode from the naive ego's game to the retrained one's; a cross is a failure."""
+    """A line per episode, of `MOST_LINES` at most, from the naive ego's game to the retrained one's; a cross is a
+    failure."""
     with figure_of(4.8, 3.5) as figure:
-        for axes, pairs in zip(figure.subplots(1, len(quantities), squeeze=False)[0], quantities, strict=True):
+        for axes, every in zip(figure.subplots(1, len(quantities), squeeze=False)[0], quantities, strict=True):
+            pairs = _some(every)
             both = np.isfinite(pairs.before) & np.isfinite(pairs.after)
             ends = np.stack((pairs.before, pairs.after))
             axes.plot([0, 1], ends[:, both], color=INK, linewidth=0.7, alpha=0.22)
@@ -98,6 +102,15 @@ def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str) -> M
             axes.tick_params(axis="x", length=0)
             axes.set_ylabel(pairs.label)
         return svg(figure, name, alternative)
+
+
+def _some(pairs: Pairs) -> Pairs:
+    count = len(pairs.before)
+    if count <= MOST_LINES:
+        return pairs
+    drawn = np.arange(MOST_LINES) * count // MOST_LINES
+    columns = (pairs.before, pairs.after, pairs.before_failed, pairs.after_failed)
+    return Pairs(pairs.label, *(column[drawn] for column in columns))
 
 
 def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> Markup:

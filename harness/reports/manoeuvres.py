@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,8 @@ from harness.reports.games import key
 NONE_NAMED = "–"
 RUN_UP_S = 1.5
 """A game is opened this long before the manoeuvre that led to the failure."""
+MOST_LISTED = 50
+"""Games that a pair lists."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,12 @@ class Failures:
     counts: Sequence[int]
     """Failures in each arm, in the order of the table's arms."""
     games: Sequence[FailedGame]
+
+    def listed(self, embedded: Container[str], most: int) -> Sequence[FailedGame]:
+        """The games to list, at most so many: those that the page can play go first where not all can be listed."""
+        if len(self.games) <= most:
+            return self.games
+        return sorted(self.games, key=lambda game: key(game.arm, game.seed, game.episode) not in embedded)[:most]
 
 
 def words(manoeuvre: str) -> str:

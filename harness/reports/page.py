@@ -12,13 +12,14 @@ from markupsafe import Markup
 
 from harness.reports.cards import card
 from harness.reports.cells import table
+from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
 from harness.reports.figures import steps_text
 from harness.reports.games import RecordedGame, SceneDrawing, key
 from harness.reports.learning import learning, stopped
-from harness.reports.manoeuvres import failures_by_pair, marks_of
+from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
 from harness.reports.provenance import mixed_versions
-from harness.reports.replays import keys, replay_list, worst_game
+from harness.reports.replays import failures, keys, replay_list, worst_game
 from harness.reports.results import results, unplayed
 from harness.tables import typed
 
@@ -78,8 +79,8 @@ def render_page(
     personas = [name for name in dict.fromkeys(named) if name]
     stages = manifest.get("stages", {})
     errored = episodes[unplayed(episodes)]
-    rows = min(len(episodes), MOST_ROWS)
-    room = max(min(GAMES_BYTES, PAGE_BYTES - _REST_BYTES - rows * _ROW_BYTES), 0)
+    in_table = episodes if len(episodes) <= MOST_ROWS else episodes[:0]
+    room = max(min(GAMES_BYTES, PAGE_BYTES - _REST_BYTES - len(in_table) * _ROW_BYTES), 0)
     embedded = Embedded(scene, games, marks_of(manoeuvres), room)
     shown = embedded.keys
     arms, pairs = failures_by_pair(manoeuvres, episodes) if manoeuvres is not None else ([], None)
@@ -87,7 +88,7 @@ def render_page(
         "comparisons": table("comparisons", "Every test of the campaign.", comparisons),
         "summary": table("summary", "A row per arm and training seed.", summary),
         "training": table("training", "A row per window of a learning curve.", training),
-        "episodes": table("episodes", "A row per game.", episodes[:MOST_ROWS]),
+        "episodes": table("episodes", "A row per game.", in_table),
     }
     environment = Environment(
         loader=PackageLoader("harness", "reports"),
@@ -116,11 +117,14 @@ def render_page(
         tables=tables,
         games=len(episodes),
         most_rows=MOST_ROWS,
+        most_listed=MOST_LISTED,
+        most_dots=MOST_DOTS if episodes.groupby("arm").size().max() > MOST_DOTS else 0,
         replays=replay_list(replays, episodes, shown),
         replays_shown=REPLAYS_SHOWN,
+        unlisted=failures(episodes) - failures(episodes, replays),
         embedded=shown,
         left=len(episodes) - len(errored) - len(shown),
-        keys=keys(episodes[:MOST_ROWS]),
+        keys=keys(in_table),
         key=key,
         pairs=pairs,
         pair_arms=arms,

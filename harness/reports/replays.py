@@ -31,12 +31,21 @@ class Replay:
     """Key of the game if the page can play it, else empty."""
 
 
+def failures(episodes: pd.DataFrame, among: Sequence[str] | None = None) -> int:
+    """How many games the judged player failed; only those with a replay of these names, if they are given."""
+    ego = episodes["ego_outcome"]
+    failed = episodes[ego.where(ego != "", episodes["non_ego_outcome"]).isin(FAILURES)]
+    if among is None:
+        return len(failed)
+    return len({_name(game) for game in failed[["arm", "seed", "episode"]].to_dict("records")} & set(among))
+
+
 def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[Replay]:
     """The replays, worst first, in the order of `harness.replay.choice.worst_first`, which reports can't import.
 
     `embedded` are the keys of the games that the page can play.
     """
-    games = {f"{game['arm']}-seed{game['seed']}-{game['episode']:03d}": game for game in episodes.to_dict("records")}
+    games = {_name(game): game for game in episodes.to_dict("records")}
     several_seeds = episodes["seed"].nunique() > 1
     known = [(name, games[name]) for name in names if name in games]
     known.sort(key=lambda pair: _worst(pair[1]))
@@ -60,6 +69,10 @@ def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tu
 def keys(episodes: pd.DataFrame) -> list[str]:
     """The key of each game."""
     return [_key(game) for game in episodes[["arm", "seed", "episode"]].to_dict("records")]
+
+
+def _name(game: Mapping[Any, Any]) -> str:
+    return f"{game['arm']}-seed{game['seed']}-{game['episode']:03d}"
 
 
 def _key(game: Mapping[Any, Any]) -> str:
