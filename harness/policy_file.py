@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ from harness.game.observation import LAYOUT
 
 FORMAT = 1
 ACTIONS = 2
+ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
 _MOST_TENSOR_BYTES, _MOST_CARD_BYTES = 100_000_000, 1_000_000
 _MOST = 1e6  # no parameter of a network that learned anything is larger
 _PARAMETER = re.compile(r"(actor|critic)\.(\d{1,2})\.(weight|bias)", re.ASCII)
@@ -138,3 +140,18 @@ def _check_names(given: Iterable[str]) -> None:
     expected |= {f"{part}.{k}.{each}" for part, n in parts.items() for k in range(n + 1) for each in ("weight", "bias")}
     if missing := sorted(expected - matches.keys()):
         raise ValueError(f"there are no parameters {missing[0]!r}")
+
+
+def check_no_archive(file: Path, key: str, written: str, named: Path, more: str = "") -> None:
+    """Raise UsageError where a file is named, under `key` in `file`, as if it were a policy.
+
+    A learner's own archive is not opened, not even to look into it: pickles in it are programs.
+    """
+    if named.suffix.lower() in ARCHIVES or os.path.isfile(named):
+        raise UsageError.of(
+            file,
+            key,
+            f"{written!r} is a file: archives such as .zip, .pt and .pkl can carry pickles, which run code when they "
+            "are opened, so they are not read",
+            "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/" + more,
+        )

@@ -17,12 +17,11 @@ from harness.drivers.car import car_of
 from harness.drivers.given import GivenDriver, find_driver
 from harness.errors import Problem, UsageError, attempt
 from harness.game.state import EGO
-from harness.policy_file import policy_files, read_policy
+from harness.policy_file import check_no_archive, policy_files, read_policy
 from harness.rounds import AssessmentStage, plan
 from harness.traffic.opening import OpenScene, open_scene
 from harness.traffic.trial import try_scene
 
-_ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
 
@@ -153,23 +152,11 @@ def _ego_driver(file: Path, driver: str, allow_code: bool) -> GivenDriver | None
     return None if driver in (LEARNED, SUMO) else find_driver(driver, file, "ego.driver", allow_code)
 
 
-def _check_no_archive(file: Path, key: str, written: str, named: Path) -> None:
-    """A learner's own archive is not opened, not even to look into it: pickles in it are programs."""
-    if named.suffix.lower() in _ARCHIVES or os.path.isfile(named):
-        raise UsageError.of(
-            file,
-            key,
-            f"{written!r} is a file: archives such as .zip, .pt and .pkl can carry pickles, which run code when they "
-            "are opened, so they are not read",
-            "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/",
-        )
-
-
 def _policies_folder(file: Path, written: str | None) -> Path | None:
     if written is None:
         return None
     folder = resolve(file, written)
-    _check_no_archive(file, "policies", written, folder)
+    check_no_archive(file, "policies", written, folder)
     if not os.path.isdir(folder):
         raise UsageError.of(
             file,

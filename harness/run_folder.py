@@ -37,6 +37,7 @@ FORMAT = 1
 MANIFEST = "manifest.json"
 _PATIENCE_S = 10.0  # how long workers of a command that was killed may take to notice
 _MOST_MANIFEST_BYTES = 50_000_000
+_MOST_SCENE_BYTES = 1_000_000_000
 _ANY_STAGE = {"kind": "training", "name": "", "seed": 0, "status": "done"}
 _STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
 
@@ -58,7 +59,10 @@ def _only_begun(folder: Path) -> bool:
 
 
 def _is_one_of(file: Path, hashes: Mapping[str, str]) -> bool:
-    return hashlib.sha256(file.read_bytes()).hexdigest() in hashes.values()
+    try:
+        return hashlib.sha256(content_of(file, _MOST_SCENE_BYTES)).hexdigest() in hashes.values()
+    except OSError:
+        return False
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ within `MOST_CPU_S` of work and, on a machine that is busy with other things, `P
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import shutil
 import stat
@@ -268,9 +269,16 @@ def write_project(folder: Path) -> Path:
 
 
 def write_run(folder: Path) -> Path:
-    """A run folder, in order, without what no command reads."""
+    """A run folder, in order, without what no command reads, and without seals: who changes a file on purpose can seal
+    it as well."""
     unread = shutil.ignore_patterns("tensorboard", "checkpoint.safetensors")
-    return shutil.copytree(sumo_run(), folder / "project" / "run", ignore=unread)
+    run = shutil.copytree(sumo_run(), folder / "project" / "run", ignore=unread)
+    for seal in run.glob(".stages/*/done.json"):
+        seal.write_text(json.dumps({**json.loads(seal.read_text(encoding="utf-8")), "files": {}}), encoding="utf-8")
+    manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
+    del manifest["hashes"]
+    (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    return run
 
 
 def traces_of(folder: Path) -> dict[str, str]:

@@ -37,7 +37,7 @@ from harness.drivers.rules import RulesDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import DriverError, UsageError
 from harness.game.observation import SIZE
-from harness.policy_file import policy_files, read_policy
+from harness.policy_file import check_no_archive, policy_files, read_policy
 
 ALLOW_CODE = "--allow-code"
 _RUNS = {
@@ -162,6 +162,10 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> GivenDr
     if os.path.isdir(place):
         read_policy(place)
         return _given(written, place, None, policy_files(place))
+    if place.suffix.lower() != ".toml":
+        kind = "fmu" if place.suffix.lower() == ".fmu" else "stable_baselines3"
+        document_of = f'; or name a TOML document with kind = "{kind}", file = "{place.name}"'
+        check_no_archive(file, key, written, place, document_of)
     if not os.path.exists(place):
         if written.endswith(".toml") or "/" in written:
             remedy = nearest(place.name, _beside(place)) if os.path.isdir(place.parent) else f"no folder {place.parent}"
@@ -172,10 +176,6 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> GivenDr
             raise UsageError.of(file, key, f"there is no driver {written!r}", remedy)
         document: DriverDocument = Python(kind="python", entry_point=written)
         return _given(written, place.parent, document, (), version_of(entry_point(written, file, key)))
-    if place.suffix in (".zip", ".fmu"):
-        kind = "stable_baselines3" if place.suffix == ".zip" else "fmu"
-        remedy = f'name a TOML file in its place: kind = "{kind}", file = "{place.name}"'
-        raise UsageError.of(file, key, f"{written!r} is not a driver document", remedy)
     document = read_driver(place)
     if (runs := _RUNS.get(type(document))) and not allow_code:
         remedy = f"if you trust it, say so on the command line: {ALLOW_CODE}"
