@@ -172,7 +172,7 @@ PERSONAS = [
         ("a description of a megabyte", "Somebody who wants to get there.", "x" * 900_000, ("description",)),
         ("a description that is a list", '"Somebody who wants to get there."', "[]", ("description",)),
         ("a citation of nothing", '"nobody, nowhere"', '""', ("sources[0].citation",)),
-        ("a program", "[human]\nweight = 1.0", '[human]\nweight = "__import__(\'os\').system(\'id\')"', ("human.weight",)),
+        ("a program for a weight", "[human]\nweight = 1.0", '[human]\nweight = "__import__(\'os\').system(\'id\')"', ("human.weight",)),
     ),
 ]
 

@@ -47,7 +47,7 @@ def xml_attacks(file: str, root: str, schema: str) -> list[Bad]:
         "a variable speed sign of a file": ('<variableSpeedSign id="v" lanes="exit_0" file="/etc/passwd"/>', "variableSpeedSign"),
         "a rerouter of a file": ('<rerouter id="r" edges="exit" file="/etc/passwd"/>', "rerouter"),
         "a route probe": ('<routeProbe id="r" edge="exit" freq="1" file="owned.xml"/>', "routeProbe"),
-        "a picture": ('<poi id="p" x="0" y="0" imgFile="/etc/passwd"/>', "poi"),
+        "a picture on the map": ('<poi id="p" x="0" y="0" imgFile="/etc/passwd"/>', "poi"),
         "a configuration": ("<configuration><output><log value='owned'/></output></configuration>", "configuration"),
         "a script": ("<script>alert(1)</script>", "script"),
         "an element of another world": ('<x:edge xmlns:x="urn:x"/>', "edge"),

@@ -46,7 +46,15 @@ def try_scene(scene: OpenScene) -> None:
                 *("--xml-validation", "always", "--xml-validation.net", "always", "--xml-validation.routes", "always"),
             ],
         }
-        said = {program: _said(process, patience_s) for program, process in _started(commands, folder).items()}
+        running = _started(commands, folder)
+        try:
+            said = {program: _said(process, patience_s) for program, process in running.items()}
+        finally:
+            for process in running.values():
+                process.kill()
+                process.wait()
+                assert process.stderr is not None
+                process.stderr.close()
     complaint = said["sumo"] or said["netconvert"]
     if complaint:
         of_net = not (str(types) in complaint or str(vehicles) in complaint or _OF_VEHICLES.search(complaint))
@@ -89,14 +97,11 @@ def _started(commands: Mapping[str, Sequence[str]], folder: Path) -> dict[str, s
 
 
 def _said(process: subprocess.Popen[str], patience_s: float) -> str:
-    """What a program complained of; nothing if it ended well. It has ended, one way or the other."""
+    """What a program complained of; nothing if it ended well."""
     try:
         said = process.communicate(timeout=patience_s)[1]
     except subprocess.TimeoutExpired:
         return f"SUMO did not finish reading it within {patience_s:.0f} s"
-    finally:
-        process.kill()
-        process.wait()
     if process.returncode < 0:
         return f"SUMO died of it ({signal.Signals(-process.returncode).name}) {said}"
     errors = [line for line in said.splitlines() if not line.startswith(("Warning", "Quitting"))]
