@@ -75,7 +75,7 @@ def schema(
         str | None,
         typer.Argument(
             metavar="DOCUMENT",
-            help="Which: campaign, persona or scene.  [default: all, with --out]",
+            help="Which: campaign, persona, scene or driver.  [default: all, with --out]",
             show_default=False,
         ),
     ] = None,

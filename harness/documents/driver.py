@@ -28,6 +28,7 @@ class Sumo(Document):
     """SUMO's own models, as a vehicle type of the scene's route file sets them."""
 
     kind: Literal["sumo"]
+    """Which kind of driver this is: what the other keys are goes by it."""
     vehicle_type: Annotated[str, Field(min_length=1, max_length=200)]
     """The id of a `vType`: the ego is a car of this type, its size and top speed included."""
 
@@ -36,6 +37,7 @@ class Process(Document):
     """A program in any language, which answers observations with controls: docs/egos.md has the protocol."""
 
     kind: Literal["process"]
+    """Which kind of driver this is: what the other keys are goes by it."""
     command: list[Argument] = Field(min_length=1, max_length=100)
     """The program and its arguments. It is run in the document's folder; a name without `/` is looked for on PATH."""
     files: list[DocumentPath] = Field([], max_length=1000)
@@ -54,7 +56,9 @@ class Fmu(Document):
     """A digital twin: an FMI 2.0 or 3.0 co-simulation FMU, stepped once per decision."""
 
     kind: Literal["fmu"]
+    """Which kind of driver this is: what the other keys are goes by it."""
     file: DocumentPath
+    """The FMU, from this document's folder."""
     inputs: dict[VariableName, str] = Field({}, max_length=200)
     """What each input of the FMU is given: an entry of the observation. An input that is not here has to be called
     like an entry."""
@@ -88,15 +92,20 @@ class StableBaselines3(Document):
     """A policy that Stable-Baselines3 saved, trained on `harness/Ego-v0` or an environment with its spaces."""
 
     kind: Literal["stable_baselines3"]
+    """Which kind of driver this is: what the other keys are goes by it."""
     file: DocumentPath
+    """The `.zip` that Stable-Baselines3 saved, from this document's folder."""
     algorithm: Literal["PPO", "A2C", "SAC", "TD3"]
+    """Which of its algorithms saved it."""
 
 
 class Python(Document):
     """An installed Python package's entry point of the group `harness.drivers`, with arguments."""
 
     kind: Literal["python"]
+    """Which kind of driver this is: what the other keys are goes by it."""
     entry_point: Annotated[str, Field(min_length=1, max_length=200)]
+    """The entry point's name, as the package declares it."""
     parameters: dict[str, Any] = Field({}, max_length=1000)
     """Keyword arguments of the entry point."""
 

@@ -160,8 +160,11 @@ class Rules(Document):
     """A driver by rules. At most one of its tables says how it reacts to danger; without, it only cruises."""
 
     kind: Literal["rules"]
+    """Which kind of driver this is: what the other keys are goes by it."""
     name: Name
-    description: str = Field(min_length=10)
+    """What these rules are called in reports."""
+    description: str = Field(min_length=10, max_length=2000)
+    """Who drives so, in a sentence."""
     cruise: Cruise = Cruise()
     lane_keeping: LaneKeeping = LaneKeeping()
     emergency_braking: EmergencyBraking | None = None

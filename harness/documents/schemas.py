@@ -15,13 +15,14 @@ from pydantic import TypeAdapter
 from pydantic.json_schema import GenerateJsonSchema
 
 from harness.documents.campaign import Campaign
+from harness.documents.driver import DriverDocument
 from harness.documents.persona import Persona
 from harness.documents.reading import nearest
 from harness.documents.scene import Scene
 from harness.errors import UsageError
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS, Term
 
-DOCUMENTS: Mapping[str, Any] = {"campaign": Campaign, "persona": Persona, "scene": Scene}
+DOCUMENTS: Mapping[str, Any] = {"campaign": Campaign, "persona": Persona, "scene": Scene, "driver": DriverDocument}
 """Every kind of document that a person writes, with its type: what `harness schema` knows of."""
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
