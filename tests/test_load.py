@@ -36,6 +36,7 @@ from harness.assessment import assess
 from harness.documents.persona import Persona
 from harness.documents.reading import read_document
 from harness.drivers.sumo import SumoDriver
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.state import Outcome
 from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay.choice import MOST_FAILURES_PER_ARM, choose_games, replay_name
@@ -202,6 +203,13 @@ LARGE = ("naive_vs_speedy", "retrained_vs_speedy")
 READY_MS = 3_000  # until the page's player can be used
 
 
+class Restless(Steady):
+    """Straight on, never at the same speed: its games take as much room on a page as a person's."""
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return np.clip(0.5 * noise * [1.0, 0.0], -1.0, 1.0)
+
+
 @pytest.fixture(scope="module")
 def large() -> dict[str, Any]:
     """The tables of a campaign in which two arms have ten thousand episodes: a hundred, again and again."""
@@ -219,7 +227,7 @@ def large() -> dict[str, Any]:
 def traces(merge: OpenScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The traces of that many episodes, fifty to a row group: some that were really played, again and again."""
     file = tmp_path_factory.mktemp("traces") / "traces.parquet"
-    games = [pa.table(dict(game.trace or {})) for game in play(arm(merge, Steady(), SumoDriver()), 5)]
+    games = [pa.table(dict(game.trace or {})) for game in play(arm(merge, Restless(), Restless()), 5)]
     with pq.ParquetWriter(file, SCHEMA, compression="zstd") as writer:
         for first in range(0, EPISODES, GAMES_PER_FILE):
             numbered = []
@@ -257,10 +265,11 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
         intro = page.locator("#player-intro").inner_text()
         assert intro.startswith(f"{len(listed)} recorded games")
         assert f"{len(episodes) - len(listed)} more games are too many for a page" in intro
-        for outcome in ("collision", "rail", "timeout", "goal"):  # every way to fail, and what went well
+        for outcome in ("collision", "goal"):  # the worst, and what went well
             assert any(outcome in each for each in listed), outcome
+        names = page.locator("[data-is=game] option").evaluate_all("options => options.map(each => each.value)")
         for name in LARGE:
-            assert any(name in each for each in listed), name
+            assert any(each.startswith(name) for each in names), name
         before = page.locator(".player").get_attribute("data-time")
         page.locator(".player").focus()
         page.keyboard.press("End")
