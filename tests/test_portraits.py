@@ -78,6 +78,7 @@ def test_portrait__has_a_moment_for_every_term() -> None:
         "goal": (1.0, "once"),
         "timeout": (-1.0, "once"),
         "progress": (1.0, "for 100 m"),
+        "speed_under_limit": (-0.1, "per second at 10 % under"),
         "lane_offset": (-1.0, "per second at 1 m"),
         "acceleration": (-0.25, "per second at 5 m/s²"),
         "lateral_acceleration": (pytest.approx(-0.09), "per second at 3 m/s²"),
@@ -141,10 +142,10 @@ def test_drift__is_that_of_the_games_car() -> None:
 
 def test_attends__in_words() -> None:
     said = " ".join(attends(portrait(DISTRACTED)))
-    assert "Eyes off the road 50 % of the time" in said
-    assert "lapses of 4 to 6 s, between them 5 s of attention on average; 6 lapses a minute" in said
+    assert "Eyes off the road 56 % of the time" in said
+    assert "lapses of 4 to 6 s, between them 4 s of attention on average; 6.7 lapses a minute" in said
     assert "Of drives of 60 s, under 1 % are without a lapse" in said
-    assert "after 5 s, 4.6 m to the right (standard deviation 0.93 m)" in said
+    assert "after 5 s, 5.1 m to the right (standard deviation 0.93 m)" in said
     assert list(attends(portrait(CAREFUL))) == ["Attention never lapses."]
     straight = made(attention={"mean_attentive_s": 55.0, "lapse_s": [5.0, 5.0]})
     said = " ".join(attends(straight))

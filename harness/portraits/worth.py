@@ -22,6 +22,7 @@ EXAMPLES: Mapping[str, tuple[str, str, float]] = {
     "goal": ("once", "outcome", float(Outcome.GOAL)),
     "timeout": ("once", "outcome", float(Outcome.TIMEOUT)),
     "progress": ("for 100 m", "advanced_m", 100.0),
+    "speed_under_limit": ("at 10 % under", "speed_over_limit", -0.1),
     "lane_offset": ("at 1 m", "lane_offset_m", 1.0),
     "acceleration": ("at 5 m/s²", "acceleration_mps2", 5.0),
     "lateral_acceleration": ("at 3 m/s²", "lateral_acceleration_mps2", 3.0),
