@@ -117,7 +117,7 @@ def test_card__of_a_person() -> None:
         "| player | non_ego |",
         "| against | `naive-seed1` |",
         "| games without the other | 70 % |",
-        "| attention | lapses for 4–6 s after 5 s on average |",
+        "| attention | lapses for 4–6 s after 4 s on average |",
         "| no lapses in | the first 50 % of the budget |",
         "| arm | games | reaches its goal | mean speed (m/s) |",
         "| `naive_vs_distracted` | 99 | 75 % (65.3–83.1 %) | 11.56 |",

@@ -92,11 +92,21 @@ def harness(*arguments: object, timeout_s: float = 200.0, **options: Any) -> sub
 
 
 def begin(*arguments: object) -> subprocess.Popen[str]:
-    """Start the command as the leader of a process group, as a shell does."""
+    """Start the command as the leader of a process group, as a shell does, whatever is ignored where the tests run."""
     command = [HARNESS, *map(str, arguments)]
     return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        preexec_fn=_heed_all,
     )
+
+
+def _heed_all() -> None:
+    for each in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        signal.signal(each, signal.SIG_DFL)
 
 
 def end(process: subprocess.Popen[str]) -> str:

@@ -6,6 +6,7 @@ other vehicles depart; and netconvert, which copies the net when several games a
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import signal
@@ -102,6 +103,8 @@ def _said(process: subprocess.Popen[str], patience_s: float) -> str:
         said = process.communicate(timeout=patience_s)[1]
     except subprocess.TimeoutExpired:
         return f"SUMO did not finish reading it within {patience_s:.0f} s"
+    if process.returncode == -getattr(signal, "SIGXFSZ", 0):  # the disk's fault, or its quota's: not the scene's
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
     if process.returncode < 0:
         return f"SUMO died of it ({signal.Signals(-process.returncode).name}) {said}"
     errors = [line for line in said.splitlines() if not line.startswith(("Warning", "Quitting"))]
