@@ -143,6 +143,8 @@ def test_policy__with_odd_bytes_somewhere(folder: Path, data: st.DataObject) -> 
 @given(data=st.data())
 def test_manifest__with_an_odd_value_somewhere(folder: Path, data: st.DataObject) -> None:
     manifest = json.loads((REPOSITORY / "reports" / "merge" / "manifest.json").read_text(encoding="utf-8"))
+    for entry in manifest["stages"].values():
+        entry.pop("versions", None)  # as of a run whose stages have no seals: there are none here to look at
     replaced(manifest, data.draw(st.sampled_from(places(manifest))), data.draw(odd_values))
     run = folder / "run"
     shutil.rmtree(run, ignore_errors=True)
