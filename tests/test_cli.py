@@ -58,7 +58,7 @@ HELP: dict[str, list[str]] = {
     "persona": ["new", "show"],
     "persona new": ["NAME", "--out", "personas/NAME.toml", "Overwrites nothing"],
     "persona show": ["FILE", "--html", "membership curves"],
-    "schema": ["DOCUMENT", "campaign, persona or scene", "--out"],
+    "schema": ["DOCUMENT", "campaign, persona, scene or driver", "--out"],
     "replay": ["RUN", "ARM", "EPISODE", "--list", "--seed", "naive_vs_speedy", "worst first", "first"],
 }
 
