@@ -64,20 +64,29 @@ class Arena:
     """G games on one scene, in which the same seats are taken."""
 
     def __init__(
-        self, scene: OpenScene, games: int, seats: Sequence[Seat], seed: int = 0, recorded: bool = False
+        self,
+        scene: OpenScene,
+        games: int,
+        seats: Sequence[Seat | Sequence[Seat]],
+        seed: int = 0,
+        recorded: bool = False,
     ) -> None:
         """Load SUMO. Every game has to be started with `start` before the first step.
 
+        A player may have several seats: `Start.member` says whose game it is. SUMO drives all of them or none.
         `recorded`: `reading` tells of all others in every step, and not only of those near a player (at a price).
         Raises SimulationError if SUMO can't load the scene.
         """
-        self.scene, self.world, self.games, self.seats = scene, scene.world, games, tuple(seats)
-        self._taken_over = np.array([seat.driver is None or seat.driver.takes_over for seat in seats])
+        self.scene, self.world, self.games = scene, scene.world, games
+        self.seats = tuple((each,) if isinstance(each, Seat) else tuple(each) for each in seats)
+        first = [of_player[0].driver for of_player in self.seats]
+        self._taken_over = np.array([driver is None or driver.takes_over for driver in first])
         self._slack_m = slack_m(self._taken_over)
         self.simulation = open_simulation(scene, games, self._taken_over.tolist(), seed, recorded)
         players = len(self.seats)
         self.state = State.empty(games, players)
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
+        self._member = np.zeros((games, players), dtype=np.int64)
         self._noise = np.zeros((games, players, self.world.steps, 2))
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
@@ -98,9 +107,10 @@ class Arena:
         state.station_m[games], _ = self.world.road.routes.locate(
             state.x_m[games], state.y_m[games], state.station_m[games]
         )
-        for seat in self.seats:
-            if seat.driver is not None:
-                seat.driver.begin(games)
+        for player, seats in enumerate(self.seats):
+            for member, seat in enumerate(seats):
+                if seat.driver is not None:
+                    seat.driver.begin(games if len(seats) == 1 else games[self._member[games, player] == member])
         self._look(games)
 
     def reload(self, seed: int) -> None:
@@ -141,10 +151,13 @@ class Arena:
         state = self.state
         now = np.minimum(state.step, self.world.steps - 1)
         chosen = np.zeros((*drove.shape, 2)) if actions is None else np.array(actions, dtype=float)
-        for player, seat in enumerate(self.seats):
-            if seat.driver is not None:
+        for player, seats in enumerate(self.seats):
+            if seats[0].driver is not None:
                 chosen[:, player] = 0.0
-                games = np.flatnonzero(drove[:, player])
+            for member, seat in enumerate(seats):
+                if seat.driver is None:
+                    continue
+                games = np.flatnonzero(drove[:, player] if len(seats) == 1 else self._theirs(drove, player, member))
                 if seat.driver.takes_over and len(games):
                     noise = self._noise[games, player, now[games]]
                     decided = seat.driver.decide(games, self.observation[games, player], noise)
@@ -183,10 +196,16 @@ class Arena:
 
     def _pay(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
         payoff = np.zeros(drove.shape)
-        for player, seat in enumerate(self.seats):
-            if seat.payoff is not None:
-                payoff[:, player] = np.where(drove[:, player], seat.payoff.total(quantities, player), 0.0)
+        for player, seats in enumerate(self.seats):
+            for member, seat in enumerate(seats):
+                if seat.payoff is not None:
+                    paid = drove[:, player] if len(seats) == 1 else self._theirs(drove, player, member)
+                    payoff[:, player] = np.where(paid, seat.payoff.total(quantities, player), payoff[:, player])
         return payoff
+
+    def _theirs(self, drove: BoolArray, player: int, member: int) -> BoolArray:
+        """[G] the games in which a player drove who is this one of its drivers."""
+        return drove[:, player] & (self._member[:, player] == member)
 
     def _settle(self, quantities: Quantities, drove: BoolArray) -> None:
         """Who reached the goal leaves, who crashed stands; then everyone looks."""
@@ -219,7 +238,7 @@ class Arena:
         state.x_m[game], state.y_m[game], state.heading_rad[game] = start.x_m, start.y_m, start.heading_rad
         state.speed_mps[game], state.present[game] = start.speed_mps, start.present
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
-        state.overlooked_m[game] = start.overlooked_m
+        state.overlooked_m[game], self._member[game] = start.overlooked_m, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = Outcome.RUNNING, False, 0
         for player in range(len(self.seats)):
             state.station_m[game, player] = self.world.road.routes.find(player, start.x_m[player], start.y_m[player])

@@ -14,12 +14,12 @@ import numpy as np
 
 from harness.arena import Arena, Seat, Step
 from harness.documents.persona import Persona
-from harness.drivers.protocol import Driver
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.seeding import generator_of
 from harness.game.start import Chances, draw_start
 from harness.game.state import EGO, NON_EGO, ROLES, Outcome
 from harness.metrics import OF_EGO, OF_NON_EGO, Drive
+from harness.mixture import Player, mixture_of
 from harness.traffic.opening import OpenScene
 
 _UNMEASURED = np.full((1, len(ROLES)), np.nan)  # [G, P] of one game
@@ -27,12 +27,13 @@ _UNMEASURED = np.full((1, len(ROLES)), np.nan)  # [G, P] of one game
 
 @dataclass(frozen=True)
 class Arm:
-    """A pairing that is assessed. A driver of None: the player does not take part."""
+    """A pairing that is assessed. A driver of None: the player does not take part; a mixture: several, in turn."""
 
     name: str
     scene: OpenScene
-    drivers: tuple[Driver | None, Driver | None]
+    drivers: tuple[Player, Player]
     personas: tuple[Persona, Persona]
+    """Of the drivers; each of a mixture has its own."""
     seed: int
 
 
@@ -56,11 +57,10 @@ def assess(
     `begin` is told of each before it is played. Those `given_up` are not played, and why is the error of their record.
     Raises SimulationError if SUMO can't load the scene at all.
     """
+    players = [mixture_of(each or _Absent(), persona) for each, persona in zip(arm.drivers, arm.personas, strict=True)]
     present = [0.0 if driver is None else 1.0 for driver in arm.drivers]
-    chances = arm.scene.chances([persona.habits for persona in arm.personas], present)
-    seats = [
-        Seat(driver or _Absent(), persona.payoff) for driver, persona in zip(arm.drivers, arm.personas, strict=True)
-    ]
+    chances = arm.scene.chances([each.habits for each in players], present, [each.shares for each in players])
+    seats = [[Seat(member.driver, member.persona.payoff) for member in each.members] for each in players]
     arena = Arena(arm.scene, 1, seats, recorded=True)
     try:
         for episode in range(episodes) if isinstance(episodes, int) else episodes:

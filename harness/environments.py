@@ -252,7 +252,7 @@ class _Game:
     def info(self, player: int, step: Step | None = None) -> Info:
         state = self.arena.state if step is None else step.quantities.state
         station_m = float(state.station_m[0, player])
-        payoff = self.arena.seats[player].payoff
+        payoff = self.arena.seats[player][0].payoff
         terms = {} if step is None or payoff is None else payoff.evaluate(step.quantities, player)
         return {
             "outcome": Outcome(int(state.outcome[0, player])).word,

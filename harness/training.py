@@ -24,12 +24,12 @@ from harness.checkpoint import Progress, Window, policy_of, put_policy, read_che
 from harness.convergence import has_converged
 from harness.documents.campaign import Training
 from harness.documents.persona import Persona
-from harness.drivers.protocol import Driver
-from harness.game.attention import Overlooking
+from harness.game.attention import Habits, Overlooking
 from harness.game.observation import OF_OTHERS
 from harness.game.seeding import seed_of
 from harness.game.start import Chances
 from harness.game.state import Outcome
+from harness.mixture import Mixture, Player, mixture_of
 from harness.policy_file import Policy
 from harness.traffic.opening import OpenScene
 from harness.vector_environment import ArenaVecEnv, Finished
@@ -45,7 +45,7 @@ class Lesson:
     scene: OpenScene
     learner: int
     personas: tuple[Persona, Persona]  # of the ego's seat and of the non-ego's
-    opponent: Driver | None
+    opponent: Player
     """Who has the other seat; None: the learner is alone in every game."""
     alone_share: float
     attentive_share: float
@@ -104,8 +104,10 @@ def _why_to_stop(lesson: Lesson, progress: Progress) -> str | None:
 
 
 def _environment(lesson: Lesson) -> ArenaVecEnv:
-    seats = [Seat(lesson.opponent), Seat(lesson.opponent)]
-    seats[lesson.learner] = Seat(None, lesson.personas[lesson.learner].payoff)
+    others = _others(lesson)
+    nobody = [Seat(None)]  # and is in no game
+    seats = [[Seat(each.driver) for each in others.members] if others is not None else nobody] * 2
+    seats[lesson.learner] = [Seat(None, lesson.personas[lesson.learner].payoff)]
     seed = seed_of(*lesson.parts, "sumo") % 2**31
     arena = Arena(lesson.scene, lesson.settings.games, seats, seed)
     scale = lesson.settings.payoff_scale
@@ -116,16 +118,32 @@ def _chances(lesson: Lesson, steps: int) -> Chances:
     """What the games are drawn from, `steps` into the training."""
     present = [0.0 if lesson.opponent is None else 1.0 - lesson.alone_share] * 2
     present[lesson.learner] = 1.0
-    habits = [persona.habits for persona in lesson.personas]
+    theirs, their_shares = _of_other(lesson)
+    habits, shares = [theirs, theirs], [their_shares, their_shares]
     # Nobody learns from what was overlooked and went well: a driver learns with open eyes, and drives by habit.
-    habits[lesson.learner] = replace(habits[lesson.learner], overlooking=Overlooking())
+    own = lesson.personas[lesson.learner].habits
+    habits[lesson.learner], shares[lesson.learner] = [replace(own, overlooking=Overlooking())], [1.0]
     if steps < _attentive_steps(lesson):
-        habits = [replace(each, attention=None) for each in habits]
-    return lesson.scene.chances(habits, present)
+        habits = [[replace(each, attention=None) for each in of_player] for of_player in habits]
+    return lesson.scene.chances(habits, present, shares)
+
+
+def _others(lesson: Lesson) -> Mixture | None:
+    opponent = lesson.opponent
+    return mixture_of(opponent, lesson.personas[1 - lesson.learner]) if opponent is not None else None
+
+
+def _of_other(lesson: Lesson) -> tuple[list[Habits], list[float]]:
+    """Habits and shares of who has the other seat."""
+    others = _others(lesson)
+    if others is None:
+        return [lesson.personas[1 - lesson.learner].habits], [1.0]
+    return others.habits, others.shares
 
 
 def _attentive_steps(lesson: Lesson) -> float:
-    lapses = any(persona.attention is not None for persona in lesson.personas)
+    habits, _ = _of_other(lesson)
+    lapses = any(each.attention is not None for each in (lesson.personas[lesson.learner].habits, *habits))
     return lesson.attentive_share * lesson.settings.steps if lapses else 0.0
 
 

@@ -60,7 +60,7 @@ def test_start__other_parts_give_another(chances: Chances, parts: tuple[str | in
 
 
 def test_start__pairs_whoever_drives_and_attends(chances: Chances) -> None:
-    texting = replace(chances, habits=(Habits(), Habits(TEXTING)), present_share=(1.0, 0.0))
+    texting = replace(chances, habits=([Habits()], [Habits(TEXTING)]), present_share=(1.0, 0.0))
     one, two = draw_start(chances, "a", 1), draw_start(texting, "a", 1)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "noise", "seed"):
         assert np.array_equal(getattr(one, name), getattr(two, name))
@@ -70,8 +70,8 @@ def test_start__pairs_whoever_drives_and_attends(chances: Chances) -> None:
 
 
 def test_start__one_players_lapses_do_not_hang_on_the_others(chances: Chances) -> None:
-    both = draw_start(replace(chances, habits=(Habits(TEXTING), Habits(TEXTING))), "a", 1)
-    alone = draw_start(replace(chances, habits=(Habits(), Habits(TEXTING))), "a", 1)
+    both = draw_start(replace(chances, habits=([Habits(TEXTING)], [Habits(TEXTING)])), "a", 1)
+    alone = draw_start(replace(chances, habits=([Habits()], [Habits(TEXTING)])), "a", 1)
     assert (both.lapses[1].lapsed == alone.lapses[1].lapsed).all()
     assert (both.lapses[0].lapsed != both.lapses[1].lapsed).any()
 

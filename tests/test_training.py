@@ -216,7 +216,7 @@ def test_train__attention_lapses_only_after_its_share_of_the_budget(
 
     def noting(environment: ArenaVecEnv, chances: Chances, *parts: str | int) -> None:
         if "segment" in parts:
-            seen.append(any(each.attention is not None for each in chances.habits))
+            seen.append(any(each.attention is not None for of_player in chances.habits for each in of_player))
         begin(environment, chances, *parts)
 
     monkeypatch.setattr(ArenaVecEnv, "begin", noting)
@@ -233,7 +233,7 @@ def test_train__the_learner_overlooks_nobody_while_it_learns_and_its_opponent_do
     begin = ArenaVecEnv.begin
 
     def noting(environment: ArenaVecEnv, chances: Chances, *parts: str | int) -> None:
-        seen.append([each.overlooking.share for each in chances.habits])
+        seen.append([each.overlooking.share for (each,) in chances.habits])
         begin(environment, chances, *parts)
 
     monkeypatch.setattr(ArenaVecEnv, "begin", noting)

@@ -15,7 +15,7 @@ from math import atan2, hypot
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.attention import Habits, Lapses, draw_lapses, draw_overlooked_m
+from harness.game.attention import Attention, Habits, Lapses, draw_lapses, draw_overlooked_m
 from harness.game.seeding import generator_of, seed_of
 
 
@@ -60,15 +60,18 @@ class Start:
     lapses: tuple[Lapses, ...]
     overlooked_m: FloatArray  # how far ahead of a player others must be to be seen by it
     seed: int  # of the traffic SUMO drives
+    member: tuple[int, ...]  # who of a player's drivers drives in this game
 
 
 @dataclass(frozen=True)
 class Chances:
-    """What is drawn for a game: places [P], lengths [P], habits [P], the chance that each player takes part [P]."""
+    """What is drawn for a game: places [P], lengths [P], the chance that each player takes part [P]; and of each
+    player's drivers one, by their shares, with its habits."""
 
     places: Sequence[Place]
     length_m: FloatArray
-    habits: Sequence[Habits]
+    habits: Sequence[Sequence[Habits]]
+    shares: Sequence[Sequence[float]]
     present_share: Sequence[float]
     steps: int
     step_s: float
@@ -86,7 +89,11 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
         speeds.append(chance.uniform(*place.speed_mps))
         poses.append(place.pose(position, length))
     present = [chance.random() < share for share in chances.present_share]
-    overlooked = [draw_overlooked_m(habits.overlooking, chance) for habits in chances.habits]
+    member, habits, overlooked = [], [], []
+    for player, shares in enumerate(chances.shares):
+        member.append(0 if len(shares) == 1 else draw_member(shares, player, *parts))
+        habits.append(chances.habits[player][member[player]])
+        overlooked.append(draw_overlooked_m(habits[player].overlooking, chance))
     noise = chance.standard_normal((len(players), chances.steps, 2))
     x, y, heading = np.array(poses).T
     return Start(
@@ -97,14 +104,20 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
         np.array(positions),
         np.array(present),
         noise,
-        tuple(_lapses(chances, p, *parts) for p in players),
+        tuple(_lapses(habits[p].attention, chances, p, *parts) for p in players),
         np.array(overlooked),
         seed_of(*parts, "traffic") % 2**31,
+        tuple(member),
     )
 
 
-def _lapses(chances: Chances, player: int, *parts: str | int) -> Lapses:
-    attention = chances.habits[player].attention
+def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:
+    """Which of a player's drivers a game has: one draw, from a generator of its own, so that nothing else moves."""
+    upper = np.cumsum(shares)
+    return int(np.searchsorted(upper, generator_of(*parts, "member", player).random() * upper[-1], side="right"))
+
+
+def _lapses(attention: Attention | None, chances: Chances, player: int, *parts: str | int) -> Lapses:
     if attention is None:
         return Lapses.none(chances.steps)
     return draw_lapses(attention, chances.steps, chances.step_s, generator_of(*parts, "attention", player))

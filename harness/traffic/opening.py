@@ -22,7 +22,7 @@ from harness.game.arrays import FloatArray
 from harness.game.attention import Habits
 from harness.game.bicycle import Actuators
 from harness.game.quantities import REACH_M, World
-from harness.game.road import MARGIN_M, SPACING_M, Road, Route, Routes
+from harness.game.road import Road, Route, Routes
 from harness.game.start import Chances, Place
 from harness.game.state import ROLES
 from harness.traffic import network
@@ -65,9 +65,18 @@ class OpenScene:
         players = {player.vehicle for player in self.document.players}
         return self.routes.departures(players, self.document.time_limit_s, generator)
 
-    def chances(self, habits: Sequence[Habits], present_share: Sequence[float]) -> Chances:
-        """What is drawn at the start of each game, for players that attend and take part like this."""
-        return Chances(self.places, self.world.length_m, habits, present_share, self.world.steps, self.world.step_s)
+    def chances(
+        self,
+        habits: Sequence[Habits | Sequence[Habits]],
+        present_share: Sequence[float],
+        shares: Sequence[Sequence[float]] | None = None,
+    ) -> Chances:
+        """What is drawn at the start of each game, for players that attend and take part like this. A player with
+        several drivers has the habits of each, and the `shares` [P][n] of the games that each has."""
+        of_each = [[each] if isinstance(each, Habits) else list(each) for each in habits]
+        shares = shares or [[1.0] * len(each) for each in of_each]
+        place = (self.places, self.world.length_m, of_each, shares, present_share)
+        return Chances(*place, self.world.steps, self.world.step_s)
 
 
 class _NamedFiles(Document):
@@ -175,21 +184,9 @@ def _open_player(
         raise UsageError.of(
             routes.path, f"vehicle {vehicle.name}", f"its route {error}", "mend the route's edges"
         ) from None
-    _has_limits(file.parent / document.net, table, vehicle)
     kind = routes.types[vehicle.vehicle_type]
     _room_beyond_goal(file, document, table, kind)
     return place, table, tuple(edge.getID() for edge in onward), kind
-
-
-def _has_limits(net_file: Path, table: Route, vehicle: Departure) -> None:
-    """What a player sees and is paid for is a share of the speed limit: there has to be one, all along its route."""
-    limit = table.speed_limit_mps
-    without = np.flatnonzero(~((limit > 0.0) & np.isfinite(limit)))
-    if len(without):
-        along = np.clip(without[0] * SPACING_M - MARGIN_M, 0.0, table.length_m)
-        where = f"{along:g} m along the route of vehicle {vehicle.name!r}"
-        remedy = "give the lanes there a speed in m/s, greater than 0"
-        raise UsageError.of(net_file, "speed", f"is {limit[without[0]]:g} m/s {where}", remedy)
 
 
 def _room_beyond_goal(file: Path, document: Scene, table: Route, kind: VehicleType) -> None:
