@@ -1,9 +1,9 @@
-"""The four CSV tables of a run folder: their columns, the summary, and writing and reading them exactly.
+"""The CSV tables of a run folder: their columns, the summary, and writing and reading them exactly.
 
 An empty cell means "can't be measured", never 0. Equal tables are equal bytes: floats are written as the
 shortest text that reads back as the same number, whole numbers without a point, truth values as true/false,
 lines end in a line feed. A table is known by its columns, which are declared here and nowhere else (those of
-`comparisons.csv` beside what computes them).
+`comparisons.csv` and of the findings on equilibria beside what computes them).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from harness.comparison import COMPARISON_COLUMNS, CONFIDENCE, mean_interval
 from harness.errors import UsageError
 from harness.file_content import content_of
 from harness.files import replace_durably, scratch_beside, write_atomically
+from harness.theory.columns import GAME_TABLES
 
 EPISODE_COLUMNS = {
     "arm": "object",
@@ -106,6 +107,7 @@ TABLES = {
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,
     "manoeuvres": MANOEUVRE_COLUMNS,
+    **GAME_TABLES,
 }
 
 _MOST_BYTES = 500_000_000

@@ -49,7 +49,8 @@ ALLOWED: dict[str, set[str]] = {
     "trace_file": {"errors", "files", "file_content", "game"},
     "seals": {"files", "file_content"},
     "comparison": set(),
-    "tables": {"errors", "files", "file_content", "comparison"},
+    "theory": {"errors", "comparison"},
+    "tables": {"errors", "files", "file_content", "comparison", "theory"},  # theory: what its tables' columns are
     "rounds": {"documents", "game", "comparison"},
     "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds"},
     "run_folder": {"errors", "files", "file_content", "documents", "rounds", "locking", "seals"},
@@ -66,7 +67,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     "deaths": {"rounds", "attempts"},
     "workers": {"errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "stages"},
-    "reports": {"errors", "comparison", "tables", "manoeuvres"},
+    "reports": {"errors", "comparison", "theory", "tables", "manoeuvres"},
     "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
     "model_card": {"errors", "documents", "files", "game", "policy_file", "reports", "rounds", "run_folder"},
@@ -228,7 +229,7 @@ def test_game__opens_no_files(path: Path) -> None:
     assert not names & FILE_ACCESS_CALLS
 
 
-@pytest.mark.parametrize("part", ["comparison", "reports"])
+@pytest.mark.parametrize("part", ["comparison", "theory", "reports"])
 def test_judging__reaches_neither_sumo_nor_a_learner(part: str) -> None:
     reached = reached_from(part)
     guilty = {
@@ -239,7 +240,7 @@ def test_judging__reaches_neither_sumo_nor_a_learner(part: str) -> None:
     assert not guilty
 
 
-@pytest.mark.parametrize("part", ["comparison", "reports"])
+@pytest.mark.parametrize("part", ["comparison", "theory", "reports"])
 def test_judging__loads_neither_sumo_nor_a_learner(part: str) -> None:
     if not any(part_of(path) == part for path in SOURCES):
         pytest.skip(f"there is no harness.{part}")
