@@ -111,8 +111,9 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
     from rich.console import Console
 
     from harness.documents.campaign import LEARNED
+    from harness.plan import plan
     from harness.preflight import open_campaign
-    from harness.rounds import TrainingStage, plan
+    from harness.rounds import TrainingStage
 
     opened = open_campaign(file, allow_code=allow_code)
     stages = plan(opened.document, [persona.name for persona in opened.personas])

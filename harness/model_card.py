@@ -22,9 +22,10 @@ from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.game.payoff import GROUPS, TERMS
 from harness.game.state import NON_EGO, ROLES
+from harness.plan import plan
 from harness.policy_file import policy_files, read_card
 from harness.reports.wording import interval, number, percent
-from harness.rounds import AssessmentStage, plan
+from harness.rounds import AssessmentStage
 from harness.run_folder import RunFolder
 
 CARD = "README.md"

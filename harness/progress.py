@@ -76,6 +76,8 @@ class StageProgress:
             return "" if self._console.is_terminal else f"started  {event.stage}"
         if event.kind == "done":
             info = event.info
+            if "settled" in info:
+                return f"settled  {event.stage}: {info['message']}"
             what = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else f"{info['episodes']} episodes"
             errors = f", {info['errors']} errors" if info.get("errors") else ""
             return f"done     {event.stage}: {what}{errors} in {info['seconds']:.0f} s"

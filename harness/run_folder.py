@@ -129,7 +129,9 @@ class RunFolder:
         its work is gone or damaged."""
         said = self.done(stage)
         made = (self.policy(stage) / "policy.safetensors").is_file() or self.traces(stage).is_file()
-        if said is None or said.get("key") != key or said["info"].get("errors") or not made:
+        if said is None or said.get("key") != key or said["info"].get("errors"):
+            return None
+        if not made and not said["info"].get("settled"):
             return None
         return None if broken(said, self.path) else dict(said["info"])
 

@@ -52,7 +52,12 @@ ALLOWED: dict[str, set[str]] = {
     "theory": {"errors", "comparison"},
     "tables": {"errors", "files", "file_content", "comparison", "theory"},  # theory: what its tables' columns are
     "rounds": {"documents", "game", "comparison"},
-    "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds"},
+    "responses": {"documents", "game", "rounds"},
+    "exchange": {"documents", "game", "rounds", "responses"},
+    "plan": {"documents", "rounds", "responses", "exchange"},
+    "plan_names": {"errors", "documents", "rounds", "plan"},
+    "pairings": {"documents", "game", "rounds", "responses", "exchange", "plan", "theory"},
+    "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds", "plan", "plan_names"},
     "run_folder": {"errors", "files", "file_content", "documents", "rounds", "locking", "seals"},
     "series": {"game"},
     "manoeuvres": {"game", "series"},
@@ -60,28 +65,37 @@ ALLOWED: dict[str, set[str]] = {
     "segments": {
         *("files", "assessment", "trace_file", "tables", "seals", "versions", "attempts", "manoeuvre_file"),
     },
+    "conditions": {"documents", "drivers", "preflight", "rounds", "run_folder"},
+    "stage_keys": {"policy_file", "preflight", "responses", "rounds", "versions"},
+    "settling": {"rounds", "run_folder", "tables", "theory"},
+    "casting": {
+        *("errors", "documents", "game", "traffic", "drivers", "policy_file", "mixture", "assessment", "tables"),
+        *("rounds", "run_folder", "conditions", "theory"),
+    },
     "stages": {
-        *("errors", "files", "documents", "game", "traffic", "drivers", "policy_file", "convergence", "training"),
-        *("assessment", "segments", "tables", "preflight", "rounds", "run_folder", "manoeuvre_file"),
-        *("attempts", "versions"),
+        *("errors", "files", "game", "traffic", "policy_file", "convergence", "training", "mixture"),
+        *("assessment", "segments", "tables", "rounds", "responses", "run_folder", "manoeuvre_file"),
+        *("attempts", "versions", "conditions", "settling", "casting"),
     },
     "deaths": {"rounds", "attempts"},
-    "workers": {"errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "stages"},
+    "workers": {
+        *("errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "conditions", "stages"),
+    },
     "reports": {"errors", "comparison", "theory", "tables", "manoeuvres"},
     "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
-    "model_card": {"errors", "documents", "files", "game", "policy_file", "reports", "rounds", "run_folder"},
+    "model_card": {"errors", "documents", "files", "game", "policy_file", "reports", "plan", "rounds", "run_folder"},
     "watching": {
         *("errors", "documents", "traffic", "replay", "rounds", "run_folder", "tables", "trace_file", "manoeuvres"),
     },
     "progress": {"rounds", "workers"},
     "schema_files": {"errors", "files", "documents"},
-    "persona_template": {"errors", "documents", "game", "rounds"},
+    "persona_template": {"errors", "documents", "game", "plan"},
     "portraits": {"errors", "files", "documents", "game", "reports"},  # reports: the style of its figures and pages
     "campaign_run": {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
-        *("manoeuvre_file", "model_card", "versions"),
+        *("manoeuvre_file", "model_card", "versions", "conditions", "stage_keys", "plan", "pairings", "theory"),
     },
 }
 ALLOWED["cli_documents"] = set(ALLOWED)

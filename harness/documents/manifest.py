@@ -37,6 +37,7 @@ class StageEntry(_Record):
     seconds: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
     episodes: Count | None = None
     errors: Count | None = None
+    settled: Text | None = None
 
 
 class Manifest(_Record):
@@ -83,8 +84,9 @@ def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]
             yield key, _words(error)
     if "harness" not in manifest.get("versions", {}):
         yield "versions.harness", "is missing"
+    populations = {each.get("name") for each in manifest["campaign"].get("population", ())}
     for name, entry in manifest["stages"].items():
-        if entry.get("persona", "") not in {"", *manifest["persona_documents"]}:
+        if entry.get("persona", "") not in {"", *manifest["persona_documents"], *populations}:
             yield f"stages.{name}.persona", f"there is no document of persona {entry['persona']!r}"
         if entry["kind"] == "training" and entry["status"] == "done":
             for key in ("steps", "budget_steps", "stopped"):

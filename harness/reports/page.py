@@ -101,7 +101,7 @@ def render_page(
         name=manifest.get("name", "campaign"),
         quick=QUICK if manifest.get("quick") else "",
         trained_before=manifest.get("campaign", {}).get("policies") or "",
-        unfinished=[_stage(name, stage) for name, stage in stages.items() if stage.get("status") != "done"],
+        unfinished=[_stage(name, stage) for name, stage in stages.items() if stage.get("status") not in ("done", "settled")],
         mixed=mixed_versions(stages),
         errored=errored.groupby(["arm", "seed"], sort=False).size().items(),
         errors=len(errored),

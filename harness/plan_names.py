@@ -1,0 +1,67 @@
+"""Names in a campaign that mean other parts of it: personas of populations and retrainings, arms of best responses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from harness.documents.campaign import LEARNED, ROBUST, SUMO, Campaign
+from harness.documents.reading import nearest
+from harness.errors import Problem, UsageError
+from harness.plan import name_of, plan
+from harness.rounds import AssessmentStage
+
+Wrong = Callable[[str, str, str], None]
+"""Notes a problem: key, what is wrong, remedy."""
+
+
+def check_names(file: Path, document: Campaign, personas: Sequence[str]) -> None:
+    """Raises UsageError for every name that means nobody, or two at once."""
+    problems: list[Problem] = []
+
+    def wrong(key: str, message: str, remedy: str) -> None:
+        problems.append(Problem(str(file), key, message, remedy))
+
+    for k, each in enumerate(document.population):
+        for name in each.shares:
+            if name not in personas:
+                wrong(f"population[{k}].shares", f"there is no persona {name!r}", nearest(name, personas))
+        if each.name in personas or each.name in [other.name for other in document.population[:k]]:
+            wrong(f"population[{k}].name", f"{each.name!r} is called something else too", "give it a name of its own")
+    for name in document.retraining.against:
+        if name not in personas:
+            wrong("retraining.against", f"there is no persona {name!r}", nearest(name, personas))
+    if len(set(document.retraining.against)) < len(document.retraining.against):
+        wrong("retraining.against", "a persona stands twice", "name each once")
+    _check_other_egos(document, wrong)
+    if not problems and document.best_response is not None:
+        _check_arms(document, personas, wrong)
+    if problems:
+        raise UsageError(problems)
+
+
+def _check_other_egos(document: Campaign, wrong: Wrong) -> None:
+    for written in document.crossplay.egos if document.crossplay is not None else ():
+        if written == LEARNED:
+            wrong("crossplay.egos", "the learned egos are there anyway", "leave it out")
+        elif written == document.ego.driver:
+            wrong("crossplay.egos", f"{written!r} is the campaign's ego, which is there anyway", "leave it out")
+        elif written != SUMO and name_of(written) in ("naive", ROBUST, SUMO):
+            wrong("crossplay.egos", f"{written!r} would be called {name_of(written)!r}", "rename its file or folder")
+
+
+def _check_arms(document: Campaign, personas: Sequence[str], wrong: Wrong) -> None:
+    assert document.best_response is not None
+    arms = {stage.arm: stage for stage in plan(document, personas) if isinstance(stage, AssessmentStage)}
+    pairs = [
+        name
+        for name, stage in arms.items()
+        if stage.ego is not None
+        and stage.non_ego is not None
+        and stage.persona
+        and not {"mixture", "best"} & {stage.ego.kind, stage.non_ego.kind}
+    ]
+    for name in document.best_response.arms:
+        if name not in pairs:
+            message = f"{name!r} is no arm of an ego and a persona" if name in arms else f"there is no arm {name!r}"
+            wrong("best_response.arms", message, nearest(name, pairs))
