@@ -32,7 +32,7 @@ def test_generalisation__agrees_with_the_arithmetic_on_paper():
     assert (row["pairs"], row["failure_rate"], row["naive_failure_rate"]) == (8, 0.125, 0.375)
     assert (row["fewer_failures"], row["share_of_naive"]) == (0.25, pytest.approx(1 / 3))
     half = 2.364624 * math.sqrt(3 / 14 / 8)  # 97.5 % quantile of t with 7 degrees of freedom
-    assert (row["ci_low"], row["ci_high"]) == (
+    assert (row["fewer_failures_low"], row["fewer_failures_high"]) == (
         pytest.approx(0.25 - half, abs=1e-5),
         pytest.approx(0.25 + half, abs=1e-5),
     )

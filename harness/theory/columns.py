@@ -85,8 +85,8 @@ GENERALISATION_COLUMNS = {
     "naive_failure_rate": "float64",  # of the naive ego against the same non-ego, over the same episodes
     "share_of_naive": "float64",  # failure_rate / naive_failure_rate; empty where the naive ego never fails
     "fewer_failures": "float64",  # mean of naive - this ego, over the pairs: above 0 it fails less
-    "ci_low": "float64",  # 95 % t interval of fewer_failures
-    "ci_high": "float64",
+    "fewer_failures_low": "float64",  # 95 % t interval
+    "fewer_failures_high": "float64",
     "p_value": "float64",  # paired t-test, one-tailed: it fails less than the naive ego
     "p_holm": "float64",  # over the table
     "verdict": "object",  # harness.comparison.Verdict

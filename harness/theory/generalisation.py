@@ -65,5 +65,6 @@ def _row(
     if was.sum():
         row["share_of_naive"] = now.sum() / was.sum()
     test = paired_t_test(now, was)
-    row["fewer_failures"] = test["mean_difference"]
-    return row | {name: test[name] for name in ("ci_low", "ci_high", "p_value") if name in test}
+    names = {"mean_difference": "", "ci_low": "_low", "ci_high": "_high"}
+    row |= {f"fewer_failures{end}": test[name] for name, end in names.items() if name in test}
+    return row | ({"p_value": test["p_value"]} if "p_value" in test else {})
