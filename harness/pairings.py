@@ -9,7 +9,7 @@ from harness.documents.campaign import ROBUST, Campaign
 from harness.exchange import exchange
 from harness.game.state import ROLES
 from harness.plan import plan
-from harness.responses import arm_responded_in
+from harness.responses import arm_responded_in, is_pair
 from harness.rounds import AssessmentStage, Drives, stage_id
 from harness.theory.records import Pairing, Response
 
@@ -33,7 +33,7 @@ def who_met(campaign: Campaign, personas: Sequence[str], done: Collection[str]) 
     arms = [each for each in plan(campaign, personas) if isinstance(each, AssessmentStage) and each.id in done]
     rounds = _rounds(campaign, personas)
     return Met(
-        [_pairing(arm) for arm in arms if _is_pairing(arm)],
+        [_pairing(arm) for arm in arms if is_pair(arm)],
         [response for arm in arms for response in _responses(arm, arms, rounds)],
         {ROBUST: campaign.retraining.against}
         | {f"retrained_{each.name}": list(each.shares) for each in campaign.population}
@@ -51,11 +51,6 @@ def _name(drives: Drives, seed: int) -> str:
     if drives.kind == "given":
         return drives.stage or "naive"
     return drives.kind if drives.kind == "sumo" else drives.stage.removesuffix(stage_id("", seed))
-
-
-def _is_pairing(arm: AssessmentStage) -> bool:
-    players = (arm.ego, arm.non_ego)
-    return bool(arm.persona) and all(each is not None and each.kind not in ("mixture", "best") for each in players)
 
 
 def _pairing(arm: AssessmentStage) -> Pairing:

@@ -7,7 +7,7 @@ from pathlib import PurePath
 
 from harness.documents.campaign import ROBUST, SUMO, Campaign
 from harness.exchange import Exchange, exchange
-from harness.responses import plan_responses
+from harness.responses import is_pair, plan_responses
 from harness.rounds import (
     AssessmentStage,
     Drives,
@@ -45,7 +45,8 @@ def _responses(campaign: Campaign, exchanges: dict[str, Exchange], stages: Itera
         return []
     last = [arm_of(each.egos[-1].name, each.non_egos[-1].name) for each in exchanges.values()]
     arms = {stage.arm: stage for stage in stages if isinstance(stage, AssessmentStage)}
-    pairs = [arms[name] for name in dict.fromkeys((*last, *campaign.best_response.arms)) if name in arms]
+    named = dict.fromkeys((*last, *campaign.best_response.arms))
+    pairs = [arms[name] for name in named if name in arms and is_pair(arms[name])]
     return [stage for pair in pairs for stage in plan_responses(campaign, pair)]
 
 

@@ -9,6 +9,7 @@ from harness.documents.campaign import LEARNED, ROBUST, SUMO, Campaign
 from harness.documents.reading import nearest
 from harness.errors import Problem, UsageError
 from harness.plan import name_of, plan
+from harness.responses import is_pair
 from harness.rounds import AssessmentStage
 
 Wrong = Callable[[str, str, str], None]
@@ -41,26 +42,23 @@ def check_names(file: Path, document: Campaign, personas: Sequence[str]) -> None
 
 
 def _check_other_egos(document: Campaign, wrong: Wrong) -> None:
-    for written in document.crossplay.egos if document.crossplay is not None else ():
-        if written == LEARNED:
+    written = document.crossplay.egos if document.crossplay is not None else []
+    names = [name_of(each) for each in written]
+    for driver, name in zip(written, names, strict=True):
+        if driver == LEARNED:
             wrong("crossplay.egos", "the learned egos are there anyway", "leave it out")
-        elif written == document.ego.driver:
-            wrong("crossplay.egos", f"{written!r} is the campaign's ego, which is there anyway", "leave it out")
-        elif written != SUMO and name_of(written) in ("naive", ROBUST, SUMO):
-            wrong("crossplay.egos", f"{written!r} would be called {name_of(written)!r}", "rename its file or folder")
+        elif driver == document.ego.driver:
+            wrong("crossplay.egos", f"{driver!r} is the campaign's ego, which is there anyway", "leave it out")
+        elif names.count(name) > 1:
+            wrong("crossplay.egos", f"two drivers are called {name!r}", "rename a file, or leave one out")
+        elif driver != SUMO and name in ("naive", ROBUST, SUMO):
+            wrong("crossplay.egos", f"{driver!r} would be called {name!r}", "rename its file or folder")
 
 
 def _check_arms(document: Campaign, personas: Sequence[str], wrong: Wrong) -> None:
     assert document.best_response is not None
     arms = {stage.arm: stage for stage in plan(document, personas) if isinstance(stage, AssessmentStage)}
-    pairs = [
-        name
-        for name, stage in arms.items()
-        if stage.ego is not None
-        and stage.non_ego is not None
-        and stage.persona
-        and not {"mixture", "best"} & {stage.ego.kind, stage.non_ego.kind}
-    ]
+    pairs = [name for name, stage in arms.items() if is_pair(stage)]
     for name in document.best_response.arms:
         if name not in pairs:
             message = f"{name!r} is no arm of an ego and a persona" if name in arms else f"there is no arm {name!r}"

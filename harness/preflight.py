@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import ConfigDict
 
@@ -17,7 +18,7 @@ from harness.drivers.car import car_of
 from harness.drivers.given import GivenDriver, find_driver
 from harness.errors import Problem, UsageError, attempt
 from harness.game.state import EGO
-from harness.plan import name_of, plan
+from harness.plan import plan
 from harness.plan_names import check_names
 from harness.policy_file import check_no_archive, policy_files, read_policy
 from harness.traffic.opening import OpenScene, open_scene
@@ -25,6 +26,7 @@ from harness.traffic.trial import try_scene
 
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
+QUICK_RESPONSE_STEPS = 131_072
 
 
 @dataclass(frozen=True)
@@ -165,15 +167,11 @@ def _other_egos(
     found: dict[str, GivenDriver] = {}
     crossplay = document.crossplay if document is not None else None
     for written in crossplay.egos if crossplay is not None else ():
-        name = name_of(written)
-        if name in found:
-            message = f"{written!r}: another driver is called {name!r} too"
-            problems.append(Problem(str(file), "crossplay.egos", message, "rename its file"))
-        if written == SUMO:
+        if written in (SUMO, LEARNED):
             continue
         driver = attempt(problems, lambda written=written: find_driver(written, file, "crossplay.egos", allow_code))  # type: ignore[misc]
         if driver is not None:
-            found[name] = driver
+            found[name_of(written)] = driver
             if scene is not None:
                 attempt(problems, lambda driver=driver: driver.try_out(car_of(scene.world, EGO), False))  # type: ignore[misc]
     return found
@@ -239,4 +237,8 @@ def _quickened(document: Campaign) -> Campaign:
             "segment_steps": min(document.training.segment_steps, QUICK_SEGMENT_STEPS),
         }
     )
-    return document.model_copy(update={"training": training})
+    changes: dict[str, Any] = {"training": training}
+    if document.best_response is not None:
+        steps = min(document.best_response.steps, QUICK_RESPONSE_STEPS)
+        changes["best_response"] = document.best_response.model_copy(update={"steps": steps})
+    return document.model_copy(update=changes)

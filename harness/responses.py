@@ -12,6 +12,13 @@ from harness.game.state import EGO, NON_EGO, ROLES
 from harness.rounds import AssessmentStage, Drives, Stage, TrainingStage, stage_id
 
 
+def is_pair(stage: AssessmentStage) -> bool:
+    """Whether an arm is of an ego and a person, each of whom always drives alike: one of several has no payoff to
+    gain by, and SUMO's own driver none at all."""
+    players = (stage.ego, stage.non_ego)
+    return bool(stage.persona) and all(each is not None and each.kind not in ("mixture", "best") for each in players)
+
+
 def plan_responses(campaign: Campaign, pair: AssessmentStage) -> list[Stage]:
     """The stages that measure how much each player of an arm could still gain."""
     how = campaign.best_response

@@ -55,7 +55,7 @@ ALLOWED: dict[str, set[str]] = {
     "responses": {"documents", "game", "rounds"},
     "exchange": {"documents", "game", "rounds", "responses"},
     "plan": {"documents", "rounds", "responses", "exchange"},
-    "plan_names": {"errors", "documents", "rounds", "plan"},
+    "plan_names": {"errors", "documents", "rounds", "responses", "plan"},
     "pairings": {"documents", "game", "rounds", "responses", "exchange", "plan", "theory"},
     "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds", "plan", "plan_names"},
     "run_folder": {"errors", "files", "file_content", "documents", "rounds", "locking", "seals"},
