@@ -26,6 +26,7 @@ from harness.preflight import OpenCampaign
 from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay import choose_games, replay_name, worst_first, write_replay
+from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions
 from harness.reports.results import results
@@ -177,13 +178,14 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     with console.status("writing the report"):
         games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
         page = render_page(
-            manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres
+            manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres, game
         )
     write_atomically(folder.path / "report.html", page.encode())
     _warn(mixed_versions(manifest["stages"]), console)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] not in FINISHED)
     found = results(manifest, episodes, summary, comparisons)
     verdicts = [(persona, found.verdicts(each, persona)) for persona in manifest["personas"] for each in ARMS]
+    verdicts += gap_verdicts(game.gaps) if game is not None else []
     return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))
 
 
