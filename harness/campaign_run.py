@@ -184,7 +184,7 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     _warn(mixed_versions(manifest["stages"]), console)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] not in FINISHED)
     found = results(manifest, episodes, summary, comparisons)
-    met = list(dict.fromkeys(each.persona for each in asked))
+    met = [*manifest["personas"], *(each.name for each in _campaign(manifest).population)]
     verdicts = [(persona, found.verdicts(each, persona)) for persona in met for each in ARMS]
     verdicts += gap_verdicts(game.gaps) if game is not None else []
     return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))

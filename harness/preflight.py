@@ -18,7 +18,7 @@ from harness.drivers.car import car_of
 from harness.drivers.given import GivenDriver, find_driver
 from harness.errors import Problem, UsageError, attempt
 from harness.game.state import EGO
-from harness.plan import plan
+from harness.plan import name_of, plan
 from harness.plan_names import check_names
 from harness.policy_file import check_no_archive, policy_files, read_policy
 from harness.traffic.opening import OpenScene, open_scene

@@ -233,6 +233,21 @@ def test_words__only_the_last_round_is_the_headline(found):
     assert verdicts["speedy"].label == "no in 2 of 2 seeds"
 
 
+def test_words__pairs_of_earlier_rounds_are_said_beneath(found):
+    earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value, ego="naive")
+    both = pd.concat([earlier, found.gaps], ignore_index=True)
+    section = game_section(GameFindings(both, found.crossplay, found.equilibria, found.generalisation))
+    assert len(section.gaps) == 8
+    assert [(persona, pair, answer.seed) for persona, pair, answer in section.others] == [
+        ("speedy", "naive against speedy_round2", 1),
+        ("speedy", "naive against speedy_round2", 2),
+        ("distracted", "naive against distracted", 1),
+        ("distracted", "naive against distracted", 2),
+    ]
+    text = Page(page_of(GameFindings(both, found.crossplay, found.equilibria, found.generalisation), (1, 2))).text
+    assert "naive against distracted, seed 2: For the ego nothing better was found" in text
+
+
 def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
     cells = pd.DataFrame(
         {

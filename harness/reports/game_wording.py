@@ -42,6 +42,17 @@ def last_pairs(gaps: pd.DataFrame) -> list[list[Row]]:
     return pairs(gaps[gaps["round"] == last])
 
 
+def other_pairs(gaps: pd.DataFrame) -> list[tuple[str, str, Answer]]:
+    """Persona, name and answer of every pair that is not of its seed's last round with that persona."""
+    found = []
+    for persona in dict.fromkeys(gaps["persona"]):
+        of = gaps[gaps["persona"] == persona]
+        last = of.groupby("seed")["round"].transform("max")
+        for rows in pairs(of[of["round"] < last]):
+            found.append((str(persona), f"{rows[0]['ego']} against {rows[0]['non_ego']}", pair_answer(rows)))
+    return found
+
+
 def pair_answer(rows: Sequence[Row]) -> Answer:
     """Whether a pair is an equilibrium as far as was found, in a sentence, and what its best-responding persona
     does to the ego."""

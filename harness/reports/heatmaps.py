@@ -91,7 +91,7 @@ def _map(quantity: _Quantity, found: pd.DataFrame, label: str, place: int) -> He
         "ego_payoff": table.ego_payoffs,
         "non_ego_payoff": table.non_ego_payoffs,
     }[quantity.name]
-    between = "least to most of the seeds" if label.startswith("mean") else "95 % interval"
+    between = "least to most of the seeds that played it" if label.startswith("mean") else "95 % interval"
     kind = "" if label.startswith("mean") else (" (Wilson)" if quantity.per_cent else " (t)")
     said = [
         f"{ego} against {non_ego} {_text(quantity, values[row, column])}"
