@@ -22,6 +22,7 @@ from harness.manoeuvre_file import manoeuvres_of
 from harness.model_card import write_model_cards
 from harness.pairings import who_met
 from harness.plan import plan
+from harness.populations import by_who_drove
 from harness.preflight import OpenCampaign
 from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
@@ -166,6 +167,8 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
     game = game_of(manifest, episodes)
     tables |= vars(game) if game is not None else {}
+    if (campaign := _campaign(manifest)).population:
+        tables["populations"] = by_who_drove(campaign, episodes)
     scene = open_scene(folder.scene)
     _check_traces(folder, episodes)
     write_model_cards(folder, manifest, summary)

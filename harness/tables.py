@@ -101,12 +101,29 @@ MANOEUVRE_COLUMNS = {
 }
 """Columns of `manoeuvres.csv`."""
 
+POPULATION_COLUMNS = {
+    "arm": "object",
+    "population": "object",
+    "seed": "int64",
+    "persona": "object",
+    "episodes": "int64",
+    "errors": "int64",
+    "failure_rate": "float64",
+    "failure_rate_low": "float64",
+    "failure_rate_high": "float64",
+    "mean_speed_mps": "float64",
+    "ego_payoff": "float64",
+    "non_ego_payoff": "float64",
+}
+"""Columns of `populations.csv`: a population's arms by who drove."""
+
 TABLES = {
     "episodes": EPISODE_COLUMNS,
     "summary": SUMMARY_COLUMNS,
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,
     "manoeuvres": MANOEUVRE_COLUMNS,
+    "populations": POPULATION_COLUMNS,
     **GAME_TABLES,
 }
 

@@ -61,6 +61,7 @@ ALLOWED: dict[str, set[str]] = {
     "run_folder": {"errors", "files", "file_content", "documents", "rounds", "locking", "seals"},
     "series": {"game"},
     "manoeuvres": {"game", "series"},
+    "populations": {"documents", "game", "assessment", "tables"},
     "manoeuvre_file": {"traffic", "manoeuvres", "tables", "run_folder", "trace_file"},
     "segments": {
         *("files", "assessment", "trace_file", "tables", "seals", "versions", "attempts", "manoeuvre_file"),
@@ -96,6 +97,7 @@ ALLOWED: dict[str, set[str]] = {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
         *("manoeuvre_file", "model_card", "versions", "conditions", "stage_keys", "plan", "pairings", "theory"),
+        "populations",
     },
 }
 ALLOWED["cli_documents"] = set(ALLOWED)
