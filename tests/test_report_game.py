@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 
 import pandas as pd
 import pytest
@@ -14,6 +15,7 @@ from test_report_browser import CONTRAST
 
 from harness.reports.game import CAPTIONS, game_section
 from harness.reports.game_wording import equilibrium_sentences, gap_verdicts
+from harness.reports.heatmaps import views
 from harness.reports.page import render_page
 from harness.tables import write_csv
 from harness.theory.equilibria import equilibria
@@ -93,6 +95,14 @@ def test_heat_map__has_the_tables_number_in_every_cell(found):
 
 def test_heat_map__of_one_seed_there_is_nothing_to_choose():
     assert [view.label for view in game_section(findings(games=20)).views] == ["seed 1"]
+
+
+def test_heat_map__has_a_personas_strategies_side_by_side(found):
+    rows = found.crossplay[found.crossplay["seed"] == 1]
+    rows = pd.concat([rows[rows["non_ego"] != "speedy_round2"], rows[rows["non_ego"] == "speedy_round2"]])
+    figure = views(rows)[0].maps[0].figure
+    names = re.findall(r">(speedy|speedy_round2|distracted|sumo)</text>", figure)
+    assert names == ["speedy", "speedy_round2", "distracted", "sumo"]
 
 
 def test_section__takes_its_share_of_the_page(found, html):
