@@ -35,12 +35,12 @@ from harness.reports.wording import ARMS, Verdicts
 from harness.rounds import AssessmentStage, Stage, TrainingStage, questions, stage_id
 from harness.run_folder import FORMAT, MANIFEST, RunFolder
 from harness.stage_keys import stage_keys
+from harness.summary import summarise
 from harness.tables import (
     EPISODE_COLUMNS,
     MANOEUVRE_COLUMNS,
     TRAINING_COLUMNS,
     read_csv,
-    summarise,
     typed,
     write_csv,
 )

@@ -10,7 +10,8 @@ from harness.assessment import parts_of
 from harness.documents.campaign import Campaign, Population
 from harness.game.start import draw_member
 from harness.game.state import NON_EGO
-from harness.tables import POPULATION_COLUMNS, summarise, typed
+from harness.summary import summarise
+from harness.tables import POPULATION_COLUMNS, typed
 
 _OF_SUMMARY = [name for name in POPULATION_COLUMNS if name not in ("arm", "population", "seed", "persona")]
 

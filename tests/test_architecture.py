@@ -51,6 +51,7 @@ ALLOWED: dict[str, set[str]] = {
     "comparison": set(),
     "theory": {"errors", "comparison"},
     "tables": {"errors", "files", "file_content", "comparison", "theory"},  # theory: what its tables' columns are
+    "summary": {"comparison", "tables"},
     "rounds": {"documents", "game", "comparison"},
     "responses": {"documents", "game", "rounds"},
     "exchange": {"documents", "game", "rounds", "responses"},
@@ -61,7 +62,7 @@ ALLOWED: dict[str, set[str]] = {
     "run_folder": {"errors", "files", "file_content", "documents", "rounds", "locking", "seals"},
     "series": {"game"},
     "manoeuvres": {"game", "series"},
-    "populations": {"documents", "game", "assessment", "tables"},
+    "populations": {"documents", "game", "assessment", "tables", "summary"},
     "manoeuvre_file": {"traffic", "manoeuvres", "tables", "run_folder", "trace_file"},
     "segments": {
         *("files", "assessment", "trace_file", "tables", "seals", "versions", "attempts", "manoeuvre_file"),
@@ -97,7 +98,7 @@ ALLOWED: dict[str, set[str]] = {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
         *("manoeuvre_file", "model_card", "versions", "conditions", "stage_keys", "plan", "pairings", "theory"),
-        "populations",
+        *("populations", "summary"),
     },
 }
 ALLOWED["cli_documents"] = set(ALLOWED)
