@@ -23,16 +23,18 @@ from harness.preflight import OpenCampaign
 from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay import choose_games, replay_name, worst_first, write_replay
+from harness.reports.change import ARMS
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions
 from harness.reports.results import results
-from harness.reports.wording import ARMS, Verdicts
-from harness.rounds import AssessmentStage, Stage, TrainingStage, plan, questions, stage_id
+from harness.reports.wording import Verdicts
+from harness.rounds import AssessmentStage, ReconfigurationStage, Stage, TrainingStage, plan, questions, stage_id
 from harness.run_folder import FORMAT, MANIFEST, RunFolder
 from harness.stages import conditions_of, stage_keys
 from harness.tables import (
     EPISODE_COLUMNS,
     MANOEUVRE_COLUMNS,
+    RECONFIGURATION_COLUMNS,
     TRAINING_COLUMNS,
     read_csv,
     summarise,
@@ -43,6 +45,8 @@ from harness.trace_file import check_traces, read_trace
 from harness.traffic.opening import OpenScene, open_scene
 from harness.versions import versions, versions_of_numbers
 from harness.workers import Event, run_stages
+
+_KINDS = {TrainingStage: "training", AssessmentStage: "assessment", ReconfigurationStage: "reconfiguration"}
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
     """
     folder.claim(campaign.document.name, campaign.quick)
     with folder.held():
-        stages = plan(campaign.document, [persona.name for persona in campaign.personas])
+        stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
         ledger = _Ledger(campaign, folder, stages, keys)
         scene = campaign.scene.document
@@ -127,7 +131,7 @@ class _Ledger:
 
     @staticmethod
     def _entry(stage: Stage, info: Mapping[str, Any] | None) -> dict[str, Any]:
-        kind = "training" if isinstance(stage, TrainingStage) else "assessment"
+        kind = _KINDS[type(stage)]
         name = stage.arm if isinstance(stage, AssessmentStage) else stage.name
         entry = {
             "kind": kind,
@@ -147,10 +151,13 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
     episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
+    searched = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
     summary = summarise(episodes)
     asked = questions_of(manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
+    if "reconfiguration" in _kinds(manifest):
+        tables["reconfiguration"] = searched
     scene = open_scene(folder.scene)
     _check_traces(folder, episodes)
     write_model_cards(folder, manifest, summary)
@@ -163,7 +170,8 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     with console.status("writing the report"):
         games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
         page = render_page(
-            manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres
+            *(manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres),
+            reconfiguration=searched,
         )
     write_atomically(folder.path / "report.html", page.encode())
     _warn(mixed_versions(manifest["stages"]), console)
@@ -187,9 +195,13 @@ def questions_of(manifest: Mapping[str, Any]) -> list[Any]:
     done = {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
     return [
         question
-        for question in questions(campaign, manifest["personas"])
+        for question in questions(campaign, manifest["personas"], "reconfiguration" in _kinds(manifest))
         if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= done
     ]
+
+
+def _kinds(manifest: Mapping[str, Any]) -> set[str]:
+    return {entry["kind"] for entry in manifest["stages"].values()}
 
 
 def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, columns: list[str]) -> pd.DataFrame:

@@ -187,7 +187,8 @@ def _figures(
 ) -> Iterator[tuple[str, Sequence[str]]]:
     campaign = Campaign.model_validate(manifest["campaign"], strict=False)
     rows = {row["arm"]: row for row in summary[summary["seed"] == seed].to_dict("records")}
-    for arm in plan(campaign, manifest["personas"]):
+    tunable = any(entry["kind"] == "reconfiguration" for entry in manifest["stages"].values())
+    for arm in plan(campaign, manifest["personas"], tunable):
         if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.arm not in rows:
             continue
         player = arm.ego if is_ego else arm.non_ego

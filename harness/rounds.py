@@ -6,8 +6,9 @@
 | 1 | for each persona: train `<persona>` against the naive ego; assess `<persona>_alone`, `naive_vs_<persona>` |
 | 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
 
-An ego that the campaign does not train has no round 2. A campaign that names a folder of policies has the same arms
-and no trainings: what they would have made is read from there.
+Round 2 of an ego that is given and has parameters to tune searches them: `reconfigured_<persona>` and its arms take the
+place of `retrained_<persona>`. An ego with nothing to train and nothing to tune has no round 2. A campaign that names a
+folder of policies has the same arms and no trainings: what they would have made is read from there.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ from harness.game.state import EGO, NON_EGO
 
 @dataclass(frozen=True)
 class Drives:
-    """Who drives a player: SUMO, the campaign's given ego, the policy that a training stage made, or the one that
-    such a stage made before, in another run."""
+    """Who drives a player: SUMO, the campaign's given ego, that ego as a search reconfigured it, the policy that a
+    training stage made, or the one that such a stage made before, in another run."""
 
-    kind: Literal["sumo", "given", "policy", "before"]
+    kind: Literal["sumo", "given", "reconfigured", "policy", "before"]
     stage: str = ""
     persona: str = ""
     """Whose habits it has; empty: the ego's own."""
@@ -82,7 +83,32 @@ class AssessmentStage:
         return tuple(each.stage for each in (self.ego, self.non_ego) if each is not None and each.kind == "before")
 
 
-Stage = TrainingStage | AssessmentStage
+@dataclass(frozen=True)
+class ReconfigurationStage:
+    """One search: the given ego's parameters, on its own payoff, against whom."""
+
+    name: str  # reconfigured_<persona>
+    seed: int
+    persona: str
+    opponent: Drives
+
+    @property
+    def id(self) -> str:
+        """What the stage and the driver it finds are called in the run folder."""
+        return stage_id(self.name, self.seed)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The stages that have to be done before."""
+        return _stages(None, self.opponent)
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The policies trained before that drive in it, each called after the stage that made it."""
+        return (self.opponent.stage,) if self.opponent.kind == "before" else ()
+
+
+Stage = TrainingStage | AssessmentStage | ReconfigurationStage
 
 
 def stage_id(name: str, seed: int) -> str:
@@ -91,19 +117,21 @@ def stage_id(name: str, seed: int) -> str:
 
 
 def _stages(initial: str | None, *drivers: Drives | None) -> tuple[str, ...]:
-    named = [initial or "", *(each.stage for each in drivers if each is not None and each.kind == "policy")]
+    made = ("policy", "reconfigured")
+    named = [initial or "", *(each.stage for each in drivers if each is not None and each.kind in made)]
     return tuple(dict.fromkeys(name for name in named if name))
 
 
-def plan(campaign: Campaign, personas: Sequence[str]) -> list[Stage]:
-    """Every stage of a campaign against the personas named, each after what it needs."""
-    stages = [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed)]
+def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Stage]:
+    """Every stage of a campaign against the personas named, each after what it needs. `tunable`: the ego is given,
+    and has something to tune."""
+    stages = [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed, tunable)]
     if campaign.policies is not None:
-        return [stage for stage in stages if isinstance(stage, AssessmentStage)]
+        return [stage for stage in stages if not isinstance(stage, TrainingStage)]
     return stages
 
 
-def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
+def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int, tunable: bool) -> list[Stage]:
     learned = campaign.ego.driver == LEARNED
     trained: Literal["policy", "before"] = "policy" if campaign.policies is None else "before"
     naive = stage_id("naive", seed)
@@ -134,11 +162,23 @@ def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int) -> list[S
             retrained = Drives(trained, stage_id(f"retrained_{persona}", seed))
             stages.append(AssessmentStage(f"retrained_vs_{persona}", seed, persona, retrained, person))
             stages.append(AssessmentStage(f"retrained_alone_{persona}", seed, persona, retrained, None))
+        elif tunable:
+            stages += _reconfiguration(persona, seed, person)
     return stages
 
 
-def questions(campaign: Campaign, personas: Sequence[str]) -> list[Question]:
-    """The research questions of a campaign (paper, section 4.2), for each persona and seed."""
+def _reconfiguration(persona: str, seed: int, person: Drives) -> list[Stage]:
+    name = f"reconfigured_{persona}"
+    found = Drives("reconfigured", stage_id(name, seed))
+    return [
+        ReconfigurationStage(name, seed, persona, person),
+        AssessmentStage(f"reconfigured_vs_{persona}", seed, persona, found, person),
+        AssessmentStage(f"reconfigured_alone_{persona}", seed, persona, found, None),
+    ]
+
+
+def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Question]:
+    """The research questions of a campaign (paper, section 4.2), for each persona and seed; `tunable` as in `plan`."""
     asked = []
     for persona in personas:
         for seed in campaign.seeds:
@@ -146,4 +186,6 @@ def questions(campaign: Campaign, personas: Sequence[str]) -> list[Question]:
             asked.append(Question("RQ1", persona, seed, "naive_alone", against))
             if campaign.ego.driver == LEARNED:
                 asked.append(Question("RQ2", persona, seed, against, retrained))
+            elif tunable:
+                asked.append(Question("RQ2", persona, seed, against, f"reconfigured_vs_{persona}"))
     return asked

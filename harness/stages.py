@@ -11,6 +11,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -29,7 +30,7 @@ from harness.game.state import EGO, ROLES
 from harness.manoeuvre_file import EPISODES, MANOEUVRES
 from harness.policy_file import policy_files, read_policy, write_policy
 from harness.preflight import OpenCampaign
-from harness.rounds import AssessmentStage, Drives, Stage, TrainingStage
+from harness.rounds import AssessmentStage, Drives, ReconfigurationStage, Stage, TrainingStage
 from harness.run_folder import RunFolder
 from harness.tables import TRAINING_COLUMNS, typed, write_csv
 from harness.traffic.opening import OpenScene, open_scene
@@ -74,7 +75,12 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
         if isinstance(stage, TrainingStage):
             inputs["training"] = campaign.document.training.model_dump(mode="json")
         else:
-            inputs["episodes"] = campaign.document.assessment.episodes
+            if isinstance(stage, ReconfigurationStage):
+                assert campaign.ego_driver is not None
+                inputs["reconfiguration"] = campaign.document.reconfiguration.model_dump(mode="json")
+                inputs["tunable"] = campaign.ego_driver.searched
+            else:
+                inputs["episodes"] = campaign.document.assessment.episodes
             if campaign.policies is not None:
                 files_of = {name: policy_files(campaign.policies / name) for name in stage.reads}
                 inputs["policies"] = {
@@ -111,8 +117,8 @@ def carry_out(
     folder.begin(stage.id, key)
     scene = open_scene(conditions.scene_folder, conditions.ego_driver.vehicle_type if conditions.ego_driver else None)
     began = time.monotonic()
-    do = _train if isinstance(stage, TrainingStage) else _assess
-    info, files = do(stage, conditions, folder, scene, report, begin, attempt)  # type: ignore[arg-type]
+    do: Any = {TrainingStage: _train, AssessmentStage: _assess, ReconfigurationStage: _reconfigure}[type(stage)]
+    info, files = do(stage, conditions, folder, scene, report, begin, attempt)
     info["seconds"] = round(time.monotonic() - began, 1)
     folder.finish(stage.id, key, info, files)
     if not info.get("errors"):  # failures are not kept: the next run tries those games again, and only those segments
@@ -120,9 +126,9 @@ def carry_out(
     return info
 
 
-def _made_by(checkpoint: Path) -> list[dict[str, str]]:
-    """The versions that a training is made by: more than one, if it went on where others had stopped."""
-    file, now = checkpoint.with_name("versions.json"), versions_of_numbers()
+def _made_by(checkpoint: Path, besides: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, str]]:
+    """The versions that a training or a search is made by: more than one, if it went on where others had stopped."""
+    file, now = checkpoint.with_name("versions.json"), {**versions_of_numbers(), **besides}
     try:
         before = json.loads(file.read_text(encoding="utf-8")) if checkpoint.is_file() else []
     except (OSError, ValueError):
@@ -189,6 +195,34 @@ def _train(
     return info, [*policy_files(folder.policy(stage.id)), table]
 
 
+def _reconfigure(
+    stage: ReconfigurationStage,
+    conditions: Conditions,
+    folder: RunFolder,
+    scene: OpenScene,
+    report: Report,
+    begin: Begin,
+    attempt: Attempt,
+) -> tuple[dict[str, Any], list[Path]]:
+    from harness.reconfiguration import Search, version_of_search
+    from harness.reconfigured import reconfigure  # Optuna is slow to import
+
+    opponent, given = _driver(stage.opponent, conditions, folder, scene), conditions.ego_driver
+    assert opponent is not None
+    assert given is not None
+    personas = (conditions.ego_persona, conditions.persona(stage.persona))
+    settings = conditions.document.reconfiguration
+    search = Search(scene, given, personas, opponent, settings, ("reconfiguration", stage.seed, stage.name))
+    kept = folder.work(stage.id) / "trials.json"
+    made_by = _made_by(kept, version_of_search())
+    labels = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed}
+    try:
+        info, files = reconfigure(search, labels, kept, folder.policy(stage.id), report, begin)
+    except StageFailed as error:
+        raise StageFailed(f"{stage.id}: {error}") from error
+    return {**info, "versions": made_by}, files
+
+
 def _assess(
     stage: AssessmentStage,
     conditions: Conditions,
@@ -221,9 +255,14 @@ def _driver(drives: Drives | None, conditions: Conditions, folder: RunFolder, sc
     if drives.kind == "sumo":
         return SumoDriver()
     sampled = conditions.persona(drives.persona).decisions == "sampled"
-    if drives.kind == "given":
-        assert conditions.ego_driver is not None
-        return conditions.ego_driver.make(car_of(scene.world, EGO), sampled)
+    if drives.kind in ("given", "reconfigured"):
+        given = conditions.ego_driver
+        assert given is not None
+        if drives.kind == "reconfigured":
+            from harness.reconfigured import read_found
+
+            given = read_found(given, folder.policy(drives.stage))
+        return given.make(car_of(scene.world, EGO), sampled)
     return LearnedDriver(read_policy(_policy(drives, conditions, folder)), sampled)
 
 

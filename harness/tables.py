@@ -85,6 +85,21 @@ TRAINING_COLUMNS = {
 }
 """Columns of `training.csv`."""
 
+RECONFIGURATION_COLUMNS = {
+    "stage": "object",
+    "persona": "object",
+    "seed": "int64",
+    "trial": "int64",
+    "parameter": "object",
+    "value": "float64",
+    "mean_payoff": "float64",
+    "failure_rate": "float64",
+    "best_payoff": "float64",
+    "chosen": "bool",
+    "error": "object",
+}
+"""Columns of `reconfiguration.csv`: a row per trial and parameter."""
+
 MANOEUVRE_COLUMNS = {
     "arm": "object",
     "persona": "object",
@@ -106,6 +121,7 @@ TABLES = {
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,
     "manoeuvres": MANOEUVRE_COLUMNS,
+    "reconfiguration": RECONFIGURATION_COLUMNS,
 }
 
 _MOST_BYTES = 500_000_000

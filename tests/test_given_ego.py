@@ -228,8 +228,8 @@ def check_rounds(run: Path, manifest: dict[str, Any], episodes: pd.DataFrame, in
     assert manifest["ego_driver"]["in_words"] == in_words
     page = html.unescape((run / "report.html").read_text())
     assert in_words in page
-    assert "0 and 1: there is nothing to train in this ego" in page
-    assert "Round 2 was not played: this ego was not retrained." in page
+    assert "0 and 1: there is nothing to train or to tune in this ego" in page
+    assert "Round 2 was not played: there is nothing to train or to tune in this ego." in page
     assert in_words in (run / "policies" / "speedy-seed1" / "README.md").read_text()
 
 

@@ -95,6 +95,19 @@ class Retraining(Document):
     """Begin from the naive ego's parameters, rather than from nothing."""
 
 
+class Reconfiguration(Document):
+    """Round 2 of an ego that is given and has something to tune: how its parameters are searched."""
+
+    trials: int = Field(40, ge=2, le=10_000)
+    """Drivers tried, the first with the parameters that the ego has."""
+    games: int = Field(64, ge=1, le=100_000)
+    """Games of each trial, the same for all: the ego's mean payoff in them is what the search is for."""
+    alone_share: float = Field(0.25, ge=0.0, le=1.0)
+    """Share of those games without the non-ego, so that what worked is not lost."""
+    games_at_once: int = Field(64, ge=1, le=1024)
+    """Games played at once."""
+
+
 class Assessment(Document):
     """How players are judged."""
 
@@ -122,6 +135,7 @@ class Campaign(Document):
     training: Training = Training()
     non_ego_training: NonEgoTraining = NonEgoTraining()
     retraining: Retraining = Retraining()
+    reconfiguration: Reconfiguration = Reconfiguration()
     assessment: Assessment = Assessment()
 
     @field_validator("seeds")
@@ -139,8 +153,12 @@ class Campaign(Document):
         return self
 
     def recorded(self) -> dict[str, Any]:
-        """Every key that counts with its value, as a manifest holds it: how players learn only where some do."""
-        return self.model_dump(mode="json", exclude=set(OF_TRAINING) if self.policies is not None else None)
+        """Every key that counts with its value, as a manifest holds it: how players learn or are tuned only where some
+        may be."""
+        without = set(OF_TRAINING) if self.policies is not None else set()
+        if self.ego.driver in (LEARNED, SUMO):
+            without.add("reconfiguration")
+        return self.model_dump(mode="json", exclude=without)
 
 
 def resolve(campaign_file: Path, written: str) -> Path:

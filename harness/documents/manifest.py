@@ -24,7 +24,7 @@ class _Record(Document):
 class StageEntry(_Record):
     """What a manifest says of a stage."""
 
-    kind: Literal["training", "assessment"]
+    kind: Literal["training", "assessment", "reconfiguration"]
     name: Text
     persona: Name | Literal[""] = ""
     seed: Seed
@@ -37,6 +37,9 @@ class StageEntry(_Record):
     seconds: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
     episodes: Count | None = None
     errors: Count | None = None
+    trials: Count | None = None
+    trials_unplayed: Count | None = None
+    chosen_trial: Count | None = None
 
 
 class Manifest(_Record):
