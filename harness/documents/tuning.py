@@ -15,7 +15,7 @@ from typing_extensions import Self
 from harness.documents.reading import Document, Mistakes, nearest
 
 ParameterName = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f]*$")]
-Bound = Annotated[float, Field(ge=-1e9, le=1e9)]
+Range = Annotated[list[Annotated[float, Field(ge=-1e9, le=1e9)]], Field(min_length=2, max_length=2)]
 
 
 class Tunable(NamedTuple):
@@ -32,7 +32,7 @@ class Adjustable(Document):
     parameter_table: ClassVar[str]
     """The key of the table in which its parameters are."""
 
-    tunable: dict[ParameterName, tuple[Bound, Bound]] | None = Field(None, max_length=100)
+    tunable: dict[ParameterName, Range] | None = Field(None, max_length=100)
     """Parameters that may be searched for a better driver, each with the least and the greatest value it may have.
     What the document says they are has to be in between: the search begins there."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -35,7 +36,9 @@ def _value(value: Any) -> str:
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, str):
         return _text(value)
-    return json.dumps(value)  # numbers and truth values are written alike in JSON and TOML
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    return json.dumps(value)  # other numbers and truth values are written alike in JSON and TOML
 
 
 def _text(text: str) -> str:
