@@ -1,5 +1,7 @@
 """What a driver document may declare as tunable, and documents with other values of it."""
 
+# ruff: noqa: E501
+
 from __future__ import annotations
 
 from pathlib import Path

@@ -16,7 +16,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 def toml_of(document: Document, said: Sequence[str] = ()) -> str:
     """A document as TOML: its plain keys, then its tables. What is `said` stands above it, in comments."""
-    content = {key: value for key, value in document.model_dump(mode="json").items() if value is not None}
+    content = {key: value for key, value in document.model_dump().items() if value is not None}
     lines = [f"# {plain(' '.join(line.split()))}" for line in said]
     lines += [f"{_key(key)} = {_value(value)}" for key, value in content.items() if not isinstance(value, dict)]
     for name, table in content.items():
@@ -32,7 +32,7 @@ def _key(key: str) -> str:
 def _value(value: Any) -> str:
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{_key(key)} = {_value(each)}" for key, each in value.items()) + "}"
-    if isinstance(value, list):
+    if isinstance(value, list | tuple):
         return "[" + ", ".join(map(_value, value)) + "]"
     if isinstance(value, str):
         return _text(value)
