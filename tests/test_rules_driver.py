@@ -114,6 +114,12 @@ def test_tunable__nothing_of_a_table_that_is_not_there_or_of_a_reference_driver(
         rules().tuned({"cruise.time_gap_s": 0.1})
 
 
+def test_page__tells_what_is_usually_tuned(repository: Path) -> None:
+    page = (repository / "docs" / "egos-by-rules.md").read_text(encoding="utf-8")
+    told = re.findall(r"^\| `([\w.]+\.\w+)` \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
+    assert [(key, float(low), float(high)) for key, low, high in told] == [*rules(emergency_braking={}).searched]
+
+
 def test_page__tells_every_parameter_with_its_default(repository: Path) -> None:
     page = (repository / "docs" / "egos-by-rules.md").read_text(encoding="utf-8")
     for name in ("cruise", "lane_keeping", *REACTIONS):
