@@ -211,10 +211,17 @@ def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, c
             file = folder.work(name) / table
             frame = read_csv(file)
             of = frame["arm" if kind == "assessment" else "stage"]
-            if not ((of == entry["name"]) & (frame["seed"] == entry["seed"])).all():
+            theirs = ((of == entry["name"]) & (frame["seed"] == entry["seed"])).all()
+            if not theirs or (kind == "reconfiguration" and not _is_of_a_search(frame)):
                 raise UsageError.of(file, "", f"has rows that are not of {name}", "run the campaign again")
             frames.append(frame)
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))
+
+
+def _is_of_a_search(trials: pd.DataFrame) -> bool:
+    """Whether the ego as it was given is among the trials, and one of them was chosen."""
+    payoffs = trials.groupby("trial")["mean_payoff"].first()
+    return 0 in payoffs.index and payoffs.notna()[0] and trials.loc[trials["chosen"], "trial"].nunique() == 1
 
 
 def _check_traces(folder: RunFolder, episodes: pd.DataFrame) -> None:

@@ -10,7 +10,7 @@ import pandas as pd
 
 from harness.attempts import Begin, Report
 from harness.documents.driver import read_driver
-from harness.documents.tuning import Adjustable
+from harness.documents.tuning import Adjustable, Tunable
 from harness.documents.writing import toml_of
 from harness.drivers.given import GivenDriver
 from harness.errors import StageFailed
@@ -39,7 +39,7 @@ def reconfigure(
     driver = search.driver.tuned(found.values) if chosen else search.driver
     make_folder(folder)
     write_atomically(folder / DRIVER, toml_of(driver.document_in(folder), said).encode())
-    _write_table(trials, labels, kept.with_name(TABLE))
+    _write_table(trials, search.driver.searched, labels, kept.with_name(TABLE))
     unplayed = sum(each.mean_payoff is None for each in trials)
     info = {"trials": len(trials), "trials_unplayed": unplayed, "chosen_trial": chosen}
     return info, [folder / DRIVER, kept.with_name(TABLE)]
@@ -53,7 +53,7 @@ def read_found(given: GivenDriver, folder: Path) -> GivenDriver:
     return given.tuned({key: document.numbers[key] for key in given.numbers})
 
 
-def _write_table(trials: Sequence[Trial], labels: Mapping[str, Any], file: Path) -> None:
+def _write_table(trials: Sequence[Trial], searched: Sequence[Tunable], labels: Mapping[str, Any], file: Path) -> None:
     """A row for each trial and parameter."""
     chosen, so_far = best(trials), float("-inf")
     rows = []
@@ -67,6 +67,7 @@ def _write_table(trials: Sequence[Trial], labels: Mapping[str, Any], file: Path)
             "error": trial.error,
         }
         rows += [
-            {**labels, "trial": number, "parameter": key, "value": value, **came} for key, value in trial.values.items()
+            {**labels, "trial": number, "parameter": key, "value": trial.values[key], "low": low, "high": high, **came}
+            for key, low, high in searched
         ]
     write_csv(typed(pd.DataFrame(rows).reindex(columns=list(RECONFIGURATION_COLUMNS))), file)

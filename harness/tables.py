@@ -92,6 +92,8 @@ RECONFIGURATION_COLUMNS = {
     "trial": "int64",
     "parameter": "object",
     "value": "float64",
+    "low": "float64",
+    "high": "float64",
     "mean_payoff": "float64",
     "failure_rate": "float64",
     "best_payoff": "float64",

@@ -96,7 +96,6 @@ class GivenDriver:
             "document": self.document.model_dump(mode="json") if self.document is not None else None,
             "files": {os.path.relpath(file, self.place): value for file, value in self.files.items()},
             "package": dict(self.package),
-            "tunable": {key: [low, high] for key, low, high in self.searched},
         }
 
     @property

@@ -118,7 +118,7 @@ def render_page(
             for place, persona in enumerate(personas, 1)
         ],
         learning=learning(stages, training),
-        searches=searches(manifest, searched),
+        searches=searches(searched),
         change=found.change,
         rules=sorted({stage["rule"] for stage in stages.values() if stage.get("rule")}),
         stages=[_stage(name, stage) for name, stage in stages.items()],

@@ -29,7 +29,8 @@ def mixed_versions(stages: Mapping[str, Mapping[str, Any]]) -> list[str]:
         return []
     for name, versions in told.items():
         which = ", ".join(f"{program} {versions[program]}" for program in differ if program in versions)
-        groups.setdefault(which, []).append(name)
+        if which:
+            groups.setdefault(which, []).append(name)
     return [
         "This run mixes versions: its numbers are not promised to be those of one version.",
         *(f"  by {which}: {', '.join(names)}" for which, names in groups.items()),

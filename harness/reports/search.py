@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,31 +38,28 @@ class Found:
     """Where the driver is that it found, from the run folder."""
 
 
-def searches(manifest: Mapping[str, Any], reconfiguration: pd.DataFrame) -> list[Found]:
+def searches(reconfiguration: pd.DataFrame) -> list[Found]:
     """Each search of `reconfiguration`, the table, in order of first appearance."""
-    bounds = (manifest.get("ego_driver") or {}).get("tunable") or {}
     several = reconfiguration["seed"].nunique() > 1
     return [
-        _found(f"{stage}-seed{seed}", f"{stage}, seed {seed}" if several else str(stage), rows, bounds, place)
+        _found(f"{stage}-seed{seed}", f"{stage}, seed {seed}" if several else str(stage), rows, place)
         for place, ((stage, seed), rows) in enumerate(reconfiguration.groupby(["stage", "seed"], sort=False), 1)
     ]
 
 
-def _found(folder: str, title: str, rows: pd.DataFrame, bounds: Mapping[str, Any], place: int) -> Found:
+def _found(folder: str, title: str, rows: pd.DataFrame, place: int) -> Found:
     trials = rows.drop_duplicates("trial").sort_values("trial")
     given, chosen = rows[rows["trial"] == 0], rows[rows["chosen"]]
-    first, best = trials.iloc[0], chosen.iloc[0]
+    first, best = given.iloc[0], chosen.iloc[0]
     summary = f"{len(trials)} trials; best in trial {best['trial']}: {_came(best)}. As given: {_came(first)}."
     if best["trial"] == first["trial"]:
         summary = f"{len(trials)} trials, none better than the ego as given: {_came(first)}."
     if unplayed := int(trials["mean_payoff"].isna().sum()):
-        summary += f" {unplayed} could not be played: {trials['error'][trials['error'] != ''].iloc[0]}"
-    values = chosen.set_index("parameter")["value"]
+        summary += f" {unplayed} could not be played: {'; '.join(trials.loc[trials['error'] != '', 'error'].unique()[:3])}"
+    both = given.merge(chosen[["parameter", "value"]], on="parameter", suffixes=("", "_found"))
     parameters = [
-        Parameter(str(row.parameter), *map(_number, (row.value, values[row.parameter], *bounds.get(row.parameter, ()))))
-        if row.parameter in bounds
-        else Parameter(str(row.parameter), _number(row.value), _number(values[row.parameter]), "–", "–")
-        for row in given.itertuples()
+        Parameter(row.parameter, *map(_number, (row.value, row.value_found, row.low, row.high)))
+        for row in both.itertuples()
     ]
     drawn = _figure(trials, f"search{place}", f"Mean payoff of each trial of {title}, and the best so far. {summary}")
     return Found(title, drawn, summary, parameters, f"policies/{folder}/driver.toml")
