@@ -99,8 +99,8 @@ def test_page__of_a_campaign_without_a_search_says_nothing_of_any() -> None:
 def test_searches__in_words() -> None:
     (found,) = searches(trials())
     assert found.summary == (
-        "5 trials; best in trial 3: mean payoff 4.25, failures in 12.5 %. As given: mean payoff 2.00, failures in 12.5 %. "
-        "1 could not be played: ValueError: no"
+        "5 trials; best in trial 3: mean payoff 4.25, failures in 12.5 %. "
+        "As given: mean payoff 2.00, failures in 12.5 %. 1 could not be played: ValueError: no"
     )
     assert found.document == "policies/reconfigured_speedy-seed1/driver.toml"
     (found,) = searches(trials(payoffs=(3.0, 1.0, 3.0)))
