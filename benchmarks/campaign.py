@@ -21,11 +21,14 @@ from benchmarks.budget import Budget
 from benchmarks.games import MERGE, REPOSITORY, coasting_policy, persona_file
 from benchmarks.sides import Pace, Side, Tell, opened
 from harness import campaign_run
+from harness.conditions import conditions_of
+from harness.plan import plan
 from harness.policy_file import write_policy
 from harness.preflight import open_campaign
-from harness.rounds import Stage, TrainingStage, plan
+from harness.rounds import Stage, TrainingStage
 from harness.run_folder import RunFolder
-from harness.stages import carry_out, conditions_of, stage_keys
+from harness.stage_keys import stage_keys
+from harness.stages import carry_out
 from harness.workers import Event
 
 _STEPS = 3_000_000

@@ -13,39 +13,47 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import track
 
-from harness.comparison import compare
+from harness.comparison import Question, compare
+from harness.conditions import conditions_of
 from harness.documents.campaign import Campaign
+from harness.documents.manifest import is_tuned
 from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.manoeuvre_file import manoeuvres_of
 from harness.model_card import write_model_cards
+from harness.pairings import who_met
+from harness.plan import plan
 from harness.preflight import OpenCampaign
 from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay import choose_games, replay_name, worst_first, write_replay
 from harness.reports.change import ARMS
+from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions
 from harness.reports.results import results
 from harness.reports.wording import Verdicts
-from harness.rounds import AssessmentStage, ReconfigurationStage, Stage, TrainingStage, plan, questions, stage_id
+from harness.rounds import AssessmentStage, ReconfigurationStage, Stage, TrainingStage, questions, stage_id
 from harness.run_folder import FORMAT, MANIFEST, RunFolder
-from harness.stages import conditions_of, stage_keys
+from harness.search_columns import RECONFIGURATION_COLUMNS, is_of_a_search
+from harness.stage_keys import stage_keys
 from harness.tables import (
     EPISODE_COLUMNS,
     MANOEUVRE_COLUMNS,
-    RECONFIGURATION_COLUMNS,
     TRAINING_COLUMNS,
     read_csv,
     summarise,
     typed,
     write_csv,
 )
+from harness.theory.findings import find
+from harness.theory.records import GameFindings
 from harness.trace_file import check_traces, read_trace
 from harness.traffic.opening import OpenScene, open_scene
 from harness.versions import versions, versions_of_numbers
 from harness.workers import Event, run_stages
 
+FINISHED = ("done", "settled")
 _KINDS = {TrainingStage: "training", AssessmentStage: "assessment", ReconfigurationStage: "reconfiguration"}
 
 
@@ -71,7 +79,7 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
         ledger = _Ledger(campaign, folder, stages, keys)
         scene = campaign.scene.document
         folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
-        finished = [stage.id for stage in stages if ledger.status(stage) == "done"]
+        finished = [stage.id for stage in stages if ledger.status(stage) in FINISHED]
         if len(finished) < len(stages):
             ledger.warn_of_versions(console)
             with StageProgress(stages, len(finished), console) as progress:
@@ -108,7 +116,7 @@ class _Ledger:
         self._folder.write_manifest(self._manifest)
 
     def status(self, stage: Stage) -> str:
-        """done, failed or pending."""
+        """done, settled, failed or pending."""
         return str(self._manifest["stages"][stage.id]["status"])
 
     def warn_of_versions(self, console: Console) -> None:
@@ -120,7 +128,7 @@ class _Ledger:
         """Write down what happened to a stage."""
         entry = self._manifest["stages"][event.stage]
         if event.kind == "done":
-            entry.update(event.info, status="done", message="")
+            entry.update({"message": "", **event.info}, status=_status(event.info))
         elif event.kind == "failed":
             entry.update(status="failed", message=event.message)
         elif event.kind == "skipped":
@@ -141,7 +149,12 @@ class _Ledger:
             "status": "pending",
             "message": "",
         }
-        return {**entry, **info, "status": "done"} if info is not None else entry
+        return {**entry, **info, "status": _status(info)} if info is not None else entry
+
+
+def _status(info: Mapping[str, Any]) -> str:
+    """The status of a stage that came to its end: settled where there was nothing to do."""
+    return "settled" if info.get("settled") else "done"
 
 
 def write_results(folder: RunFolder, console: Console) -> Outcome:
@@ -156,8 +169,9 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     asked = questions_of(manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
-    if "reconfiguration" in _kinds(manifest):
-        tables["reconfiguration"] = searched
+    game = game_of(manifest, episodes)
+    tables |= vars(game) if game is not None else {}
+    tables |= {"reconfiguration": searched} if is_tuned(manifest) else {}
     scene = open_scene(folder.scene)
     _check_traces(folder, episodes)
     write_model_cards(folder, manifest, summary)
@@ -170,14 +184,27 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     with console.status("writing the report"):
         games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
         page = render_page(
-            *(manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres),
+            *(
+                manifest,
+                episodes,
+                summary,
+                comparisons,
+                training,
+                replays,
+                games,
+                scene_drawing(scene),
+                manoeuvres,
+                game,
+            ),
             reconfiguration=searched,
         )
     write_atomically(folder.path / "report.html", page.encode())
     _warn(mixed_versions(manifest["stages"]), console)
-    failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] != "done")
+    failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] not in FINISHED)
     found = results(manifest, episodes, summary, comparisons)
-    verdicts = [(persona, found.verdicts(each, persona)) for persona in manifest["personas"] for each in ARMS]
+    met = list(dict.fromkeys(each.persona for each in asked))
+    verdicts = [(persona, found.verdicts(each, persona)) for persona in met for each in ARMS]
+    verdicts += gap_verdicts(game.gaps) if game is not None else []
     return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))
 
 
@@ -186,22 +213,34 @@ def _warn(sentences: Sequence[str], console: Console) -> None:
         console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)
 
 
-def questions_of(manifest: Mapping[str, Any]) -> list[Any]:
+def questions_of(manifest: Mapping[str, Any]) -> list[Question]:
     """The questions that the finished arms of a run can answer."""
-    try:
-        campaign = Campaign.model_validate(manifest["campaign"], strict=False)
-    except ValidationError as error:
-        raise UsageError.of(MANIFEST, "campaign", f"is damaged: {error}", "run the campaign again") from None
-    done = {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
+    done = _done(manifest)
     return [
         question
-        for question in questions(campaign, manifest["personas"], "reconfiguration" in _kinds(manifest))
+        for question in questions(_campaign(manifest), manifest["personas"], is_tuned(manifest))
         if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= done
     ]
 
 
-def _kinds(manifest: Mapping[str, Any]) -> set[str]:
-    return {entry["kind"] for entry in manifest["stages"].values()}
+def game_of(manifest: Mapping[str, Any], episodes: pd.DataFrame) -> GameFindings | None:
+    """What the finished arms of a run say of the game between strategies; None where it is not asked."""
+    campaign = _campaign(manifest)
+    met = who_met(campaign, manifest["personas"], _done(manifest), is_tuned(manifest))
+    if met is None:
+        return None
+    return find(met.pairings, met.responses, met.personas_of, episodes, campaign.assessment.significance)
+
+
+def _campaign(manifest: Mapping[str, Any]) -> Campaign:
+    try:
+        return Campaign.model_validate(manifest["campaign"], strict=False)
+    except ValidationError as error:
+        raise UsageError.of(MANIFEST, "campaign", f"is damaged: {error}", "run the campaign again") from None
+
+
+def _done(manifest: Mapping[str, Any]) -> set[str]:
+    return {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
 
 
 def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, columns: list[str]) -> pd.DataFrame:
@@ -212,16 +251,10 @@ def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, c
             frame = read_csv(file)
             of = frame["arm" if kind == "assessment" else "stage"]
             theirs = ((of == entry["name"]) & (frame["seed"] == entry["seed"])).all()
-            if not theirs or (kind == "reconfiguration" and not _is_of_a_search(frame)):
+            if not theirs or (kind == "reconfiguration" and not is_of_a_search(frame)):
                 raise UsageError.of(file, "", f"has rows that are not of {name}", "run the campaign again")
             frames.append(frame)
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))
-
-
-def _is_of_a_search(trials: pd.DataFrame) -> bool:
-    """Whether the ego as it was given is among the trials, and one of them was chosen."""
-    payoffs = trials.groupby("trial")["mean_payoff"].first()
-    return 0 in payoffs.index and payoffs.notna()[0] and trials.loc[trials["chosen"], "trial"].nunique() == 1
 
 
 def _check_traces(folder: RunFolder, episodes: pd.DataFrame) -> None:

@@ -112,8 +112,9 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
 
     from harness.documents.campaign import LEARNED
     from harness.errors import plain
+    from harness.plan import plan
     from harness.preflight import open_campaign
-    from harness.rounds import AssessmentStage, ReconfigurationStage, TrainingStage, plan
+    from harness.rounds import AssessmentStage, ReconfigurationStage, TrainingStage
 
     opened = open_campaign(file, allow_code=allow_code)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)

@@ -22,7 +22,7 @@ the table, which is the whole campaign's.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Literal
@@ -118,12 +118,12 @@ def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance:
     """
     if not 0 < significance < 1:
         raise ValueError(f"significance must be between 0 and 1, not {significance}")
-    games = dict(iter(episodes.groupby(["arm", "seed"], sort=False)))
+    games = games_by_arm(episodes)
     rows = [_row(question, metric, games) for question in questions for metric in METRICS]
     table = pd.DataFrame(rows, columns=list(COMPARISON_COLUMNS))
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
     table["rejects_h0"] = table["p_value"].astype("float64") < significance
-    table["verdict"] = [_verdict(row, significance).value for row in table.to_dict("records")]
+    table["verdict"] = [verdict_of(row, significance).value for row in table.to_dict("records")]
     return table.astype(COMPARISON_COLUMNS)
 
 
@@ -151,8 +151,11 @@ def mean_interval(values: Floats) -> tuple[float, float]:
 
 
 def _row(question: Question, metric: Metric, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
-    baseline, treatment, left_out = _pairs(question, metric.column, games)
+    baseline, treatment, left_out = pairs_of(
+        games, question.seed, question.baseline, question.treatment, [metric.column]
+    )
     low, high = (baseline, treatment) if metric.sign[question.question] > 0 else (treatment, baseline)
+    low, high = low[:, 0], high[:, 0]
     row: dict[str, object] = {
         "question": question.question,
         "persona": question.persona,
@@ -161,32 +164,50 @@ def _row(question: Question, metric: Metric, games: Mapping[Any, pd.DataFrame]) 
         "pairs": len(low),
         "pairs_left_out": left_out,
     }
-    row |= _paired_t_test(low, high)
+    row |= paired_t_test(low, high)
     if metric.name == "failure" and len(low) >= 2:
         row["mcnemar_p"] = _mcnemar(low, high)
     return row
 
 
-def _pairs(question: Question, column: str, games: Mapping[Any, pd.DataFrame]) -> tuple[Floats, Floats, int]:
-    """Baseline values [N], treatment values [N] of the same N episodes, and how many pairs were left out."""
-    sides = {}
-    for side, arm in (("baseline", question.baseline), ("treatment", question.treatment)):
-        rows = games.get((arm, question.seed))
-        if rows is None:
-            sides[side] = pd.Series(dtype="float64")
-            continue
-        values = pd.to_numeric(rows[column]).astype("Float64").to_numpy(dtype=np.float64, na_value=np.nan)
-        errored = (rows["ego_outcome"] == "error") | (rows["error"].fillna("") != "")
-        sides[side] = pd.Series(np.where(errored, np.nan, values), index=rows["episode"].to_numpy())
-        if not sides[side].index.is_unique:
-            raise ValueError(f"arm {arm!r}, seed {question.seed}: an episode appears more than once")
-    both = pd.DataFrame(sides).to_numpy(dtype=np.float64)
+def games_by_arm(episodes: pd.DataFrame) -> Mapping[Any, pd.DataFrame]:
+    """The rows of episodes.csv by (arm, seed)."""
+    return dict(iter(episodes.groupby(["arm", "seed"], sort=False)))
+
+
+def pairs_of(
+    games: Mapping[Any, pd.DataFrame], seed: int, baseline: str, treatment: str, columns: Sequence[str]
+) -> tuple[Floats, Floats, int]:
+    """Baseline values [N, C], treatment values [N, C] of the same N episodes, and how many pairs were left out:
+    those of which a game errored, is missing, or lacks one of the columns [C].
+
+    Raises ValueError when an arm has two games for one episode.
+    """
+    sides = [measured_values(games.get((arm, seed)), columns) for arm in (baseline, treatment)]
+    for arm, side in zip((baseline, treatment), sides, strict=True):
+        if not side.index.is_unique:
+            raise ValueError(f"arm {arm!r}, seed {seed}: an episode appears more than once")
+    both = pd.concat(sides, axis=1).to_numpy(dtype=np.float64)
     measured = np.isfinite(both).all(axis=1)
-    return both[measured, 0], both[measured, 1], int((~measured).sum())
+    return both[measured, : len(columns)], both[measured, len(columns) :], int((~measured).sum())
 
 
-def _paired_t_test(low: Floats, high: Floats) -> dict[str, float]:
-    """H1: the mean of `high - low` is > 0. Only what exists is in the answer."""
+def measured_values(rows: pd.DataFrame | None, columns: Sequence[str]) -> pd.DataFrame:
+    """The columns of an arm's games by episode; NaN where one is empty or the game could not be played."""
+    if rows is None:
+        return pd.DataFrame(columns=list(columns), dtype="float64")
+    errored = ((rows["ego_outcome"] == "error") | (rows["error"].fillna("") != "")).to_numpy(dtype=bool)
+    values = {
+        name: pd.to_numeric(rows[name]).astype("Float64").to_numpy(dtype=np.float64, na_value=np.nan)
+        for name in columns
+    }
+    return pd.DataFrame(
+        {name: np.where(errored, np.nan, cells) for name, cells in values.items()}, index=rows["episode"].to_numpy()
+    )
+
+
+def paired_t_test(low: Floats, high: Floats) -> dict[str, float]:
+    """H1: the mean of `high - low`, [N] each, is > 0. Only what exists is in the answer, by the table's columns."""
     differences = high - low
     if len(differences) == 0:
         return {}
@@ -218,7 +239,8 @@ def _mcnemar(low: Floats, high: Floats) -> float:
     return float(stats.binomtest(in_favour, in_favour + against, 0.5, alternative="greater").pvalue)
 
 
-def _verdict(row: Mapping[Any, Any], significance: float) -> Verdict:
+def verdict_of(row: Mapping[Any, Any], significance: float) -> Verdict:
+    """What a row's pairs, p-values and mean difference come to."""
     if row["pairs"] < 2:
         return Verdict.NOT_ENOUGH_PAIRS
     if np.isnan(row["p_value"]):

@@ -16,15 +16,17 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import ConfigDict, Field, ValidationError
 
 from harness.documents.campaign import Campaign
+from harness.documents.manifest import is_tuned
 from harness.documents.persona import Parametrised, Persona
 from harness.documents.reading import Document
 from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.game.payoff import GROUPS, TERMS
 from harness.game.state import NON_EGO, ROLES
+from harness.plan import plan
 from harness.policy_file import policy_files, read_card
 from harness.reports.wording import interval, number, percent
-from harness.rounds import AssessmentStage, plan
+from harness.rounds import AssessmentStage
 from harness.run_folder import RunFolder
 
 CARD = "README.md"
@@ -187,8 +189,7 @@ def _figures(
 ) -> Iterator[tuple[str, Sequence[str]]]:
     campaign = Campaign.model_validate(manifest["campaign"], strict=False)
     rows = {row["arm"]: row for row in summary[summary["seed"] == seed].to_dict("records")}
-    tunable = any(entry["kind"] == "reconfiguration" for entry in manifest["stages"].values())
-    for arm in plan(campaign, manifest["personas"], tunable):
+    for arm in plan(campaign, manifest["personas"], is_tuned(manifest)):
         if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.arm not in rows:
             continue
         player = arm.ego if is_ego else arm.non_ego

@@ -18,7 +18,7 @@ from harness.documents.scene import Name
 from harness.documents.schemas import file_of, schema_of, term_in_words, unit_of
 from harness.errors import UsageError
 from harness.game.payoff import FUZZY_QUANTITIES, TERMS
-from harness.rounds import plan
+from harness.plan import plan
 
 FOLDER = "personas"
 """Where a persona's file is written if no other place is named."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pydantic import ConfigDict
 
@@ -17,14 +18,16 @@ from harness.drivers.car import car_of
 from harness.drivers.given import GivenDriver, find_driver
 from harness.errors import Problem, UsageError, attempt
 from harness.game.state import EGO
+from harness.plan import name_of, plan
+from harness.plan_names import check_names
 from harness.policy_file import check_no_archive, policy_files, read_policy
-from harness.rounds import AssessmentStage, plan
 from harness.traffic.opening import OpenScene, open_scene
 from harness.traffic.trial import try_scene
 
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
 QUICK_TRIALS = 12
+QUICK_RESPONSE_STEPS = 131_072
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class OpenCampaign:
     """The ego's driver, where it is neither learned nor plainly SUMO's own."""
     policies: Path | None
     """The folder of the policies trained before, where the campaign names one."""
+    other_egos: Mapping[str, GivenDriver]
+    """Who meets every non-ego in cross-play beside the campaign's own egos, by name; SUMO's plain own is not here."""
     hashes: dict[str, str]
     """SHA-256 of every file the campaign rests on, by its path from the campaign's folder."""
 
@@ -75,6 +80,7 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
         sampled = personas[0] is not None and personas[0].decisions == "sampled"
         attempt(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, _at_once(document, ego_driver)))
     attempt(problems, lambda: _check_round_2(file, document, ego_driver))
+    other_egos = _other_egos(problems, file, document, scene, allow_code)
     policies = attempt(problems, lambda: _policies_folder(file, named.policies))
     for given, persona in zip(named.personas, personas[1:], strict=True):
         names = [each.name for each in personas[1:] if each is not None]
@@ -93,6 +99,7 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
         raise UsageError(problems)
     names = [persona.name for persona in personas[1:] if persona is not None]
     tunable = ego_driver is not None and bool(ego_driver.searched)
+    check_names(file, document, names, tunable)
     _check_stage_names(file, document, names, tunable)
     files = [
         file,
@@ -100,14 +107,15 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
         *persona_files,
         *(scene_folder / each for each in ("scene.toml", scene.document.net, scene.document.routes)),
     ]
-    if ego_driver is not None:
-        files += map(Path, ego_driver.files)
+    for driver in (ego_driver, *other_egos.values()):
+        if driver is not None:
+            files += map(Path, driver.files)
     hashes = {_from(file, each): hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
     ego, *others = (persona for persona in personas if persona is not None)
     quick = quick and (policies is None or tunable)
     if quick:
         document = _quickened(document)
-    return OpenCampaign(file, document, quick, scene, ego, tuple(others), ego_driver, policies, hashes)
+    return OpenCampaign(file, document, quick, scene, ego, tuple(others), ego_driver, policies, other_egos, hashes)
 
 
 def _from(campaign_file: Path, path: Path) -> str:
@@ -184,6 +192,23 @@ def _ego_driver(file: Path, driver: str, allow_code: bool) -> GivenDriver | None
     return None if driver in (LEARNED, SUMO) else find_driver(driver, file, "ego.driver", allow_code)
 
 
+def _other_egos(
+    problems: list[Problem], file: Path, document: Campaign | None, scene: OpenScene | None, allow_code: bool
+) -> dict[str, GivenDriver]:
+    """The drivers of [crossplay], each found and tried; what is wrong with them goes to `problems`."""
+    found: dict[str, GivenDriver] = {}
+    crossplay = document.crossplay if document is not None else None
+    for written in crossplay.egos if crossplay is not None else ():
+        if written in (SUMO, LEARNED):
+            continue
+        driver = attempt(problems, lambda written=written: find_driver(written, file, "crossplay.egos", allow_code))  # type: ignore[misc]
+        if driver is not None:
+            found[name_of(written)] = driver
+            if scene is not None:
+                attempt(problems, lambda driver=driver: driver.try_out(car_of(scene.world, EGO), False))  # type: ignore[misc]
+    return found
+
+
 def _policies_folder(file: Path, written: str | None) -> Path | None:
     if written is None:
         return None
@@ -208,11 +233,11 @@ def _beside(folder: Path) -> str:
 
 def _trained_before(file: Path, document: Campaign, personas: Sequence[str], folder: Path) -> list[Path]:
     """The files of every policy that a campaign reads. Raises UsageError for each that is missing or doesn't fit."""
-    arms = [stage for stage in plan(document, personas) if isinstance(stage, AssessmentStage)]
+    stages = plan(document, personas)
     there = {each.name for each in folder.iterdir() if each.is_dir()}
     problems: list[Problem] = []
     files: list[Path] = []
-    for name in dict.fromkeys(name for arm in arms for name in arm.reads):
+    for name in dict.fromkeys(name for stage in stages for name in stage.reads):
         if name not in there:
             message = f"{document.policies!r} holds no policy {name!r}"
             problems.append(Problem(str(file), "policies", message, _instead(name, there)))
@@ -246,4 +271,8 @@ def _quickened(document: Campaign) -> Campaign:
     )
     search = document.reconfiguration
     search = search.model_copy(update={"trials": min(search.trials, QUICK_TRIALS)})
-    return document.model_copy(update={"training": training, "reconfiguration": search})
+    changes: dict[str, Any] = {"training": training, "reconfiguration": search}
+    if document.best_response is not None:
+        steps = min(document.best_response.steps, QUICK_RESPONSE_STEPS)
+        changes["best_response"] = document.best_response.model_copy(update={"steps": steps})
+    return document.model_copy(update=changes)

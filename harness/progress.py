@@ -78,6 +78,8 @@ class StageProgress:
             return "" if self._console.is_terminal else f"started  {event.stage}"
         if event.kind == "done":
             info = event.info
+            if "settled" in info:
+                return f"settled  {event.stage}: {info['message']}"
             what = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else ""
             what = what or next(f"{info[unit]} {unit}" for unit in ("episodes", "trials") if unit in info)
             errors = f", {info['errors']} errors" if info.get("errors") else ""

@@ -16,7 +16,8 @@ from harness.drivers.given import GivenDriver
 from harness.errors import StageFailed
 from harness.files import make_folder, write_atomically
 from harness.reconfiguration import Search, Trial, best, run_search
-from harness.tables import RECONFIGURATION_COLUMNS, typed, write_csv
+from harness.search_columns import RECONFIGURATION_COLUMNS
+from harness.tables import typed, write_csv
 
 DRIVER = "driver.toml"
 TABLE = "reconfiguration.csv"

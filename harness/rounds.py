@@ -1,4 +1,4 @@
-"""The plan: which trainings and which arms follow from a campaign, and what each needs first.
+"""The paper's rounds: which trainings and which arms follow from a campaign, and what each needs first.
 
 | round | stages of each seed |
 | --- | --- |
@@ -6,31 +6,67 @@
 | 1 | for each persona: train `<persona>` against the naive ego; assess `<persona>_alone`, `naive_vs_<persona>` |
 | 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
 
-Round 2 of an ego that is given and has parameters to tune searches them: `reconfigured_<persona>` and its arms take the
-place of `retrained_<persona>`. An ego with nothing to train and nothing to tune has no round 2. A campaign that names a
-folder of policies has the same arms and no trainings: what they would have made is read from there.
+A population is met as a persona is, and nobody is trained for it: its members are. The ego that is retrained against
+several personas at once is `robust`. An ego that the campaign does not train is searched for better parameters in its
+round 2 (`harness.plan_searches`), or has none. A campaign that names a folder of policies has the same arms and no
+trainings: what they would have made is read from there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from harness.comparison import Question
-from harness.documents.campaign import LEARNED, SUMO, Campaign
+from harness.documents.campaign import LEARNED, ROBUST, SUMO, Campaign
 from harness.game.state import EGO, NON_EGO
 
 
 @dataclass(frozen=True)
 class Drives:
-    """Who drives a player: SUMO, the campaign's given ego, that ego as a search reconfigured it, the policy that a
-    training stage made, or the one that such a stage made before, in another run."""
+    """Who drives a player.
 
-    kind: Literal["sumo", "given", "reconfigured", "policy", "before"]
+    | kind | who |
+    | --- | --- |
+    | sumo | SUMO's own models |
+    | given | the campaign's given ego, or the other driver called `stage` |
+    | reconfigured | the given ego as the search `stage` reconfigured it |
+    | policy | the policy that the training `stage` made |
+    | before | the policy that such a stage made before, in another run |
+    | mixture | one of `members` in each game, by `shares` or, without, by the equilibrium of the arms in `weighed_by` |
+    | best | the one of `members` who earns most in games that are played for this choice alone |
+    """
+
+    kind: Literal["sumo", "given", "reconfigured", "policy", "before", "mixture", "best"]
     stage: str = ""
     persona: str = ""
     """Whose habits it has; empty: the ego's own."""
+    members: tuple[Drives, ...] = ()
+    shares: tuple[float, ...] = ()
+    weighed_by: tuple[tuple[str, ...], ...] = ()
+    """Stages of the arms of every ego (rows) against every non-ego (columns)."""
+
+    @property
+    def in_words(self) -> str:
+        """Who that is, for the card of a policy."""
+        if self.kind == "mixture":
+            return "one in each game of " + ", ".join(each.stage for each in self.members)
+        return self.stage or self.kind
+
+    @property
+    def everyone(self) -> tuple[Drives, ...]:
+        """Whoever may drive: the members, or this one."""
+        return self.members or (self,)
+
+
+@dataclass(frozen=True)
+class Gate:
+    """The arms by which an exchange may be found to have settled: a pair, and each player's best response in it."""
+
+    pair: str
+    ego_response: str
+    non_ego_response: str
 
 
 @dataclass(frozen=True)
@@ -45,6 +81,12 @@ class TrainingStage:
     initial: str | None
     alone_share: float
     attentive_share: float = 0.0
+    responds_in: tuple[str, ...] = ()
+    """Of a best response: the arm in which it replaces a player."""
+    begins_as: tuple[str, ...] = ()
+    """The policy, trained before, that it begins from."""
+    unless: tuple[Gate, ...] = ()
+    """There is nothing to do where one of them has settled."""
 
     @property
     def id(self) -> str:
@@ -54,7 +96,12 @@ class TrainingStage:
     @property
     def needs(self) -> tuple[str, ...]:
         """The stages that have to be done before."""
-        return _stages(self.initial, self.opponent)
+        return _stages(self.unless, self.initial, self.opponent)
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The policies trained before that it needs, each called after the stage that made it."""
+        return tuple(dict.fromkeys((*self.begins_as, *_before(self.opponent))))
 
 
 @dataclass(frozen=True)
@@ -66,6 +113,8 @@ class AssessmentStage:
     persona: str
     ego: Drives | None
     non_ego: Drives | None
+    unless: tuple[Gate, ...] = ()
+    """There is nothing to do where one of them has settled."""
 
     @property
     def id(self) -> str:
@@ -75,12 +124,12 @@ class AssessmentStage:
     @property
     def needs(self) -> tuple[str, ...]:
         """The stages that have to be done before."""
-        return _stages(None, self.ego, self.non_ego)
+        return _stages(self.unless, None, self.ego, self.non_ego)
 
     @property
     def reads(self) -> tuple[str, ...]:
         """The policies trained before that drive in it, each called after the stage that made it."""
-        return tuple(each.stage for each in (self.ego, self.non_ego) if each is not None and each.kind == "before")
+        return _before(self.ego, self.non_ego)
 
 
 @dataclass(frozen=True)
@@ -91,6 +140,8 @@ class ReconfigurationStage:
     seed: int
     persona: str
     opponent: Drives
+    unless: tuple[Gate, ...] = ()
+    """There is nothing to do where one of them has settled."""
 
     @property
     def id(self) -> str:
@@ -100,12 +151,12 @@ class ReconfigurationStage:
     @property
     def needs(self) -> tuple[str, ...]:
         """The stages that have to be done before."""
-        return _stages(None, self.opponent)
+        return _stages(self.unless, None, self.opponent)
 
     @property
     def reads(self) -> tuple[str, ...]:
         """The policies trained before that drive in it, each called after the stage that made it."""
-        return (self.opponent.stage,) if self.opponent.kind == "before" else ()
+        return _before(self.opponent)
 
 
 Stage = TrainingStage | AssessmentStage | ReconfigurationStage
@@ -116,34 +167,59 @@ def stage_id(name: str, seed: int) -> str:
     return f"{name}-seed{seed}"
 
 
-def _stages(initial: str | None, *drivers: Drives | None) -> tuple[str, ...]:
-    made = ("policy", "reconfigured")
-    named = [initial or "", *(each.stage for each in drivers if each is not None and each.kind in made)]
+def arm_of(ego: str, non_ego: str) -> str:
+    """What the arm of two strategies is called."""
+    made = next((made for made in ("retrained", "reconfigured") if ego == f"{made}_{non_ego}"), ego)
+    return f"{made}_vs_{non_ego}"
+
+
+_MADE = ("policy", "reconfigured")  # by a stage of the plan
+
+
+def _stages(unless: Sequence[Gate], initial: str | None, *drivers: Drives | None) -> tuple[str, ...]:
+    players = [each for player in drivers if player is not None for each in player.everyone]
+    weighed = [arm for player in drivers if player is not None for row in player.weighed_by for arm in row]
+    gates = [stage for gate in unless for stage in (gate.pair, gate.ego_response, gate.non_ego_response)]
+    named = [initial or "", *(each.stage for each in players if each.kind in _MADE), *weighed, *gates]
     return tuple(dict.fromkeys(name for name in named if name))
 
 
-def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Stage]:
-    """Every stage of a campaign against the personas named, each after what it needs. `tunable`: the ego is given,
-    and has something to tune."""
-    stages = [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed, tunable)]
-    if campaign.policies is not None:
-        return [stage for stage in stages if not isinstance(stage, TrainingStage)]
-    return stages
+def _before(*drivers: Drives | None) -> tuple[str, ...]:
+    players = [each for player in drivers if player is not None for each in player.everyone]
+    return tuple(dict.fromkeys(each.stage for each in players if each.kind == "before"))
 
 
-def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int, tunable: bool) -> list[Stage]:
-    learned = campaign.ego.driver == LEARNED
-    trained: Literal["policy", "before"] = "policy" if campaign.policies is None else "before"
-    naive = stage_id("naive", seed)
-    if learned:
-        ego = Drives(trained, naive)
-    else:
-        ego = Drives("sumo" if campaign.ego.driver == SUMO else "given")
+def learns(campaign: Campaign) -> bool:
+    """Whether the campaign's ego is one that learns, or has learned before."""
+    return campaign.ego.driver == LEARNED
+
+
+def ego_of(campaign: Campaign, seed: int) -> Drives:
+    """Who the naive ego is."""
+    if learns(campaign):
+        return learned(campaign, "naive", seed)
+    return Drives("sumo" if campaign.ego.driver == SUMO else "given")
+
+
+def learned(campaign: Campaign, name: str, seed: int, persona: str = "") -> Drives:
+    """The driver that a training of this name makes, or has made before."""
+    return Drives("policy" if campaign.policies is None else "before", stage_id(name, seed), persona)
+
+
+def population(campaign: Campaign, shares: Mapping[str, float], seed: int) -> Drives:
+    """People by their shares, one of whom a game has."""
+    members = tuple(learned(campaign, name, seed, name) for name in shares)
+    return Drives("mixture", members=members, shares=tuple(shares.values()))
+
+
+def plan_rounds(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
+    """The stages of rounds 0, 1 and 2 for one seed, each after what it needs."""
+    naive, ego = stage_id("naive", seed), ego_of(campaign, seed)
     stages: list[Stage] = []
-    if learned:
+    if learns(campaign):
         stages.append(TrainingStage("naive", seed, "", EGO, None, None, 1.0))
     for persona in personas:
-        initial = naive if learned and campaign.non_ego_training.warm_start else None
+        initial = naive if learns(campaign) and campaign.non_ego_training.warm_start else None
         how = campaign.non_ego_training
         stages.append(
             TrainingStage(persona, seed, persona, NON_EGO, ego, initial, how.alone_share, how.attentive_share)
@@ -151,36 +227,55 @@ def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int, tunable: 
     stages.append(AssessmentStage("naive_alone", seed, "", ego, None))
     stages.append(AssessmentStage("naive_vs_sumo", seed, "", ego, Drives("sumo")))
     for persona in personas:
-        person = Drives(trained, stage_id(persona, seed), persona)
-        if learned:
-            name = f"retrained_{persona}"
-            begins = naive if campaign.retraining.warm_start else None
-            stages.append(TrainingStage(name, seed, persona, EGO, person, begins, campaign.retraining.alone_share))
+        person = learned(campaign, persona, seed, persona)
+        retrained = _retraining(campaign, f"retrained_{persona}", persona, person, seed)
+        stages += retrained
         stages.append(AssessmentStage(f"{persona}_alone", seed, persona, None, person))
-        stages.append(AssessmentStage(f"naive_vs_{persona}", seed, persona, ego, person))
-        if learned:
-            retrained = Drives(trained, stage_id(f"retrained_{persona}", seed))
-            stages.append(AssessmentStage(f"retrained_vs_{persona}", seed, persona, retrained, person))
-            stages.append(AssessmentStage(f"retrained_alone_{persona}", seed, persona, retrained, None))
-        elif tunable:
-            stages += _reconfiguration(persona, seed, person)
+        stages += _arms_of(campaign, persona, person, bool(retrained), seed)
+    for each in campaign.population:
+        people = population(campaign, each.shares, seed)
+        retrained = _retraining(campaign, f"retrained_{each.name}", each.name, people, seed)
+        stages += [*retrained, *_arms_of(campaign, each.name, people, bool(retrained), seed)]
     return stages
 
 
-def _reconfiguration(persona: str, seed: int, person: Drives) -> list[Stage]:
-    name = f"reconfigured_{persona}"
-    found = Drives("reconfigured", stage_id(name, seed))
-    return [
-        ReconfigurationStage(name, seed, persona, person),
-        AssessmentStage(f"reconfigured_vs_{persona}", seed, persona, found, person),
-        AssessmentStage(f"reconfigured_alone_{persona}", seed, persona, found, None),
-    ]
+def plan_robust(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
+    """One ego retrained against several personas at once, and its arms against them and those it never met."""
+    against = campaign.retraining.against
+    if not against or not learns(campaign):
+        return []
+    people = population(campaign, dict.fromkeys(against, 1.0), seed)
+    robust = learned(campaign, ROBUST, seed)
+    stages = _retraining(campaign, ROBUST, "", people, seed)
+    stages.append(AssessmentStage(f"{ROBUST}_alone", seed, "", robust, None))
+    for persona in personas:
+        person = learned(campaign, persona, seed, persona)
+        stages.append(AssessmentStage(arm_of(ROBUST, persona), seed, persona, robust, person))
+    return stages
+
+
+def _retraining(campaign: Campaign, name: str, persona: str, opponent: Drives, seed: int) -> list[Stage]:
+    if not learns(campaign):
+        return []
+    begins = stage_id("naive", seed) if campaign.retraining.warm_start else None
+    return [TrainingStage(name, seed, persona, EGO, opponent, begins, campaign.retraining.alone_share)]
+
+
+def _arms_of(campaign: Campaign, name: str, opponent: Drives, retrained: bool, seed: int) -> list[Stage]:
+    """The ego's arms against a persona or population, before and after it was retrained."""
+    stages: list[Stage] = [AssessmentStage(f"naive_vs_{name}", seed, name, ego_of(campaign, seed), opponent)]
+    if retrained:
+        ego = learned(campaign, f"retrained_{name}", seed)
+        stages.append(AssessmentStage(f"retrained_vs_{name}", seed, name, ego, opponent))
+        stages.append(AssessmentStage(f"retrained_alone_{name}", seed, name, ego, None))
+    return stages
 
 
 def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Question]:
-    """The research questions of a campaign (paper, section 4.2), for each persona and seed; `tunable` as in `plan`."""
+    """The research questions of a campaign (paper, section 4.2), for each persona or population and seed; `tunable` as
+    in `harness.plan`."""
     asked = []
-    for persona in personas:
+    for persona in [*personas, *(each.name for each in campaign.population)]:
         for seed in campaign.seeds:
             against, retrained = f"naive_vs_{persona}", f"retrained_vs_{persona}"
             asked.append(Question("RQ1", persona, seed, "naive_alone", against))

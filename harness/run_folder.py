@@ -130,14 +130,11 @@ class RunFolder:
         """What came of a stage when it was done from these very inputs, without an error; None if it is not done, or
         its work is gone or damaged."""
         said = self.done(stage)
-        made = any(
-            file.is_file()
-            for file in (
-                *(self.policy(stage) / name for name in ("policy.safetensors", "driver.toml")),
-                self.traces(stage),
-            )
-        )
-        if said is None or said.get("key") != key or said["info"].get("errors") or not made:
+        made = any((self.policy(stage) / name).is_file() for name in ("policy.safetensors", "driver.toml"))
+        made = made or self.traces(stage).is_file()
+        if said is None or said.get("key") != key or said["info"].get("errors"):
+            return None
+        if not made and not said["info"].get("settled"):
             return None
         return None if broken(said, self.path) else dict(said["info"])
 

@@ -1,9 +1,9 @@
-"""The four CSV tables of a run folder: their columns, the summary, and writing and reading them exactly.
+"""The CSV tables of a run folder: their columns, the summary, and writing and reading them exactly.
 
 An empty cell means "can't be measured", never 0. Equal tables are equal bytes: floats are written as the
 shortest text that reads back as the same number, whole numbers without a point, truth values as true/false,
 lines end in a line feed. A table is known by its columns, which are declared here and nowhere else (those of
-`comparisons.csv` beside what computes them).
+`comparisons.csv` and of the findings on equilibria beside what computes them).
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from harness.comparison import COMPARISON_COLUMNS, CONFIDENCE, mean_interval
 from harness.errors import UsageError
 from harness.file_content import content_of
 from harness.files import replace_durably, scratch_beside, write_atomically
+from harness.search_columns import RECONFIGURATION_COLUMNS
+from harness.theory.columns import GAME_TABLES
 
 EPISODE_COLUMNS = {
     "arm": "object",
@@ -85,23 +87,6 @@ TRAINING_COLUMNS = {
 }
 """Columns of `training.csv`."""
 
-RECONFIGURATION_COLUMNS = {
-    "stage": "object",
-    "persona": "object",
-    "seed": "int64",
-    "trial": "int64",
-    "parameter": "object",
-    "value": "float64",
-    "low": "float64",
-    "high": "float64",
-    "mean_payoff": "float64",
-    "failure_rate": "float64",
-    "best_payoff": "float64",
-    "chosen": "bool",
-    "error": "object",
-}
-"""Columns of `reconfiguration.csv`: a row per trial and parameter."""
-
 MANOEUVRE_COLUMNS = {
     "arm": "object",
     "persona": "object",
@@ -124,6 +109,7 @@ TABLES = {
     "training": TRAINING_COLUMNS,
     "manoeuvres": MANOEUVRE_COLUMNS,
     "reconfiguration": RECONFIGURATION_COLUMNS,
+    **GAME_TABLES,
 }
 
 _MOST_BYTES = 500_000_000

@@ -54,6 +54,8 @@ class Lesson:
     settings: Training
     parts: tuple[str | int, ...]
     """Names the lesson's random numbers."""
+    as_it_drives: bool = False
+    """Learn with the habits of driving as well: a best response is best under the limits it is judged by."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,8 @@ def _chances(lesson: Lesson, steps: int) -> Chances:
     habits, shares = [theirs, theirs], [their_shares, their_shares]
     # Nobody learns from what was overlooked and went well: a driver learns with open eyes, and drives by habit.
     own = lesson.personas[lesson.learner].habits
-    habits[lesson.learner], shares[lesson.learner] = [replace(own, overlooking=Overlooking())], [1.0]
+    eyes_open = own if lesson.as_it_drives else replace(own, overlooking=Overlooking())
+    habits[lesson.learner], shares[lesson.learner] = [eyes_open], [1.0]
     if steps < _attentive_steps(lesson):
         habits = [[replace(each, attention=None) for each in of_player] for of_player in habits]
     return lesson.scene.chances(habits, present, shares)

@@ -25,13 +25,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.attempts import Attempt, Begin, Report
+from harness.conditions import Conditions
 from harness.deaths import Deaths
 from harness.errors import HarnessError, is_of_memory
 from harness.files import make_folder
 from harness.locking import share
 from harness.rounds import Stage
 from harness.run_folder import RunFolder
-from harness.stages import Conditions, carry_out
+from harness.stages import carry_out
 
 _REPORT_EVERY_S = 0.25
 _REQUESTS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))

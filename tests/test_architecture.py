@@ -45,16 +45,33 @@ ALLOWED: dict[str, set[str]] = {
         *("arena", "mixture", "vector_environment", "checkpoint", "convergence"),
     },
     "metrics": {"game"},
-    "assessment": {"errors", "documents", "game", "traffic", "arena", "mixture", "metrics"},
     "paired_games": {"documents", "game", "traffic", "drivers", "arena", "mixture"},
     "reconfiguration": {"errors", "files", "documents", "game", "traffic", "drivers", "mixture", "paired_games"},
+    "search_columns": set(),
+    "assessment": {"errors", "documents", "game", "traffic", "arena", "mixture", "metrics"},
     "trace_file": {"errors", "files", "file_content", "game"},
     "seals": {"files", "file_content"},
     "comparison": set(),
-    "tables": {"errors", "files", "file_content", "comparison"},
-    "reconfigured": {"errors", "files", "documents", "drivers", "attempts", "tables", "reconfiguration"},
+    "theory": {"errors", "comparison"},
+    "tables": {
+        "errors",
+        "files",
+        "file_content",
+        "comparison",
+        "theory",
+        "search_columns",
+    },  # theory: what its tables' columns are
+    "reconfigured": {
+        *("errors", "files", "documents", "drivers", "attempts", "tables", "search_columns", "reconfiguration"),
+    },
     "rounds": {"documents", "game", "comparison"},
-    "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds"},
+    "responses": {"documents", "game", "rounds"},
+    "exchange": {"documents", "game", "rounds", "responses"},
+    "plan_searches": {"documents", "rounds"},
+    "plan": {"documents", "rounds", "responses", "exchange", "plan_searches"},
+    "plan_names": {"errors", "documents", "rounds", "responses", "plan"},
+    "pairings": {"documents", "game", "rounds", "responses", "exchange", "plan", "theory"},
+    "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds", "plan", "plan_names"},
     "run_folder": {"errors", "files", "file_content", "documents", "rounds", "locking", "seals"},
     "series": {"game"},
     "manoeuvres": {"game", "series"},
@@ -62,28 +79,38 @@ ALLOWED: dict[str, set[str]] = {
     "segments": {
         *("files", "assessment", "trace_file", "tables", "seals", "versions", "attempts", "manoeuvre_file"),
     },
+    "conditions": {"documents", "drivers", "preflight", "rounds", "run_folder"},
+    "stage_keys": {"policy_file", "preflight", "responses", "rounds", "versions"},
+    "settling": {"rounds", "run_folder", "tables", "theory"},
+    "casting": {
+        *("errors", "documents", "game", "traffic", "drivers", "policy_file", "mixture", "assessment", "tables"),
+        *("rounds", "run_folder", "conditions", "theory", "reconfigured"),
+    },
     "stages": {
-        *("errors", "files", "documents", "game", "traffic", "drivers", "policy_file", "convergence", "training"),
-        *("assessment", "segments", "tables", "preflight", "rounds", "run_folder", "manoeuvre_file"),
-        *("attempts", "versions", "reconfiguration", "reconfigured"),
+        *("errors", "files", "game", "traffic", "policy_file", "convergence", "training", "mixture"),
+        *("assessment", "segments", "tables", "rounds", "responses", "run_folder", "manoeuvre_file"),
+        *("attempts", "versions", "conditions", "settling", "casting", "reconfiguration", "reconfigured"),
     },
     "deaths": {"rounds", "attempts"},
-    "workers": {"errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "stages"},
-    "reports": {"errors", "comparison", "tables", "manoeuvres"},
+    "workers": {
+        *("errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "conditions", "stages"),
+    },
+    "reports": {"errors", "comparison", "theory", "tables", "search_columns", "manoeuvres"},
     "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
-    "model_card": {"errors", "documents", "files", "game", "policy_file", "reports", "rounds", "run_folder"},
+    "model_card": {"errors", "documents", "files", "game", "policy_file", "reports", "plan", "rounds", "run_folder"},
     "watching": {
         *("errors", "documents", "traffic", "replay", "rounds", "run_folder", "tables", "trace_file", "manoeuvres"),
     },
     "progress": {"rounds", "workers"},
     "schema_files": {"errors", "files", "documents"},
-    "persona_template": {"errors", "documents", "game", "rounds"},
+    "persona_template": {"errors", "documents", "game", "plan"},
     "portraits": {"errors", "files", "documents", "game", "reports"},  # reports: the style of its figures and pages
     "campaign_run": {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
-        *("manoeuvre_file", "model_card", "versions"),
+        *("manoeuvre_file", "model_card", "versions", "conditions", "stage_keys", "plan", "pairings", "theory"),
+        *("search_columns",),
     },
 }
 ALLOWED["cli_documents"] = set(ALLOWED)
@@ -231,7 +258,7 @@ def test_game__opens_no_files(path: Path) -> None:
     assert not names & FILE_ACCESS_CALLS
 
 
-@pytest.mark.parametrize("part", ["comparison", "reports"])
+@pytest.mark.parametrize("part", ["comparison", "theory", "reports"])
 def test_judging__reaches_neither_sumo_nor_a_learner(part: str) -> None:
     reached = reached_from(part)
     guilty = {
@@ -242,7 +269,7 @@ def test_judging__reaches_neither_sumo_nor_a_learner(part: str) -> None:
     assert not guilty
 
 
-@pytest.mark.parametrize("part", ["comparison", "reports"])
+@pytest.mark.parametrize("part", ["comparison", "theory", "reports"])
 def test_judging__loads_neither_sumo_nor_a_learner(part: str) -> None:
     if not any(part_of(path) == part for path in SOURCES):
         pytest.skip(f"there is no harness.{part}")

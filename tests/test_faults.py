@@ -32,11 +32,12 @@ from tiny import (
 from harness import campaign_run
 from harness.attempts import Attempt, Begin, Report
 from harness.campaign_run import Outcome, run_campaign
+from harness.conditions import Conditions
 from harness.deaths import TRIES
 from harness.preflight import open_campaign
 from harness.rounds import Stage
 from harness.run_folder import RunFolder
-from harness.stages import Conditions, carry_out
+from harness.stages import carry_out
 from harness.tables import read_csv
 from harness.workers import Work, run_stages
 

@@ -20,10 +20,11 @@ from harness.documents.reading import tomllib
 from harness.drivers.given import GivenDriver, find_driver
 from harness.errors import UsageError
 from harness.game.observation import LAYOUT
+from harness.plan import plan
 from harness.policy_file import write_policy
 from harness.preflight import open_campaign
-from harness.rounds import TrainingStage, plan
-from harness.stages import stage_keys
+from harness.rounds import TrainingStage
+from harness.stage_keys import stage_keys
 
 PERL = REPOSITORY / "egos" / "examples" / "process"
 ADAS, RSS = (REPOSITORY / "egos" / f"{name}.toml" for name in ("adas", "rss"))

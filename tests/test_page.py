@@ -583,7 +583,8 @@ def test_page__every_table_has_a_caption_and_scoped_headings(html, page):
 
 
 def test_page__an_empty_run_is_a_page_too():
-    empty = {name: typed(pd.DataFrame(columns=list(columns))) for name, columns in TABLES.items()}
+    tables = ("episodes", "summary", "comparisons", "training", "manoeuvres")
+    empty = {name: typed(pd.DataFrame(columns=list(TABLES[name]))) for name in tables}
     page = Page(render_page({"name": "merge", "stages": {}}, **empty, replays=[]))
     assert "No persona has been assessed yet." in page.text
 

@@ -21,6 +21,7 @@ from tiny import CAREFUL, MERGE, SPEEDY, write_campaign
 
 import harness.arena
 from harness.arena import Arena, Seat
+from harness.conditions import conditions_of
 from harness.documents.persona import Persona
 from harness.documents.reading import read_document
 from harness.drivers.sumo import SumoDriver
@@ -34,10 +35,11 @@ from harness.game.plausibility import ImpossibleNumber, check_observation, check
 from harness.game.quantities import Quantities
 from harness.game.state import EGO, NON_EGO, ROLES, Bodies, Outcome, State
 from harness.metrics import OF_EGO, OF_NON_EGO, Drive
+from harness.plan import plan
 from harness.preflight import open_campaign
-from harness.rounds import plan
 from harness.run_folder import RunFolder
-from harness.stages import carry_out, conditions_of, stage_keys
+from harness.stage_keys import stage_keys
+from harness.stages import carry_out
 from harness.traffic.local import LocalSimulation
 from harness.traffic.opening import OpenScene, open_scene
 from harness.training import Lesson

@@ -14,10 +14,11 @@ from tiny import CAREFUL, SPEEDY, TRAINING, harness, learned_run, tables, write_
 
 from harness.documents.campaign import Campaign
 from harness.errors import Problem, UsageError
+from harness.plan import plan
 from harness.policy_file import write_policy
 from harness.preflight import open_campaign
-from harness.rounds import AssessmentStage, plan, questions
-from harness.stages import stage_keys
+from harness.rounds import AssessmentStage, questions
+from harness.stage_keys import stage_keys
 from harness.tables import read_csv
 
 NAMES = ("naive", "speedy", "retrained_speedy")

@@ -19,10 +19,11 @@ from test_killed import FILES
 from tiny import CAREFUL, REPOSITORY, SPEEDY, begin, end, harness, wait_for, write_campaign
 
 from harness.documents.driver import read_driver
+from harness.plan import plan
 from harness.preflight import QUICK_TRIALS, open_campaign
 from harness.reconfiguration import read_trials
-from harness.rounds import AssessmentStage, ReconfigurationStage, TrainingStage, plan, questions
-from harness.stages import stage_keys
+from harness.rounds import AssessmentStage, ReconfigurationStage, TrainingStage, questions
+from harness.stage_keys import stage_keys
 from harness.tables import read_csv
 
 ADAS = REPOSITORY / "egos" / "adas.toml"

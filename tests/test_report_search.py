@@ -14,7 +14,8 @@ from test_page import campaign
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions
 from harness.reports.search import searches
-from harness.tables import RECONFIGURATION_COLUMNS, typed
+from harness.search_columns import RECONFIGURATION_COLUMNS
+from harness.tables import typed
 
 PAYOFFS = (2.0, 1.5, math.nan, 4.25, 4.25)
 

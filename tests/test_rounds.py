@@ -10,10 +10,11 @@ from test_policy_file import some_policy
 from tiny import CAREFUL, SPEEDY, write_campaign, write_persona
 
 from harness.game.state import EGO, NON_EGO
+from harness.plan import plan
 from harness.policy_file import write_policy
 from harness.preflight import open_campaign
-from harness.rounds import AssessmentStage, Stage, TrainingStage, plan, questions
-from harness.stages import stage_keys
+from harness.rounds import AssessmentStage, Stage, TrainingStage, questions
+from harness.stage_keys import stage_keys
 
 
 def planned(folder: Path, **changes: Any) -> tuple[dict[str, Stage], dict[str, str]]:

@@ -13,12 +13,12 @@ import pytest
 from tiny import BY_SUMO, begin, end, harness, in_session, sumo_run, tables, wait_for, workers_of, write_campaign
 
 from harness.attempts import Attempt, Begin, Report
+from harness.conditions import Conditions
 from harness.deaths import TRIES
 from harness.documents.campaign import Campaign
 from harness.documents.persona import Persona
 from harness.errors import StageFailed
 from harness.rounds import Drives, Stage, TrainingStage
-from harness.stages import Conditions
 from harness.workers import Event, run_stages
 
 
@@ -31,7 +31,7 @@ def stage(name: str, *needs: str) -> Stage:
 
 def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2, finished: tuple[str, ...] = ()) -> list[Event]:
     nobody = Persona.model_construct(name="nobody")
-    conditions = Conditions(folder, folder, Campaign.model_construct(), nobody, {}, None, None, {})
+    conditions = Conditions(folder, folder, Campaign.model_construct(), nobody, {}, None, {}, None, {})
     events: list[Event] = []
     run_stages(stages, [f"{name}-seed1" for name in finished], conditions, jobs, events.append, work)
     return events

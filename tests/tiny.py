@@ -79,10 +79,17 @@ def write_campaign(folder: Path, **changes: Any) -> Path:
 
 
 def toml(document: dict[str, Any]) -> str:
-    """Plain values first, then a section for each table; JSON's plain values are TOML's."""
-    plain = [f"{key} = {json.dumps(value)}" for key, value in document.items() if not isinstance(value, dict)]
+    """Plain values first, then a section for each table."""
+    plain = [f"{key} = {_inline(value)}" for key, value in document.items() if not isinstance(value, dict)]
     sections = [f"[{key}]\n{toml(value)}" for key, value in document.items() if isinstance(value, dict)]
     return "\n".join([*plain, *sections]) + "\n"
+
+
+def _inline(value: Any) -> str:
+    """JSON's plain values are TOML's."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_inline(each)}" for key, each in value.items()) + " }"
+    return f"[{', '.join(map(_inline, value))}]" if isinstance(value, list | tuple) else json.dumps(value)
 
 
 def harness(*arguments: object, timeout_s: float = 200.0, **options: Any) -> subprocess.CompletedProcess[str]:

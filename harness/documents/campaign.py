@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
 from harness.documents.reading import Document, Mistakes
+from harness.documents.scene import Name
 
 LEARNED, SUMO = "learned", "sumo"  # drivers an ego can have by name
+ROBUST = "robust"  # what the ego is called that is retrained against several personas at once
 OF_TRAINING = ("training", "non_ego_training", "retraining")  # the tables that say how players learn
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]
@@ -94,6 +96,53 @@ class Retraining(Document):
     warm_start: bool = False
     """Begin from the naive ego's parameters, rather than from nothing."""
 
+    against: list[Name] = Field([], max_length=50)
+    """Personas, by name, against all of whom one ego more is retrained, `robust`, in equal shares of its games. It
+    meets those of the campaign who are left out as well: drivers whom it never met."""
+
+
+class Population(Document):
+    """A kind of traffic: drivers of several personas, one of whom a game has."""
+
+    name: Name
+    """What it is called, in stages, arms and tables."""
+    shares: dict[Name, Annotated[float, Field(gt=0.0, le=1000.0)]] = Field(min_length=2, max_length=50)
+    """Each persona's share of the games, by name. Shares are relative: 1 and 3 are a quarter and three quarters."""
+
+
+class Rounds(Document):
+    """How often non-ego and ego answer one another."""
+
+    count: int = Field(2, ge=2, le=20)
+    """The last round. In odd rounds the non-ego learns, in even rounds the ego; the paper ends after 2."""
+    against: Literal["latest", "all", "equilibrium"] = "latest"
+    """Whom a player answers from round 3 on: the other player's latest strategy, all it has had so far in equal shares
+    (fictitious play), or the equilibrium's mixture of them (policy-space response oracles)."""
+    stop_early: bool | None = None
+    """Whether an exchange ends when neither player's best response gains anything distinguishable from 0: it does, if
+    it is left out and there is a table [best_response]."""
+
+
+class BestResponse(Document):
+    """How much each player of an arm could still gain by changing its strategy alone (equation 2): the last arm of each
+    exchange is measured, and the arms that are named."""
+
+    steps: int = Field(500_000, ge=1_000, le=1_000_000_000)
+    """Budget of each training of a best response."""
+    starts: int = Field(2, ge=1, le=20)
+    """Trainings of each best response: the first begins from the player's own policy, the others from nothing."""
+    choice_episodes: int = Field(100, ge=2, le=100_000)
+    """Games, beside the assessment's, by which the best of them is chosen."""
+    arms: list[Annotated[str, Field(min_length=1, max_length=200)]] = Field([], max_length=200)
+    """Further arms to measure, by name."""
+
+
+class CrossPlay(Document):
+    """Every ego of the campaign meets every non-ego."""
+
+    egos: list[DocumentPath] = Field([], max_length=50)
+    """Other drivers who meet them too: as in `[ego] driver`, `sumo`, a driver document or the folder of a policy."""
+
 
 class Reconfiguration(Document):
     """Round 2 of an ego that is given and has something to tune: how its parameters are searched."""
@@ -136,6 +185,11 @@ class Campaign(Document):
     non_ego_training: NonEgoTraining = NonEgoTraining()
     retraining: Retraining = Retraining()
     reconfiguration: Reconfiguration = Reconfiguration()
+    population: list[Population] = Field([], max_length=50)
+    """Kinds of traffic that the ego meets as it meets a persona, and is retrained against."""
+    rounds: Rounds = Rounds()
+    best_response: BestResponse | None = None
+    crossplay: CrossPlay | None = None
     assessment: Assessment = Assessment()
 
     @field_validator("seeds")
@@ -147,18 +201,42 @@ class Campaign(Document):
 
     @model_validator(mode="after")
     def _nothing_is_ignored(self) -> Campaign:
-        if self.policies is not None and (given := [name for name in OF_TRAINING if name in self.model_fields_set]):
+        if self.policies is not None and (given := self._of_no_use()):
             message = "with `policies` nothing is trained: this table would be ignored"
             raise Mistakes([(name, message, "leave out this table or `policies`") for name in given])
+        if self.rounds.stop_early and self.best_response is None:
+            message = "without [best_response] nobody knows when an exchange has settled"
+            raise Mistakes([("rounds.stop_early", message, "add [best_response] or leave it out")])
+        if self.ego.driver != LEARNED and self.rounds.count > Rounds().count:
+            message = "an ego that does not learn answers nobody: there is nothing after round 1"
+            raise Mistakes([("rounds.count", message, "leave it out, or let the ego be learned")])
+        if self.ego.driver != LEARNED and self.retraining.against:
+            message = "an ego that does not learn can't be retrained"
+            raise Mistakes([("retraining.against", message, "leave it out, or let the ego be learned")])
         return self
+
+    def _of_no_use(self) -> list[str]:
+        """The tables given that say how players learn, though none learns so."""
+        given = [name for name in OF_TRAINING if name in self.model_fields_set]
+        if self.retraining.model_fields_set <= {"against"} and "retraining" in given:
+            given.remove("retraining")  # who met whom counts without a training as well
+        return given if self.best_response is None else [name for name in given if name == "retraining"]
+
+    @property
+    def stops_early(self) -> bool:
+        """Whether an exchange may end before its last round."""
+        return self.best_response is not None and self.rounds.stop_early is not False
 
     def recorded(self) -> dict[str, Any]:
         """Every key that counts with its value, as a manifest holds it: how players learn or are tuned only where some
         may be."""
-        without = set(OF_TRAINING) if self.policies is not None else set()
-        if self.ego.driver in (LEARNED, SUMO):
-            without.add("reconfiguration")
-        return self.model_dump(mode="json", exclude=without)
+        unused: dict[str, Any] = {"reconfiguration": True} if self.ego.driver in (LEARNED, SUMO) else {}
+        if self.policies is None:
+            return self.model_dump(mode="json", exclude=unused)
+        unused["retraining"] = {"alone_share", "warm_start"} if self.retraining.against else True
+        if self.best_response is None:
+            unused |= {"training": True, "non_ego_training": True}
+        return self.model_dump(mode="json", exclude=unused)
 
 
 def resolve(campaign_file: Path, written: str) -> Path:

@@ -40,6 +40,7 @@ class StageEntry(_Record):
     trials: Count | None = None
     trials_unplayed: Count | None = None
     chosen_trial: Count | None = None
+    settled: Text | None = None
 
 
 class Manifest(_Record):
@@ -86,13 +87,19 @@ def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]
             yield key, _words(error)
     if "harness" not in manifest.get("versions", {}):
         yield "versions.harness", "is missing"
+    populations = {each.get("name") for each in manifest["campaign"].get("population", ())}
     for name, entry in manifest["stages"].items():
-        if entry.get("persona", "") not in {"", *manifest["persona_documents"]}:
+        if entry.get("persona", "") not in {"", *manifest["persona_documents"], *populations}:
             yield f"stages.{name}.persona", f"there is no document of persona {entry['persona']!r}"
         if entry["kind"] == "training" and entry["status"] == "done":
             for key in ("steps", "budget_steps", "stopped"):
                 if entry.get(key) is None:
                     yield f"stages.{name}.{key}", "is missing"
+
+
+def is_tuned(manifest: Mapping[str, Any]) -> bool:
+    """Whether the campaign's ego has something to tune, which round 2 searches."""
+    return any(entry["kind"] == "reconfiguration" for entry in manifest["stages"].values())
 
 
 def _words(error: ValidationError) -> str:

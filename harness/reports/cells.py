@@ -13,7 +13,12 @@ from harness.reports.wording import number, p_number, trimmed
 from harness.tables import typed
 
 UNITS = (("_mps2", "m/s²"), ("_mps", "m/s"), ("_m", "m"), ("_s", "s"))
-RATES = ("failure_rate", "non_ego_goal_rate")
+RATES = (
+    *("failure_rate", "non_ego_goal_rate", "ego_failure_rate", "naive_failure_rate", "solution_failure_rate"),
+    *("gap_share", "share"),
+)
+POINTS = ("failure_difference", "fewer_failures")
+"""Differences of rates."""
 P_VALUES = ("p_value", "p_holm", "mcnemar_p")
 IN_THE_METRICS_UNIT = ("mean_difference", "ci_low", "ci_high")
 
@@ -77,7 +82,7 @@ def heading(column: str, text: bool) -> Heading:
     """What the page calls a column, from its name and the unit in it."""
     if column in NAMES:
         return Heading(column, NAMES[column], "", text=False)
-    stem, unit = column, "%" if column.startswith(RATES) else ""
+    stem, unit = column, "%" if column.startswith(RATES) else "points" if column.startswith(POINTS) else ""
     for ending, symbol in UNITS:
         if column.endswith(ending):
             stem, unit = column.removesuffix(ending), symbol
@@ -114,8 +119,8 @@ def _text(column: str, value: Any, metric: str) -> str:
         return str(value)
     if column in P_VALUES:
         return p_number(value)
-    if column.startswith(RATES):
+    if column.startswith(RATES + POINTS):
         return trimmed(value * 100, 1)
-    if column in IN_THE_METRICS_UNIT:
+    if column in IN_THE_METRICS_UNIT and metric:
         return f"{number(value * 100, 1)} points" if metric == "failure" else f"{number(value, 3)} m/s"
     return number(value, 2)

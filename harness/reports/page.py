@@ -15,6 +15,7 @@ from harness.reports.cells import table
 from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
 from harness.reports.figures import steps_text
+from harness.reports.game import game_section
 from harness.reports.games import RecordedGame, SceneDrawing, key
 from harness.reports.learning import learning, stopped
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
@@ -22,7 +23,9 @@ from harness.reports.provenance import mixed_versions
 from harness.reports.replays import failures, keys, replay_list, worst_game
 from harness.reports.results import results, unplayed
 from harness.reports.search import searches
-from harness.tables import RECONFIGURATION_COLUMNS, typed
+from harness.search_columns import RECONFIGURATION_COLUMNS
+from harness.tables import typed
+from harness.theory.records import GameFindings
 
 MOST_ROWS = 3_000
 """A table longer than this is left to its CSV file, and the page says so."""
@@ -64,6 +67,7 @@ def render_page(
     games: Iterable[RecordedGame] = (),
     scene: SceneDrawing | None = None,
     manoeuvres: pd.DataFrame | None = None,
+    game: GameFindings | None = None,
     reconfiguration: pd.DataFrame | None = None,
 ) -> str:
     """The report as HTML. Equal input gives equal text.
@@ -71,7 +75,8 @@ def render_page(
     `manifest` is the content of manifest.json, the frames are those of the CSV files with the columns of
     `harness.tables.TABLES`, `replays` the names of the folders under `replays/`, in any order. `games`, the ones
     to watch first on top, are taken until the page is full (`PAGE_BYTES`); without a `scene` there are none.
-    Without `manoeuvres` nothing is said of them, nor of searches without `reconfiguration`.
+    Without `manoeuvres` nothing is said of them, without `game` nothing of equilibria, without `reconfiguration`
+    nothing of searches.
     Raises ValueError when a frame is none of those tables.
     """
     episodes, summary, comparisons, training = map(typed, (episodes, summary, comparisons, training))
@@ -83,7 +88,9 @@ def render_page(
     stages = manifest.get("stages", {})
     errored = episodes[unplayed(episodes)]
     in_table = episodes if len(episodes) <= MOST_ROWS else episodes[:0]
-    room = max(min(GAMES_BYTES, PAGE_BYTES - _REST_BYTES - len(in_table) * _ROW_BYTES), 0)
+    section = game_section(game)
+    taken = _REST_BYTES + len(in_table) * _ROW_BYTES + (section.bytes if section else 0)
+    room = max(min(GAMES_BYTES, PAGE_BYTES - taken), 0)
     embedded = Embedded(scene, games, marks_of(manoeuvres), room)
     shown = embedded.keys
     arms, pairs = failures_by_pair(manoeuvres, episodes) if manoeuvres is not None else ([], None)
@@ -107,12 +114,13 @@ def render_page(
         name=manifest.get("name", "campaign"),
         quick=QUICK if manifest.get("quick") else "",
         trained_before=manifest.get("campaign", {}).get("policies") or "",
-        unfinished=[_stage(name, stage) for name, stage in stages.items() if stage.get("status") != "done"],
+        unfinished=[_stage(name, stage) for name, stage in stages.items() if stage.get("status") not in ("done", "settled")],
         mixed=mixed_versions(stages),
         errored=errored.groupby(["arm", "seed"], sort=False).size().items(),
         errors=len(errored),
         facts=_facts(manifest, found.seeds, len(personas)),
         several_seeds=len(found.seeds) > 1,
+        game=section,
         cards=[
             card(persona, place, found, worst_game(f"naive_vs_{persona}", episodes, shown))
             for place, persona in enumerate(personas, 1)

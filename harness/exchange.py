@@ -1,0 +1,123 @@
+"""Rounds without end: non-ego and ego go on answering one another, each by a training of its own.
+
+Round 3 is the non-ego's answer to the retrained ego, round 4 the ego's to that, and so on. Whom a player answers is
+the campaign's choice:
+
+| `[rounds] against` | the opponent in a training |
+| --- | --- |
+| latest | the other player of the round before |
+| all | one of all it has been so far, by chance in each game (fictitious play: Brown 1951, Heinrich et al. 2015) |
+| equilibrium | the same by the equilibrium of the game between all strategies so far (policy-space response oracles: \
+Lanctot et al. 2017) |
+
+With `[best_response]` an exchange ends early: when neither player's best response gains anything distinguishable from
+0 (`harness.settling`), there is nothing to do for what would follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from harness.documents.campaign import Campaign
+from harness.game.state import EGO, NON_EGO
+from harness.responses import plan_responses, response_arms
+from harness.rounds import AssessmentStage, Drives, Gate, Stage, TrainingStage, arm_of, ego_of, learned, stage_id
+
+PAPER_ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class Strategy:
+    """What a player may do: the driver that a round made of it."""
+
+    name: str
+    persona: str
+    round: int
+    drives: Drives
+    unless: tuple[Gate, ...] = ()
+
+
+def ego_name(persona: str, round_: int) -> str:
+    """What the ego of an even round is called."""
+    return "naive" if round_ == 0 else f"retrained_{persona}" + (f"_round{round_}" if round_ > PAPER_ROUNDS else "")
+
+
+def non_ego_name(persona: str, round_: int) -> str:
+    """What the non-ego of an odd round is called."""
+    return persona if round_ == 1 else f"{persona}_round{round_}"
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """One persona's exchange with the ego, for one seed."""
+
+    egos: tuple[Strategy, ...]
+    non_egos: tuple[Strategy, ...]
+    stages: tuple[Stage, ...]
+    """Those of the rounds after the paper's, and the best responses that may end the exchange before."""
+
+
+def exchange(campaign: Campaign, persona: str, seed: int) -> Exchange:
+    """All rounds of a persona. The stages of rounds 0 to 2 are `harness.rounds`'s."""
+    egos = [Strategy("naive", persona, 0, ego_of(campaign, seed))]
+    non_egos = [Strategy(persona, persona, 1, learned(campaign, persona, seed, persona))]
+    stages: list[Stage] = []
+    gates: tuple[Gate, ...] = ()
+    for round_ in range(PAPER_ROUNDS, campaign.rounds.count + 1):
+        if round_ % 2 == 0:
+            name = ego_name(persona, round_)
+            egos.append(Strategy(name, persona, round_, learned(campaign, name, seed), gates))
+        else:
+            name = non_ego_name(persona, round_)
+            non_egos.append(Strategy(name, persona, round_, learned(campaign, name, seed, persona), gates))
+        if round_ > PAPER_ROUNDS:
+            stages += _round(campaign, persona, seed, round_, egos, non_egos)
+        if campaign.stops_early and round_ % 2 == 0 and round_ < campaign.rounds.count:
+            pair = arm_of(egos[-1].name, non_egos[-1].name)
+            arm = AssessmentStage(pair, seed, persona, egos[-1].drives, non_egos[-1].drives, gates)
+            stages += plan_responses(campaign, arm)
+            gates = (*gates, gate_of(pair, seed))
+    return Exchange(tuple(egos), tuple(non_egos), tuple(stages))
+
+
+def gate_of(pair: str, seed: int) -> Gate:
+    """The gate after an arm."""
+    return Gate(stage_id(pair, seed), *response_arms(pair, seed))
+
+
+def _round(
+    campaign: Campaign, persona: str, seed: int, round_: int, egos: Sequence[Strategy], non_egos: Sequence[Strategy]
+) -> list[Stage]:
+    learner = EGO if round_ % 2 == 0 else NON_EGO
+    latest = egos[-1] if learner == EGO else non_egos[-1]
+    others = list(non_egos if learner == EGO else egos)
+    how = campaign.retraining if learner == EGO else campaign.non_ego_training
+    initial = stage_id("naive", seed) if how.warm_start else None
+    attentive = campaign.non_ego_training.attentive_share if learner == NON_EGO else 0.0
+    stages: list[Stage] = []
+    opponent = others[-1].drives
+    if campaign.rounds.against != "latest" and len(others) > 1:
+        weighed_by: tuple[tuple[str, ...], ...] = ()
+        if campaign.rounds.against == "equilibrium":
+            rows = list(egos[:-1] if learner == EGO else egos)
+            columns = list(non_egos if learner == EGO else non_egos[:-1])
+            stages += [arm(ego, non_ego, seed) for ego in rows for non_ego in columns]
+            weighed_by = tuple(tuple(stage_id(arm_of(e.name, n.name), seed) for n in columns) for e in rows)
+        shares = () if weighed_by else (1.0,) * len(others)
+        opponent = Drives("mixture", members=tuple(o.drives for o in others), shares=shares, weighed_by=weighed_by)
+    name, unless = latest.name, latest.unless
+    training = (name, seed, persona, learner, opponent, initial, how.alone_share, attentive)
+    stages.append(TrainingStage(*training, unless=unless))
+    stages.append(arm(egos[-1], non_egos[-1], seed))
+    if learner == EGO:
+        stages.append(AssessmentStage(f"{name}_alone", seed, persona, latest.drives, None, unless))
+    else:
+        stages.append(AssessmentStage(f"{name}_alone", seed, persona, None, latest.drives, unless))
+    return stages
+
+
+def arm(ego: Strategy, non_ego: Strategy, seed: int) -> AssessmentStage:
+    """The arm of two strategies."""
+    unless = max(ego.unless, non_ego.unless, key=len)  # a later round has the gates of the earlier ones
+    return AssessmentStage(arm_of(ego.name, non_ego.name), seed, non_ego.persona, ego.drives, non_ego.drives, unless)

@@ -1,0 +1,163 @@
+"""Cross-play as heat maps: a cell for each ego and non-ego, its number written in it, shaded by its size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from markupsafe import Markup
+
+from harness.reports.figures import INK, SERIES, figure_of, svg
+from harness.reports.wording import number, trimmed
+from harness.theory.crossplay import Matrices, matrices
+
+Floats = npt.NDArray[np.float64]
+
+PALEST, DARKEST = 0.04, 0.5
+"""Opacity of the least and the greatest value: what is written on it stands out in dark and light."""
+COLUMN_IN, ROW_IN, LETTER_IN = 0.8, 0.46, 0.085
+
+
+@dataclass(frozen=True)
+class HeatMap:
+    """One figure of a view."""
+
+    title: str
+    caption: str
+    figure: Markup
+    width_in: float
+
+
+@dataclass(frozen=True)
+class View:
+    """The heat maps of one training seed, or of the mean over all."""
+
+    label: str
+    maps: Sequence[HeatMap]
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    name: str
+    title: str
+    caption: str
+    series: str
+    per_cent: bool
+
+
+QUANTITIES = (
+    _Quantity("failure_rate", "Failure rate of the ego (%)", "Darker: fails more.", "persona", True),
+    _Quantity("ego_payoff", "Payoff of the ego", "Darker: earns more.", "alone", False),
+    _Quantity(
+        "non_ego_payoff",
+        "Payoff of the non-ego",
+        "Darker: earns more than others of the same persona; people of two personas do not count in one currency. "
+        "SUMO’s own driver has no payoff.",
+        "retrained",
+        False,
+    ),
+)
+
+
+def views(crossplay: pd.DataFrame) -> list[View]:
+    """The heat maps of `crossplay`: of its seed, or of the mean over its seeds first and then of each."""
+    seeds = list(dict.fromkeys(crossplay["seed"]))
+    shown = [(f"seed {seed}", crossplay[crossplay["seed"] == seed]) for seed in seeds]
+    if len(seeds) > 1:
+        shown.insert(0, (f"mean over {len(seeds)} seeds", _mean(crossplay)))
+    return [
+        View(label, [_map(quantity, found, label, place) for quantity in QUANTITIES])
+        for place, (label, found) in enumerate(shown)
+    ]
+
+
+def _mean(crossplay: pd.DataFrame) -> pd.DataFrame:
+    """Each cell's mean over the seeds that have it, and the least and the most in place of an interval."""
+    cells = crossplay.groupby(["ego", "non_ego", "persona"], sort=False)
+    means = {quantity.name: cells[quantity.name].mean() for quantity in QUANTITIES}
+    means |= {f"{quantity.name}_low": cells[quantity.name].min() for quantity in QUANTITIES}
+    means |= {f"{quantity.name}_high": cells[quantity.name].max() for quantity in QUANTITIES}
+    return pd.DataFrame(means).reset_index()
+
+
+def _map(quantity: _Quantity, found: pd.DataFrame, label: str, place: int) -> HeatMap:
+    table = matrices(found)
+    cells = {(row["ego"], row["non_ego"]): row for row in found.to_dict("records")}
+    values = {
+        "failure_rate": table.failure_rates,
+        "ego_payoff": table.ego_payoffs,
+        "non_ego_payoff": table.non_ego_payoffs,
+    }[quantity.name]
+    between = "least to most of the seeds" if label.startswith("mean") else "95 % interval"
+    kind = "" if label.startswith("mean") else (" (Wilson)" if quantity.per_cent else " (t)")
+    said = [
+        f"{ego} against {non_ego} {_text(quantity, values[row, column])}"
+        for row, ego in enumerate(table.egos)
+        for column, non_ego in enumerate(table.non_egos)
+    ]
+    longest = max(map(len, table.egos)), max(map(len, table.non_egos))
+    width_in = LETTER_IN * longest[0] + COLUMN_IN * len(table.non_egos) + 0.1 * min(longest[1], 12) * 0.5
+    height_in = ROW_IN * len(table.egos) + 0.35 + LETTER_IN * longest[1] * 0.55
+    name = f"heat-{quantity.name.replace('_', '-')}-{place}"
+    with figure_of(width_in, height_in) as figure:
+        axes = figure.subplots()
+        axes.grid(False)
+        for spine in axes.spines.values():
+            spine.set_visible(False)
+        axes.set(xlim=(0, len(table.non_egos)), ylim=(len(table.egos), 0))
+        axes.xaxis.tick_top()
+        axes.set_xticks(
+            [column + 0.5 for column in range(len(table.non_egos))], table.non_egos,
+            rotation=30, ha="left", rotation_mode="anchor",
+        )  # fmt: skip
+        axes.set_yticks([row + 0.5 for row in range(len(table.egos))], table.egos)
+        axes.tick_params(length=0)
+        shades = _shades(quantity, table, values)
+        for row, ego in enumerate(table.egos):
+            for column, non_ego in enumerate(table.non_egos):
+                if not np.isfinite(values[row, column]):
+                    axes.text(column + 0.5, row + 0.5, "–", ha="center", va="center")
+                    continue
+                axes.bar(
+                    column + 0.5, 0.92, 0.95, bottom=row + 0.04, linewidth=0,
+                    color=SERIES[quantity.series], alpha=PALEST + (DARKEST - PALEST) * shades[row, column],
+                )  # fmt: skip
+                axes.text(column + 0.5, row + 0.46, _text(quantity, values[row, column]), ha="center", color=INK)
+                span = _span(quantity, cells[ego, non_ego])
+                axes.text(column + 0.5, row + 0.82, span, ha="center", fontsize=8, color=INK)
+        drawn = svg(figure, name, f"{quantity.title}, {label}: {'; '.join(said)}")
+    caption = f"{quantity.caption} Below each mean: {between}{kind}."
+    return HeatMap(f"{quantity.title}, {label}", caption, drawn, round(width_in, 2))
+
+
+def _shades(quantity: _Quantity, table: Matrices, values: Floats) -> Floats:
+    """How dark each cell is, from 0 to 1; NaN stays."""
+    if quantity.per_cent:
+        most = np.nanmax(values, initial=0.0)
+        return values / most if most > 0 else values
+    shades = np.full(values.shape, np.nan)
+    groups = table.personas if quantity.name == "non_ego_payoff" else [""] * len(table.non_egos)
+    for group in set(groups):
+        columns = [place for place, each in enumerate(groups) if each == group]
+        part = values[:, columns]
+        low, high = (np.nan, np.nan) if np.isnan(part).all() else (np.nanmin(part), np.nanmax(part))
+        shades[:, columns] = (part - low) / (high - low) if high > low else np.where(np.isnan(part), np.nan, 0.5)
+    return shades
+
+
+def _text(quantity: _Quantity, value: float) -> str:
+    if not np.isfinite(value):
+        return "–"
+    return f"{trimmed(value * 100, 1)} %" if quantity.per_cent else number(value, 1)
+
+
+def _span(quantity: _Quantity, cell: Mapping[str, float]) -> str:
+    low, high = cell[f"{quantity.name}_low"], cell[f"{quantity.name}_high"]
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return ""
+    if quantity.per_cent:
+        return f"{trimmed(low * 100, 0)}–{trimmed(high * 100, 0)}"
+    return f"{number(low, 1)} to {number(high, 1)}"
