@@ -16,6 +16,7 @@ from rich.progress import track
 from harness.comparison import Question, compare
 from harness.conditions import conditions_of
 from harness.documents.campaign import Campaign
+from harness.documents.manifest import is_tuned
 from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.manoeuvre_file import manoeuvres_of
@@ -27,13 +28,15 @@ from harness.preflight import OpenCampaign
 from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay import choose_games, replay_name, worst_first, write_replay
+from harness.reports.change import ARMS
 from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions
 from harness.reports.results import results
-from harness.reports.wording import ARMS, Verdicts
-from harness.rounds import AssessmentStage, Stage, TrainingStage, questions, stage_id
+from harness.reports.wording import Verdicts
+from harness.rounds import AssessmentStage, ReconfigurationStage, Stage, TrainingStage, questions, stage_id
 from harness.run_folder import FORMAT, MANIFEST, RunFolder
+from harness.search_columns import RECONFIGURATION_COLUMNS, is_of_a_search
 from harness.stage_keys import stage_keys
 from harness.summary import summarise
 from harness.tables import (
@@ -52,6 +55,7 @@ from harness.versions import versions, versions_of_numbers
 from harness.workers import Event, run_stages
 
 FINISHED = ("done", "settled")
+_KINDS = {TrainingStage: "training", AssessmentStage: "assessment", ReconfigurationStage: "reconfiguration"}
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
     """
     folder.claim(campaign.document.name, campaign.quick)
     with folder.held():
-        stages = plan(campaign.document, [persona.name for persona in campaign.personas])
+        stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
         ledger = _Ledger(campaign, folder, stages, keys)
         scene = campaign.scene.document
@@ -136,7 +140,7 @@ class _Ledger:
 
     @staticmethod
     def _entry(stage: Stage, info: Mapping[str, Any] | None) -> dict[str, Any]:
-        kind = "training" if isinstance(stage, TrainingStage) else "assessment"
+        kind = _KINDS[type(stage)]
         name = stage.arm if isinstance(stage, AssessmentStage) else stage.name
         entry = {
             "kind": kind,
@@ -161,6 +165,7 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
     episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
+    searched = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
     summary = summarise(episodes)
     asked = questions_of(manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
@@ -169,6 +174,7 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     tables |= vars(game) if game is not None else {}
     if (campaign := _campaign(manifest)).population:
         tables["populations"] = by_who_drove(campaign, episodes)
+    tables |= {"reconfiguration": searched} if is_tuned(manifest) else {}
     scene = open_scene(folder.scene)
     _check_traces(folder, episodes)
     write_model_cards(folder, manifest, summary)
@@ -181,7 +187,19 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     with console.status("writing the report"):
         games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
         page = render_page(
-            manifest, episodes, summary, comparisons, training, replays, games, scene_drawing(scene), manoeuvres, game
+            *(
+                manifest,
+                episodes,
+                summary,
+                comparisons,
+                training,
+                replays,
+                games,
+                scene_drawing(scene),
+                manoeuvres,
+                game,
+            ),
+            reconfiguration=searched,
         )
     write_atomically(folder.path / "report.html", page.encode())
     _warn(mixed_versions(manifest["stages"]), console)
@@ -203,7 +221,7 @@ def questions_of(manifest: Mapping[str, Any]) -> list[Question]:
     done = _done(manifest)
     return [
         question
-        for question in questions(_campaign(manifest), manifest["personas"])
+        for question in questions(_campaign(manifest), manifest["personas"], is_tuned(manifest))
         if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= done
     ]
 
@@ -211,7 +229,7 @@ def questions_of(manifest: Mapping[str, Any]) -> list[Question]:
 def game_of(manifest: Mapping[str, Any], episodes: pd.DataFrame) -> GameFindings | None:
     """What the finished arms of a run say of the game between strategies; None where it is not asked."""
     campaign = _campaign(manifest)
-    met = who_met(campaign, manifest["personas"], _done(manifest))
+    met = who_met(campaign, manifest["personas"], _done(manifest), is_tuned(manifest))
     if met is None:
         return None
     return find(met.pairings, met.responses, met.personas_of, episodes, campaign.assessment.significance)
@@ -235,7 +253,8 @@ def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, c
             file = folder.work(name) / table
             frame = read_csv(file)
             of = frame["arm" if kind == "assessment" else "stage"]
-            if not ((of == entry["name"]) & (frame["seed"] == entry["seed"])).all():
+            theirs = ((of == entry["name"]) & (frame["seed"] == entry["seed"])).all()
+            if not theirs or (kind == "reconfiguration" and not is_of_a_search(frame)):
                 raise UsageError.of(file, "", f"has rows that are not of {name}", "run the campaign again")
             frames.append(frame)
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))

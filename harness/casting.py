@@ -84,6 +84,11 @@ class Casting:
         sampled = self.conditions.persona(drives.persona).decisions == "sampled"
         if drives.kind == "given":
             return self.conditions.given(drives.stage).make(car_of(self.scene.world, EGO), sampled)
+        if drives.kind == "reconfigured":
+            from harness.reconfigured import read_found  # Optuna is slow to import
+
+            found = read_found(self.conditions.given(""), self.folder.policy(drives.stage))
+            return found.make(car_of(self.scene.world, EGO), sampled)
         return LearnedDriver(read_policy(self.policy(drives)), sampled)
 
     def policy(self, drives: Drives) -> Path:

@@ -111,12 +111,14 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
     from rich.console import Console
 
     from harness.documents.campaign import LEARNED
+    from harness.errors import plain
     from harness.plan import plan
     from harness.preflight import open_campaign
-    from harness.rounds import TrainingStage
+    from harness.rounds import AssessmentStage, ReconfigurationStage, TrainingStage
 
     opened = open_campaign(file, allow_code=allow_code)
-    stages = plan(opened.document, [persona.name for persona in opened.personas])
+    stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
+    arms = sum(isinstance(stage, AssessmentStage) for stage in stages)
     trainings = sum(isinstance(stage, TrainingStage) for stage in stages)
     console = Console()
 
@@ -126,13 +128,18 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
     say(f"{file} is in order.")
     if opened.document.ego.driver != LEARNED:
         ego = opened.ego_driver.in_words if opened.ego_driver is not None else "SUMO's own models"
-        say(f"The ego: {ego}. There is nothing to train in it: rounds 0 and 1.")
+        round_2 = "There is nothing to train or to tune in it: rounds 0 and 1."
+        if opened.ego_driver is not None and opened.tunable:
+            search = opened.document.reconfiguration
+            ranges = ", ".join(f"{key} from {low:g} to {high:g}" for key, low, high in opened.ego_driver.searched)
+            round_2 = f"Round 2 searches it in {search.trials} trials of {search.games} games: {ranges}."
+        say(plain(f"The ego: {ego}. {round_2}"))
     how = f"{trainings} trainings of up to {opened.document.training.steps:,} steps"
     if opened.policies is not None:
         how = f"Players trained before, read from {opened.policies}: nothing is trained"
-    say(f"{how}, {len(stages) - trainings} arms of {opened.document.assessment.episodes} episodes:")
+    say(f"{how}, {arms} arms of {opened.document.assessment.episodes} episodes:")
     for stage in stages:
-        kind = "train" if isinstance(stage, TrainingStage) else "assess"
+        kind = {TrainingStage: "train", AssessmentStage: "assess", ReconfigurationStage: "tune"}[type(stage)]
         reads = () if isinstance(stage, TrainingStage) else stage.reads
         after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
         say(f"  {kind:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else ""))

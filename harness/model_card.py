@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import ConfigDict, Field, ValidationError
 
 from harness.documents.campaign import Campaign
+from harness.documents.manifest import is_tuned
 from harness.documents.persona import Parametrised, Persona
 from harness.documents.reading import Document
 from harness.errors import UsageError
@@ -188,7 +189,7 @@ def _figures(
 ) -> Iterator[tuple[str, Sequence[str]]]:
     campaign = Campaign.model_validate(manifest["campaign"], strict=False)
     rows = {row["arm"]: row for row in summary[summary["seed"] == seed].to_dict("records")}
-    for arm in plan(campaign, manifest["personas"]):
+    for arm in plan(campaign, manifest["personas"], is_tuned(manifest)):
         if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.arm not in rows:
             continue
         player = arm.ego if is_ego else arm.non_ego

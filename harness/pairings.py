@@ -13,6 +13,8 @@ from harness.responses import arm_responded_in, is_pair
 from harness.rounds import AssessmentStage, Drives, stage_id
 from harness.theory.records import Pairing, Response
 
+_MADE = ("retrained", "reconfigured")
+
 
 @dataclass(frozen=True)
 class Met:
@@ -21,22 +23,23 @@ class Met:
     pairings: Sequence[Pairing]
     responses: Sequence[Response]
     personas_of: Mapping[str, Collection[str]]
-    """Of each retrained ego the personas that it was trained against."""
+    """Of each ego that was retrained or reconfigured the personas against whom it was."""
 
 
-def who_met(campaign: Campaign, personas: Sequence[str], done: Collection[str]) -> Met | None:
+def who_met(campaign: Campaign, personas: Sequence[str], done: Collection[str], tunable: bool = False) -> Met | None:
     """What of a campaign is a game between strategies, among the stages that are done; None where it plays the paper's
-    rounds and nothing more."""
+    rounds and nothing more. `tunable` as in `plan`."""
     asks = (campaign.crossplay, campaign.best_response, campaign.retraining.against or None)
     if all(each is None for each in asks) and campaign.rounds.count == type(campaign.rounds)().count:
         return None
-    arms = [each for each in plan(campaign, personas) if isinstance(each, AssessmentStage) and each.id in done]
+    arms = [each for each in plan(campaign, personas, tunable) if isinstance(each, AssessmentStage) and each.id in done]
     rounds = _rounds(campaign, personas)
     return Met(
         [_pairing(arm) for arm in arms if is_pair(arm)],
         [response for arm in arms for response in _responses(arm, arms, rounds)],
         {ROBUST: campaign.retraining.against}
-        | {f"retrained_{each.name}": list(each.shares) for each in campaign.population}
+        | {f"{made}_{each.name}": list(each.shares) for made in _MADE for each in campaign.population}
+        | {f"reconfigured_{persona}": [persona] for persona in personas}
         | {ego.name: [persona] for persona in personas for ego in exchange(campaign, persona, 0).egos if ego.round},
     )
 

@@ -16,8 +16,8 @@ Wrong = Callable[[str, str, str], None]
 """Notes a problem: key, what is wrong, remedy."""
 
 
-def check_names(file: Path, document: Campaign, personas: Sequence[str]) -> None:
-    """Raises UsageError for every name that means nobody, or two at once."""
+def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable: bool = False) -> None:
+    """Raises UsageError for every name that means nobody, or two at once; `tunable` as in `plan`."""
     problems: list[Problem] = []
 
     def wrong(key: str, message: str, remedy: str) -> None:
@@ -36,7 +36,7 @@ def check_names(file: Path, document: Campaign, personas: Sequence[str]) -> None
         wrong("retraining.against", "a persona stands twice", "name each once")
     _check_other_egos(document, wrong)
     if not problems and document.best_response is not None:
-        _check_arms(document, personas, wrong)
+        _check_arms(document, personas, tunable, wrong)
     if problems:
         raise UsageError(problems)
 
@@ -55,9 +55,9 @@ def _check_other_egos(document: Campaign, wrong: Wrong) -> None:
             wrong("crossplay.egos", f"{driver!r} would be called {name!r}", "rename its file or folder")
 
 
-def _check_arms(document: Campaign, personas: Sequence[str], wrong: Wrong) -> None:
+def _check_arms(document: Campaign, personas: Sequence[str], tunable: bool, wrong: Wrong) -> None:
     assert document.best_response is not None
-    arms = {stage.arm: stage for stage in plan(document, personas) if isinstance(stage, AssessmentStage)}
+    arms = {stage.arm: stage for stage in plan(document, personas, tunable) if isinstance(stage, AssessmentStage)}
     pairs = [name for name, stage in arms.items() if is_pair(stage)]
     for name in document.best_response.arms:
         if name not in pairs:

@@ -26,6 +26,7 @@ from harness.traffic.trial import try_scene
 
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
+QUICK_TRIALS = 12
 QUICK_RESPONSE_STEPS = 131_072
 
 
@@ -48,6 +49,11 @@ class OpenCampaign:
     hashes: dict[str, str]
     """SHA-256 of every file the campaign rests on, by its path from the campaign's folder."""
 
+    @property
+    def tunable(self) -> bool:
+        """Whether the ego is given, and has something to tune."""
+        return self.ego_driver is not None and bool(self.ego_driver.searched)
+
     def hash_of(self, path: Path) -> str:
         """SHA-256 of one of those files."""
         return self.hashes[_from(self.file, path)]
@@ -56,8 +62,8 @@ class OpenCampaign:
 def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> OpenCampaign:
     """Read a campaign and everything it names. Raises UsageError with every problem found.
 
-    Quick makes trainings shorter: a campaign that trains nothing is the same without it. `allow_code`: an ego that is
-    code which comes as a file may be run (`harness.drivers.given` says why a document can't decide that).
+    Quick makes trainings and searches shorter: a campaign that has none is the same without it. `allow_code`: an ego
+    that is code which comes as a file may be run (`harness.drivers.given` says why a document can't decide that).
     """
     problems: list[Problem] = []
 
@@ -72,8 +78,8 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
     personas = [attempt(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
     if ego_driver is not None and scene is not None:
         sampled = personas[0] is not None and personas[0].decisions == "sampled"
-        games = document.training.games if document is not None and document.policies is None else 1
-        attempt(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, games))
+        attempt(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, _at_once(document, ego_driver)))
+    attempt(problems, lambda: _check_round_2(file, document, ego_driver))
     other_egos = _other_egos(problems, file, document, scene, allow_code)
     policies = attempt(problems, lambda: _policies_folder(file, named.policies))
     for given, persona in zip(named.personas, personas[1:], strict=True):
@@ -92,8 +98,9 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
     if problems or document is None or scene is None:
         raise UsageError(problems)
     names = [persona.name for persona in personas[1:] if persona is not None]
-    check_names(file, document, names)
-    _check_stage_names(file, document, names)
+    tunable = ego_driver is not None and bool(ego_driver.searched)
+    check_names(file, document, names, tunable)
+    _check_stage_names(file, document, names, tunable)
     files = [
         file,
         *(_trained_before(file, document, names, policies) if policies is not None else ()),
@@ -105,7 +112,7 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
             files += map(Path, driver.files)
     hashes = {_from(file, each): hashlib.sha256(each.read_bytes()).hexdigest() for each in files}
     ego, *others = (persona for persona in personas if persona is not None)
-    quick = quick and policies is None
+    quick = quick and (policies is None or tunable)
     if quick:
         document = _quickened(document)
     return OpenCampaign(file, document, quick, scene, ego, tuple(others), ego_driver, policies, other_egos, hashes)
@@ -138,10 +145,35 @@ def _named(file: Path) -> _Named | None:
         return None
 
 
-def _check_stage_names(file: Path, document: Campaign, personas: Sequence[str]) -> None:
+def _at_once(document: Campaign | None, ego_driver: GivenDriver) -> int:
+    """How many games at once the ego will have to play."""
+    if document is None:
+        return 1
+    search = document.reconfiguration
+    return max(
+        document.training.games if document.policies is None else 1,
+        min(search.games, search.games_at_once) if ego_driver.searched else 1,
+    )
+
+
+def _check_round_2(file: Path, document: Campaign | None, ego_driver: GivenDriver | None) -> None:
+    """Raises UsageError for a table that says how round 2 goes of another kind of ego than this."""
+    if document is None or (ego_driver is None and document.ego.driver not in (LEARNED, SUMO)):
+        return  # nobody knows which ego it has
+    learned = document.ego.driver == LEARNED
+    wrong = {"reconfiguration": "is trained" if learned else "has nothing to tune", "retraining": "is not trained"}
+    has = {"reconfiguration": ego_driver is not None and ego_driver.searched, "retraining": learned}
+    if ignored := [name for name in wrong if name in document.model_fields_set and not has[name]]:
+        remedy = "leave out this table, or name another ego"
+        raise UsageError(
+            Problem(str(file), name, f"this ego {wrong[name]}: the table would be ignored", remedy) for name in ignored
+        )
+
+
+def _check_stage_names(file: Path, document: Campaign, personas: Sequence[str], tunable: bool) -> None:
     """Stages are called after personas: a persona called `naive` would be taken for the naive ego."""
     stages: dict[str, list[str]] = {}
-    for stage in plan(document.model_copy(update={"policies": None}), personas):
+    for stage in plan(document.model_copy(update={"policies": None}), personas, tunable):
         stages.setdefault(stage.id, []).append(stage.persona)
     clashes = {tuple(sorted(filter(None, of))): name for name, of in stages.items() if len(of) > 1}
     if clashes:
@@ -230,14 +262,16 @@ def _instead(missing: str, there: Iterable[str]) -> str:
 
 
 def _quickened(document: Campaign) -> Campaign:
-    """The same campaign with fewer training steps."""
+    """The same campaign with fewer training steps, and fewer trials."""
     training: Training = document.training.model_copy(
         update={
             "steps": min(document.training.steps, QUICK_STEPS),
             "segment_steps": min(document.training.segment_steps, QUICK_SEGMENT_STEPS),
         }
     )
-    changes: dict[str, Any] = {"training": training}
+    search = document.reconfiguration
+    search = search.model_copy(update={"trials": min(search.trials, QUICK_TRIALS)})
+    changes: dict[str, Any] = {"training": training, "reconfiguration": search}
     if document.best_response is not None:
         steps = min(document.best_response.steps, QUICK_RESPONSE_STEPS)
         changes["best_response"] = document.best_response.model_copy(update={"steps": steps})

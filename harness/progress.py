@@ -16,16 +16,18 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from harness.rounds import Stage, TrainingStage
+from harness.rounds import AssessmentStage, ReconfigurationStage, Stage, TrainingStage
 from harness.workers import Event
+
+_UNITS = {TrainingStage: "steps", AssessmentStage: "episodes", ReconfigurationStage: "trials"}
 
 
 class _Rate(ProgressColumn):
-    """Steps or episodes a second."""
+    """Steps, episodes or trials a second."""
 
     def render(self, task: Task) -> Text:
         rate = task.finished_speed or task.speed
-        return Text(f"{rate:,.0f}/s" if rate else "", style="progress.data.speed")
+        return Text((f"{rate:,.0f}/s" if rate >= 10 else f"{rate:.2g}/s") if rate else "", style="progress.data.speed")
 
 
 class StageProgress:
@@ -33,7 +35,7 @@ class StageProgress:
 
     def __init__(self, stages: list[Stage], finished: int, console: Console) -> None:
         self._console = console
-        self._units = {stage.id: "steps" if isinstance(stage, TrainingStage) else "episodes" for stage in stages}
+        self._units = {stage.id: _UNITS[type(stage)] for stage in stages}
         self._bars = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -78,7 +80,8 @@ class StageProgress:
             info = event.info
             if "settled" in info:
                 return f"settled  {event.stage}: {info['message']}"
-            what = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else f"{info['episodes']} episodes"
+            what = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else ""
+            what = what or next(f"{info[unit]} {unit}" for unit in ("episodes", "trials") if unit in info)
             errors = f", {info['errors']} errors" if info.get("errors") else ""
             return f"done     {event.stage}: {what}{errors} in {info['seconds']:.0f} s"
         return f"{event.kind:8s} {event.stage}: {event.message}"

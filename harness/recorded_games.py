@@ -49,17 +49,19 @@ def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
     turn[chosen["ego_outcome"].where(chosen["ego_outcome"] != "", chosen["non_ego_outcome"]) == "goal"] = 0
     for game in chosen.loc[turn.sort_values(kind="stable").index].itertuples():
         order[game.Index] = None
-        counterpart = rows.get((_counterpart(game.arm), game.seed, game.episode))
-        if counterpart is not None:
-            order[counterpart] = None
+        for arm in _counterparts(game.arm):
+            counterpart = rows.get((arm, game.seed, game.episode))
+            if counterpart is not None:
+                order[counterpart] = None
     order |= dict.fromkeys(worst_first(played).index)
     return played.loc[list(order)]
 
 
-def _counterpart(arm: str) -> str:
-    """The arm that an arm is shown beside: naive beside retrained."""
+def _counterparts(arm: str) -> list[str]:
+    """The arms that an arm may be shown beside: naive beside retrained or reconfigured."""
     before, against, persona = arm.partition("_vs_")
-    return {"naive": "retrained", "retrained": "naive"}.get(before, before) + against + persona
+    others = {"naive": ("retrained", "reconfigured"), "retrained": ("naive",), "reconfigured": ("naive",)}
+    return [other + against + persona for other in others.get(before, (before,))]
 
 
 def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedGame:

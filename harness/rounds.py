@@ -7,8 +7,9 @@
 | 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
 
 A population is met as a persona is, and nobody is trained for it: its members are. The ego that is retrained against
-several personas at once is `robust`. An ego that the campaign does not train has no round 2. A campaign that names a
-folder of policies has the same arms and no trainings: what they would have made is read from there.
+several personas at once is `robust`. An ego that the campaign does not train is searched for better parameters in its
+round 2 (`harness.plan_searches`), or has none. A campaign that names a folder of policies has the same arms and no
+trainings: what they would have made is read from there.
 """
 
 from __future__ import annotations
@@ -30,13 +31,14 @@ class Drives:
     | --- | --- |
     | sumo | SUMO's own models |
     | given | the campaign's given ego, or the other driver called `stage` |
+    | reconfigured | the given ego as the search `stage` reconfigured it |
     | policy | the policy that the training `stage` made |
     | before | the policy that such a stage made before, in another run |
     | mixture | one of `members` in each game, by `shares` or, without, by the equilibrium of the arms in `weighed_by` |
     | best | the one of `members` who earns most in games that are played for this choice alone |
     """
 
-    kind: Literal["sumo", "given", "policy", "before", "mixture", "best"]
+    kind: Literal["sumo", "given", "reconfigured", "policy", "before", "mixture", "best"]
     stage: str = ""
     persona: str = ""
     """Whose habits it has; empty: the ego's own."""
@@ -130,7 +132,34 @@ class AssessmentStage:
         return _before(self.ego, self.non_ego)
 
 
-Stage = TrainingStage | AssessmentStage
+@dataclass(frozen=True)
+class ReconfigurationStage:
+    """One search: the given ego's parameters, on its own payoff, against whom."""
+
+    name: str  # reconfigured_<persona>
+    seed: int
+    persona: str
+    opponent: Drives
+    unless: tuple[Gate, ...] = ()
+    """There is nothing to do where one of them has settled."""
+
+    @property
+    def id(self) -> str:
+        """What the stage and the driver it finds are called in the run folder."""
+        return stage_id(self.name, self.seed)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The stages that have to be done before."""
+        return _stages(self.unless, None, self.opponent)
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The policies trained before that drive in it, each called after the stage that made it."""
+        return _before(self.opponent)
+
+
+Stage = TrainingStage | AssessmentStage | ReconfigurationStage
 
 
 def stage_id(name: str, seed: int) -> str:
@@ -140,14 +169,18 @@ def stage_id(name: str, seed: int) -> str:
 
 def arm_of(ego: str, non_ego: str) -> str:
     """What the arm of two strategies is called."""
-    return f"retrained_vs_{non_ego}" if ego == f"retrained_{non_ego}" else f"{ego}_vs_{non_ego}"
+    made = next((made for made in ("retrained", "reconfigured") if ego == f"{made}_{non_ego}"), ego)
+    return f"{made}_vs_{non_ego}"
+
+
+_MADE = ("policy", "reconfigured")  # by a stage of the plan
 
 
 def _stages(unless: Sequence[Gate], initial: str | None, *drivers: Drives | None) -> tuple[str, ...]:
     players = [each for player in drivers if player is not None for each in player.everyone]
     weighed = [arm for player in drivers if player is not None for row in player.weighed_by for arm in row]
     gates = [stage for gate in unless for stage in (gate.pair, gate.ego_response, gate.non_ego_response)]
-    named = [initial or "", *(each.stage for each in players if each.kind == "policy"), *weighed, *gates]
+    named = [initial or "", *(each.stage for each in players if each.kind in _MADE), *weighed, *gates]
     return tuple(dict.fromkeys(name for name in named if name))
 
 
@@ -238,8 +271,9 @@ def _arms_of(campaign: Campaign, name: str, opponent: Drives, retrained: bool, s
     return stages
 
 
-def questions(campaign: Campaign, personas: Sequence[str]) -> list[Question]:
-    """The research questions of a campaign (paper, section 4.2), for each persona or population and seed."""
+def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Question]:
+    """The research questions of a campaign (paper, section 4.2), for each persona or population and seed; `tunable` as
+    in `harness.plan`."""
     asked = []
     for persona in [*personas, *(each.name for each in campaign.population)]:
         for seed in campaign.seeds:
@@ -247,4 +281,6 @@ def questions(campaign: Campaign, personas: Sequence[str]) -> list[Question]:
             asked.append(Question("RQ1", persona, seed, "naive_alone", against))
             if campaign.ego.driver == LEARNED:
                 asked.append(Question("RQ2", persona, seed, against, retrained))
+            elif tunable:
+                asked.append(Question("RQ2", persona, seed, against, f"reconfigured_vs_{persona}"))
     return asked

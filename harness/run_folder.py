@@ -2,9 +2,11 @@
 
     manifest.json            campaign, versions, seeds, hashes, status of every stage
     policies/<stage>/        policy.safetensors, policy.json, README.md (its model card)
+                             of a reconfiguration: driver.toml
     traces/<stage>.parquet   one file per arm
     scene/                   a copy of the scene's files
-    .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, segments, tables, done.json
+    .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, trials, segments, tables,
+                             done.json
     .stages/{lock,workers}   whose the folder is at the moment: one command's and its workers'
     .stages/scratch/         temporary files of the workers
 
@@ -128,7 +130,8 @@ class RunFolder:
         """What came of a stage when it was done from these very inputs, without an error; None if it is not done, or
         its work is gone or damaged."""
         said = self.done(stage)
-        made = (self.policy(stage) / "policy.safetensors").is_file() or self.traces(stage).is_file()
+        made = any((self.policy(stage) / name).is_file() for name in ("policy.safetensors", "driver.toml"))
+        made = made or self.traces(stage).is_file()
         if said is None or said.get("key") != key or said["info"].get("errors"):
             return None
         if not made and not said["info"].get("settled"):

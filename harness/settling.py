@@ -6,19 +6,19 @@ from collections.abc import Sequence
 
 import pandas as pd
 
-from harness.rounds import AssessmentStage, Gate, TrainingStage
+from harness.rounds import Gate, Stage
 from harness.run_folder import RunFolder
 from harness.tables import read_csv
 from harness.theory.gaps import gaps, nothing_to_gain
 from harness.theory.records import Response
 
 
-def settled(stage: TrainingStage | AssessmentStage, folder: RunFolder, significance: float) -> Gate | None:
+def settled(stage: Stage, folder: RunFolder, significance: float) -> Gate | None:
     """The gate by which a stage has nothing to do; None if it has."""
     return next((gate for gate in stage.unless if _has_settled(gate, stage, folder, significance)), None)
 
 
-def _has_settled(gate: Gate, stage: TrainingStage | AssessmentStage, folder: RunFolder, significance: float) -> bool:
+def _has_settled(gate: Gate, stage: Stage, folder: RunFolder, significance: float) -> bool:
     arms = (gate.pair, gate.ego_response, gate.non_ego_response)
     episodes = pd.concat([read_csv(folder.work(arm) / "episodes.csv") for arm in arms], ignore_index=True)
     pair, *responses = (str(name) for name in episodes["arm"].unique())

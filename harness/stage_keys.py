@@ -11,7 +11,7 @@ from typing import Any
 from harness.policy_file import policy_files
 from harness.preflight import OpenCampaign
 from harness.responses import settings_of
-from harness.rounds import AssessmentStage, Drives, Stage, TrainingStage
+from harness.rounds import AssessmentStage, Drives, ReconfigurationStage, Stage, TrainingStage
 from harness.versions import NUMBERS_FORMAT
 
 
@@ -36,6 +36,10 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
         }
         if isinstance(stage, TrainingStage):
             inputs["training"] = settings_of(document, stage).model_dump(mode="json")
+        elif isinstance(stage, ReconfigurationStage):
+            assert campaign.ego_driver is not None
+            inputs["reconfiguration"] = document.reconfiguration.model_dump(mode="json")
+            inputs["tunable"] = campaign.ego_driver.searched
         else:
             inputs["episodes"] = document.assessment.episodes
         if campaign.policies is not None and (reads := stage.reads):

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -23,7 +25,7 @@ from harness.manoeuvre_file import EPISODES, MANOEUVRES
 from harness.mixture import Player
 from harness.policy_file import Policy, policy_files, read_policy, write_policy
 from harness.responses import settings_of
-from harness.rounds import AssessmentStage, Stage, TrainingStage
+from harness.rounds import AssessmentStage, ReconfigurationStage, Stage, TrainingStage
 from harness.run_folder import RunFolder
 from harness.settling import settled
 from harness.tables import TRAINING_COLUMNS, typed, write_csv
@@ -48,8 +50,8 @@ def carry_out(
         folder.finish(stage.id, key, info)
         return info
     scene = open_scene(conditions.scene_folder, conditions.vehicle_type(stage))
-    do = _train if isinstance(stage, TrainingStage) else _assess
-    info, files = do(stage, conditions, folder, scene, report, begin, attempt)  # type: ignore[arg-type]
+    do: Any = {TrainingStage: _train, AssessmentStage: _assess, ReconfigurationStage: _reconfigure}[type(stage)]
+    info, files = do(stage, conditions, folder, scene, report, begin, attempt)
     info["seconds"] = round(time.monotonic() - began, 1)
     folder.finish(stage.id, key, info, files)
     if not info.get("errors"):  # failures are not kept: the next run tries those games again, and only those segments
@@ -57,9 +59,9 @@ def carry_out(
     return info
 
 
-def _made_by(checkpoint: Path) -> list[dict[str, str]]:
-    """The versions that a training is made by: more than one, if it went on where others had stopped."""
-    file, now = checkpoint.with_name("versions.json"), versions_of_numbers()
+def _made_by(checkpoint: Path, besides: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, str]]:
+    """The versions that a training or a search is made by: more than one, if it went on where others had stopped."""
+    file, now = checkpoint.with_name("versions.json"), {**versions_of_numbers(), **besides}
     try:
         before = json.loads(file.read_text(encoding="utf-8")) if checkpoint.is_file() else []
     except (OSError, ValueError):
@@ -125,6 +127,34 @@ def _train(
         "versions": made_by,
     }
     return info, [*policy_files(folder.policy(stage.id)), table]
+
+
+def _reconfigure(
+    stage: ReconfigurationStage,
+    conditions: Conditions,
+    folder: RunFolder,
+    scene: OpenScene,
+    report: Report,
+    begin: Begin,
+    attempt: Attempt,
+) -> tuple[dict[str, Any], list[Path]]:
+    from harness.reconfiguration import Search, version_of_search
+    from harness.reconfigured import reconfigure  # Optuna is slow to import
+
+    opponent = Casting(conditions, folder, scene).player(stage.opponent)
+    assert opponent is not None
+    other = conditions.persona(stage.persona if stage.persona in conditions.personas else "")
+    personas, settings = (conditions.ego_persona, other), conditions.document.reconfiguration
+    named = ("reconfiguration", stage.seed, stage.name)
+    search = Search(scene, conditions.given(""), personas, opponent, settings, named)
+    kept = folder.work(stage.id) / "trials.json"
+    made_by = _made_by(kept, version_of_search())
+    labels = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed}
+    try:
+        info, files = reconfigure(search, labels, kept, folder.policy(stage.id), report, begin)
+    except StageFailed as error:
+        raise StageFailed(f"{stage.id}: {error}") from error
+    return {**info, "versions": made_by}, files
 
 
 def _assess(

@@ -21,6 +21,7 @@ from harness.comparison import COMPARISON_COLUMNS
 from harness.errors import UsageError
 from harness.file_content import content_of
 from harness.files import replace_durably, scratch_beside, write_atomically
+from harness.search_columns import RECONFIGURATION_COLUMNS
 from harness.theory.columns import GAME_TABLES
 
 EPISODE_COLUMNS = {
@@ -123,6 +124,7 @@ TABLES = {
     "training": TRAINING_COLUMNS,
     "manoeuvres": MANOEUVRE_COLUMNS,
     "populations": POPULATION_COLUMNS,
+    "reconfiguration": RECONFIGURATION_COLUMNS,
     **GAME_TABLES,
 }
 

@@ -45,17 +45,25 @@ ALLOWED: dict[str, set[str]] = {
         *("arena", "mixture", "vector_environment", "checkpoint", "convergence"),
     },
     "metrics": {"game"},
+    "paired_games": {"documents", "game", "traffic", "drivers", "arena", "mixture"},
+    "reconfiguration": {"errors", "files", "documents", "game", "traffic", "drivers", "mixture", "paired_games"},
+    "search_columns": set(),
     "assessment": {"errors", "documents", "game", "traffic", "arena", "mixture", "metrics"},
     "trace_file": {"errors", "files", "file_content", "game"},
     "seals": {"files", "file_content"},
     "comparison": set(),
     "theory": {"errors", "comparison"},
-    "tables": {"errors", "files", "file_content", "comparison", "theory"},  # theory: what its tables' columns are
+    # theory, search_columns: what their tables' columns are
+    "tables": {"errors", "files", "file_content", "comparison", "theory", "search_columns"},
     "summary": {"comparison", "tables"},
+    "reconfigured": {
+        *("errors", "files", "documents", "drivers", "attempts", "tables", "search_columns", "reconfiguration"),
+    },
     "rounds": {"documents", "game", "comparison"},
     "responses": {"documents", "game", "rounds"},
     "exchange": {"documents", "game", "rounds", "responses"},
-    "plan": {"documents", "rounds", "responses", "exchange"},
+    "plan_searches": {"documents", "rounds"},
+    "plan": {"documents", "rounds", "responses", "exchange", "plan_searches"},
     "plan_names": {"errors", "documents", "rounds", "responses", "plan"},
     "pairings": {"documents", "game", "rounds", "responses", "exchange", "plan", "theory"},
     "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds", "plan", "plan_names"},
@@ -72,18 +80,18 @@ ALLOWED: dict[str, set[str]] = {
     "settling": {"rounds", "run_folder", "tables", "theory"},
     "casting": {
         *("errors", "documents", "game", "traffic", "drivers", "policy_file", "mixture", "assessment", "tables"),
-        *("rounds", "run_folder", "conditions", "theory"),
+        *("rounds", "run_folder", "conditions", "theory", "reconfigured"),
     },
     "stages": {
         *("errors", "files", "game", "traffic", "policy_file", "convergence", "training", "mixture"),
         *("assessment", "segments", "tables", "rounds", "responses", "run_folder", "manoeuvre_file"),
-        *("attempts", "versions", "conditions", "settling", "casting"),
+        *("attempts", "versions", "conditions", "settling", "casting", "reconfiguration", "reconfigured"),
     },
     "deaths": {"rounds", "attempts"},
     "workers": {
         *("errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "conditions", "stages"),
     },
-    "reports": {"errors", "comparison", "theory", "tables", "manoeuvres"},
+    "reports": {"errors", "comparison", "theory", "tables", "search_columns", "manoeuvres"},
     "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
     "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
     "model_card": {"errors", "documents", "files", "game", "policy_file", "reports", "plan", "rounds", "run_folder"},
@@ -99,6 +107,7 @@ ALLOWED: dict[str, set[str]] = {
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
         *("manoeuvre_file", "model_card", "versions", "conditions", "stage_keys", "plan", "pairings", "theory"),
         *("populations", "summary"),
+        *("search_columns",),
     },
 }
 ALLOWED["cli_documents"] = set(ALLOWED)

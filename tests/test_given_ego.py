@@ -27,7 +27,7 @@ from harness.rounds import TrainingStage
 from harness.stage_keys import stage_keys
 
 PERL = REPOSITORY / "egos" / "examples" / "process"
-ADAS = REPOSITORY / "egos" / "adas.toml"
+ADAS, RSS = (REPOSITORY / "egos" / f"{name}.toml" for name in ("adas", "rss"))
 
 
 def find(written: str, folder: Path, allow_code: bool = True) -> GivenDriver:
@@ -164,7 +164,7 @@ def test_open_campaign__its_files_are_in_the_manifests_hashes(tmp_path: Path) ->
 
 def keys(folder: Path, driver: object) -> dict[str, str]:
     opened = open_campaign(write_campaign(folder, ego=ego(driver)), allow_code=True)
-    stages = plan(opened.document, [each.name for each in opened.personas])
+    stages = plan(opened.document, [each.name for each in opened.personas], opened.tunable)
     return stage_keys(opened, stages)
 
 
@@ -186,14 +186,14 @@ def test_keys__of_a_policy_are_what_they_were_before_there_were_other_drivers(tm
 
 @pytest.mark.parametrize(
     "driver",
-    [ADAS, PERL / "perl.toml", "types.toml", "policy"],
+    [RSS, PERL / "perl.toml", "types.toml", "policy"],
     ids=["rules", "process", "sumo", "policy"],
 )
-def test_plan__an_ego_with_nothing_to_train_gets_rounds_0_and_1(driver: object, tmp_path: Path) -> None:
+def test_plan__an_ego_with_nothing_to_train_or_to_tune_gets_rounds_0_and_1(driver: object, tmp_path: Path) -> None:
     document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_car"', "types.toml")
     write_policy(some_policy(), tmp_path / "policy")
     opened = open_campaign(write_campaign(tmp_path, ego=ego(driver)), allow_code=True)
-    stages = plan(opened.document, ["speedy"])
+    stages = plan(opened.document, ["speedy"], opened.tunable)
     assert [stage.id for stage in stages if isinstance(stage, TrainingStage)] == ["speedy-seed1"]
     assert [stage.id for stage in stages if not isinstance(stage, TrainingStage)] == [
         "naive_alone-seed1",
@@ -229,16 +229,16 @@ def check_rounds(run: Path, manifest: dict[str, Any], episodes: pd.DataFrame, in
     assert manifest["ego_driver"]["in_words"] == in_words
     page = html.unescape((run / "report.html").read_text())
     assert in_words in page
-    assert "0 and 1: there is nothing to train in this ego" in page
-    assert "Round 2 was not played: this ego was not retrained." in page
+    assert "0 and 1: there is nothing to train or to tune in this ego" in page
+    assert "Round 2 was not played: there is nothing to train or to tune in this ego." in page
     assert in_words in (run / "policies" / "speedy-seed1" / "README.md").read_text()
 
 
 @pytest.mark.slow
 def test_campaign__of_rules(tmp_path: Path) -> None:
-    run, manifest, episodes = played(tmp_path, ADAS)
-    check_rounds(run, manifest, episodes, f"the rules adas ({ADAS})")
-    assert manifest["ego_driver"]["document"]["name"] == "adas"
+    run, manifest, episodes = played(tmp_path, RSS)
+    check_rounds(run, manifest, episodes, f"the rules rss ({RSS})")
+    assert manifest["ego_driver"]["document"]["name"] == "rss"
 
 
 @pytest.mark.slow
@@ -291,8 +291,8 @@ def test_campaign__a_program_that_dies_costs_games_that_are_counted(tmp_path: Pa
 def test_page__every_document_on_it_is_one() -> None:
     page = (REPOSITORY / "docs" / "egos.md").read_text()
     blocks = [block for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "kind =" in block]
-    kinds = [KINDS[table["kind"]].model_validate(table).kind for table in map(tomllib.loads, blocks)]  # type: ignore[attr-defined]
-    assert sorted(kinds) == sorted(set(KINDS) - {"rules"})
+    kinds = {KINDS[table["kind"]].model_validate(table).kind for table in map(tomllib.loads, blocks)}  # type: ignore[attr-defined]
+    assert kinds == set(KINDS) - {"rules"}
 
 
 def test_page__names_every_entry_that_a_driver_sees() -> None:

@@ -341,7 +341,7 @@ def test_words__without_retraining_round_2_was_not_played():
     arguments = campaign(personas=["speedy"], retrained=False)
     rq1, rq2 = verdict_texts(arguments)
     assert rq1[0] == "RQ1: yes"
-    assert rq2[1] == "Round 2 was not played: this ego was not retrained."
+    assert rq2[1] == "Round 2 was not played: there is nothing to train or to tune in this ego."
     assert "retrained vs" not in without_curves(arguments)
 
 

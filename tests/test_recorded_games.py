@@ -22,12 +22,13 @@ def in_order(table):
     return [(row.arm, row.episode) for row in watching_order(table).itertuples()]
 
 
-def test_order__a_failure_is_followed_by_the_game_it_is_compared_with():
+@pytest.mark.parametrize("made", ["retrained", "reconfigured"])
+def test_order__a_failure_is_followed_by_the_game_it_is_compared_with(made):
     table = episodes(
         *(("naive_vs_speedy", episode, "collision" if episode == 3 else "goal") for episode in range(5)),
-        *(("retrained_vs_speedy", episode, "goal") for episode in range(5)),
+        *((f"{made}_vs_speedy", episode, "goal") for episode in range(5)),
     )
-    assert in_order(table)[:2] == [("naive_vs_speedy", 3), ("retrained_vs_speedy", 3)]
+    assert in_order(table)[:2] == [("naive_vs_speedy", 3), (f"{made}_vs_speedy", 3)]
     assert sorted(in_order(table)) == sorted(zip(table["arm"], table["episode"], strict=True))
 
 

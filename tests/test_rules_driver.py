@@ -96,8 +96,8 @@ def test_fuzzy__needs_something_between_comfortable_and_hardest() -> None:
 
 def test_tunable__each_is_a_real_parameter_that_may_have_both_bounds() -> None:
     document = rules(emergency_braking={})
-    assert len(document.tunable) >= 5
-    for key, low, high in document.tunable:
+    assert len(document.searched) >= 5
+    for key, low, high in document.searched:
         table, name = key.split(".")
         default = getattr(getattr(document, table), name)
         assert low <= default <= high
@@ -106,12 +106,18 @@ def test_tunable__each_is_a_real_parameter_that_may_have_both_bounds() -> None:
 
 
 def test_tunable__nothing_of_a_table_that_is_not_there_or_of_a_reference_driver() -> None:
-    assert {each.key.split(".")[0] for each in rules().tunable} == {"cruise"}
-    assert rules(fuzzy={}).tunable == ()
+    assert {each.key.split(".")[0] for each in rules().searched} == {"cruise"}
+    assert rules(fuzzy={}).searched == ()
     with pytest.raises(KeyError):
         rules().tuned({"emergency_braking.brakes_ttc_s": 1.0})
     with pytest.raises(ValidationError):
         rules().tuned({"cruise.time_gap_s": 0.1})
+
+
+def test_page__tells_what_is_usually_tuned(repository: Path) -> None:
+    page = (repository / "docs" / "egos-by-rules.md").read_text(encoding="utf-8")
+    told = re.findall(r"^\| `([\w.]+\.\w+)` \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
+    assert [(key, float(low), float(high)) for key, low, high in told] == [*rules(emergency_braking={}).searched]
 
 
 def test_page__tells_every_parameter_with_its_default(repository: Path) -> None:

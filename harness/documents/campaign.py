@@ -144,6 +144,19 @@ class CrossPlay(Document):
     """Other drivers who meet them too: as in `[ego] driver`, `sumo`, a driver document or the folder of a policy."""
 
 
+class Reconfiguration(Document):
+    """Round 2 of an ego that is given and has something to tune: how its parameters are searched."""
+
+    trials: int = Field(40, ge=2, le=10_000)
+    """Drivers tried, the first with the parameters that the ego has."""
+    games: int = Field(64, ge=1, le=100_000)
+    """Games of each trial, the same for all: the ego's mean payoff in them is what the search is for."""
+    alone_share: float = Field(0.25, ge=0.0, le=1.0)
+    """Share of those games without the non-ego, so that what worked is not lost."""
+    games_at_once: int = Field(64, ge=1, le=1024)
+    """Games played at once."""
+
+
 class Assessment(Document):
     """How players are judged."""
 
@@ -171,6 +184,7 @@ class Campaign(Document):
     training: Training = Training()
     non_ego_training: NonEgoTraining = NonEgoTraining()
     retraining: Retraining = Retraining()
+    reconfiguration: Reconfiguration = Reconfiguration()
     population: list[Population] = Field([], max_length=50)
     """Kinds of traffic that the ego meets as it meets a persona, and is retrained against."""
     rounds: Rounds = Rounds()
@@ -214,10 +228,12 @@ class Campaign(Document):
         return self.best_response is not None and self.rounds.stop_early is not False
 
     def recorded(self) -> dict[str, Any]:
-        """Every key that counts with its value, as a manifest holds it: how players learn only where some do."""
+        """Every key that counts with its value, as a manifest holds it: how players learn or are tuned only where some
+        may be."""
+        unused: dict[str, Any] = {"reconfiguration": True} if self.ego.driver in (LEARNED, SUMO) else {}
         if self.policies is None:
-            return self.model_dump(mode="json")
-        unused: dict[str, Any] = {"retraining": {"alone_share", "warm_start"} if self.retraining.against else True}
+            return self.model_dump(mode="json", exclude=unused)
+        unused["retraining"] = {"alone_share", "warm_start"} if self.retraining.against else True
         if self.best_response is None:
             unused |= {"training": True, "non_ego_training": True}
         return self.model_dump(mode="json", exclude=unused)

@@ -6,13 +6,14 @@ Paths in it are relative to the document's own folder.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeAlias, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, get_args
 
 from pydantic import ConfigDict, Field, field_validator
 
 from harness.documents.campaign import DocumentPath
 from harness.documents.reading import Document, nearest, read_document
 from harness.documents.rules import Rules
+from harness.documents.tuning import Adjustable, ParameterName
 from harness.errors import UsageError
 from harness.game.observation import LAYOUT
 
@@ -33,13 +34,17 @@ class Sumo(Document):
     """The id of a `vType`: the ego is a car of this type, its size and top speed included."""
 
 
-class Process(Document):
+class Process(Adjustable):
     """A program in any language, which answers observations with controls: docs/egos.md has the protocol."""
+
+    parameter_table: ClassVar[str] = "parameters"
 
     kind: Literal["process"]
     """Which kind of driver this is: what the other keys are goes by it."""
     command: list[Argument] = Field(min_length=1, max_length=100)
-    """The program and its arguments. It is run in the document's folder; a name without `/` is looked for on PATH."""
+    """The program and its arguments. It is run in `folder`; a name without `/` is looked for on PATH."""
+    folder: DocumentPath = "."
+    """Where the program is run, from this document's folder; the paths of its files are from there, too."""
     files: list[DocumentPath] = Field([], max_length=1000)
     """Further files its decisions depend on: when one changes, the games are played again. Arguments that are files
     count anyway."""
@@ -50,10 +55,14 @@ class Process(Document):
     """How long a decision may take. Not how quick it has to be: a busy machine must not change what comes of a game."""
     start_deadline_s: DeadlineS = 20.0
     """How long it may take to start."""
+    parameters: dict[ParameterName, bool | int | float | str] = Field({}, max_length=1000)
+    """What the program is told under `parameters` when it is greeted."""
 
 
-class Fmu(Document):
+class Fmu(Adjustable):
     """A digital twin: an FMI 2.0 or 3.0 co-simulation FMU, stepped once per decision."""
+
+    parameter_table: ClassVar[str] = "start"
 
     kind: Literal["fmu"]
     """Which kind of driver this is: what the other keys are goes by it."""
@@ -99,8 +108,10 @@ class StableBaselines3(Document):
     """Which of its algorithms saved it."""
 
 
-class Python(Document):
+class Python(Adjustable):
     """An installed Python package's entry point of the group `harness.drivers`, with arguments."""
+
+    parameter_table: ClassVar[str] = "parameters"
 
     kind: Literal["python"]
     """Which kind of driver this is: what the other keys are goes by it."""

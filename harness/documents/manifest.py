@@ -24,7 +24,7 @@ class _Record(Document):
 class StageEntry(_Record):
     """What a manifest says of a stage."""
 
-    kind: Literal["training", "assessment"]
+    kind: Literal["training", "assessment", "reconfiguration"]
     name: Text
     persona: Name | Literal[""] = ""
     seed: Seed
@@ -37,6 +37,9 @@ class StageEntry(_Record):
     seconds: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
     episodes: Count | None = None
     errors: Count | None = None
+    trials: Count | None = None
+    trials_unplayed: Count | None = None
+    chosen_trial: Count | None = None
     settled: Text | None = None
 
 
@@ -92,6 +95,11 @@ def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]
             for key in ("steps", "budget_steps", "stopped"):
                 if entry.get(key) is None:
                     yield f"stages.{name}.{key}", "is missing"
+
+
+def is_tuned(manifest: Mapping[str, Any]) -> bool:
+    """Whether the campaign's ego has something to tune, which round 2 searches."""
+    return any(entry["kind"] == "reconfiguration" for entry in manifest["stages"].values())
 
 
 def _words(error: ValidationError) -> str:

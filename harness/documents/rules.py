@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Literal, NamedTuple
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
 from harness.documents.reading import Document
 from harness.documents.scene import Name
+from harness.documents.tuning import Adjustable, Tunable
 
 
 class Cruise(Document):
@@ -134,15 +134,7 @@ class Fuzzy(Reacting):
         return self
 
 
-class Tunable(NamedTuple):
-    """A parameter that a search may change: its key, and between what."""
-
-    key: str
-    low: float
-    high: float
-
-
-_TUNABLE = (
+_USUAL = (
     Tunable("cruise.speed_share", 0.7, 1.0),
     Tunable("cruise.time_gap_s", 0.8, 2.5),
     Tunable("cruise.standstill_m", 2.0, 6.0),
@@ -153,11 +145,18 @@ _TUNABLE = (
     Tunable("emergency_braking.warns_before_s", 0.8, 2.0),
     Tunable("emergency_braking.warning_braking_mps2", 0.0, 4.0),
 )
+"""What may be searched of a driver whose document does not say."""
 REACTIONS = ("emergency_braking", "careful_and_competent", "rss", "fuzzy")
 
 
-class Rules(Document):
-    """A driver by rules. At most one of its tables says how it reacts to danger; without, it only cruises."""
+class Rules(Adjustable):
+    """A driver by rules. At most one of its tables says how it reacts to danger; without, it only cruises.
+
+    Its parameters are called `<table>.<key>` in `tunable`. Without `tunable`, those of driver assistance that are set
+    by taste may be searched, and nothing of a reference driver: tuned, it would be no reference.
+    """
+
+    parameter_table: ClassVar[str] = ""  # they are in several
 
     kind: Literal["rules"]
     """Which kind of driver this is: what the other keys are goes by it."""
@@ -180,20 +179,26 @@ class Rules(Document):
         return self
 
     @property
-    def tunable(self) -> tuple[Tunable, ...]:
-        """What may be searched for a better driver. A reference driver has nothing: tuned, it would be no reference."""
+    def searched(self) -> tuple[Tunable, ...]:
+        """What may be searched for a better driver."""
+        if self.tunable is not None:
+            return self.declared
         if any(getattr(self, name) is not None for name in REACTIONS[1:]):
             return ()
-        return tuple(each for each in _TUNABLE if getattr(self, each.key.split(".")[0]) is not None)
+        now = self.numbers
+        return tuple(Tunable(key, min(low, now[key]), max(high, now[key])) for key, low, high in _USUAL if key in now)
 
-    def tuned(self, values: Mapping[str, float]) -> Rules:
-        """This driver with other values of tunable parameters. Raises KeyError for a key that is none, ValueError
-        (pydantic's) for a value that can't be."""
-        document = self.model_dump()
-        known = {each.key for each in self.tunable}
-        for key, value in values.items():
-            if key not in known:
-                raise KeyError(key)
-            table, name = key.split(".")
-            document[table][name] = value
-        return Rules.model_validate(document)
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Every parameter, by its table and key."""
+        tables = {name: getattr(self, name) for name in ("cruise", "lane_keeping", *REACTIONS)}
+        return {
+            f"{name}.{key}": value
+            for name, table in tables.items()
+            if table is not None
+            for key, value in table.model_dump().items()
+        }
+
+    def _put(self, document: dict[str, Any], key: str, value: float) -> None:
+        table, name = key.split(".")
+        document[table][name] = value

@@ -20,6 +20,8 @@ from fmpy.fmi3 import FMU3Slave
 
 from harness.drivers.process import PROTOCOL
 
+_ONE_GAME = "give the campaign training.games = 1 and reconfiguration.games_at_once = 1"
+
 
 class _Twin:
     """One game's instance."""
@@ -95,7 +97,7 @@ def _answer(
             if game in twins:
                 twins.pop(game).close()
             if twins and description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
-                raise RuntimeError("the FMU can play one game at a time only: give the campaign training.games = 1")
+                raise RuntimeError(f"the FMU can play one game at a time only: {_ONE_GAME}")
             twins[game] = _Twin(spec, description, folder, game)
         return {}
     return {"actions": [twins[game].decide(seen) for game, seen in zip(games, message["observation"], strict=True)]}

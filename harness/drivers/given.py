@@ -17,7 +17,7 @@ import hashlib
 import os
 import shutil
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +27,7 @@ from harness.documents.campaign import LEARNED, SUMO, resolve
 from harness.documents.driver import DriverDocument, Fmu, Process, Python, StableBaselines3, Sumo, read_driver
 from harness.documents.reading import nearest
 from harness.documents.rules import Rules
+from harness.documents.tuning import Adjustable, Tunable
 from harness.drivers.car import Car
 from harness.drivers.fmu import fmu_driver
 from harness.drivers.installed import entry_point, installed_driver, installed_names, version_of
@@ -78,7 +79,11 @@ class GivenDriver:
         """What its numbers depend on: hashed into the keys of stages."""
         if self.document is None:
             return self.files[str(policy_files(self.place)[1])]
-        document = self.document.model_dump(mode="json")
+        document = self.document.model_dump(mode="json", exclude={"tunable"})  # what may be is not what is
+        if isinstance(self.document, Process):  # its files are hashed, wherever they are
+            del document["folder"]
+            if not self.document.parameters:
+                del document["parameters"]
         return {"document": document, "files": list(self.files.values()), "package": dict(self.package)}
 
     @property
@@ -92,6 +97,32 @@ class GivenDriver:
             "files": {os.path.relpath(file, self.place): value for file, value in self.files.items()},
             "package": dict(self.package),
         }
+
+    @property
+    def searched(self) -> tuple[Tunable, ...]:
+        """The parameters of it that may be searched for a better driver. Nothing: it has nothing to tune."""
+        return self.document.searched if isinstance(self.document, Adjustable) else ()
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The values that those parameters have, in their order."""
+        numbers = self.document.numbers if isinstance(self.document, Adjustable) else {}
+        return {each.key: numbers[each.key] for each in self.searched}
+
+    def tuned(self, values: Mapping[str, float]) -> GivenDriver:
+        """The same driver with other values of such parameters. Raises KeyError and ValueError as its document does."""
+        assert isinstance(self.document, Adjustable), "a driver that has nothing to tune"
+        return replace(self, document=self.document.tuned(values))
+
+    def document_in(self, folder: Path) -> DriverDocument:
+        """Its document as it has to be in a folder, so that the paths in it lead to the same files."""
+        assert self.document is not None, "a policy's folder is no document"
+        match self.document:
+            case Process(folder=written):
+                return self.document.model_copy(update={"folder": _path_from(folder, resolve_in(self.place, written))})
+            case Fmu(file=file) | StableBaselines3(file=file):
+                return self.document.model_copy(update={"file": _path_from(folder, resolve_in(self.place, file))})
+        return self.document
 
     @property
     def in_words(self) -> str:
@@ -127,8 +158,10 @@ class GivenDriver:
                 return SumoDriver()
             case Rules():
                 return RulesDriver(self.document, car)
-            case Process(units=units, deadline_s=deadline_s, start_deadline_s=start_s):
-                return ProcessDriver(self.command, self.place, car, units, deadline_s, start_s)
+            case Process(folder=folder, units=units):
+                deadlines = self.document.deadline_s, self.document.start_deadline_s
+                place, told = resolve_in(self.place, folder), self.document.parameters
+                return ProcessDriver(self.command, place, car, units, *deadlines, parameters=told)
             case Fmu(file=file):
                 return fmu_driver(self.document, resolve_in(self.place, file), car)
             case StableBaselines3(file=file):
@@ -187,13 +220,17 @@ def _opened(written: str, place: Path, document: DriverDocument) -> GivenDriver:
     folder = place.parent
     match document:
         case Process(command=command, files=files):
-            program = _program(command[0], place)
-            rests_on = [*(each for each in command[1:] if _is_file(folder, each)), *files]
-            missing = [each for each in files if not _is_file(folder, each)]
+            runs_in = resolve_in(folder, document.folder)
+            if not runs_in.is_dir():
+                remedy = nearest(runs_in.name, _beside(runs_in))
+                raise UsageError.of(place, "folder", f"{document.folder!r}: there is no such folder", remedy)
+            program = _program(command[0], runs_in, place)
+            rests_on = [*(each for each in command[1:] if _is_file(runs_in, each)), *files]
+            missing = [each for each in files if not _is_file(runs_in, each)]
             if missing:
-                remedy = nearest(Path(missing[0]).name, _beside(resolve_in(folder, missing[0])))
+                remedy = nearest(Path(missing[0]).name, _beside(resolve_in(runs_in, missing[0])))
                 raise UsageError.of(place, "files", f"{missing[0]!r}: there is no such file", remedy)
-            paths = [program, *(resolve_in(folder, each) for each in rests_on)]
+            paths = [program, *(resolve_in(runs_in, each) for each in rests_on)]
             return _given(written, folder, document, paths, command=(str(program), *command[1:]))
         case Fmu(file=file) | StableBaselines3(file=file):
             if not _is_file(folder, file):
@@ -218,20 +255,24 @@ def _given(
     return GivenDriver(written, place, document, command, {str(file): _hash(file) for file in files}, package or {})
 
 
-def _program(name: str, place: Path) -> Path:
-    """The file of a program: beside the document where its name has a `/`, otherwise on PATH."""
+def _program(name: str, folder: Path, document: Path) -> Path:
+    """The file of a program: from the folder it runs in where its name has a `/`, otherwise on PATH."""
     # not resolved: a virtual environment's python is a link, and knows by its place which packages it has
-    found = shutil.which(os.path.abspath(place.parent / name) if "/" in name else name)
+    found = shutil.which(os.path.abspath(folder / name) if "/" in name else name)
     if found is None:
         where = "here" if "/" in name else "on PATH"
         message = f"there is no program {name!r} {where} that can be run"
-        raise UsageError.of(place, "command", message, "build or install it, or mend its name and permissions")
+        raise UsageError.of(document, "command", message, "build or install it, or mend its name and permissions")
     return Path(found)
 
 
 def resolve_in(folder: Path, written: str) -> Path:
     """A path in a driver document is relative to the document's own folder."""
     return resolve(folder / "document", written)
+
+
+def _path_from(folder: Path, file: Path) -> str:
+    return Path(os.path.relpath(file, os.path.realpath(folder))).as_posix()
 
 
 def _is_file(folder: Path, written: str) -> bool:

@@ -6,8 +6,9 @@
 | `{"type": "begin", "games": […]}` | `{}` |
 | `{"type": "decide", "games": […], "observation": [[…], …], "noise": [[…], …]}` | `{"actions": [[…, …], …]}` |
 
-To any of them a program may answer `{"error": "…"}`. A program that died, is late or answers nonsense is killed and
-costs the game; the next game begins with a new one. It ends with its driver, and with the harness.
+The hello ends with `"parameters": {…}` where the program has any. To any of them a program may answer
+`{"error": "…"}`. A program that died, is late or answers nonsense is killed and costs the game; the next game begins
+with a new one. It ends with its driver, and with the harness.
 """
 
 from __future__ import annotations
@@ -21,8 +22,9 @@ import subprocess
 import sys
 import time
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import IO, Any
 
 import numpy as np
@@ -58,8 +60,10 @@ class ProcessDriver:
         deadline_s: float,
         start_deadline_s: float,
         name: str = "",
+        parameters: Mapping[str, bool | int | float | str] = MappingProxyType({}),
     ) -> None:
-        """The program is started when the first game begins, in `folder`. Errors call it `name`, or as it is called."""
+        """The program is started when the first game begins, in `folder`, and is told its `parameters`, if it has any.
+        Errors call it `name`, or as it is called."""
         self._command, self._folder, self._car, self._name = tuple(command), folder, car, name or command[0]
         self._si = units == "si"
         self._deadline_s, self._start_deadline_s = deadline_s, start_deadline_s
@@ -67,6 +71,8 @@ class ProcessDriver:
             **{"type": "hello", "protocol": PROTOCOL, "units": units, "layout": list(LAYOUT), "step_s": car.step_s},
             "limits": {**car.limits, "length_m": car.length_m, "width_m": car.width_m},
         }
+        if parameters:
+            self._hello["parameters"] = dict(parameters)
         self._program: _Program | None = None
 
     def begin(self, games: IntArray) -> None:

@@ -16,7 +16,7 @@ from harness.reports.wording import Row, Verdicts, failures, failures_of, interv
 
 QUESTIONS = {
     "RQ1": "Does the persona make the ego fail?",
-    "RQ2": "Does retraining mend it?",
+    "RQ2": "Does {doing} mend it?",
 }
 METRICS = {"failure": "failures", "mean_speed": "average speed"}
 LONGEST_LABEL = 12
@@ -64,7 +64,7 @@ class Card:
     rate_figure: Markup
     speed_figure: Markup
     paired_figure: Markup | None
-    """None where the ego was not retrained."""
+    """None where round 2 was not played."""
     paired_note: str
     """How many of the episodes are drawn in it, if not all."""
     spread_figure: Markup
@@ -75,21 +75,24 @@ class Card:
 def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None) -> Card:
     """The card of a persona; `place` tells its figures' ids from those of other cards, `worst` is the game to show."""
     rows = [row for row in found.comparisons if row["persona"] == persona]
-    retrained = bool(found.asked("RQ2", persona))
+    made = found.change.made if found.asked("RQ2", persona) else None
     arms = [
         ("naive ego, alone", "alone", "naive_alone"),
         (f"naive ego, against {persona}", "persona", f"naive_vs_{persona}"),
     ]
-    if retrained:
-        arms.append((f"retrained ego, against {persona}", "retrained", f"retrained_vs_{persona}"))
-    columns = _columns(persona, retrained, found)
-    paired, note = _paired(persona, place, found) if retrained else (None, "")
+    if made:
+        arms.append((f"{made} ego, against {persona}", "retrained", f"{made}_vs_{persona}"))
+    columns = _columns(persona, made)
+    paired, note = _paired(persona, place, found) if made else (None, "")
     return Card(
         persona,
         f"persona-{place}",
-        [(words, found.verdicts(question, persona)) for question, words in QUESTIONS.items()],
+        [
+            (words.format(doing=found.change.doing), found.verdicts(question, persona))
+            for question, words in QUESTIONS.items()
+        ],
         [_rate(label, series, found.of(arm)) for label, series, arm in arms],
-        _facts(persona, retrained, found),
+        _facts(persona, made, found),
         [_test(row) for row in rows],
         rate_figure(
             [Column(label, series, _rates(found.of(arm))) for label, series, arm in columns],
@@ -115,16 +118,17 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
 
 
 def _paired(persona: str, place: int, found: Results) -> tuple[Markup, str]:
-    pairs = pairs_of(persona, found.games)
+    change = found.change
+    pairs = pairs_of(persona, found.games, change.made)
     mended = int((pairs[0].before_failed & ~pairs[0].after_failed).sum())
     broken = int((~pairs[0].before_failed & pairs[0].after_failed).sum())
     alternative = (
         f"Average speed and least time to collision of {len(pairs[0].before)} episodes against {persona}, naive and "
-        f"retrained: {mended} failed before and no longer, {broken} fail only after retraining."
+        f"{change.made}: {mended} failed before and no longer, {broken} fail only after {change.doing}."
     )
     count = len(pairs[0].before)
     note = f"{MOST_LINES} of the {count:,} episodes are drawn, evenly chosen." if count > MOST_LINES else ""
-    return paired_figure(pairs, f"paired{place}", alternative), note
+    return paired_figure(pairs, f"paired{place}", alternative, change.made), note
 
 
 def _rate(label: str, series: str, rows: Mapping[int, Row]) -> Rate:
@@ -154,7 +158,7 @@ def _by_seed(lines: Mapping[int, str]) -> list[str]:
     return [f"Seed {seed}: {line}" if len(lines) > 1 else line[:1].upper() + line[1:] for seed, line in lines.items()]
 
 
-def _facts(persona: str, retrained: bool, found: Results) -> list[tuple[str, Sequence[str]]]:
+def _facts(persona: str, made: str | None, found: Results) -> list[tuple[str, Sequence[str]]]:
     naive, against = found.of("naive_alone"), found.of(f"naive_vs_{persona}")
     ordinary, alone = found.of("naive_vs_sumo"), found.of(f"{persona}_alone")
     facts: list[tuple[str, Sequence[str]]] = []
@@ -185,9 +189,9 @@ def _facts(persona: str, retrained: bool, found: Results) -> list[tuple[str, Seq
         for seed, row in alone.items()
     }
     say("The persona alone on the road", _by_seed(reaches))
-    if retrained:
-        unbroken = _counts(found.of(f"retrained_alone_{persona}"), "the retrained ego")
-        say("The retrained ego alone: is what worked unbroken?", unbroken)
+    if made:
+        unbroken = _counts(found.of(f"{made}_alone_{persona}"), f"the {made} ego")
+        say(f"The {made} ego alone: is what worked unbroken?", unbroken)
     if any(failures(row) for row in naive.values()):
         say(
             "Caution",
@@ -209,7 +213,7 @@ def _test(row: Row) -> Test:
     )
 
 
-def _columns(persona: str, retrained: bool, found: Results) -> list[tuple[str, str, str]]:
+def _columns(persona: str, made: str | None) -> list[tuple[str, str, str]]:
     """Label, series and arm of each column of the figures; the order is the paper's story."""
     name = persona if len(persona) <= LONGEST_LABEL else persona[: LONGEST_LABEL - 1] + "…"
     columns = [
@@ -217,7 +221,7 @@ def _columns(persona: str, retrained: bool, found: Results) -> list[tuple[str, s
         ("naive vs\nSUMO driver", "sumo", "naive_vs_sumo"),
         (f"naive vs\n{name}", "persona", f"naive_vs_{persona}"),
     ]
-    return columns + [(f"retrained vs\n{name}", "retrained", f"retrained_vs_{persona}")] * retrained
+    return columns + ([(f"{made} vs\n{name}", "retrained", f"{made}_vs_{persona}")] if made else [])
 
 
 def _rates(rows: Mapping[int, Row]) -> list[Point]:

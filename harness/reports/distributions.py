@@ -51,9 +51,9 @@ class Spread:
     """Label, series, values and failures of each arm."""
 
 
-def pairs_of(persona: str, games: pd.DataFrame) -> list[Pairs]:
-    """`PAIRED` of the episodes that both the naive and the retrained ego played against the persona."""
-    before, after = (games[games["arm"] == f"{ego}_vs_{persona}"] for ego in ("naive", "retrained"))
+def pairs_of(persona: str, games: pd.DataFrame, made: str = "retrained") -> list[Pairs]:
+    """`PAIRED` of the episodes that both the naive ego and what round 2 made of it played against the persona."""
+    before, after = (games[games["arm"] == f"{ego}_vs_{persona}"] for ego in ("naive", made))
     both = before.merge(after, on=["seed", "episode"], suffixes=("", "_after"))
     failed = [_failed(both[column]) for column in ("ego_failed", "ego_failed_after")]
     return [
@@ -82,9 +82,9 @@ def _failed(column: pd.Series) -> NDArray[np.bool_]:
     return failed
 
 
-def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str) -> Markup:
-    """A line per episode, of `MOST_LINES` at most, from the naive ego's game to the retrained one's; a cross is a
-    failure."""
+def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str, made: str = "retrained") -> Markup:
+    """A line per episode, of `MOST_LINES` at most, from the naive ego's game to that of what round 2 `made` of it; a
+    cross is a failure."""
     with figure_of(4.8, 3.5) as figure:
         for axes, every in zip(figure.subplots(1, len(quantities), squeeze=False)[0], quantities, strict=True):
             pairs = _some(every)
@@ -98,7 +98,7 @@ def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str) -> M
             if not both.any():
                 axes.annotate("no pair", (0.5, 0.5), xycoords="axes fraction", ha="center", fontsize=9)
             axes.set_xlim(-0.25, 1.25)
-            axes.set_xticks([0, 1], ["naive", "retrained"])
+            axes.set_xticks([0, 1], ["naive", made])
             axes.tick_params(axis="x", length=0)
             axes.set_ylabel(pairs.label)
         return svg(figure, name, alternative)

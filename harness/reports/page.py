@@ -22,6 +22,8 @@ from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
 from harness.reports.provenance import mixed_versions
 from harness.reports.replays import failures, keys, replay_list, worst_game
 from harness.reports.results import results, unplayed
+from harness.reports.search import searches
+from harness.search_columns import RECONFIGURATION_COLUMNS
 from harness.tables import typed
 from harness.theory.records import GameFindings
 
@@ -66,17 +68,20 @@ def render_page(
     scene: SceneDrawing | None = None,
     manoeuvres: pd.DataFrame | None = None,
     game: GameFindings | None = None,
+    reconfiguration: pd.DataFrame | None = None,
 ) -> str:
     """The report as HTML. Equal input gives equal text.
 
     `manifest` is the content of manifest.json, the frames are those of the CSV files with the columns of
     `harness.tables.TABLES`, `replays` the names of the folders under `replays/`, in any order. `games`, the ones
     to watch first on top, are taken until the page is full (`PAGE_BYTES`); without a `scene` there are none.
-    Without `manoeuvres` nothing is said of them, without `game` nothing of equilibria.
+    Without `manoeuvres` nothing is said of them, without `game` nothing of equilibria, without `reconfiguration`
+    nothing of searches.
     Raises ValueError when a frame is none of those tables.
     """
     episodes, summary, comparisons, training = map(typed, (episodes, summary, comparisons, training))
     manoeuvres = typed(manoeuvres) if manoeuvres is not None else None
+    searched = typed(pd.DataFrame(columns=list(RECONFIGURATION_COLUMNS)) if reconfiguration is None else reconfiguration)
     found = results(manifest, episodes, summary, comparisons)
     named = (*manifest.get("personas", ()), *comparisons["persona"], *summary["persona"])
     personas = [name for name in dict.fromkeys(named) if name]
@@ -95,6 +100,9 @@ def render_page(
         "training": table("training", "A row per window of a learning curve.", training),
         "episodes": table("episodes", "A row per game.", in_table),
     }
+    if len(searched):
+        caption = "A row per trial and parameter of a search."
+        tables["reconfiguration"] = table("reconfiguration", caption, searched)
     environment = Environment(
         loader=PackageLoader("harness", "reports"),
         autoescape=True,
@@ -118,6 +126,8 @@ def render_page(
             for place, persona in enumerate(personas, 1)
         ],
         learning=learning(stages, training),
+        searches=searches(searched),
+        change=found.change,
         rules=sorted({stage["rule"] for stage in stages.values() if stage.get("rule")}),
         stages=[_stage(name, stage) for name, stage in stages.items()],
         tables=tables,
@@ -152,12 +162,13 @@ def _source(environment: Environment, name: str) -> str:
 
 def _facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
     campaign = manifest.get("campaign", {})
+    stages = manifest.get("stages", {}).values()
     assessment, training = campaign.get("assessment", {}), campaign.get("training", {})
     ego = str(campaign.get("ego", {}).get("driver", ""))
     facts = [
         ("Scene", str(campaign.get("scene", "")).rstrip("/").rsplit("/", 1)[-1]),
         ("Ego", str((manifest.get("ego_driver") or {}).get("in_words") or ego)),
-        ("Rounds", "" if ego in ("", "learned") else "0 and 1: there is nothing to train in this ego"),
+        ("Rounds", "" if ego in ("", "learned") else _rounds(stages)),
         ("Personas", str(personas)),
         ("Training seeds", ", ".join(map(str, manifest.get("seeds", seeds)))),
         ("Games per arm and seed", f"{assessment['episodes']:,}" if "episodes" in assessment else ""),
@@ -166,6 +177,13 @@ def _facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> 
         ("Significance", f"{assessment['significance']:g}" if "significance" in assessment else ""),
     ]
     return [(label, value) for label, value in facts if value]
+
+
+def _rounds(stages: Iterable[Mapping[str, Any]]) -> str:
+    """The rounds of an ego that is not trained."""
+    if any(stage.get("kind") == "reconfiguration" for stage in stages):
+        return "0, 1 and 2: this ego is not trained, but its parameters are tuned"
+    return "0 and 1: there is nothing to train or to tune in this ego"
 
 
 def _stage(name: str, stage: Mapping[str, Any]) -> Stage:
@@ -203,6 +221,8 @@ def _glossary(arms: Sequence[str], personas: Sequence[str]) -> list[tuple[str, s
         meanings |= {
             f"{persona}_alone": f"the non-ego {persona} without the ego",
             f"naive_vs_{persona}": f"the naive ego against the non-ego {persona}",
+            f"reconfigured_vs_{persona}": f"the ego tuned against {persona}, against the same {persona}",
+            f"reconfigured_alone_{persona}": f"the ego tuned against {persona}, without the non-ego",
             f"retrained_vs_{persona}": f"the ego retrained against {persona}, against the same {persona}",
             f"retrained_alone_{persona}": f"the ego retrained against {persona}, without the non-ego",
         }

@@ -116,7 +116,8 @@ function describe(game) {
 
 /** The same episode with the other ego; undefined when it is not in the page. */
 function counterpartOf(game) {
-  const other = { naive: "retrained", retrained: "naive" };
-  const arm = game.arm.replace(/^(naive|retrained)(?=_vs_)/, ego => other[ego]);
-  return arm === game.arm ? undefined : games.get(keyOf({ ...game, arm }));
+  const others = { naive: ["retrained", "reconfigured"], retrained: ["naive"], reconfigured: ["naive"] };
+  const ego = game.arm.match(/^(naive|retrained|reconfigured)(?=_vs_)/)?.[1];
+  const arms = (others[ego] ?? []).map(other => other + game.arm.slice(ego.length));
+  return arms.map(arm => games.get(keyOf({ ...game, arm }))).find(found => found !== undefined);
 }

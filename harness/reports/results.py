@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
 
 from harness.reports import wording
+from harness.reports.change import ARMS, RECONFIGURED, RETRAINED, Change
 from harness.reports.wording import Row, Verdicts, played
 
 
@@ -25,7 +26,7 @@ class Results:
     """Rows of `episodes` that could be played."""
     seeds: Sequence[int]
     significance: float | None
-    planned: Container[str]
+    planned: Collection[str]
     """Ids of the stages of the campaign, whether they are done or not."""
 
     def of(self, arm: str) -> dict[int, Row]:
@@ -33,9 +34,15 @@ class Results:
         rows = {seed: self.arms.get((arm, seed)) for seed in self.seeds}
         return {seed: row for seed, row in rows.items() if row is not None and played(row)}
 
+    @property
+    def change(self) -> Change:
+        """What round 2 makes of the ego, if it is played."""
+        arms = {*self.planned, *(arm for arm, _ in self.arms)}
+        return RECONFIGURED if any(arm.startswith(f"{RECONFIGURED.made}_vs_") for arm in arms) else RETRAINED
+
     def asked(self, question: str, persona: str) -> list[int]:
         """The training seeds of which a question is asked: its treatment is played, or it is compared."""
-        _, treatment = wording.ARMS[question](persona)
+        _, treatment = ARMS[question](persona, self.change)
         compared = {row["seed"] for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)}
         return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.planned or seed in compared]
 
@@ -43,7 +50,7 @@ class Results:
         """The answer to a question about a persona, in words."""
         rows = [row for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)]
         seeds = self.asked(question, persona)
-        return wording.verdicts(question, persona, seeds, rows, self.arms, self.significance)
+        return wording.verdicts(question, persona, seeds, rows, self.arms, self.significance, self.change)
 
 
 def results(

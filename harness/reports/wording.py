@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from harness.comparison import Verdict
+from harness.reports.change import ARMS, RETRAINED, Change
 
 Row = Mapping[Any, Any]
 Number = Callable[[float], str]
@@ -63,17 +64,19 @@ def verdicts(
     rows: Sequence[Row],
     arms: Mapping[tuple[str, int], Row],
     significance: float | None,
+    change: Change = RETRAINED,
 ) -> Verdicts:
     """Answer `question` for the training seeds it is asked of, by `rows`: its comparisons of this persona.
 
-    `arms` are the rows of `summary` by arm and seed. A seed without rows is not answered yet.
+    `arms` are the rows of `summary` by arm and seed, `change` what round 2 does. A seed without rows is not answered yet.
     """
     answers = [
-        _answer(question, persona, seed, [row for row in rows if row["seed"] == seed], arms, significance)
+        _answer(question, persona, seed, [row for row in rows if row["seed"] == seed], arms, significance, change)
         for seed in seeds
     ]
     if not answers:
-        what = "Round 2 was not played: this ego was not retrained." if question == "RQ2" else "Not compared."
+        what = "Round 2 was not played: there is nothing to train or to tune in this ego."
+        what = what if question == "RQ2" else "Not compared."
         return Verdicts(question, "not asked", "open", what, "", ())
     if len(answers) == 1:
         (only,) = answers
@@ -82,7 +85,7 @@ def verdicts(
     if question == "RQ1":
         finding = f"the {persona} driver makes the naive ego fail significantly more often than it does alone"
     else:
-        finding = f"retraining makes the ego fail significantly less often against the {persona} driver"
+        finding = f"{change.doing} makes the ego fail significantly less often against the {persona} driver"
     label = f"yes in {yes} of {several} seeds" if yes else f"not shown in any of {several} seeds"
     return Verdicts(
         question,
@@ -101,9 +104,10 @@ def _answer(
     rows: Sequence[Row],
     arms: Mapping[tuple[str, int], Row],
     significance: float | None,
+    change: Change,
 ) -> Answer:
     by_metric = {row["metric"]: row for row in rows}
-    before_arm, after_arm = ARMS[question](persona)
+    before_arm, after_arm = ARMS[question](persona, change)
     before, after = arms.get((before_arm, seed)), arms.get((after_arm, seed))
     missing = [arm for arm, row in ((before_arm, before), (after_arm, after)) if played(row) == 0]
     failure = by_metric.get("failure")
@@ -114,7 +118,7 @@ def _answer(
             lacking += " not played"
         return Answer(seed, False, "not answered", "open", f"{lacking}.", "")
     verdict = Verdict(failure["verdict"])
-    sentence = _failure_sentence(question, persona, verdict, failure, before, after)
+    sentence = _failure_sentence(question, persona, verdict, failure, before, after, change)
     if verdict is Verdict.ALL_EQUAL and significance is not None:
         below = "below" if failure["mcnemar_p"] < significance else "not below"
         sentence += f" That is {below} the campaign's significance of {significance:g} (no correction applied)."
@@ -129,14 +133,7 @@ def _answer(
     return Answer(seed, yes, LABELS[verdict], tone, sentence + left_out(failure), beside)
 
 
-ARMS = {
-    "RQ1": lambda persona: ("naive_alone", f"naive_vs_{persona}"),
-    "RQ2": lambda persona: (f"naive_vs_{persona}", f"retrained_vs_{persona}"),
-}
-"""Baseline and treatment of each question."""
-
-
-def _failure_sentence(question: str, persona: str, verdict: Verdict, row: Row, before: Row, after: Row) -> str:
+def _failure_sentence(question: str, persona: str, verdict: Verdict, row: Row, before: Row, after: Row, change: Change) -> str:
     was, now = failures_of(before), failures_of(after)
     ps = p_values(row)
     if question == "RQ1":
@@ -144,8 +141,8 @@ def _failure_sentence(question: str, persona: str, verdict: Verdict, row: Row, b
         plain = f"The naive ego fails in {now} games against the {persona} driver and in {was} alone"
         direction = "more often"
     else:
-        claim = f"Retraining brings the ego's failures against the {persona} driver down to {now} games from {was}"
-        plain = f"Against the {persona} driver the retrained ego fails in {now} games, the naive ego in {was}"
+        claim = f"{change.doing.capitalize()} brings the ego's failures against the {persona} driver down to {now} games from {was}"
+        plain = f"Against the {persona} driver the {change.made} ego fails in {now} games, the naive ego in {was}"
         direction = "less often"
     pairs = row["pairs"]
     return {
