@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,9 @@ import pandas as pd
 from markupsafe import Markup
 
 from harness.reports.figures import Curve, learning_figure
+
+
+_OF_NON_EGO, _OF_EGO = re.compile(r"_non_ego_response\d+$"), re.compile(r"_ego_response\d+$")
 
 
 @dataclass(frozen=True)
@@ -43,13 +47,22 @@ def learning(stages: Mapping[str, Any], training: pd.DataFrame) -> list[Learning
             if of_manifest.get("steps") is not None:
                 stop = f"{of_manifest['steps']:,} steps ({stopped(of_manifest)})"
                 stops.append(f"seed {seed}: {stop}" if rows["seed"].nunique() > 1 else stop)
-        series = "alone" if stage == "naive" else "retrained" if stage.startswith("retrained_") else "persona"
+        series = _series(str(stage))
         last = [f"seed {curve.seed} ends at mean payoff {curve.payoffs[-1]:.3g}" for curve in curves]
         alternative = f"Learning curve of {stage}: mean payoff and failure rate over training steps; "
         figures.append(
             Learning(stage, learning_figure(curves, series, f"curve{place}", alternative + "; ".join(last)), stops)
         )
     return figures
+
+
+def _series(stage: str) -> str:
+    """Whose curve it is: the naive ego's, an ego's that learns again, or a person's."""
+    if _OF_NON_EGO.search(stage):
+        return "persona"
+    if stage == "naive":
+        return "alone"
+    return "retrained" if stage.startswith(("retrained_", "robust")) or _OF_EGO.search(stage) else "persona"
 
 
 def stopped(stage: Mapping[str, Any]) -> str:

@@ -226,4 +226,13 @@ def _glossary(arms: Sequence[str], personas: Sequence[str]) -> list[tuple[str, s
             f"retrained_vs_{persona}": f"the ego retrained against {persona}, against the same {persona}",
             f"retrained_alone_{persona}": f"the ego retrained against {persona}, without the non-ego",
         }
-    return [(arm, meanings[arm]) for arm in arms if arm in meanings]
+    return [(arm, meanings.get(arm) or _of_strategies(arm)) for arm in arms]
+
+
+def _of_strategies(arm: str) -> str:
+    """What an arm beside the paper's rounds is of, by its name."""
+    for ending, player in (("_non_ego_response", "the non-ego"), ("_ego_response", "the ego")):
+        if arm.endswith(ending):
+            return f"{arm.removesuffix(ending)}, {player} replaced by its best response"
+    ego, against, non_ego = arm.partition("_vs_")
+    return f"the ego {ego} against the non-ego {non_ego}" if against else f"{arm.removesuffix('_alone')} alone on the road"
