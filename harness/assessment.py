@@ -91,8 +91,13 @@ class _Absent:
         return np.zeros((len(games), 2))
 
 
+def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
+    """What names the chance of an episode, in every arm."""
+    return ("assessment", seed, "episode", episode)
+
+
 def _play(arena: Arena, arm: Arm, chances: Chances, episode: int) -> Game:
-    parts = ("assessment", arm.seed, "episode", episode)
+    parts = parts_of(arm.seed, episode)
     start = draw_start(chances, *parts)
     arena.reload(start.seed)
     arena.start({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})

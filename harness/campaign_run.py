@@ -23,6 +23,7 @@ from harness.manoeuvre_file import manoeuvres_of
 from harness.model_card import write_model_cards
 from harness.pairings import who_met
 from harness.plan import plan
+from harness.populations import by_who_drove
 from harness.preflight import OpenCampaign
 from harness.progress import StageProgress
 from harness.recorded_games import recorded_games, scene_drawing
@@ -37,12 +38,12 @@ from harness.rounds import AssessmentStage, ReconfigurationStage, Stage, Trainin
 from harness.run_folder import FORMAT, MANIFEST, RunFolder
 from harness.search_columns import RECONFIGURATION_COLUMNS, is_of_a_search
 from harness.stage_keys import stage_keys
+from harness.summary import summarise
 from harness.tables import (
     EPISODE_COLUMNS,
     MANOEUVRE_COLUMNS,
     TRAINING_COLUMNS,
     read_csv,
-    summarise,
     typed,
     write_csv,
 )
@@ -172,6 +173,8 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     game = game_of(manifest, episodes)
     tables |= vars(game) if game is not None else {}
     tables |= {"reconfiguration": searched} if is_tuned(manifest) else {}
+    if (campaign := _campaign(manifest)).population:
+        tables["populations"] = by_who_drove(campaign, episodes)
     scene = open_scene(folder.scene)
     _check_traces(folder, episodes)
     write_model_cards(folder, manifest, summary)
@@ -202,7 +205,7 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     _warn(mixed_versions(manifest["stages"]), console)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] not in FINISHED)
     found = results(manifest, episodes, summary, comparisons)
-    met = list(dict.fromkeys(each.persona for each in asked))
+    met = [*manifest["personas"], *(each.name for each in _campaign(manifest).population)]
     verdicts = [(persona, found.verdicts(each, persona)) for persona in met for each in ARMS]
     verdicts += gap_verdicts(game.gaps) if game is not None else []
     return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +45,7 @@ class Casting:
             return None
         if drives.kind != "mixture":
             return self._driver(drives)
-        shares = drives.shares or self._equilibrium(drives)
+        shares = drives.shares or equilibrium_of(drives, self.folder)
         members = zip(drives.members, shares, strict=True)
         return Mixture(
             tuple(
@@ -98,20 +97,25 @@ class Casting:
             return self.conditions.policy_before(drives.stage)
         return self.folder.policy(drives.stage)
 
-    def _equilibrium(self, drives: Drives) -> Sequence[float]:
-        """The members' shares in the equilibrium of the arms between all strategies so far."""
-        of_players = [[self._mean_payoffs(arm) for arm in row] for row in drives.weighed_by]
-        payoffs = np.array(of_players, dtype=np.float64)  # [E, N, P]
-        try:
-            of_ego, of_non_ego = equilibrium_shares(payoffs[..., 0], payoffs[..., 1])
-        except NoEquilibrium as error:
-            raise StageFailed(f"the mixture of {drives.in_words} can't be weighed: {error}") from error
-        are_egos = not any(each.persona for each in drives.members)
-        return [float(share) for share in (of_ego if are_egos else of_non_ego)]
 
-    def _mean_payoffs(self, arm: str) -> tuple[float, float]:
-        episodes = read_csv(self.folder.work(arm) / "episodes.csv")
-        played = episodes[episodes["error"] == ""]
-        if played.empty:
-            raise StageFailed(f"{arm}: none of its games could be played, so that it can weigh no mixture")
-        return float(played["ego_payoff"].mean()), float(played["non_ego_payoff"].mean())
+def equilibrium_of(drives: Drives, folder: RunFolder) -> list[float]:
+    """The shares of a mixture's members in the equilibrium of the arms between all strategies so far.
+
+    Raises StageFailed where there is none, or an arm of which no game could be played.
+    """
+    of_players = [[_mean_payoffs(folder, arm) for arm in row] for row in drives.weighed_by]
+    payoffs = np.array(of_players, dtype=np.float64)  # [E, N, P]
+    try:
+        of_ego, of_non_ego = equilibrium_shares(payoffs[..., 0], payoffs[..., 1])
+    except NoEquilibrium as error:
+        raise StageFailed(f"the mixture of {drives.in_words} can't be weighed: {error}") from error
+    are_egos = not any(each.persona for each in drives.members)
+    return [float(share) for share in (of_ego if are_egos else of_non_ego)]
+
+
+def _mean_payoffs(folder: RunFolder, arm: str) -> tuple[float, float]:
+    episodes = read_csv(folder.work(arm) / "episodes.csv")
+    played = episodes[episodes["error"] == ""]
+    if played.empty:
+        raise StageFailed(f"{arm}: none of its games could be played, so that it can weigh no mixture")
+    return float(played["ego_payoff"].mean()), float(played["non_ego_payoff"].mean())

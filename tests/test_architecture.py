@@ -53,17 +53,12 @@ ALLOWED: dict[str, set[str]] = {
     "seals": {"files", "file_content"},
     "comparison": set(),
     "theory": {"errors", "comparison"},
-    "tables": {
-        "errors",
-        "files",
-        "file_content",
-        "comparison",
-        "theory",
-        "search_columns",
-    },  # theory: what its tables' columns are
+    # theory: its own columns
+    "tables": {"errors", "files", "file_content", "comparison", "theory", "search_columns"},
     "reconfigured": {
         *("errors", "files", "documents", "drivers", "attempts", "tables", "search_columns", "reconfiguration"),
     },
+    "summary": {"comparison", "tables"},
     "rounds": {"documents", "game", "comparison"},
     "responses": {"documents", "game", "rounds"},
     "exchange": {"documents", "game", "rounds", "responses"},
@@ -75,6 +70,7 @@ ALLOWED: dict[str, set[str]] = {
     "run_folder": {"errors", "files", "file_content", "documents", "rounds", "locking", "seals"},
     "series": {"game"},
     "manoeuvres": {"game", "series"},
+    "populations": {"documents", "game", "assessment", "tables", "summary"},
     "manoeuvre_file": {"traffic", "manoeuvres", "tables", "run_folder", "trace_file"},
     "segments": {
         *("files", "assessment", "trace_file", "tables", "seals", "versions", "attempts", "manoeuvre_file"),
@@ -110,7 +106,7 @@ ALLOWED: dict[str, set[str]] = {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
         *("manoeuvre_file", "model_card", "versions", "conditions", "stage_keys", "plan", "pairings", "theory"),
-        *("search_columns",),
+        *("populations", "summary", "search_columns"),
     },
 }
 ALLOWED["cli_documents"] = set(ALLOWED)

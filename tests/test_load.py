@@ -42,7 +42,8 @@ from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay.choice import MOST_FAILURES_PER_ARM, choose_games, replay_name
 from harness.reports.manoeuvres import MOST_LISTED
 from harness.reports.page import PAGE_BYTES, render_page
-from harness.tables import MANOEUVRE_COLUMNS, summarise, typed
+from harness.summary import summarise
+from harness.tables import MANOEUVRE_COLUMNS, typed
 from harness.trace_file import SCHEMA, TraceWriter
 from harness.traffic.opening import OpenScene, open_scene
 

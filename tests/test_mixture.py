@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from harness.arena import Arena, Seat
 from harness.assessment import Arm, Game, assess
+from harness.documents.campaign import Campaign, Population
 from harness.documents.persona import Persona
 from harness.documents.reading import read_document
 from harness.drivers.sumo import SumoDriver
@@ -16,6 +18,8 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.attention import Attention, Habits
 from harness.game.start import Start, draw_start
 from harness.mixture import Member, Mixture, mixture_of
+from harness.populations import by_who_drove
+from harness.tables import EPISODE_COLUMNS, typed
 from harness.traffic.opening import OpenScene, open_scene
 
 TEXTING = Habits(Attention(2.0, (1.0, 2.0), 0.02))
@@ -131,3 +135,22 @@ def test_mixture__is_of_drivers_that_a_game_can_have(people: dict[str, Persona])
         Mixture((Member(Steady(0.0), careful, 0.0),))
     with pytest.raises(ValueError, match="SUMO can't drive a player in some games"):
         Mixture((Member(Steady(0.0), careful), Member(SumoDriver(), careful)))
+
+
+def test_by_who_drove__is_who_did(merge: OpenScene, people: dict[str, Persona]) -> None:
+    """The table says of each game what the draw of its start said, with the failures of those games alone."""
+    shares = {"careful": 1.0, "speedy": 1.0}
+    members = tuple(Member(Steady(0.2), people[name], share) for name, share in shares.items())
+    arm = Arm("naive_vs_town", merge, (Steady(0.0), Mixture(members)), (people["careful"], people["careful"]), 3)
+    played = pd.DataFrame([{"arm": arm.name, "persona": "town", "seed": 3, **game.record} for game in assess(arm, 8)])
+    episodes = typed(played.reindex(columns=list(EPISODE_COLUMNS)))
+    campaign = Campaign(name="any", scene="any", personas=["any"], population=[Population(name="town", shares=shares)])
+    found = by_who_drove(campaign, episodes).set_index("persona")
+    chances = merge.chances([Habits(), [Habits(), Habits()]], [1.0, 1.0], [[1.0], [1.0, 1.0]])
+    drove = [list(shares)[draw_start(chances, "assessment", 3, "episode", k).member[1]] for k in range(8)]
+    assert set(drove) == set(shares)
+    for name in shares:
+        theirs = episodes[[who == name for who in drove]]
+        assert found.loc[name, "episodes"] == len(theirs)
+        assert found.loc[name, "failure_rate"] == theirs["ego_failed"].mean()
+        assert found.loc[name, "non_ego_payoff"] == pytest.approx(theirs["non_ego_payoff"].mean())

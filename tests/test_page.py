@@ -15,7 +15,8 @@ from harness.replay.choice import choose_games, replay_name, worst_first
 from harness.reports import page as page_module
 from harness.reports.page import duration, render_page
 from harness.reports.wording import effect, number, p_number, p_text, percent, verdicts
-from harness.tables import TABLES, summarise, typed, write_csv
+from harness.summary import summarise
+from harness.tables import TABLES, typed, write_csv
 
 GAMES = 60
 FAILING = {"alone": 0.0, "sumo": 0.03, "naive": 0.3, "retrained": 0.03}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 
 import pandas as pd
 import pytest
@@ -14,6 +15,7 @@ from test_report_browser import CONTRAST
 
 from harness.reports.game import CAPTIONS, game_section
 from harness.reports.game_wording import equilibrium_sentences, gap_verdicts
+from harness.reports.heatmaps import views
 from harness.reports.page import render_page
 from harness.tables import write_csv
 from harness.theory.equilibria import equilibria
@@ -95,6 +97,14 @@ def test_heat_map__of_one_seed_there_is_nothing_to_choose():
     assert [view.label for view in game_section(findings(games=20)).views] == ["seed 1"]
 
 
+def test_heat_map__has_a_personas_strategies_side_by_side(found):
+    rows = found.crossplay[found.crossplay["seed"] == 1]
+    rows = pd.concat([rows[rows["non_ego"] != "speedy_round2"], rows[rows["non_ego"] == "speedy_round2"]])
+    figure = views(rows)[0].maps[0].figure
+    names = re.findall(r">(speedy|speedy_round2|distracted|sumo)</text>", figure)
+    assert names == ["speedy", "speedy_round2", "distracted", "sumo"]
+
+
 def test_section__takes_its_share_of_the_page(found, html):
     without = page_of(None, seeds=(1, 2))
     assert len(html) - len(without) == pytest.approx(game_section(found).bytes, rel=0.35)
@@ -171,7 +181,7 @@ def test_words__one_could_gain():
 
 def test_words__nothing_better_is_no_equilibrium_but_as_near_as_was_looked():
     label, sentence, induced, tone = said(-0.2, -0.4, failing=12)
-    assert label == "nothing better found"
+    assert label == "not refuted"
     assert sentence == (
         "For the ego nothing better was found; for the speedy driver nothing better was found: as near to an "
         "equilibrium as this search can tell."
@@ -185,6 +195,16 @@ def test_words__a_negative_gap_is_never_a_gain(found):
     negative = [gap for gap in game_section(found).gaps if gap.verdict == GapVerdict.NONE_FOUND.value]
     assert negative
     assert {gap.share for gap in negative} == {"none found"}
+
+
+def test_words__a_gain_that_cant_be_told_from_0_has_its_interval_beside_it():
+    row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
+    row = row.assign(verdict=GapVerdict.NOT_DISTINGUISHABLE.value, payoff=-20.0, gap=6.0, gap_share=0.3)
+    ((_, answer),) = gap_verdicts(row.assign(ci_low=-1.0, ci_high=13.0))
+    assert answer.tone == "open"  # nothing is shown, neither way
+    assert plain(answer.sentence).startswith(
+        "For the ego a gain of 30 % was measured, which can't be told from 0 (95 %: −5 to 65 %); for the speedy driver"
+    )
 
 
 def test_words__of_one_side_alone_nothing_is_decided():
@@ -222,8 +242,8 @@ def test_words__several_seeds_are_counted_and_each_is_said(found):
     assert plain(speedy.speed).startswith(
         "A speedy driver trained anew against this ego makes it fail in 26 % of games"
     )
-    assert distracted.label == "nothing better found in 2 of 2 seeds"
-    assert distracted.sentence == "In 2 of 2 seeds nothing better was found for either."
+    assert distracted.label == "not refuted in 2 of 2 seeds"
+    assert distracted.sentence == "In 2 of 2 seeds no gain that can be told from 0 was found for either."
     assert [answer.seed for answer in speedy.per_seed] == [1, 2]
 
 
@@ -231,6 +251,21 @@ def test_words__only_the_last_round_is_the_headline(found):
     earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value)
     verdicts = dict(gap_verdicts(pd.concat([earlier, found.gaps], ignore_index=True)))
     assert verdicts["speedy"].label == "no in 2 of 2 seeds"
+
+
+def test_words__pairs_of_earlier_rounds_are_said_beneath(found):
+    earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value, ego="naive")
+    both = pd.concat([earlier, found.gaps], ignore_index=True)
+    section = game_section(GameFindings(both, found.crossplay, found.equilibria, found.generalisation))
+    assert len(section.gaps) == 8
+    assert [(persona, pair, answer.seed) for persona, pair, answer in section.others] == [
+        ("speedy", "naive against speedy_round2", 1),
+        ("speedy", "naive against speedy_round2", 2),
+        ("distracted", "naive against distracted", 1),
+        ("distracted", "naive against distracted", 2),
+    ]
+    text = Page(page_of(GameFindings(both, found.crossplay, found.equilibria, found.generalisation), (1, 2))).text
+    assert "naive against distracted, seed 2: For the ego nothing better was found" in text
 
 
 def test_words__of_an_equilibrium_name_shares_failures_and_payoff():

@@ -11,7 +11,8 @@ from scipy import stats
 
 from harness.comparison import Question, compare
 from harness.errors import UsageError
-from harness.tables import SUMMARY_COLUMNS, TABLES, read_csv, summarise, typed, write_csv
+from harness.summary import summarise
+from harness.tables import SUMMARY_COLUMNS, TABLES, read_csv, typed, write_csv
 
 WHOLE = st.integers(-(2**62), 2**62)
 CELLS = {

@@ -173,7 +173,8 @@ def _scratch() -> Path:
     return folder
 
 
-def _finished(*options: object, **changes: Any) -> Path:
+def finished(*options: object, **changes: Any) -> Path:
+    """Run a campaign to its end: its run folder, beside its document."""
     campaign = write_campaign(_scratch(), **changes)
     run = campaign.with_suffix("")
     done = harness("campaign", campaign, "--out", run, *options)
@@ -184,13 +185,13 @@ def _finished(*options: object, **changes: Any) -> Path:
 @cache
 def learned_run() -> Path:
     """The run folder of a finished campaign with a learned ego. Many tests read it; none may change it."""
-    return _finished(name="learned")
+    return finished(name="learned")
 
 
 @cache
 def sumo_run() -> Path:
     """The run folder of a finished campaign whose ego SUMO drives. Many tests read it; none may change it."""
-    return _finished("--jobs", 1, **BY_SUMO)
+    return finished("--jobs", 1, **BY_SUMO)
 
 
 BY_SUMO: dict[str, Any] = {

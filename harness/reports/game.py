@@ -10,9 +10,9 @@ import pandas as pd
 
 from harness.comparison import Verdict
 from harness.reports.cells import Table, table
-from harness.reports.game_wording import equilibrium_sentences, gap_verdicts, last_pairs
+from harness.reports.game_wording import equilibrium_sentences, gap_verdicts, last_pairs, other_pairs
 from harness.reports.heatmaps import View, views
-from harness.reports.wording import Row, Verdicts, interval, number, p_number, percent, trimmed
+from harness.reports.wording import Answer, Row, Verdicts, interval, number, p_number, percent, trimmed
 from harness.tables import typed
 from harness.theory.records import GameFindings
 
@@ -62,6 +62,8 @@ class GameSection:
     """All that the page says of the game."""
 
     verdicts: Sequence[tuple[str, Verdicts]]
+    others: Sequence[tuple[str, str, Answer]]
+    """Persona, name and answer of each pair that is not of the last round."""
     gaps: Sequence[Gap]
     views: Sequence[View]
     solutions: Sequence[tuple[int, str, Sequence[str]]]
@@ -84,12 +86,17 @@ def game_section(findings: GameFindings | None) -> GameSection | None:
     gaps, crossplay = found["gaps"], found["crossplay"]
     return GameSection(
         gap_verdicts(gaps),
-        [_gap(row) for rows in last_pairs(gaps) for row in rows],
+        other_pairs(gaps),
+        [_gap(row) for name in dict.fromkeys(gaps["persona"]) for row in _last(gaps[gaps["persona"] == name])],
         views(crossplay),
         equilibrium_sentences(found["equilibria"]),
         _strangers(found["generalisation"]),
         {name: table(name, CAPTIONS[name], frame) for name, frame in found.items()},
     )
+
+
+def _last(gaps: pd.DataFrame) -> list[Row]:
+    return [row for rows in last_pairs(gaps) for row in rows]
 
 
 def _gap(row: Row) -> Gap:

@@ -11,12 +11,12 @@ from typing import Any
 
 import pandas as pd
 
-from harness.reports.wording import NO_SPACE, Answer, Row, Tone, Verdicts, interval, left_out, number, p_text, percent
+from harness.reports.wording import (NO_SPACE, Answer, Row, Tone, Verdicts, interval, left_out, number, p_text, percent, trimmed)
 from harness.theory.equilibria import ALL, SolutionKind
 from harness.theory.gaps import NOTHING_TO_GAIN, GapVerdict
 
 QUESTION = "Equilibrium"
-NO, NEAR, OPEN = "no", "nothing better found", "not decided"
+NO, NEAR, OPEN = "no", "not refuted", "not decided"
 
 
 def gap_verdicts(gaps: pd.DataFrame) -> list[tuple[str, Verdicts]]:
@@ -42,6 +42,17 @@ def last_pairs(gaps: pd.DataFrame) -> list[list[Row]]:
     return pairs(gaps[gaps["round"] == last])
 
 
+def other_pairs(gaps: pd.DataFrame) -> list[tuple[str, str, Answer]]:
+    """Persona, name and answer of every pair that is not of its seed's last round with that persona."""
+    found = []
+    for persona in dict.fromkeys(gaps["persona"]):
+        of = gaps[gaps["persona"] == persona]
+        last = of.groupby("seed")["round"].transform("max")
+        for rows in pairs(of[of["round"] < last]):
+            found.append((str(persona), f"{rows[0]['ego']} against {rows[0]['non_ego']}", pair_answer(rows)))
+    return found
+
+
 def pair_answer(rows: Sequence[Row]) -> Answer:
     """Whether a pair is an equilibrium as far as was found, in a sentence, and what its best-responding persona
     does to the ego."""
@@ -64,9 +75,8 @@ def pair_answer(rows: Sequence[Row]) -> Answer:
     sentence = "; ".join(parts) + f": {so}."
     sentence = sentence[0].upper() + sentence[1:]
     induced = "" if non_ego is None else induced_failures(non_ego)
-    tone: Tone = "mended" if label == NEAR else "open"
-    if non_ego is not None and non_ego["failure_difference_low"] > 0:
-        tone = "harm"
+    harmful = non_ego is not None and non_ego["failure_difference_low"] > 0
+    tone: Tone = "harm" if harmful else "open"  # what is not refuted is no yes
     return Answer(rows[0]["seed"], label == NEAR, label, tone, sentence + "".join(map(left_out, rows)), induced)
 
 
@@ -102,7 +112,7 @@ def _part(who: str, row: Row | None) -> str:
             f"{who} might gain {_share(row)} of its payoff, but not after Holm's correction ({p_text(row['p_holm'])})"
         ),
         GapVerdict.NOT_DISTINGUISHABLE: (
-            f"for {who} a gain of {_share(row)} was measured, which can't be told from 0"
+            f"for {who} a gain of {_share(row)} was measured, which can't be told from 0{_span(row)}"
         ),
         GapVerdict.NONE_FOUND: f"for {who} nothing better was found",
         GapVerdict.NO_DIFFERENCE: f"the best response of {who} earns the same in every game",
@@ -122,6 +132,14 @@ def _share(row: Row) -> str:
     return f"{number(row['gap'], 2)} above the 0"
 
 
+def _span(row: Row) -> str:
+    """The gap's interval as shares of the payoff; empty where there is none."""
+    if not (row["payoff"] and math.isfinite(row["ci_low"])):
+        return ""
+    low, high = (trimmed(row[end] / abs(row["payoff"]) * 100, 1) for end in ("ci_low", "ci_high"))
+    return f" (95{NO_SPACE}%: {low} to {high}{NO_SPACE}%)"
+
+
 def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]) -> Verdicts:
     if len(answers) == 1:
         (only,) = answers
@@ -131,10 +149,10 @@ def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]
     what = "seeds" if len({answer.seed for answer in answers}) == several else "pairs"
     tones = [answer.tone for answer in answers]
     label = f"no in {no} of {several} {what}" if no else f"{NEAR} in {near} of {several} {what}" if near else OPEN
-    tone: Tone = "harm" if "harm" in tones else "mended" if near == several else "open"
+    tone: Tone = "harm" if "harm" in tones else "open"
     finding = {
         NO: f"the ego or the {persona} driver could still gain by changing its strategy alone (after Holm's correction)",
-        NEAR: "nothing better was found for either",
+        NEAR: "no gain that can be told from 0 was found for either",
         OPEN: "it is not decided",
     }
     counts = {each: sum(answer.label == each for answer in answers) for each in finding}

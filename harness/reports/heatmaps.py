@@ -30,6 +30,11 @@ class HeatMap:
     figure: Markup
     width_in: float
 
+    @property
+    def wide(self) -> bool:
+        """Whether it needs the page for itself."""
+        return self.width_in > 5.5
+
 
 @dataclass(frozen=True)
 class View:
@@ -54,8 +59,7 @@ QUANTITIES = (
     _Quantity(
         "non_ego_payoff",
         "Payoff of the non-ego",
-        "Darker: earns more than others of the same persona; people of two personas do not count in one currency. "
-        "SUMO’s own driver has no payoff.",
+        "Darker: earns more than others of the same persona; people of two personas do not count in one currency.",
         "retrained",
         False,
     ),
@@ -84,14 +88,14 @@ def _mean(crossplay: pd.DataFrame) -> pd.DataFrame:
 
 
 def _map(quantity: _Quantity, found: pd.DataFrame, label: str, place: int) -> HeatMap:
-    table = matrices(found)
+    table = _by_persona(matrices(found))
     cells = {(row["ego"], row["non_ego"]): row for row in found.to_dict("records")}
     values = {
         "failure_rate": table.failure_rates,
         "ego_payoff": table.ego_payoffs,
         "non_ego_payoff": table.non_ego_payoffs,
     }[quantity.name]
-    between = "least to most of the seeds" if label.startswith("mean") else "95 % interval"
+    between = "least to most of the seeds that played it" if label.startswith("mean") else "95 % interval"
     kind = "" if label.startswith("mean") else (" (Wilson)" if quantity.per_cent else " (t)")
     said = [
         f"{ego} against {non_ego} {_text(quantity, values[row, column])}"
@@ -128,9 +132,18 @@ def _map(quantity: _Quantity, found: pd.DataFrame, label: str, place: int) -> He
                 axes.text(column + 0.5, row + 0.46, _text(quantity, values[row, column]), ha="center", color=INK)
                 span = _span(quantity, cells[ego, non_ego])
                 axes.text(column + 0.5, row + 0.82, span, ha="center", fontsize=8, color=INK)
+        for cell in (*axes.texts, *axes.patches):
+            cell.set_in_layout(False)  # they are within the axes, and would be measured again and again
         drawn = svg(figure, name, f"{quantity.title}, {label}: {'; '.join(said)}")
-    caption = f"{quantity.caption} Below each mean: {between}{kind}."
+    unpaid = " SUMO’s own driver has no payoff." if quantity.name == "non_ego_payoff" and "" in table.personas else ""
+    caption = f"{quantity.caption}{unpaid} Below each mean: {between}{kind}."
     return HeatMap(f"{quantity.title}, {label}", caption, drawn, round(width_in, 2))
+
+
+def _by_persona(table: Matrices) -> Matrices:
+    """Each persona's strategies side by side."""
+    places = sorted(range(len(table.non_egos)), key=lambda place: table.personas.index(table.personas[place]))
+    return table.among(range(len(table.egos)), places)
 
 
 def _shades(quantity: _Quantity, table: Matrices, values: Floats) -> Floats:

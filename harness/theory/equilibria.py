@@ -9,7 +9,7 @@ are dominated against every non-ego, and the safest mixture of egos, which asks 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from enum import Enum
 from typing import Any
 
@@ -74,12 +74,12 @@ def _nash(table: Matrices) -> Iterator[dict[str, Any]]:
     measured = [np.isfinite(each) for each in (table.failure_rates, table.ego_payoffs, table.non_ego_payoffs)]
     game, left_out = _complete(table, np.logical_and.reduce(measured))
     if game.egos:
-        found = solve(game.ego_payoffs, game.non_ego_payoffs).equilibria
+        found, strategies = solve(game.ego_payoffs, game.non_ego_payoffs).equilibria, _strategies(game)
         for number, each in enumerate(found, 1):
-            for row in _equilibrium(game, each):
+            for row in _equilibrium(game, each, strategies):
                 yield {"solution": SolutionKind.NASH.value, "number": number, **row}
         if not found:
-            for row in _strategies(game):
+            for row in strategies:
                 yield {"solution": SolutionKind.NOT_VERIFIED.value, **row}
     yield from left_out
 
@@ -97,7 +97,9 @@ def _strategies(game: Matrices) -> list[dict[str, object]]:
     return rows + [{"role": "non_ego", "player": name, "dominated_in_payoff": payoff} for name, payoff in non_egos]
 
 
-def _equilibrium(game: Matrices, at: Equilibrium) -> Iterator[dict[str, object]]:
+def _equilibrium(
+    game: Matrices, at: Equilibrium, strategies: Sequence[dict[str, object]]
+) -> Iterator[dict[str, object]]:
     x, y = at.ego_shares, at.non_ego_shares
     ego_regret, non_ego_regret = regrets(game.ego_payoffs, game.non_ego_payoffs, at)
     against = {
@@ -106,7 +108,7 @@ def _equilibrium(game: Matrices, at: Equilibrium) -> Iterator[dict[str, object]]
     }
     failure_rate = float(x @ game.failure_rates @ y)
     places = {"ego": 0, "non_ego": 0}
-    for row in _strategies(game):
+    for row in strategies:
         role = str(row["role"])
         shares, payoffs, failures, regret = against[role]
         place = places[role]
