@@ -106,8 +106,7 @@ ALLOWED: dict[str, set[str]] = {
         *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
         *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
         *("manoeuvre_file", "model_card", "versions", "conditions", "stage_keys", "plan", "pairings", "theory"),
-        *("populations", "summary"),
-        *("search_columns",),
+        *("populations", "summary", "search_columns"),
     },
 }
 ALLOWED["cli_documents"] = set(ALLOWED)
