@@ -10,7 +10,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, field_validator, mode
 from harness.documents.reading import Document
 from harness.documents.scene import Interval
 from harness.game.attention import Attention, Overlooking
-from harness.game.limits import PERSISTENCE_S, Missing, Reaction, Sight, Uses
+from harness.game.limits import NOBODY, PERSISTENCE_S, Missing, Reaction, Sight, Uses
 
 LONGEST_DELAY_S = 5.0
 LATER = ("misses_share", "noticed_within_m", "range_m", "distance_error", "closing_error_per_s", "error_s")
@@ -109,7 +109,7 @@ class Perception(Document):
     @property
     def missing(self) -> Missing:
         """Whom the person looks at and fails to see."""
-        return Missing() if self.noticed_within_m is None else Missing(self.misses_share, self.noticed_within_m)
+        return NOBODY if self.noticed_within_m is None else Missing(self.misses_share, self.noticed_within_m)
 
     @property
     def sight(self) -> Sight:
