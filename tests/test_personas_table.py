@@ -158,6 +158,21 @@ def test_rows__say_what_the_run_says(run: Path) -> None:
     assert [name for name, cell in anna.items() if cell] == ["persona", "naive ego"]
 
 
+@pytest.mark.parametrize("with_careful", [True, False])
+def test_rows__a_trait_that_is_compared_needs_the_other(with_careful: bool, tmp_path: Path, merge: OpenScene) -> None:
+    shutil.copytree(merge.folder, tmp_path / "scene")
+    (tmp_path / "traces").mkdir()
+    people = {"impaired": 0.2, "careful": 0.05} if with_careful else {"impaired": 0.2}
+    for persona, side_m in people.items():  # to the left and to the right in turns: a standard deviation of as much
+        places = [{"x_m": 140.0 + k, "y_m": LANE_1_M + side_m * (-1) ** k} for k in range(6)]
+        with TraceWriter(tmp_path / "traces" / f"{persona}_alone-seed1.parquet") as traces:
+            traces.add(trace(*places).to_dict("list"))
+    games = [episode(f"{persona}_alone", persona, None) for persona in people]
+    run = table.Run(tmp_path, 1, pd.DataFrame(games), pd.DataFrame({"stage": [], "mean_payoff": []}), merge)
+    over = run.measured(table.TRAITS["impaired"], "impaired")
+    assert over == pytest.approx(0.15 if with_careful else np.nan, abs=0.01, nan_ok=True)
+
+
 def test_main__prints_markdown_and_writes_what_it_prints(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table.main(run, 1, run / "table.csv")
     printed = [line.strip("| ").split(" | ") for line in capsys.readouterr().out.splitlines()]

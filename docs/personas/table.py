@@ -65,6 +65,8 @@ class Trait:
     low: float
     high: float
     """The persona is itself from `low` to `high`."""
+    over: str = ""
+    """The persona whose own measure is subtracted."""
 
 
 # --- measures ---------------------------------------------------------------------------------------------------------
@@ -167,7 +169,7 @@ TRAITS: dict[str, Trait] = {
         "way left in the ending lane when it crosses the line, against the naive ego",
         *(AGAINST, lane_left_m, "{:.1f} m"),
         "most merge near the middle of an acceleration lane (Li, Wang, Chen and Li 2007)",
-        *(-30.0, 5.0),
+        *(-30.0, 0.0),
     ),
     "distracted": Trait(
         "mean lapse, alone",
@@ -182,10 +184,11 @@ TRAITS: dict[str, Trait] = {
         *(0.75, 2.5),
     ),
     "impaired": Trait(
-        "standard deviation of lateral position, alone",
-        *(ALONE, lateral_deviation_m, "{:.2f} m"),
-        "+2.5 cm at 0.5 g/L (Jongen et al. 2017); see the careful driver's",
-        *(0.0, np.inf),
+        "standard deviation of lateral position, alone, over the careful driver's",
+        *(ALONE, lateral_deviation_m, "{:+.2f} m"),
+        "+0.02 to +0.03 m at 0.5 g/L of blood alcohol (Jongen et al. 2017)",
+        *(0.02, 0.3),
+        over="careful",
     ),
 }
 
@@ -243,6 +246,14 @@ class Run:
         curve = self.training.loc[self.training["stage"] == persona, "mean_payoff"]
         return f"{curve.iloc[0]:.1f} → {curve.iloc[-WINDOWS:].mean():.1f}" if len(curve) else ""
 
+    def measured(self, trait: Trait, persona: str) -> float:
+        """A trait of a persona; NaN: whoever it is compared with is not in this run."""
+        whom = [persona, trait.over] if trait.over else [persona]
+        if not set(whom) <= set(self.personas):
+            return float("nan")
+        own, *other = (trait.measure(list(self.played(trait.arm.format(each)))) for each in whom)
+        return own - sum(other)
+
     def played(self, arm: str) -> Iterator[Played]:
         """An arm's recorded games."""
         for _, trace in read_traces(self.folder / "traces" / f"{arm}-seed{self.seed}.parquet"):
@@ -263,9 +274,10 @@ def rows(run: Run) -> list[dict[str, str]]:
             "people": "",
         }
         if trait is not None:
-            value = trait.measure(list(run.played(trait.arm.format(persona))))
+            value = run.measured(trait, persona)
             itself = "yes" if trait.low <= value <= trait.high else "no"
-            row |= {"trait": trait.what, "is": trait.form.format(value), "itself": itself, "people": trait.people}
+            shown = ("", "") if np.isnan(value) else (trait.form.format(value), itself)
+            row |= {"trait": trait.what, "is": shown[0], "itself": shown[1], "people": trait.people}
         row |= {"alone: fails": run.fails_alone(persona), "naive ego": run.fails(f"naive_vs_{persona}")}
         row |= {ego: run.fails(f"{ego}_vs_{persona}") for ego in run.egos}
         row["retrained ego"] = run.fails(f"retrained_vs_{persona}")
