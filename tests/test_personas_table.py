@@ -130,6 +130,7 @@ def run(tmp_path: Path, merge: OpenScene) -> Path:
         {**episode("naive_vs_tailgater", "tailgater", None, np.nan, "error"), "error": "the simulator died"},
         episode("adas_vs_tailgater", "tailgater", True, 5.0),
         episode("retrained_vs_tailgater", "tailgater", False, 9.0),
+        episode("retrained_anna_vs_tailgater", "tailgater", True, 1.0),  # cross-play has a page of its own
         episode("naive_vs_anna", "anna", False),
     ]
     elsewhere = {**episode("naive_vs_tailgater", "tailgater", True), "seed": 2}

@@ -24,7 +24,7 @@ from harness.series import drove_in, quantities_of
 from harness.trace_file import read_traces
 from harness.traffic.opening import OpenScene, open_scene
 
-NAIVE, RETRAINED = "naive", "retrained"
+LEARNED = ("naive", "retrained", "robust")  # the egos that a campaign trains
 WINDOWS = 3  # of the learning curve, at its end
 
 
@@ -221,9 +221,8 @@ class Run:
     def egos(self) -> list[str]:
         """Who else meets the personas, beside the naive and the retrained ego."""
         arms = [arm.partition("_vs_") for arm in dict.fromkeys(self.episodes["arm"])]
-        return list(
-            dict.fromkeys(ego for ego, _, who in arms if who in self.personas and ego not in (NAIVE, RETRAINED))
-        )
+        others = (ego for ego, _, who in arms if who in self.personas and not ego.startswith(LEARNED))
+        return list(dict.fromkeys(others))
 
     def games(self, arm: str) -> pd.DataFrame:
         """An arm's games that were played."""
