@@ -3,7 +3,7 @@
 | order | what happens in a step | where |
 | --- | --- | --- |
 | 1 | drivers decide from what they saw at the end of the step before; learners' actions come from outside | `drivers` |
-| 2 | lapses of attention omit decisions | `game.attention` |
+| 2 | they reach pedals and wheel, late or in part; lapses of attention omit them | `game.limits`, `game.attention` |
 | 3 | the players' cars move | `game.bicycle` |
 | 4 | their poses go to SUMO, SUMO moves everyone else, and is read back | `traffic.simulation` |
 | 5 | contact, goal and time decide outcomes | `game.quantities` |
@@ -27,6 +27,7 @@ import numpy as np
 from harness.drivers.protocol import Driver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import drive, requests
+from harness.game.limits import PlayersLimits
 from harness.game.observation import SIZE, observe
 from harness.game.payoff import Payoff
 from harness.game.plausibility import check_observation, check_step, checked_decisions, slack_m
@@ -90,6 +91,7 @@ class Arena:
         self._noise = np.zeros((games, players, self.world.steps, 2))
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
+        self._limits = PlayersLimits(games, players, self.world.steps)
         self._all_games = np.arange(games)
         self.reading: Reading | None = None
         self._players_length = np.tile(self.world.length_m, (games, 1))
@@ -134,6 +136,8 @@ class Arena:
         self._take_back(reading, drove)
         quantities = Quantities(self.world, state, self._bodies(reading), *self._locate())
         state.step = state.step + 1
+        if self._limits.misjudges:
+            self._limits.look(state)
         self._judge(quantities, drove)
         payoff = self._pay(quantities, drove)
         check_step(before, quantities, drove, payoff, self._slack_m)
@@ -162,7 +166,11 @@ class Arena:
                     noise = self._noise[games, player, now[games]]
                     decided = seat.driver.decide(games, self.observation[games, player], noise)
                     chosen[games, player] = checked_decisions(decided, seat.driver, player, games, state.step)
+        if self._limits.delays:
+            chosen = self._limits.arriving(chosen, now)
         acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)
+        if self._limits.spares:
+            acceleration, steering = self._limits.within(acceleration, steering)
         lapsed = self._lapsed[self._all_games, :, now] & drove
         state.lapsed = lapsed
         drifting = self._lapsed_steering_rad[self._all_games, :, now]
@@ -244,6 +252,7 @@ class Arena:
             state.station_m[game, player] = self.world.road.routes.find(player, start.x_m[player], start.y_m[player])
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
+            self._limits.begin(game, player, start.limits[player], state)
         self._noise[game] = start.noise
 
     def _look(self, games: IntArray) -> None:

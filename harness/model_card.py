@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import ConfigDict, Field, ValidationError
 
 from harness.documents.campaign import Campaign
+from harness.documents.habits import Perception
 from harness.documents.manifest import is_tuned
 from harness.documents.persona import Parametrised, Persona
 from harness.documents.reading import Document
@@ -154,7 +155,27 @@ def _facts(
             yield "no lapses in", f"the first {percent(campaign.non_ego_training.attentive_share)} of the budget"
     if persona.perception is not None:
         share, up_to_m = percent(persona.perception.overlooks_share), persona.perception.overlooked_up_to_m
-        yield "overlooks", f"in {share} of drives, others whose centre is less than {up_to_m:g} m ahead of its own"
+        if persona.perception.overlooks_share:
+            yield "overlooks", f"in {share} of drives, others whose centre is less than {up_to_m:g} m ahead of its own"
+        yield from _sight(persona.perception)
+    if persona.reaction is not None:
+        yield "reaction", f"decisions count {'–'.join(f'{each:g}' for each in persona.reaction.delay_s)} s later"
+    if persona.actuators is not None:
+        uses = persona.actuators
+        shares = (uses.throttle_share, uses.braking_share, uses.steering_share)
+        throttle, braking, steering = map(percent, shares)
+        yield "uses of the car", f"{throttle} of its acceleration, {braking} of its braking, {steering} of its steering"
+
+
+def _sight(perception: Perception) -> Iterator[tuple[str, str]]:
+    if perception.misses_share:
+        share, within_m = percent(perception.misses_share), perception.noticed_within_m
+        yield "misses", f"in {share} of drives, others that are more than {within_m:g} m away"
+    if perception.range_m is not None:
+        yield "sees", f"others up to {perception.range_m:g} m away"
+    if perception.distance_error or perception.closing_error_per_s:
+        closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance a second"
+        yield "misjudges", f"distances by {percent(perception.distance_error)}, {closing}, for {perception.error_s:g} s"
 
 
 def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:

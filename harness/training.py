@@ -24,7 +24,7 @@ from harness.checkpoint import Progress, Window, policy_of, put_policy, read_che
 from harness.convergence import has_converged
 from harness.documents.campaign import Training
 from harness.documents.persona import Persona
-from harness.game.attention import Habits, Overlooking
+from harness.game.attention import Habits
 from harness.game.observation import OF_OTHERS
 from harness.game.seeding import seed_of
 from harness.game.start import Chances
@@ -122,9 +122,10 @@ def _chances(lesson: Lesson, steps: int) -> Chances:
     present[lesson.learner] = 1.0
     theirs, their_shares = _of_other(lesson)
     habits, shares = [theirs, theirs], [their_shares, their_shares]
-    # Nobody learns from what was overlooked and went well: a driver learns with open eyes, and drives by habit.
+    # Nobody learns from what was overlooked and went well: a driver learns with open eyes, and drives by habit. What
+    # the body can't do is there from the first lesson on.
     own = lesson.personas[lesson.learner].habits
-    eyes_open = own if lesson.as_it_drives else replace(own, overlooking=Overlooking())
+    eyes_open = own if lesson.as_it_drives else own.with_open_eyes
     habits[lesson.learner], shares[lesson.learner] = [eyes_open], [1.0]
     if steps < _attentive_steps(lesson):
         habits = [[replace(each, attention=None) for each in of_player] for of_player in habits]

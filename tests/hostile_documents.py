@@ -143,6 +143,34 @@ PERSONAS = [
     *no_numbers(PERSONA, "progress = 1.0", "operational.terms.progress"),
     *no_numbers(PERSONA, "mean_attentive_s = 5.0", "attention.mean_attentive_s"),
     *no_numbers(PERSONA, "overlooks_share = 0.5", "perception.overlooks_share"),
+    *changed(
+        PERSONA,
+        *(
+            (f"a perception of {line}", "overlooks_share = 0.5", line, said)
+            for line, said in {
+                "misses_share = 0.5": ("perception", "noticed_within_m"),
+                "noticed_within_m = 5.0": ("perception", "misses_share"),
+                "error_s = 5.0": ("perception", "distance_error"),
+                "range_m = 0.0": ("perception.range_m",),
+                "rnge_m = 5.0": ("perception.rnge_m", "'range_m'"),
+                "distance_error = -0.1": ("perception.distance_error",),
+            }.items()
+        ),
+        *(
+            (f"a body of {line}", "[perception]", f"{table}\n{line}\n[perception]", said)
+            for table, line, said in (
+                ("[reaction]", "delay_s = [0.5, 0.2]", ("reaction.delay_s", "empty")),
+                ("[reaction]", "delay_s = [-0.5, 0.2]", ("reaction.delay_s", "0 to 5 s")),
+                ("[reaction]", "delay_s = [0.5, 6.0]", ("reaction.delay_s", "0 to 5 s")),
+                ("[reaction]", "delay_s = [nan, nan]", ("reaction.delay_s",)),
+                ("[reaction]", "delay_s = 0.5", ("reaction.delay_s",)),
+                ("[reaction]", "", ("reaction.delay_s: is missing",)),
+                ("[actuators]", "throttle_share = 0.0", ("actuators.throttle_share",)),
+                ("[actuators]", "braking_share = 1.5", ("actuators.braking_share",)),
+                ("[actuators]", "stering_share = 0.5", ("actuators.stering_share", "'steering_share'")),
+            )
+        ),
+    ),
     *(Bad(f"anna.toml: named {way}", edit(PERSONA, '"anna"', f'"{name}"'), ("anna.toml: name",)) for way, name in ODD_NAMES.items()),
     *changed(
         PERSONA,

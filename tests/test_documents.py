@@ -13,6 +13,7 @@ from harness.documents.persona import Persona
 from harness.documents.reading import Document, nearest, read_document
 from harness.documents.scene import Scene
 from harness.errors import Problem, UsageError
+from harness.game.limits import Reaction, Sight, Uses
 
 Write = Callable[[str], Path]
 
@@ -220,3 +221,27 @@ def test_document__is_frozen(write: Write) -> None:
         campaign.training.clip = 0.2
     with pytest.raises(ValidationError, match="frozen"):
         read_document(write(SCENE), Scene).ego.lane = "b"
+
+
+def test_persona__without_limits_is_written_as_before_there_were_any(write: Write) -> None:
+    """What stages are keyed by, and what a manifest holds."""
+    plain = read_document(write(PERSONA), Persona).model_dump(mode="json")
+    assert {"reaction", "actuators"}.isdisjoint(plain)
+    assert plain["perception"] is None
+    perceives = "[perception]\noverlooks_share = 0.5\n"
+    written = read_document(write(PERSONA + perceives), Persona).model_dump(mode="json")
+    assert written["perception"] == {"overlooks_share": 0.5, "overlooked_up_to_m": 0.0}
+
+
+def test_persona__limits_are_written_and_read_again(write: Write) -> None:
+    limits = (
+        "[perception]\nrange_m = 50.0\ndistance_error = 0.1\nerror_s = 5.0\n"
+        "[reaction]\ndelay_s = [0.2, 0.3]\n[actuators]\nbraking_share = 0.5\n"
+    )
+    person = read_document(write(PERSONA + limits), Persona)
+    written = person.model_dump(mode="json")
+    assert Persona.model_validate(written, strict=False) == person
+    assert person.habits.sight == Sight(50.0, 0.1, 0.0, 5.0)
+    assert person.habits.reaction == Reaction((0.2, 0.3))
+    assert person.habits.uses == Uses(braking=0.5)
+    assert person.habits.missing is read_document(write(PERSONA), Persona).habits.missing

@@ -136,6 +136,28 @@ def test_card__of_a_persona_with_fuzzy_terms_and_mirrors_not_looked_into() -> No
     assert any(line.startswith("| overlooks | in 85 % of drives") for line in card)
 
 
+def test_card__of_a_persona_with_a_body() -> None:
+    document = {
+        **persona("careful"),
+        "reaction": {"delay_s": [0.2, 0.4]},
+        "actuators": {"throttle_share": 0.5},
+        "perception": {
+            "misses_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0, "distance_error": 0.1, "error_s": 10.0,
+        },
+    }  # fmt: skip
+    manifest = {**MANIFEST, "persona_documents": {"distracted": document}}
+    card = lines(model_card("distracted-seed1", manifest, SUMMARY, PERSON))
+    for row in (
+        "| misses | in 30 % of drives, others that are more than 8 m away |",
+        "| sees | others up to 60 m away |",
+        "| misjudges | distances by 10 %, closing speeds by 0 of the distance a second, for 10 s |",
+        "| reaction | decisions count 0.2–0.4 s later |",
+        "| uses of the car | 50 % of its acceleration, 100 % of its braking, 100 % of its steering |",
+    ):
+        assert row in card, row
+    assert not any(line.startswith("| overlooks |") for line in card)
+
+
 def test_card__of_the_retrained_ego() -> None:
     policy = {**POLICY, "against": "distracted-seed1", "began_from": "naive-seed1"}
     card = lines(model_card("retrained_distracted-seed1", MANIFEST, SUMMARY, policy))

@@ -337,6 +337,19 @@ def test_harm__a_fuzzy_term_may_not_pay_for_contact(read: Callable[[str], Person
     assert "nobody may be paid for a crash" in problems(read, fuzzy(quantity, sets))[0]
 
 
+def test_fuzzy__of_the_lane_that_ends(read: Callable[[str], Persona], moment: Moment, merge: OpenScene) -> None:
+    # lane 0 (y = -4.8) ends at 100 m, lane 1 goes on: half-way from 0 to 80 m, and never
+    sets = (
+        "{ name = 'late', points = [[0.0, 1.0], [80.0, 0.0]], value = 3.0 },"
+        "{ name = 'early', points = [[0.0, 0.0], [80.0, 1.0]], value = -1.0 }"
+    )
+    payoff = read(fuzzy("lane_end_m", sets)).payoff
+    q = moment(merge.world, [{"x_m": 60.0, "y_m": -4.8}, {"x_m": 60.0, "y_m": -1.6}])
+    assert q.lane_end_m[0] == pytest.approx([40.0, np.inf])
+    assert payoff.total(q, 0) == pytest.approx(0.1 * (0.5 * 3.0 - 0.5 * 1.0))
+    assert payoff.total(q, 1) == pytest.approx(0.1 * -1.0)
+
+
 def test_harm__a_tailgater_may_still_like_a_short_gap(read: Callable[[str], Persona]) -> None:
     sets = (
         "{ name = 'crash', points = [[0.0, 1.0], [0.2, 0.0]], value = -9.0 },"

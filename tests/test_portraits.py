@@ -22,7 +22,17 @@ from harness.game.payoff import GROUPS, TERMS
 from harness.portraits.drives import DRIFT_SPEED_MPS, drift_m, free_share, lapsed_share, lapses_per_minute
 from harness.portraits.page import render_portrait, write_portrait
 from harness.portraits.plotting import area, axis, curve, stretches, ticks
-from harness.portraits.portrait import SHOWN, Portrait, attends, decides, function_in_words, portrait_of, sees, wants
+from harness.portraits.portrait import (
+    SHOWN,
+    Portrait,
+    attends,
+    body,
+    decides,
+    function_in_words,
+    portrait_of,
+    sees,
+    wants,
+)
 from harness.portraits.terminal import show
 from harness.portraits.worth import EXAMPLES, LIMITED
 
@@ -161,6 +171,30 @@ def test_sees__in_words() -> None:
     behind = made(perception={"overlooks_share": 1.0, "overlooked_up_to_m": -5.0})
     assert "others whose centre is more than 5 m behind its own are not seen: in 8 of the 8" in next(sees(behind))
     assert list(sees(portrait(CAREFUL))) == ["Nobody is overlooked."]
+
+
+def test_body__in_words() -> None:
+    assert list(body(portrait(CAREFUL))) == []
+    of = made(
+        perception={
+            "misses_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
+            "distance_error": 0.1, "closing_error_per_s": 0.02,
+        },
+        reaction={"delay_s": [0.2, 0.6]},
+        actuators={"throttle_share": 0.5, "steering_share": 0.8},
+        attention={"mean_attentive_s": 5.0, "lapse_s": [1.0, 2.0]},
+    )  # fmt: skip
+    assert list(body(of)) == [
+        "In 30 % of the drives it looks and fails to see: others are noticed within 8 m only.",
+        "Others more than 60 m away are never seen.",
+        "Two thirds of the time, 10 m to another are taken for 9.05 to 11.1 m.",  # 10 exp(-0.1) to 10 exp(0.1)
+        "At 20 m, closing speeds are off by 0.4 m/s (standard deviation).",
+        "What is misjudged stays so for 20 s or so.",
+        "Decisions count 0.2 to 0.6 s later: at 50 km/h after up to 8.3 m.",
+        "After a lapse the car is let go for as long again.",
+        "Of what the car can do it uses 50 % of its acceleration, 80 % of its steering.",
+        "While the person itself is trained, nobody is overlooked or missed; all else is as in driving.",
+    ]
 
 
 def test_decides__in_words() -> None:

@@ -134,7 +134,8 @@ def test_schema__every_key_is_described_with_its_unit(kind: str) -> None:
         assert "\n" not in node["description"]
         ending = name.rpartition("_")[2]
         if "_" in name and ending in UNITS:
-            assert f"Unit: {UNITS[ending]}." in node["description"]
+            unit = "1/s" if name.endswith("_per_s") else UNITS[ending]
+            assert f"Unit: {unit}." in node["description"]
 
 
 @each_kind

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import (
+    Discriminator,
+    Field,
+    SerializerFunctionWrapHandler,
+    Tag,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
+from harness.documents.habits import CarUse, Lapsing, Perception, Reacting
 from harness.documents.reading import NUMBER, TABLE, Document, Mistakes, nearest
-from harness.documents.scene import Interval, Name
-from harness.game.attention import Attention, Habits, Overlooking
+from harness.documents.scene import Name
+from harness.game.attention import Habits
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
+from harness.game.limits import ALL, AT_ONCE, EXACT, NOBODY
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -132,36 +142,6 @@ class Human(Group):
     """Terms declared by membership functions."""
 
 
-class Lapsing(Document):
-    """When attention lapses, for how long, and what the car does meanwhile."""
-
-    mean_attentive_s: float = Field(gt=0.1, le=3600.0)
-    """Mean time between lapses (exponential)."""
-    lapse_s: Interval
-    """Range of a lapse's length (uniform). In it the policy's actions are omitted: pedals and wheel are let go."""
-    crown_rad: float = Field(0.0, ge=0.0, le=0.1)
-    """Steering angle, to the right, that the road's crown makes of a wheel let go."""
-    bumps_rad: float = Field(0.0, ge=0.0, le=0.1)
-    """Standard deviation, from lapse to lapse, of the steering angle that bumps and the car's own pull add to it."""
-
-    @field_validator("lapse_s")
-    @classmethod
-    def _positive(cls, lapse_s: tuple[float, float]) -> tuple[float, float]:
-        if lapse_s[0] <= 0.0:
-            raise ValueError("a lapse must last longer than 0 s")
-        return lapse_s
-
-
-class Perception(Document):
-    """What a person fails to see. A habit of driving, not of learning: while the person itself is trained, its eyes
-    are open, for nobody has learned from what was overlooked and went well."""
-
-    overlooks_share: float = Field(ge=0.0, le=1.0)
-    """Share of the drives in which the person does not look into the mirrors and over the shoulder."""
-    overlooked_up_to_m: float = Field(0.0, ge=-20.0, le=100.0)
-    """In such a drive, others whose centre is not at least this far ahead of the person's own are not seen."""
-
-
 def _fits(parameter: str, given: float | Parametrised) -> bool:
     """Whether a term that takes this limit (or none) was given as it has to be."""
     if isinstance(given, Parametrised):
@@ -183,6 +163,8 @@ class Persona(Document):
     human: Human = Human()
     attention: Lapsing | None = None
     perception: Perception | None = None
+    reaction: Reacting | None = None
+    actuators: CarUse | None = None
     decisions: Literal["mode", "sampled"] = "mode"
     """Whether it always takes its policy's most likely action, or varies as the policy does."""
 
@@ -212,6 +194,15 @@ class Persona(Document):
             raise ValueError("the payoff has no terms: nothing could be learned from it")
         return self
 
+    @model_serializer(mode="wrap")
+    def _without_limits_that_nobody_has(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """A person without the limits of later versions is written as before them: stages keep their keys."""
+        written: dict[str, Any] = dump(self)
+        for table in ("reaction", "actuators"):
+            if written.get(table, 0) is None:
+                del written[table]
+        return written
+
     @property
     def payoff(self) -> Payoff:
         """Equation 1 of this persona."""
@@ -233,8 +224,12 @@ class Persona(Document):
     @property
     def habits(self) -> Habits:
         """How this person attends to the road."""
-        given, sight = self.attention, self.perception
+        perception = self.perception
         return Habits(
-            Attention(given.mean_attentive_s, given.lapse_s, given.crown_rad, given.bumps_rad) if given else None,
-            Overlooking(sight.overlooks_share, sight.overlooked_up_to_m) if sight else Overlooking(),
+            self.attention.attention if self.attention else None,
+            perception.overlooking if perception else Habits.overlooking,
+            perception.missing if perception else NOBODY,
+            self.reaction.reaction if self.reaction else AT_ONCE,
+            perception.sight if perception else EXACT,
+            self.actuators.uses if self.actuators else ALL,
         )

@@ -64,6 +64,8 @@ def file_of(document: str) -> str:
 
 def unit_of(key: str) -> str:
     """The unit in a key's name, e.g. "m/s" of speed_mps; empty: it has none."""
+    if key.endswith("_per_s"):
+        return "1/s"
     return UNITS.get(key.rpartition("_")[2], "") if "_" in key else ""
 
 

@@ -7,11 +7,12 @@ takes (NHTSA).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.limits import ALL, AT_ONCE, EXACT, NOBODY, Missing, Reaction, Sight, Uses
 
 
 @dataclass(frozen=True)
@@ -37,10 +38,19 @@ class Overlooking:
 
 @dataclass(frozen=True)
 class Habits:
-    """How a person attends: when attention lapses (None: never), and what is overlooked."""
+    """How a person attends: when attention lapses (None: never), who is overlooked or missed; and the body's limits."""
 
     attention: Attention | None = None
     overlooking: Overlooking = Overlooking()
+    missing: Missing = NOBODY
+    reaction: Reaction = AT_ONCE
+    sight: Sight = EXACT
+    uses: Uses = ALL
+
+    @property
+    def with_open_eyes(self) -> Habits:
+        """The same person who overlooks and misses nobody."""
+        return replace(self, overlooking=Overlooking(), missing=Missing())
 
 
 @dataclass(frozen=True)
@@ -54,6 +64,13 @@ class Lapses:
     def none(cls, steps: int) -> Lapses:
         """Attention all the time."""
         return cls(np.zeros(steps, dtype=bool), np.zeros(steps))
+
+    def until_hands_obey(self, delay_steps: int) -> Lapses:
+        """The same lapses, each with the steps that the first decision after it takes to reach pedals and wheel."""
+        steps = np.arange(len(self.lapsed))
+        last = np.maximum.accumulate(np.where(self.lapsed, steps, -1 - len(steps)))
+        let_go = steps - last <= delay_steps
+        return Lapses(let_go, np.where(let_go, self.steering_rad[np.maximum(last, 0)], 0.0))
 
 
 def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.random.Generator) -> Lapses:

@@ -3,6 +3,9 @@
 Only what a person behind the wheel could see: nobody's intentions, persona, payoff or plan. Every entry is scaled
 to [-1, 1]; `LAYOUT` names them in order and is written beside every policy.
 
+Who misjudges distances sees others so much farther away or nearer, in the direction they are in; who misjudges closing
+speeds sees them come nearer or move away as well (`game.limits`).
+
 The free width at a distance ahead reaches to the nearest surface on either side, rail or vehicle alike (the paper's
 ego "seeks to maintain a large distance between itself and nearby objects", section 4.3.2).
 """
@@ -74,7 +77,8 @@ def observe(q: Quantities) -> FloatArray:
     state, bodies, actuators = q.state, q.bodies, q.world.actuators
     return _view(
         *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
-        *(state.station_m, q.lateral_offset_m, state.present, state.overlooked_m),
+        *(state.station_m, q.lateral_offset_m, state.present),
+        (state.overlooked_m, state.sight_m, state.distance_error, state.closing_error_per_s),
         *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
         *(bodies.present, actuators.max_steering_rad, tuple(q.world.road.routes)),
     )
@@ -91,7 +95,7 @@ def _view(
     station_m: FloatArray,
     offset_m: FloatArray,
     present: BoolArray,
-    overlooked_m: FloatArray,
+    sight: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     body_x_m: FloatArray,
     body_y_m: FloatArray,
     body_heading_rad: FloatArray,
@@ -104,6 +108,7 @@ def _view(
 ) -> FloatArray:
     """All of it at once: in games that begin anew there is too little to look at for the price of several calls."""
     routes = Routes(*table)
+    overlooked_m, sight_m, distance_error, closing_error_per_s = sight
     bounded = np.zeros((*present.shape, SIZE), dtype=np.float32)
     view = np.empty(SIZE)
     bodies = body_present.shape[1]
@@ -134,9 +139,11 @@ def _view(
                 dx, dy = body_x_m[g, b] - x_m[g, p], body_y_m[g, b] - y_m[g, p]
                 ahead_m[b], left_m[b] = dx * cosine + dy * sine, dy * cosine - dx * sine
                 distance_m[b] = np.hypot(dx, dy)
-                seen[b] = body_present[g, b] and b != p and ahead_m[b] >= overlooked_m[g, p]
+                looked_at = ahead_m[b] >= overlooked_m[g, p] and distance_m[b] <= sight_m[g, p]
+                seen[b] = body_present[g, b] and b != p and looked_at
                 if seen[b]:
-                    pose = (body_x_m[g, b], body_y_m[g, b], body_heading_rad[g, b])
+                    off = distance_error[g, p]
+                    pose = (body_x_m[g, b] + off * dx, body_y_m[g, b] + off * dy, body_heading_rad[g, b])
                     room = along_route(row, station, offset, p, routes, *pose, body_length_m[g, b], body_width_m[g, b])
                     _narrow(view, *room)
             for k in range(_COUNT):
@@ -151,10 +158,12 @@ def _view(
                 turned, speed = body_heading_rad[g, nearest] - heading, body_speed_mps[g, nearest]
                 entry = view[_FIRST_OTHER + k * _ENTRIES :]
                 entry[0] = 1.0
-                entry[1] = ahead_m[nearest] / _AHEAD_M
-                entry[2] = left_m[nearest] / _SIDE_M
-                entry[3] = (speed * np.cos(turned) - speed_mps[g, p]) / _CLOSING_MPS
-                entry[4] = speed * np.sin(turned) / _CROSSING_MPS
+                off, closing = distance_error[g, p], closing_error_per_s[g, p]
+                ahead, left = ahead_m[nearest], left_m[nearest]
+                entry[1] = (ahead + off * ahead) / _AHEAD_M
+                entry[2] = (left + off * left) / _SIDE_M
+                entry[3] = (speed * np.cos(turned) - speed_mps[g, p] + closing * ahead) / _CLOSING_MPS
+                entry[4] = (speed * np.sin(turned) + closing * left) / _CROSSING_MPS
                 entry[5] = np.sin(turned)
                 entry[6] = np.cos(turned)
             for k in range(SIZE):

@@ -31,6 +31,7 @@ FUZZY_QUANTITIES: Mapping[str, str] = {
     "time_gap_s": "time gap to the vehicle ahead",
     "clearance_m": "distance to the nearest surface, rail or vehicle",
     "lane_offset_m": "distance from the centre of the nearest lane",
+    "lane_end_m": "distance until the lane the car is in ends; infinite if it goes on",
     "goal_m": "distance to the goal, along the route",
 }
 """The quantities that a fuzzy term can be a function of, in words."""

@@ -16,7 +16,20 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.attention import Attention, Habits, Lapses, draw_lapses, draw_overlooked_m
+from harness.game.limits import (
+    ALL,
+    AT_ONCE,
+    EXACT,
+    NO_LIMITS,
+    NOBODY,
+    Limits,
+    draw_delay_steps,
+    draw_misjudged,
+    draw_noticed_m,
+)
 from harness.game.seeding import generator_of, seed_of
+
+_UNLIMITED = (NOBODY, AT_ONCE, EXACT, ALL)  # the defaults themselves: compared at once
 
 
 @dataclass(frozen=True)
@@ -59,6 +72,7 @@ class Start:
     noise: FloatArray  # [P, T, 2] standard normal, for drivers whose decisions vary
     lapses: tuple[Lapses, ...]
     overlooked_m: FloatArray  # how far ahead of a player others must be to be seen by it
+    limits: tuple[Limits, ...]
     seed: int  # of the traffic SUMO drives
     member: tuple[int, ...]  # who of a player's drivers drives in this game
 
@@ -95,6 +109,10 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
         habits.append(chances.habits[player][member[player]])
         overlooked.append(draw_overlooked_m(habits[player].overlooking, chance))
     noise = chance.standard_normal((len(players), chances.steps, 2))
+    limits = [
+        NO_LIMITS if (of.missing, of.reaction, of.sight, of.uses) == _UNLIMITED else _limits(of, chances, p, *parts)
+        for p, of in enumerate(habits)
+    ]
     x, y, heading = np.array(poses).T
     return Start(
         x,
@@ -104,8 +122,9 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
         np.array(positions),
         np.array(present),
         noise,
-        tuple(_lapses(habits[p].attention, chances, p, *parts) for p in players),
+        tuple(_lapses(habits[p].attention, chances, p, limits[p].delay_steps, *parts) for p in players),
         np.array(overlooked),
+        tuple(limits),
         seed_of(*parts, "traffic") % 2**31,
         tuple(member),
     )
@@ -117,7 +136,23 @@ def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:
     return int(np.searchsorted(upper, generator_of(*parts, "member", player).random() * upper[-1], side="right"))
 
 
-def _lapses(attention: Attention | None, chances: Chances, player: int, *parts: str | int) -> Lapses:
+def _lapses(attention: Attention | None, chances: Chances, player: int, delay_steps: int, *parts: str | int) -> Lapses:
     if attention is None:
         return Lapses.none(chances.steps)
-    return draw_lapses(attention, chances.steps, chances.step_s, generator_of(*parts, "attention", player))
+    lapses = draw_lapses(attention, chances.steps, chances.step_s, generator_of(*parts, "attention", player))
+    return lapses.until_hands_obey(delay_steps) if delay_steps else lapses
+
+
+def _limits(habits: Habits, chances: Chances, player: int, *parts: str | int) -> Limits:
+    """Each limit from a generator of its own, which nobody needs who does not have it."""
+
+    def chance(of: str) -> np.random.Generator:
+        return generator_of(*parts, of, player)
+
+    sight, step_s = habits.sight, chances.step_s
+    delay_steps = draw_delay_steps(habits.reaction, step_s, chance("reaction")) if any(habits.reaction.delay_s) else 0
+    noticed_m = draw_noticed_m(habits.missing, chance("missing")) if habits.missing.share else np.inf
+    exact = sight.distance_error == sight.closing_error_per_s == 0.0
+    misjudged = None if exact else draw_misjudged(sight, chances.steps, step_s, chance("sight"))
+    uses = (habits.uses.throttle, habits.uses.braking, habits.uses.steering)
+    return Limits(delay_steps, min(sight.range_m, noticed_m), misjudged, uses)

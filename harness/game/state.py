@@ -52,6 +52,9 @@ class State:
     present: BoolArray  # takes part and has not left the scene
     lapsed: BoolArray  # attention is elsewhere in this step
     overlooked_m: FloatArray  # others are seen from this far ahead of the player on; -inf: all around
+    sight_m: FloatArray  # others are seen up to this far away
+    distance_error: FloatArray  # share by which others seem farther away (+) or nearer (-) than they are
+    closing_error_per_s: FloatArray  # what others seem to move away (+) or nearer (-), per distance
     step: IntArray  # [G]
 
     @classmethod
@@ -69,6 +72,9 @@ class State:
             present=np.zeros(shape, dtype=bool),
             lapsed=np.zeros(shape, dtype=bool),
             overlooked_m=np.full(shape, -np.inf),
+            sight_m=np.full(shape, np.inf),
+            distance_error=np.zeros(shape),
+            closing_error_per_s=np.zeros(shape),
             step=np.zeros(games, dtype=np.int64),
         )
 

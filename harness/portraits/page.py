@@ -10,7 +10,7 @@ from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.portraits.drives import DRIVE_S
 from harness.portraits.figures import drives_figure, function_figure
-from harness.portraits.portrait import FORMULA, Portrait, attends, decides, function_in_words, number, sees, wants
+from harness.portraits.portrait import FORMULA, Portrait, attends, body, decides, function_in_words, number, sees, wants
 
 
 def write_portrait(portrait: Portrait, file: Path) -> None:
@@ -45,7 +45,7 @@ def render_portrait(portrait: Portrait) -> str:
         terms=portrait.terms,
         wants=list(wants(portrait)),
         functions=functions,
-        attends=[*attends(portrait), *sees(portrait)],
+        attends=[*attends(portrait), *sees(portrait), *body(portrait)],
         drives_figure=lapses,
         decides=decides(portrait),
         number=number,

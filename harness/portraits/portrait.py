@@ -29,9 +29,13 @@ SHOWN = (
     *GROUPS,
     "attention",
     "perception",
+    "reaction",
+    "actuators",
     "decisions",
 )
 """The tables and keys of a persona that its portrait shows: all there are."""
+NEAR_M = 20.0
+"""A distance to picture errors at."""
 FORMULA = "payoff = α₀ · Σ safety + α₁ · Σ operational + α₂ · Σ human, added up over every step of the game"
 
 
@@ -147,7 +151,45 @@ def sees(portrait: Portrait) -> Iterator[str]:
         f"In {percent(overlooking.share)} of the drives, others whose centre {who} its own are not seen: in {count} of "
         f"the {len(portrait.drives)} drawn here."
     )
-    yield "While the person itself is trained, nobody is overlooked."
+
+
+def body(portrait: Portrait) -> Iterator[str]:
+    """How far and how exactly the person sees, how late its decisions count, how much of the car it uses."""
+    habits = portrait.persona.habits
+    sight, missing = habits.sight, habits.missing
+    if missing.share:
+        yield (
+            f"In {percent(missing.share)} of the drives it looks and fails to see: others are noticed within "
+            f"{missing.within_m:g} m only."
+        )
+    if math.isfinite(sight.range_m):
+        yield f"Others more than {sight.range_m:g} m away are never seen."
+    if sight.distance_error:
+        low, high = (math.exp(sign * sight.distance_error) for sign in (-1, 1))
+        yield f"Two thirds of the time, 10 m to another are taken for {10 * low:.3g} to {10 * high:.3g} m."
+    if sight.closing_error_per_s:
+        off_mps = NEAR_M * sight.closing_error_per_s
+        yield f"At {NEAR_M:g} m, closing speeds are off by {off_mps:.2g} m/s (standard deviation)."
+    if sight.distance_error or sight.closing_error_per_s:
+        yield f"What is misjudged stays so for {sight.error_s:g} s or so."
+    yield from _slowly(habits.reaction.delay_s, habits.attention is not None)
+    uses = habits.uses
+    shares = {"acceleration": uses.throttle, "braking": uses.braking, "steering": uses.steering}
+    if used := [f"{percent(share)} of its {name}" for name, share in shares.items() if share < 1.0]:
+        yield f"Of what the car can do it uses {', '.join(used)}."
+    if habits.missing.share or habits.overlooking.share:
+        yield "While the person itself is trained, nobody is overlooked or missed; all else is as in driving."
+
+
+def _slowly(delay_s: tuple[float, float], lapses: bool) -> Iterator[str]:
+    shortest, longest = delay_s
+    if longest == 0.0:
+        return
+    length = f"{shortest:g}" if shortest == longest else f"{shortest:g} to {longest:g}"
+    way_m = DRIFT_SPEED_MPS * longest
+    yield f"Decisions count {length} s later: at {DRIFT_SPEED_MPS * 3.6:.0f} km/h after up to {way_m:.2g} m."
+    if lapses:
+        yield "After a lapse the car is let go for as long again."
 
 
 def decides(portrait: Portrait) -> str:

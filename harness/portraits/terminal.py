@@ -12,7 +12,7 @@ from rich.text import Text
 
 from harness.portraits.drives import DRIVE_S
 from harness.portraits.plotting import area, axis, curve, stretches, ticks
-from harness.portraits.portrait import FORMULA, Portrait, attends, decides, function_in_words, number, sees, wants
+from harness.portraits.portrait import FORMULA, Portrait, attends, body, decides, function_in_words, number, sees, wants
 from harness.portraits.worth import Drawn
 
 ROWS, SET_ROWS = 10, 2
@@ -53,7 +53,7 @@ def show(portrait: Portrait, console: Console) -> None:
         say(function_in_words(function))
     say("")
     say("How this person attends", "bold")
-    for sentence in (*attends(portrait), *sees(portrait)):
+    for sentence in (*attends(portrait), *sees(portrait), *body(portrait)):
         say(sentence)
     if persona.habits.attention is not None:
         for line in _drives(portrait, columns, plain):
