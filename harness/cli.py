@@ -150,8 +150,8 @@ def report(run: RunPath) -> None:
     """Write the tables, replays and report.html of a run anew, from its folder alone."""
     from rich.console import Console
 
-    from harness.campaign_run import write_results
     from harness.run_folder import RunFolder
+    from harness.run_results import write_results
 
     console, folder = Console(), RunFolder(run)
     folder.manifest()

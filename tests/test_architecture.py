@@ -102,11 +102,14 @@ ALLOWED: dict[str, set[str]] = {
     "schema_files": {"errors", "files", "documents"},
     "persona_template": {"errors", "documents", "game", "plan"},
     "portraits": {"errors", "files", "documents", "game", "reports"},  # reports: the style of its figures and pages
+    "run_results": {
+        *("errors", "files", "documents", "traffic", "comparison", "tables", "summary", "rounds", "run_folder"),
+        *("reports", "replay", "trace_file", "recorded_games", "manoeuvre_file", "model_card", "pairings"),
+        *("populations", "search_columns", "theory"),
+    },
     "campaign_run": {
-        *("errors", "files", "documents", "traffic", "comparison", "tables", "preflight", "rounds", "run_folder"),
-        *("stages", "workers", "progress", "reports", "replay", "trace_file", "recorded_games"),
-        *("manoeuvre_file", "model_card", "versions", "conditions", "stage_keys", "plan", "pairings", "theory"),
-        *("populations", "summary", "search_columns"),
+        *("documents", "preflight", "plan", "rounds", "run_folder", "conditions", "stage_keys", "workers", "progress"),
+        *("reports", "run_results", "versions"),
     },
 }
 ALLOWED["cli_documents"] = set(ALLOWED)

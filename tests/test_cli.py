@@ -345,7 +345,7 @@ def test_main__a_full_disk_is_one_message(run_command: Callable[..., Said], monk
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", "/data/run/episodes.csv")
 
-    monkeypatch.setattr("harness.campaign_run.write_results", full)
+    monkeypatch.setattr("harness.run_results.write_results", full)
     said = run_command("report", learned_run())
     assert said.code == 1
     assert said.err.strip() == "/data/run/episodes.csv: No space left on device; what was done is kept"
@@ -357,7 +357,7 @@ def test_main__trouble_of_sumos_is_one_message(
     def refuse(*_: object) -> None:
         raise SimulationError("SUMO died")
 
-    monkeypatch.setattr("harness.campaign_run.write_results", refuse)
+    monkeypatch.setattr("harness.run_results.write_results", refuse)
     said = run_command("report", learned_run())
     assert (said.code, said.err.strip()) == (1, "SimulationError: SUMO died")
 
@@ -366,7 +366,7 @@ def test_main__a_bug_has_its_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
     def bug(*_: object) -> None:
         raise KeyError("a bug")
 
-    monkeypatch.setattr("harness.campaign_run.write_results", bug)
+    monkeypatch.setattr("harness.run_results.write_results", bug)
     monkeypatch.setattr("sys.argv", ["harness", "report", str(learned_run())])
     with pytest.raises(KeyError, match="a bug"):
         cli.main()

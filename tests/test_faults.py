@@ -31,12 +31,13 @@ from tiny import (
 
 from harness import campaign_run
 from harness.attempts import Attempt, Begin, Report
-from harness.campaign_run import Outcome, run_campaign
+from harness.campaign_run import run_campaign
 from harness.conditions import Conditions
 from harness.deaths import TRIES
 from harness.preflight import open_campaign
 from harness.rounds import Stage
 from harness.run_folder import RunFolder
+from harness.run_results import Outcome
 from harness.stages import carry_out
 from harness.tables import read_csv
 from harness.workers import Work, run_stages

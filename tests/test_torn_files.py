@@ -13,9 +13,9 @@ import pytest
 from rich.console import Console
 from tiny import harness, learned_run, tables
 
-from harness.campaign_run import write_results
 from harness.errors import UsageError
 from harness.run_folder import RunFolder
+from harness.run_results import write_results
 
 pytestmark = pytest.mark.slow
 

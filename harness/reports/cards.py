@@ -183,12 +183,15 @@ def _facts(persona: str, made: str | None, found: Results) -> list[tuple[str, Se
         seeds = f" (seed {', '.join(map(str, as_bad))})" if len(ordinary) > 1 else ""
         lines.append(f"That is no less often than against {persona}{seeds}: an ordinary driver does it too.")
     say("An ordinary SUMO driver in the persona's place", lines)
+    if drove := [row for row in found.drove if row["population"] == persona]:
+        say("Who drove, and how the ego fared", [_by_who(row, len(found.seeds) > 1) for row in drove])
     reaches = {
         seed: f"reaches its goal in {percent(row['non_ego_goal_rate'])} of {played(row)} games ({SURE}: "
         f"{interval(row['non_ego_goal_rate_low'], row['non_ego_goal_rate_high'])})."
         for seed, row in alone.items()
     }
-    say("The persona alone on the road", _by_seed(reaches))
+    if not drove:
+        say("The persona alone on the road", _by_seed(reaches))
     if made:
         unbroken = _counts(found.of(f"{made}_alone_{persona}"), f"the {made} ego")
         say(f"The {made} ego alone: is what worked unbroken?", unbroken)
@@ -198,6 +201,14 @@ def _facts(persona: str, made: str | None, found: Results) -> list[tuple[str, Se
             ["The naive ego fails alone as well: part of its failures are not the persona's doing."],
         )
     return facts
+
+
+def _by_who(row: Row, several: bool) -> str:
+    """How an ego fared against one of a population's people."""
+    seed = f", seed {row['seed']}" if several else ""
+    rate = f"{percent(row['failure_rate'])} of {played(row)} games"
+    sure = f"{SURE}: {interval(row['failure_rate_low'], row['failure_rate_high'])}"
+    return f"{row['persona']}, in {row['arm']}{seed}: the ego fails in {rate} ({sure})."
 
 
 def _test(row: Row) -> Test:

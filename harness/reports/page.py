@@ -68,6 +68,7 @@ def render_page(
     scene: SceneDrawing | None = None,
     manoeuvres: pd.DataFrame | None = None,
     game: GameFindings | None = None,
+    populations: pd.DataFrame | None = None,
     reconfiguration: pd.DataFrame | None = None,
 ) -> str:
     """The report as HTML. Equal input gives equal text.
@@ -82,7 +83,7 @@ def render_page(
     episodes, summary, comparisons, training = map(typed, (episodes, summary, comparisons, training))
     manoeuvres = typed(manoeuvres) if manoeuvres is not None else None
     searched = typed(pd.DataFrame(columns=list(RECONFIGURATION_COLUMNS)) if reconfiguration is None else reconfiguration)
-    found = results(manifest, episodes, summary, comparisons)
+    found = results(manifest, episodes, summary, comparisons, populations)
     named = (*manifest.get("personas", ()), *comparisons["persona"], *summary["persona"])
     personas = [name for name in dict.fromkeys(named) if name]
     stages = manifest.get("stages", {})

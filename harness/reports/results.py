@@ -28,6 +28,8 @@ class Results:
     significance: float | None
     planned: Collection[str]
     """Ids of the stages of the campaign, whether they are done or not."""
+    drove: Sequence[Row] = ()
+    """Rows of `populations`: each arm against a population by who drove."""
 
     def of(self, arm: str) -> dict[int, Row]:
         """The arm's rows by seed, where there are games that could be played."""
@@ -54,7 +56,11 @@ class Results:
 
 
 def results(
-    manifest: Mapping[str, Any], episodes: pd.DataFrame, summary: pd.DataFrame, comparisons: pd.DataFrame
+    manifest: Mapping[str, Any],
+    episodes: pd.DataFrame,
+    summary: pd.DataFrame,
+    comparisons: pd.DataFrame,
+    populations: pd.DataFrame | None = None,
 ) -> Results:
     """The frames, looked up by arm and seed."""
     good = episodes[~unplayed(episodes)]
@@ -66,6 +72,7 @@ def results(
         sorted({*manifest.get("seeds", ()), *summary["seed"].tolist(), *comparisons["seed"].tolist()}),
         manifest.get("campaign", {}).get("assessment", {}).get("significance"),
         manifest.get("stages", {}),
+        populations.to_dict("records") if populations is not None else (),
     )
 
 
