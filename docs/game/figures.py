@@ -1,0 +1,107 @@
+"""The figures of docs/game.md, from the tables of a run.
+
+    python docs/game/figures.py gaps reports/merge-seeds              # how much each player could still gain
+    python docs/game/figures.py failures reports/merge-arms-race      # every ego against every non-ego
+    python docs/game/figures.py strangers reports/merge-arms-race     # egos against people they never met
+
+Each prints a table in Markdown. They read gaps.csv, crossplay.csv and generalisation.csv of the folder named, or the
+file itself.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import pandas as pd
+import typer
+
+from harness.tables import read_csv
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
+Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, or one of its tables.")]
+
+
+def read(run: Path, table: str) -> pd.DataFrame:
+    """A table of a run."""
+    return read_csv(run if run.is_file() else run / f"{table}.csv")
+
+
+def gaps_table(found: pd.DataFrame) -> str:
+    """A row for each pair and player that could change; seed by seed in a cell."""
+    lines = [
+        "| pair, and who changes | seed | payoff → best response's | gap (95 %) | share | p (Holm) | the ego fails |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for row in found.sort_values(["persona", "round", "role", "seed"], kind="stable").to_dict("records"):
+        who = "ego" if row["role"] == "ego" else row["non_ego"]
+        interval = f"{row['gap']:+.2f} ({row['ci_low']:+.2f} to {row['ci_high']:+.2f})"
+        fails = f"{row['ego_failure_rate']:.0%} → {row['ego_failure_rate_best_response']:.0%}"
+        cells = (
+            f"`{row['ego']}` against `{row['non_ego']}`: {who}",
+            row["seed"],
+            f"{row['payoff']:.2f} → {row['payoff_best_response']:.2f}",
+            interval,
+            f"{row['gap_share']:+.1%}",
+            f"{row['p_holm']:.2g}",
+            fails,
+        )
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return "\n".join(lines)
+
+
+def failures_table(found: pd.DataFrame) -> str:
+    """Failure rates in percent: a row for each ego, a column for each non-ego; the mean over seeds."""
+    rates = found.groupby(["ego", "non_ego"], sort=False)["failure_rate"].mean().unstack()
+    egos, non_egos = found["ego"].unique(), found["non_ego"].unique()
+    lines = [f"| ego | {' | '.join(f'`{each}`' for each in non_egos)} |", "| --- |" + " ---: |" * len(non_egos)]
+    for ego in egos:
+        cells = [rates.loc[ego, non_ego] for non_ego in non_egos]
+        shown = ["–" if pd.isna(each) else f"{each:.0%}" for each in cells]
+        lines.append(f"| `{ego}` | {' | '.join(shown)} |")
+    return "\n".join(lines)
+
+
+def strangers_table(found: pd.DataFrame) -> str:
+    """A row for each ego and each person whom it never met."""
+    lines = [
+        "| ego | met | meets | fails (95 %) | the naive ego | share of it | p (Holm) |",
+        "| --- | --- | --- | --- | ---: | ---: | ---: |",
+    ]
+    for row in found.to_dict("records"):
+        share = "–" if pd.isna(row["share_of_naive"]) else f"{row['share_of_naive']:.2f}"
+        p = "–" if pd.isna(row["p_holm"]) else f"{row['p_holm']:.2g}"
+        rate = f"{row['failure_rate']:.0%} ({row['failure_rate_low']:.1%} to {row['failure_rate_high']:.1%})"
+        cells = (
+            f"`{row['ego']}`",
+            row["met"],
+            f"`{row['non_ego']}`",
+            rate,
+            f"{row['naive_failure_rate']:.0%}",
+            share,
+            p,
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines)
+
+
+@app.command()
+def gaps(run: Run) -> None:
+    """How much each player could still gain by changing its strategy alone."""
+    print(gaps_table(read(run, "gaps")))
+
+
+@app.command()
+def failures(run: Run) -> None:
+    """How often each ego fails against each non-ego."""
+    print(failures_table(read(run, "crossplay")))
+
+
+@app.command()
+def strangers(run: Run) -> None:
+    """How egos fare against people they never met."""
+    print(strangers_table(read(run, "generalisation")))
+
+
+if __name__ == "__main__":
+    app()
