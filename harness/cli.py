@@ -134,9 +134,12 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
             ranges = ", ".join(f"{key} from {low:g} to {high:g}" for key, low, high in opened.ego_driver.searched)
             round_2 = f"Round 2 searches it in {search.trials} trials of {search.games} games: {ranges}."
         say(plain(f"The ego: {ego}. {round_2}"))
-    how = f"{trainings} trainings of up to {opened.document.training.steps:,} steps"
+    responses = sum(isinstance(stage, TrainingStage) and bool(stage.responds_in) for stage in stages)
+    how = f"{trainings - responses} trainings of up to {opened.document.training.steps:,} steps"
     if opened.policies is not None:
         how = f"Players trained before, read from {opened.policies}: nothing is trained"
+    if opened.document.best_response is not None:
+        how += f", {responses} trainings of best responses of up to {opened.document.best_response.steps:,} steps"
     say(f"{how}, {arms} arms of {opened.document.assessment.episodes} episodes:")
     for stage in stages:
         kind = {TrainingStage: "train", AssessmentStage: "assess", ReconfigurationStage: "tune"}[type(stage)]

@@ -21,8 +21,20 @@ from dataclasses import dataclass
 
 from harness.documents.campaign import Campaign
 from harness.game.state import EGO, NON_EGO
+from harness.plan_searches import reconfigured
 from harness.responses import plan_responses, response_arms
-from harness.rounds import AssessmentStage, Drives, Gate, Stage, TrainingStage, arm_of, ego_of, learned, stage_id
+from harness.rounds import (
+    AssessmentStage,
+    Drives,
+    Gate,
+    Stage,
+    TrainingStage,
+    arm_of,
+    ego_of,
+    learned,
+    learns,
+    stage_id,
+)
 
 PAPER_ROUNDS = 2
 
@@ -58,10 +70,14 @@ class Exchange:
     """Those of the rounds after the paper's, and the best responses that may end the exchange before."""
 
 
-def exchange(campaign: Campaign, persona: str, seed: int) -> Exchange:
-    """All rounds of a persona. The stages of rounds 0 to 2 are `harness.rounds`'s."""
+def exchange(campaign: Campaign, persona: str, seed: int, tunable: bool = False) -> Exchange:
+    """All rounds of a persona. The stages of rounds 0 to 2 are `harness.rounds`'s, or for a given ego that is `tunable`
+    those of `harness.plan_searches`."""
     egos = [Strategy("naive", persona, 0, ego_of(campaign, seed))]
     non_egos = [Strategy(persona, persona, 1, learned(campaign, persona, seed, persona))]
+    if not learns(campaign):
+        tuned = Strategy(f"reconfigured_{persona}", persona, PAPER_ROUNDS, reconfigured(persona, seed))
+        return Exchange((*egos, tuned) if tunable else tuple(egos), tuple(non_egos), ())
     stages: list[Stage] = []
     gates: tuple[Gate, ...] = ()
     for round_ in range(PAPER_ROUNDS, campaign.rounds.count + 1):
@@ -119,5 +135,7 @@ def _round(
 
 def arm(ego: Strategy, non_ego: Strategy, seed: int) -> AssessmentStage:
     """The arm of two strategies."""
-    unless = max(ego.unless, non_ego.unless, key=len)  # a later round has the gates of the earlier ones
+    # of one exchange a later round has the gates of the earlier ones; of two, each has its own
+    one = ego.persona == non_ego.persona
+    unless = max(ego.unless, non_ego.unless, key=len) if one else (*ego.unless, *non_ego.unless)
     return AssessmentStage(arm_of(ego.name, non_ego.name), seed, non_ego.persona, ego.drives, non_ego.drives, unless)

@@ -33,21 +33,15 @@ def who_met(campaign: Campaign, personas: Sequence[str], done: Collection[str], 
     if all(each is None for each in asks) and campaign.rounds.count == type(campaign.rounds)().count:
         return None
     arms = [each for each in plan(campaign, personas, tunable) if isinstance(each, AssessmentStage) and each.id in done]
-    rounds = _rounds(campaign, personas)
+    exchanges = {persona: exchange(campaign, persona, 0, tunable) for persona in personas}
+    rounds = {each.name: each.round for found in exchanges.values() for each in (*found.egos, *found.non_egos)}
     return Met(
         [_pairing(arm) for arm in arms if is_pair(arm)],
         [response for arm in arms for response in _responses(arm, arms, rounds)],
         {ROBUST: campaign.retraining.against}
         | {f"{made}_{each.name}": list(each.shares) for made in _MADE for each in campaign.population}
-        | {f"reconfigured_{persona}": [persona] for persona in personas}
-        | {ego.name: [persona] for persona in personas for ego in exchange(campaign, persona, 0).egos if ego.round},
+        | {ego.name: [persona] for persona, found in exchanges.items() for ego in found.egos if ego.round},
     )
-
-
-def _rounds(campaign: Campaign, personas: Sequence[str]) -> dict[str, int]:
-    """The round of every strategy of every exchange."""
-    exchanges = [exchange(campaign, persona, 0) for persona in personas]
-    return {each.name: each.round for found in exchanges for each in (*found.egos, *found.non_egos)}
 
 
 def _name(drives: Drives, seed: int) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import PurePath
 
 from harness.documents.campaign import ROBUST, SUMO, Campaign
-from harness.exchange import Exchange, exchange
+from harness.exchange import Exchange, Strategy, arm, exchange
 from harness.plan_searches import plan_searches, reconfigured
 from harness.responses import is_pair, plan_responses
 from harness.rounds import (
@@ -32,58 +32,48 @@ def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> 
 
 
 def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int, tunable: bool) -> list[Stage]:
-    exchanges = {persona: exchange(campaign, persona, seed) for persona in personas}
+    exchanges = {persona: exchange(campaign, persona, seed, tunable) for persona in personas}
     stages = [*plan_rounds(campaign, personas, seed), *plan_robust(campaign, personas, seed)]
     stages += plan_searches(campaign, personas, seed) if tunable else []
     for each in exchanges.values():
         stages += each.stages
     if campaign.crossplay is not None:
-        stages += _everyone(campaign, exchanges, seed, tunable)
-    stages += _responses(campaign, exchanges, stages, tunable)
+        stages += _everyone(campaign, exchanges, seed)
+    stages += _responses(campaign, exchanges, stages)
     return list(dict.fromkeys(stages))
 
 
-def _responses(
-    campaign: Campaign, exchanges: dict[str, Exchange], stages: Iterable[Stage], tunable: bool
-) -> list[Stage]:
+def _responses(campaign: Campaign, exchanges: dict[str, Exchange], stages: Iterable[Stage]) -> list[Stage]:
     """Best responses in the last arm of every exchange, and in the arms that the campaign names."""
     if campaign.best_response is None:
         return []
-    last = [
-        arm_of(f"reconfigured_{persona}" if tunable else each.egos[-1].name, each.non_egos[-1].name)
-        for persona, each in exchanges.items()
-    ]
+    last = [arm_of(each.egos[-1].name, each.non_egos[-1].name) for each in exchanges.values()]
     arms = {stage.arm: stage for stage in stages if isinstance(stage, AssessmentStage)}
     named = dict.fromkeys((*last, *campaign.best_response.arms))
     pairs = [arms[name] for name in named if name in arms and is_pair(arms[name])]
     return [stage for pair in pairs for stage in plan_responses(campaign, pair)]
 
 
-def _everyone(campaign: Campaign, exchanges: dict[str, Exchange], seed: int, tunable: bool) -> list[Stage]:
+def _everyone(campaign: Campaign, exchanges: dict[str, Exchange], seed: int) -> list[Stage]:
     """The arms of every ego against every non-ego."""
-    assert campaign.crossplay is not None
-    egos = {ego.name: (ego.drives, ego.unless) for each in exchanges.values() for ego in each.egos}
-    if learns(campaign):
-        names = [f"retrained_{each.name}" for each in campaign.population]
-        names += [ROBUST] if campaign.retraining.against else []
-        egos |= {name: (learned(campaign, name, seed), ()) for name in names}
-    if tunable:
-        names = [*exchanges, *(each.name for each in campaign.population)]
-        egos |= {f"reconfigured_{name}": (reconfigured(name, seed), ()) for name in names}
-    egos |= {name: (drives, ()) for name, drives in other_egos(campaign).items()}
-    return [
-        AssessmentStage(
-            arm_of(name, non_ego.name),
-            seed,
-            non_ego.persona,
-            drives,
-            non_ego.drives,
-            max(unless, non_ego.unless, key=len) if non_ego.persona in name else (*unless, *non_ego.unless),
-        )
-        for name, (drives, unless) in egos.items()
-        for each in exchanges.values()
-        for non_ego in each.non_egos
-    ]
+    egos = {ego.name: ego for each in exchanges.values() for ego in each.egos}
+    for name, drives in _beside_exchanges(campaign, seed, bool(egos.keys() - {"naive"})).items():
+        egos[name] = Strategy(name, "", 0, drives)
+    non_egos = [non_ego for each in exchanges.values() for non_ego in each.non_egos]
+    return [arm(ego, non_ego, seed) for ego in egos.values() for non_ego in non_egos]
+
+
+def _beside_exchanges(campaign: Campaign, seed: int, has_round_2: bool) -> dict[str, Drives]:
+    """The egos of no one persona's exchange, by name: made against several, or brought along."""
+    egos: dict[str, Drives] = {}
+    for each in campaign.population if has_round_2 else ():
+        if learns(campaign):
+            egos[f"retrained_{each.name}"] = learned(campaign, f"retrained_{each.name}", seed)
+        else:
+            egos[f"reconfigured_{each.name}"] = reconfigured(each.name, seed)
+    if learns(campaign) and campaign.retraining.against:
+        egos[ROBUST] = learned(campaign, ROBUST, seed)
+    return egos | other_egos(campaign)
 
 
 def other_egos(campaign: Campaign) -> dict[str, Drives]:

@@ -61,7 +61,7 @@ ALLOWED: dict[str, set[str]] = {
     },
     "rounds": {"documents", "game", "comparison"},
     "responses": {"documents", "game", "rounds"},
-    "exchange": {"documents", "game", "rounds", "responses"},
+    "exchange": {"documents", "game", "rounds", "plan_searches", "responses"},
     "plan_searches": {"documents", "rounds"},
     "plan": {"documents", "rounds", "responses", "exchange", "plan_searches"},
     "plan_names": {"errors", "documents", "rounds", "responses", "plan"},

@@ -13,6 +13,7 @@ from tiny import CAREFUL, REPOSITORY, write_campaign, write_persona
 from harness.errors import UsageError
 from harness.game.state import EGO, NON_EGO
 from harness.pairings import who_met
+from harness.plan import plan
 from harness.policy_file import Policy, write_policy
 from harness.preflight import QUICK_RESPONSE_STEPS, open_campaign
 from harness.responses import arm_responded_in, response_arm, settings_of
@@ -210,6 +211,27 @@ def test_plan__everyone_meets_everyone(tmp_path: Path, both: list[str]) -> None:
     assert {(each.ego, each.non_ego) for each in met.pairings} == {(ego, other) for ego in egos for other in non_egos}
     assert met.personas_of["robust"] == ["anna"]
     assert met.personas_of["retrained_bert_round4"] == ["bert"]
+
+
+@pytest.mark.parametrize(
+    ("driver", "egos", "measured"),
+    [
+        ("sumo", {"naive", "adas"}, "naive_vs_anna"),
+        (str(REPOSITORY / "egos/adas.toml"), {"naive", "reconfigured_anna", "sumo"}, "reconfigured_vs_anna"),
+    ],
+)
+def test_plan__an_ego_that_is_given_meets_everyone_as_it_is_and_as_it_was_tuned(
+    driver: str, egos: set[str], measured: str, tmp_path: Path, anna: list[str]
+) -> None:
+    other = "sumo" if driver != "sumo" else str(REPOSITORY / "egos/adas.toml")
+    changes = {"ego": {"driver": driver, "persona": str(CAREFUL)}, "crossplay": {"egos": [other]}}
+    campaign = open_campaign(write_campaign(tmp_path, personas=anna, best_response=RESPONSE, **changes))
+    stages = {stage.id: stage for stage in plan(campaign.document, ["anna"], campaign.tunable)}
+    met = who_met(campaign.document, ["anna"], set(stages), campaign.tunable)
+    assert met is not None
+    assert {each.ego for each in met.pairings} == egos
+    assert {each.pair_arm for each in met.responses} == {measured}
+    assert {name for stage in stages.values() for name in stage.needs} <= set(stages)
 
 
 def test_plan__the_robust_ego_meets_those_it_never_met_as_well(tmp_path: Path, both: list[str]) -> None:
