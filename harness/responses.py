@@ -70,8 +70,12 @@ def arm_responded_in(name: str) -> str:
 
 
 def settings_of(campaign: Campaign, stage: TrainingStage) -> Training:
-    """How a stage learns: a best response has a budget of its own."""
-    if not stage.responds_in:
-        return campaign.training
-    assert campaign.best_response is not None
-    return campaign.training.model_copy(update={"steps": campaign.best_response.steps})
+    """How a stage learns: a best response has a budget of its own, and who meets several people has for each the
+    budget, and in each segment by which its curve is judged the games, of a training against that one alone."""
+    if stage.responds_in:
+        assert campaign.best_response is not None
+        return campaign.training.model_copy(update={"steps": campaign.best_response.steps})
+    met = len({each.persona for each in stage.opponent.everyone}) if stage.opponent is not None else 1
+    settings = campaign.training
+    more = {"steps": settings.steps * met, "segment_steps": settings.segment_steps * met}
+    return settings.model_copy(update=more) if met > 1 else settings

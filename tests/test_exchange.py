@@ -164,6 +164,26 @@ def test_settings__a_best_response_has_its_own_budget(tmp_path: Path, anna: list
     assert settings_of(quick, training(stages, "retrained_vs_anna_ego_response1")).steps == QUICK_RESPONSE_STEPS
 
 
+def test_settings__who_meets_several_people_has_the_budget_of_as_many_trainings(
+    tmp_path: Path, both: list[str]
+) -> None:
+    town = {"name": "town", "shares": {"anna": 1.0, "bert": 3.0}}
+    stages, _ = planned(
+        tmp_path,
+        personas=both,
+        population=[town],
+        retraining={"against": ["anna", "bert"]},
+        rounds={"count": 4, "against": "all"},
+    )
+    campaign = open_campaign(tmp_path / "tiny.toml").document
+    once = campaign.training
+    for name in ("robust", "retrained_town"):
+        settings = settings_of(campaign, training(stages, name))
+        assert (settings.steps, settings.segment_steps) == (2 * once.steps, 2 * once.segment_steps)
+    for name in ("naive", "anna", "retrained_anna", "retrained_anna_round4"):  # of one person's strategies it meets one
+        assert settings_of(campaign, training(stages, name)) == once
+
+
 @pytest.mark.parametrize("learner", [EGO, NON_EGO])
 @pytest.mark.parametrize("pair", ["naive_vs_anna", "retrained_vs_ego_response"])
 def test_responses__are_called_after_their_arm(pair: str, learner: int) -> None:

@@ -97,8 +97,8 @@ class Retraining(Document):
     """Begin from the naive ego's parameters, rather than from nothing."""
 
     against: list[Name] = Field([], max_length=50)
-    """Personas, by name, against all of whom one ego more is retrained, `robust`, in equal shares of its games. It
-    meets those of the campaign who are left out as well: drivers whom it never met."""
+    """Personas, by name, against all of whom one ego more is retrained, `robust`, in equal shares of its games and with
+    as many times the budget. It meets those of the campaign who are left out as well: drivers whom it never met."""
 
 
 class Population(Document):
