@@ -80,7 +80,9 @@ def exchange(campaign: Campaign, persona: str, seed: int, tunable: bool = False)
         return Exchange((*egos, tuned) if tunable else tuple(egos), tuple(non_egos), ())
     stages: list[Stage] = []
     gates: tuple[Gate, ...] = ()
-    for round_ in range(PAPER_ROUNDS, campaign.rounds.count + 1):
+    goes_on = not campaign.rounds.personas or persona in campaign.rounds.personas
+    last = campaign.rounds.count if goes_on else PAPER_ROUNDS
+    for round_ in range(PAPER_ROUNDS, last + 1):
         if round_ % 2 == 0:
             name = ego_name(persona, round_)
             egos.append(Strategy(name, persona, round_, learned(campaign, name, seed), gates))
@@ -89,7 +91,7 @@ def exchange(campaign: Campaign, persona: str, seed: int, tunable: bool = False)
             non_egos.append(Strategy(name, persona, round_, learned(campaign, name, seed, persona), gates))
         if round_ > PAPER_ROUNDS:
             stages += _round(campaign, persona, seed, round_, egos, non_egos)
-        if campaign.stops_early and round_ % 2 == 0 and round_ < campaign.rounds.count:
+        if campaign.stops_early and round_ % 2 == 0 and round_ < last:
             pair = arm_of(egos[-1].name, non_egos[-1].name)
             arm = AssessmentStage(pair, seed, persona, egos[-1].drives, non_egos[-1].drives, gates)
             stages += plan_responses(campaign, arm)

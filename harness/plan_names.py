@@ -29,9 +29,13 @@ def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable
                 wrong(f"population[{k}].shares", f"there is no persona {name!r}", nearest(name, personas))
         if each.name in personas or each.name in [other.name for other in document.population[:k]]:
             wrong(f"population[{k}].name", f"{each.name!r} is called something else too", "give it a name of its own")
-    for name in document.retraining.against:
-        if name not in personas:
-            wrong("retraining.against", f"there is no persona {name!r}", nearest(name, personas))
+    for key, names in (
+        ("retraining.against", document.retraining.against),
+        ("rounds.personas", document.rounds.personas),
+    ):
+        for name in names:
+            if name not in personas:
+                wrong(key, f"there is no persona {name!r}", nearest(name, personas))
     if len(set(document.retraining.against)) < len(document.retraining.against):
         wrong("retraining.against", "a persona stands twice", "name each once")
     _check_other_egos(document, wrong)

@@ -110,6 +110,15 @@ def test_plan__an_equilibrium_is_of_all_strategies_before_the_round(tmp_path: Pa
     assert {arm for row in opponent.weighed_by for arm in row} <= set(training(stages, "retrained_anna_round4").needs)
 
 
+def test_plan__an_exchange_may_go_on_with_some_people_only(tmp_path: Path, both: list[str]) -> None:
+    stages, _ = planned(tmp_path, personas=both, rounds={"count": 4, "personas": ["bert"]}, best_response=RESPONSE)
+    later = {name for name, stage in stages.items() if "_round" in name}
+    assert later
+    assert {stages[name].persona for name in later} == {"bert"}
+    assert not any(stage.unless for stage in stages.values() if stage.persona == "anna")
+    assert "retrained_vs_anna_ego_response-seed1" in stages  # what could still be gained is measured of both
+
+
 @pytest.mark.parametrize("against", ["latest", "all", "equilibrium"])
 def test_plan__what_a_stage_needs_stands_before_it(against: str, tmp_path: Path, both: list[str]) -> None:
     stages, _ = planned(
@@ -307,6 +316,7 @@ def test_who_met__knows_whose_response_an_arm_is(tmp_path: Path, anna: list[str]
         ({"population": [{"name": "town", "shares": {"anna": 1.0}}]}, "population[0].shares", "at least 2"),
         ({"retraining": {"against": ["bret"]}}, "retraining.against", "'bret'"),
         ({"retraining": {"against": ["anna", "anna"]}}, "retraining.against", "twice"),
+        ({"rounds": {"count": 4, "personas": ["bret"]}}, "rounds.personas", "'bret'"),
         ({"rounds": {"count": 1}}, "rounds.count", "greater than or equal to 2"),
         ({"rounds": {"count": 3, "stop_early": True}}, "rounds.stop_early", "best_response"),
         ({"best_response": {"arms": ["naive_vs_bret"]}}, "best_response.arms", "naive_vs_b"),

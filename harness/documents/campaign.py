@@ -115,6 +115,8 @@ class Rounds(Document):
 
     count: int = Field(2, ge=2, le=20)
     """The last round. In odd rounds the non-ego learns, in even rounds the ego; the paper ends after 2."""
+    personas: list[Name] = Field([], max_length=50)
+    """The personas, by name, whose exchange goes on after round 2. Left out: all."""
     against: Literal["latest", "all", "equilibrium"] = "latest"
     """Whom a player answers from round 3 on: the other player's latest strategy, all it has had so far in equal shares
     (fictitious play), or the equilibrium's mixture of them (policy-space response oracles)."""
