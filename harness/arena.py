@@ -88,7 +88,9 @@ class Arena:
         self.state = State.empty(games, players)
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
         self._member = np.zeros((games, players), dtype=np.int64)
-        self._noise = np.zeros((games, players, self.world.steps, 2))
+        drivers = [seat.driver for of_player in self.seats for seat in of_player if seat.driver is not None]
+        self._asks_drivers = any(driver.takes_over for driver in drivers)
+        self._noise = np.zeros((games, players, self.world.steps if self._asks_drivers else 0, 2))
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._limits = PlayersLimits(games, players, self.world.steps)
@@ -253,7 +255,8 @@ class Arena:
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
             self._limits.begin(game, player, start.limits[player], state)
-        self._noise[game] = start.noise
+        if self._asks_drivers:
+            self._noise[game] = start.noise
 
     def _look(self, games: IntArray) -> None:
         """Look again in games where somebody came or left."""

@@ -8,6 +8,7 @@ takes (NHTSA).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.r
     while time < steps * step_s:
         lasts = generator.uniform(*attention.lapse_s) * (1.0 - passed)
         turns = generator.normal(-attention.crown_rad, attention.bumps_rad)
-        first = max(int(np.ceil(time / step_s)), attentive_from)
+        first = max(ceil(time / step_s), attentive_from)
         end = first + max(round(lasts / step_s), 1)
         lapses.lapsed[first:end], lapses.steering_rad[first:end] = True, turns
         attentive_from = end + 1  # a glance at the road, or two lapses were one
