@@ -31,7 +31,7 @@ from harness.game.limits import PlayersLimits
 from harness.game.observation import SIZE, observe
 from harness.game.payoff import Payoff
 from harness.game.plausibility import check_observation, check_step, checked_decisions, slack_m
-from harness.game.quantities import Quantities
+from harness.game.quantities import Quantities, judge
 from harness.game.start import Start
 from harness.game.state import Bodies, Outcome, State
 from harness.traffic.opening import OpenScene
@@ -198,11 +198,9 @@ class Arena:
 
     def _judge(self, quantities: Quantities, drove: BoolArray) -> None:
         state = self.state
-        outcome = state.outcome
-        outcome[drove & (state.step[:, None] >= self.world.steps)] = Outcome.TIMEOUT
-        outcome[drove & (quantities.goal_m <= 0.0)] = Outcome.GOAL
-        outcome[drove & quantities.touches_rail & self._taken_over] = Outcome.RAIL
-        outcome[drove & quantities.touches_vehicle] = Outcome.COLLISION
+        clearances_m = (quantities.vehicle_clearance_m, quantities.rail_clearance_m)
+        time_is_up = state.step >= self.world.steps
+        judge(state.outcome, drove, self._taken_over, time_is_up, quantities.goal_m, *clearances_m)
 
     def _pay(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
         payoff = np.zeros(drove.shape)
