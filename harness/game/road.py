@@ -105,22 +105,29 @@ class Routes(NamedTuple):
         lanes = (self.lane_offset_m, self.lane_end_m)
         return Along(*_along(station_m, offset_m, self.speed_limit_mps, *lanes, self.first_row, self.last_row))
 
-    def find(self, player: int, x_m: float, y_m: float) -> float:
-        """Station of a player of which nothing is known but the point."""
-        first, last = self.first_row[player], self.last_row[player]
-        return (_nearestrow_at(x_m, y_m, self.x_m, self.y_m, first, last) - first) * SPACING_M - MARGIN_M
+    def find(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+        """[G, P] stations in the table nearest to players of whom nothing is known but the points [G, P]."""
+        return _find(x_m, y_m, self.x_m, self.y_m, self.first_row, self.last_row)
 
 
 @compiled
-def _nearestrow_at(
-    x_m: float, y_m: float, line_x_m: FloatArray, line_y_m: FloatArray, first_row: int, last_row: int
-) -> int:
-    nearest, nearest2 = first_row, np.inf
-    for row in range(first_row, last_row + 1):
-        away2 = (line_x_m[row] - x_m) ** 2 + (line_y_m[row] - y_m) ** 2
-        if away2 < nearest2:
-            nearest, nearest2 = row, away2
-    return nearest
+def _find(
+    x_m: FloatArray,
+    y_m: FloatArray,
+    line_x_m: FloatArray,
+    line_y_m: FloatArray,
+    first_row: IntArray,
+    last_row: IntArray,
+) -> FloatArray:
+    stations = np.empty(x_m.shape)
+    for g, p in np.ndindex(x_m.shape):
+        nearest, nearest2 = first_row[p], np.inf
+        for row in range(first_row[p], last_row[p] + 1):
+            away2 = (line_x_m[row] - x_m[g, p]) ** 2 + (line_y_m[row] - y_m[g, p]) ** 2
+            if away2 < nearest2:
+                nearest, nearest2 = row, away2
+        stations[g, p] = (nearest - first_row[p]) * SPACING_M - MARGIN_M
+    return stations
 
 
 @compiled

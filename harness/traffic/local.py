@@ -138,15 +138,15 @@ class LocalSimulation:
 
     def halt(self, game: int, player: int) -> None:
         """Whoever drove a player, from now on it stands where `step` says."""
+        if self._taken_over[player]:
+            return
         name = self._name(game, player)
         self._self_driven.pop(name, None)
         self._placed[name] = game * len(self._taken_over) + player
 
     def remove(self, game: int, player: int) -> None:
         """Take a player out of the traffic; where there is nobody else it stands there till the next game starts."""
-        if self._drives_nobody:
-            self.halt(game, player)
-        else:
+        if not self._drives_nobody:
             with self._asking(f"remove a player from game {game}"):
                 self._take_out(game, player)
 
