@@ -26,18 +26,20 @@ import numpy as np
 
 from harness.drivers.protocol import Driver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.attention import let_go
 from harness.game.bicycle import drive, requests
 from harness.game.limits import PlayersLimits
 from harness.game.observation import SIZE, observe
 from harness.game.payoff import Payoff
 from harness.game.plausibility import check_observation, check_step, checked_decisions, slack_m
-from harness.game.quantities import Quantities
+from harness.game.quantities import Quantities, judge
 from harness.game.start import Start
 from harness.game.state import Bodies, Outcome, State
 from harness.traffic.opening import OpenScene
 from harness.traffic.route_file import Departure
 from harness.traffic.simulation import NOTICED_M, Reading, open_simulation
 
+_RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # NumPy would ask the enumeration each time
 NEAREST = 16  # others that a game's bodies have room for
 
 
@@ -88,7 +90,9 @@ class Arena:
         self.state = State.empty(games, players)
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
         self._member = np.zeros((games, players), dtype=np.int64)
-        self._noise = np.zeros((games, players, self.world.steps, 2))
+        drivers = [seat.driver for of_player in self.seats for seat in of_player if seat.driver is not None]
+        self._asks_drivers = any(driver.takes_over for driver in drivers)
+        self._noise = np.zeros((games, players, self.world.steps if self._asks_drivers else 0, 2))
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._limits = PlayersLimits(games, players, self.world.steps)
@@ -105,10 +109,8 @@ class Arena:
             if self.reading is not None:
                 self.reading.present[game] = False
         games = np.array(sorted(starts), dtype=np.int64)
-        state = self.state
-        state.station_m[games], _ = self.world.road.routes.locate(
-            state.x_m[games], state.y_m[games], state.station_m[games]
-        )
+        routes, where = self.world.road.routes, (self.state.x_m[games], self.state.y_m[games])
+        self.state.station_m[games], _ = routes.locate(*where, routes.find(*where))
         for player, seats in enumerate(self.seats):
             for member, seat in enumerate(seats):
                 if seat.driver is not None:
@@ -134,7 +136,7 @@ class Arena:
         reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         self.reading = reading
         self._take_back(reading, drove)
-        quantities = Quantities(self.world, state, self._bodies(reading), *self._locate())
+        quantities = Quantities(self.world, state, self._bodies(state), *self._locate())
         state.step = state.step + 1
         if self._limits.misjudges:
             self._limits.look(state)
@@ -171,10 +173,8 @@ class Arena:
         acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
-        lapsed = self._lapsed[self._all_games, :, now] & drove
-        state.lapsed = lapsed
-        drifting = self._lapsed_steering_rad[self._all_games, :, now]
-        return np.where(lapsed, 0.0, acceleration), np.where(lapsed, drifting, steering)
+        state.lapsed = let_go(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
+        return acceleration, steering
 
     def _take_back(self, reading: Reading, drove: BoolArray) -> None:
         if reading.players is None:
@@ -196,11 +196,9 @@ class Arena:
 
     def _judge(self, quantities: Quantities, drove: BoolArray) -> None:
         state = self.state
-        outcome = state.outcome
-        outcome[drove & (state.step[:, None] >= self.world.steps)] = Outcome.TIMEOUT
-        outcome[drove & (quantities.goal_m <= 0.0)] = Outcome.GOAL
-        outcome[drove & quantities.touches_rail & self._taken_over] = Outcome.RAIL
-        outcome[drove & quantities.touches_vehicle] = Outcome.COLLISION
+        clearances_m = (quantities.vehicle_clearance_m, quantities.rail_clearance_m)
+        time_is_up = state.step >= self.world.steps
+        judge(state.outcome, drove, self._taken_over, time_is_up, quantities.goal_m, *clearances_m)
 
     def _pay(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
         payoff = np.zeros(drove.shape)
@@ -217,24 +215,25 @@ class Arena:
 
     def _settle(self, quantities: Quantities, drove: BoolArray) -> None:
         """Who reached the goal leaves, who crashed stands; then everyone looks."""
-        ended = drove & (self.state.outcome != Outcome.RUNNING)
+        outcome = self.state.outcome
+        ended = drove & (outcome != _RUNNING)
         if not ended.any():
             self.observation = observe(quantities)
             return
-        for game, player in np.argwhere(ended).tolist():
-            if self.state.outcome[game, player] == Outcome.GOAL:
+        for (game, player), how in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
+            if how == _GOAL:
                 self.simulation.remove(game, player)
             else:
                 self.simulation.halt(game, player)
         self.state = self.state.copy()  # `quantities` keeps what was true at the end of the step
         self._stop(ended)
         # Everyone is in the same place, though some are slower, or gone.
-        there = (self._bodies(self.reading), quantities.advanced_m, quantities.lateral_offset_m)
+        there = (self._bodies(self.state), quantities.advanced_m, quantities.lateral_offset_m)
         self.observation = observe(Quantities(self.world, self.state, *there))
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
-        state.present &= ~(ended & (state.outcome == Outcome.GOAL))
+        state.present &= ~(ended & (state.outcome == _GOAL))
         state.speed_mps[ended] = 0.0
         state.acceleration_mps2[ended] = 0.0
         state.lapsed[ended] = False
@@ -247,13 +246,13 @@ class Arena:
         state.speed_mps[game], state.present[game] = start.speed_mps, start.present
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
         state.overlooked_m[game], self._member[game] = start.overlooked_m, start.member
-        state.outcome[game], state.lapsed[game], state.step[game] = Outcome.RUNNING, False, 0
+        state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
         for player in range(len(self.seats)):
-            state.station_m[game, player] = self.world.road.routes.find(player, start.x_m[player], start.y_m[player])
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
             self._limits.begin(game, player, start.limits[player], state)
-        self._noise[game] = start.noise
+        if self._asks_drivers:
+            self._noise[game] = start.noise
 
     def _look(self, games: IntArray) -> None:
         """Look again in games where somebody came or left."""
@@ -262,17 +261,24 @@ class Arena:
 
     def quantities_of(self, games: IntArray) -> Quantities:
         """The quantities of some games [N], as they are now."""
-        state, bodies = self.state.of(games), self._bodies(self.reading).of(games)
+        state = self.state.of(games)
+        bodies = self._bodies(state, games)
         state.station_m, offset = self.world.road.routes.locate(state.x_m, state.y_m, state.station_m)
         return Quantities(self.world, state, bodies, np.zeros_like(offset), offset)
 
-    def _bodies(self, reading: Reading | None) -> Bodies:
-        """Players first, then the others nearest to them."""
-        state = self.state
-        motion = (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
-        players = Bodies(*motion, self._players_length, self._players_width, state.present.copy())
+    def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
+        """Players first, then the others nearest to them: in all games, or in some, of which the state is."""
+        reading, motion = self.reading, (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
+        players = Bodies(*motion, self._players_length[games], self._players_width[games], state.present.copy())
         if reading is None or not reading.present.size:
             return players
-        beside = (reading.x_m, reading.y_m, reading.heading_rad, reading.speed_mps)
-        others = Bodies(*beside, reading.length_m, reading.width_m, reading.present)
+        others = Bodies(
+            reading.x_m[games],
+            reading.y_m[games],
+            reading.heading_rad[games],
+            reading.speed_mps[games],
+            reading.length_m[games],
+            reading.width_m[games],
+            reading.present[games],
+        )
         return players.with_nearest(others, NEAREST, NOTICED_M)

@@ -83,7 +83,6 @@ def moment() -> Callable[..., Quantities]:
         for p, car in enumerate(players):
             for name, value in car.items():
                 getattr(state, name)[0, p] = value
-            state.station_m[0, p] = world.road.routes.find(p, car["x_m"], car["y_m"])
         usual = {"heading_rad": 0.0, "speed_mps": 10.0, "length_m": 4.6, "width_m": 1.8, "present": True}
         more = [{**usual, **other} for other in others]
 
@@ -99,8 +98,8 @@ def moment() -> Callable[..., Quantities]:
             column("width_m", world.width_m),
             column("present", state.present[0]),
         )
-        before = state.station_m
-        state.station_m, offset = world.road.routes.locate(state.x_m, state.y_m, before)
+        routes, where = world.road.routes, (state.x_m, state.y_m)
+        state.station_m, offset = routes.locate(*where, routes.find(*where))
         return Quantities(world, state, bodies, np.zeros((1, len(players))), offset)
 
     return make

@@ -166,15 +166,17 @@ def test_step__the_first_one_is_paid_the_way_it_went(straight: OpenScene, opened
 # --- how games end ----------------------------------------------------------------------------------------------------
 
 
-def test_goal__the_player_leaves_sumo_and_the_other_drives_on(straight: OpenScene, opened: Open) -> None:
-    arena = begun(opened(straight), placed(straight, (240, RIGHT_Y, 0, 10), (200, LEFT_Y, 0, 10)))
+@pytest.mark.parametrize("others", [False, True])
+def test_goal__the_player_leaves_and_the_other_drives_on(others: bool, tmp_path: Any, opened: Open) -> None:
+    road = build_scene(tmp_path, others=FLOW.format("road") if others else "")
+    arena = begun(opened(road), placed(road, (240, RIGHT_Y, 0, 10), (200, LEFT_Y, 0, 10)))
     for _ in range(10):
         step = arena.step(COAST)
     assert outcomes(arena) == ["goal", ""]
     assert step.quantities.state.present.all()
     assert arena.state.present[0].tolist() == [False, True]
     arena.step(COAST)
-    assert libsumo.vehicle.getIDList() == ("non_ego",)
+    assert ("ego" in libsumo.vehicle.getIDList()) is not others  # where SUMO drives nobody, nobody meets it there
     assert not arena.observation[0, 0].any()
     assert arena.observation[0, 1, LAYOUT.index("other0_seen")] == 0.0
 

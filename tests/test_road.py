@@ -99,8 +99,8 @@ def test_locate__follows_a_car_round_a_hairpin() -> None:
 
 def test_find__a_player_of_which_nothing_is_known() -> None:
     routes = Routes.of([straight(0.0), arc(20.0)])
-    assert routes.find(0, 33.3, 2.0) == pytest.approx(33.3, abs=SPACING_M / 2)
-    assert routes.find(1, *on_arc(20.0, 41.2, 1.0)) == pytest.approx(41.2, abs=SPACING_M / 2)
+    points = np.array([(33.3, 2.0), on_arc(20.0, 41.2, 1.0)])
+    assert routes.find(*points.T[:, None])[0] == pytest.approx([33.3, 41.2], abs=SPACING_M / 2)
 
 
 def test_rows__stay_within_a_players_own_route() -> None:

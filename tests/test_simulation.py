@@ -24,12 +24,19 @@ from harness.traffic.route_file import Departure
 from harness.traffic.simulation import Reading
 
 HARNESS, SUMO = True, False
+OTHERS = '<vehicle id="other" type="van" depart="0"><route edges="road"/></vehicle>'
 Open = Callable[..., LocalSimulation]
 
 
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
+
+
+@pytest.fixture(scope="module")
+def busy(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    """That road, with others on it: tests say which."""
+    return build_scene(tmp_path_factory.mktemp("scenes") / "busy", others=OTHERS)
 
 
 @pytest.fixture
@@ -79,10 +86,10 @@ def test_step__poses_given_are_the_poses_sumo_has(scene: OpenScene, opened: Open
             assert centre_in_sumo(name) == pytest.approx((x[0, k], y[0, k], heading[0, k]), abs=1e-3)
 
 
-def test_step__tiles_lie_beside_one_another_and_know_nothing_of_it(scene: OpenScene, opened: Open) -> None:
-    simulation = opened(games=3)
+def test_step__tiles_lie_beside_one_another_and_know_nothing_of_it(busy: OpenScene, opened: Open) -> None:
+    simulation = opened(games=3, on=busy)
     for game in range(3):
-        simulation.restart(game, placed(scene, (40, RIGHT_Y, 0, 10), None), [other("van")])
+        simulation.restart(game, placed(busy, (40, RIGHT_Y, 0, 10), None), [other("van")])
     poses = np.array([[50.0, 0.0], [60.0, 0.0], [70.0, 0.0]]), np.full((3, 2), RIGHT_Y), np.zeros((3, 2))
     reading = simulation.step(*poses)
     assert [round(libsumo.vehicle.getPosition(f"g{k}_ego")[0] - 2.3) for k in range(3)] == [50, 60, 70]
@@ -145,6 +152,41 @@ def test_restart__in_place_leaves_nothing_of_the_game_before(scene: OpenScene, o
         assert set(libsumo.vehicle.getIDList()) == expected
 
 
+def test_restart__where_sumo_drives_nobody_players_stay_in_the_traffic_and_begin_where_they_should(
+    scene: OpenScene, opened: Open
+) -> None:
+    simulation, generator = opened(games=2), np.random.default_rng(0)
+    far = placed(scene, (250, RIGHT_Y, 0, 10), (240, LEFT_Y, 0, 10))
+    simulation.restart(1, far, [])
+    for _ in range(30):
+        starts = [
+            placed(scene, (generator.uniform(30, 60), RIGHT_Y, 0, 10), (generator.uniform(30, 60), LEFT_Y, 0, 10)),
+            far,
+        ]
+        simulation.restart(0, starts[0], [])
+        for k in range(20):  # along the road, and off it
+            x, y, heading = (
+                np.array([getattr(start, name) for start in starts]) for name in ("x_m", "y_m", "heading_rad")
+            )
+            x[0], y[0], heading[0] = x[0] + 10 * k, y[0] + np.array([-0.2, 0.2]) * k, heading[0] + 0.01 * k
+            simulation.step(x, y, heading)
+            for name, player in (("g0_ego", 0), ("g0_non_ego", 1)):
+                expected = (x[0, player], y[0, player], heading[0, player])
+                assert centre_in_sumo(name) == pytest.approx(expected, abs=1e-3)
+        simulation.remove(0, 1)
+    assert set(libsumo.vehicle.getIDList()) == {"g0_ego", "g0_non_ego", "g1_ego", "g1_non_ego"}
+
+
+def test_restart__where_sumo_drives_nobody_who_takes_no_part_is_gone(scene: OpenScene, opened: Open) -> None:
+    simulation = opened()
+    both, alone = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), placed(scene, (90, LEFT_Y, 0, 10), None)
+    for start, expected in ((both, {"ego", "non_ego"}), (alone, {"ego"}), (both, {"ego", "non_ego"})):
+        simulation.restart(0, start, [])
+        for _ in range(5):
+            step(simulation, start)
+        assert set(libsumo.vehicle.getIDList()) == expected
+
+
 def test_remove__the_player_is_gone_and_the_other_goes_on(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10))
@@ -172,9 +214,9 @@ def test_halt__a_player_that_sumo_drove_stands_where_it_is_told(scene: OpenScene
 # --- others -----------------------------------------------------------------------------------------------------------
 
 
-def test_others__depart_when_they_are_due_and_are_seen_once_they_are_in(scene: OpenScene, opened: Open) -> None:
-    simulation = opened()
-    start = placed(scene, (40, LEFT_Y, 0, 0), None)
+def test_others__depart_when_they_are_due_and_are_seen_once_they_are_in(busy: OpenScene, opened: Open) -> None:
+    simulation = opened(on=busy)
+    start = placed(busy, (40, LEFT_Y, 0, 0), None)
     simulation.restart(0, start, [other("early"), other("late", 0.3, "0", "50")])
     names, present = zip(
         *((r.names[0], r.present[0].tolist()) for r in (step(simulation, start) for _ in range(5))), strict=True
@@ -183,9 +225,9 @@ def test_others__depart_when_they_are_due_and_are_seen_once_they_are_in(scene: O
     assert list(present) == [[True]] * 3 + [[True, True]] * 2
 
 
-def test_others__are_read_by_their_centre_with_their_size_and_type(scene: OpenScene, opened: Open) -> None:
-    simulation = opened()
-    start = placed(scene, (40, LEFT_Y, 0, 0), None)
+def test_others__are_read_by_their_centre_with_their_size_and_type(busy: OpenScene, opened: Open) -> None:
+    simulation = opened(on=busy)
+    start = placed(busy, (40, LEFT_Y, 0, 0), None)
     simulation.restart(0, start, [other("van")])
     reading = step(simulation, start)
     seen = [float(getattr(reading, name)[0, 0]) for name in ("x_m", "y_m", "heading_rad", "speed_mps")]
@@ -193,9 +235,9 @@ def test_others__are_read_by_their_centre_with_their_size_and_type(scene: OpenSc
     assert (reading.length_m[0, 0], reading.width_m[0, 0], reading.types) == (6.0, 2.0, [["van"]])
 
 
-def test_others__wait_while_a_player_stands_in_their_way(scene: OpenScene, opened: Open) -> None:
-    simulation = opened()
-    start = placed(scene, (4, RIGHT_Y, 0, 0), None)
+def test_others__wait_while_a_player_stands_in_their_way(busy: OpenScene, opened: Open) -> None:
+    simulation = opened(on=busy)
+    start = placed(busy, (4, RIGHT_Y, 0, 0), None)
     simulation.restart(0, start, [other("waiting", 0.2, "0", "base", "10")])
     readings = [step(simulation, start) for _ in range(10)]
     assert not any(reading.present.any() for reading in readings)
@@ -203,9 +245,9 @@ def test_others__wait_while_a_player_stands_in_their_way(scene: OpenScene, opene
     assert [step(simulation, away).present.any() for _ in range(3)][-1]
 
 
-def test_others__waiting_to_get_in_are_cleared_by_a_restart(scene: OpenScene, opened: Open) -> None:
-    simulation = opened()
-    start = placed(scene, (4, RIGHT_Y, 0, 0), None)
+def test_others__waiting_to_get_in_are_cleared_by_a_restart(busy: OpenScene, opened: Open) -> None:
+    simulation = opened(on=busy)
+    start = placed(busy, (4, RIGHT_Y, 0, 0), None)
     for _ in range(2):
         simulation.restart(0, start, [other("waiting", 0.0, "0", "base", "10")])
         for _ in range(3):
@@ -216,17 +258,17 @@ def test_others__waiting_to_get_in_are_cleared_by_a_restart(scene: OpenScene, op
     assert libsumo.vehicle.getIDList() == ("ego",)
 
 
-def test_others__leave_the_reading_when_they_arrive(scene: OpenScene, opened: Open) -> None:
-    simulation = opened()
-    start = placed(scene, (40, LEFT_Y, 0, 0), None)
+def test_others__leave_the_reading_when_they_arrive(busy: OpenScene, opened: Open) -> None:
+    simulation = opened(on=busy)
+    start = placed(busy, (40, LEFT_Y, 0, 0), None)
     simulation.restart(0, start, [other("gone", 0.0, "0", "298", "10"), other("stays")])
     assert [step(simulation, start).names[0] for _ in range(5)][-1] == ["stays"]
 
 
-def test_others__that_sumo_refuses_are_an_error_with_its_message(scene: OpenScene, opened: Open) -> None:
-    simulation = opened()
+def test_others__that_sumo_refuses_are_an_error_with_its_message(busy: OpenScene, opened: Open) -> None:
+    simulation = opened(on=busy)
     with pytest.raises(SimulationError, match=r"start game 0.*departLane.*wrong"):
-        simulation.restart(0, placed(scene, (40, LEFT_Y, 0, 0), None), [other("wrong", lane="7")])
+        simulation.restart(0, placed(busy, (40, LEFT_Y, 0, 0), None), [other("wrong", lane="7")])
 
 
 def test_reload__the_same_seed_brings_the_same_traffic(tmp_path: Path, opened: Open) -> None:

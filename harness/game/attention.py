@@ -8,10 +8,12 @@ takes (NHTSA).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import ceil
 
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray
+from harness.compiling import compiled
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.limits import ALL, AT_ONCE, EXACT, NOBODY, Missing, Reaction, Sight, Uses
 
 
@@ -88,13 +90,32 @@ def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.r
     while time < steps * step_s:
         lasts = generator.uniform(*attention.lapse_s) * (1.0 - passed)
         turns = generator.normal(-attention.crown_rad, attention.bumps_rad)
-        first = max(int(np.ceil(time / step_s)), attentive_from)
+        first = max(ceil(time / step_s), attentive_from)
         end = first + max(round(lasts / step_s), 1)
         lapses.lapsed[first:end], lapses.steering_rad[first:end] = True, turns
         attentive_from = end + 1  # a glance at the road, or two lapses were one
         time += lasts + generator.exponential(attention.mean_attentive_s)
         passed = 0.0
     return lapses
+
+
+@compiled
+def let_go(
+    acceleration_mps2: FloatArray,
+    steering_rad: FloatArray,
+    lapsed: BoolArray,
+    lapsed_steering_rad: FloatArray,
+    step: IntArray,
+    drove: BoolArray,
+) -> BoolArray:
+    """[G, P] whose attention is elsewhere in this step [G] of those who drove, by the lapses [G, P, T] of their games.
+    In place: they let go of the pedals, and the road turns the wheel."""
+    elsewhere = np.zeros(drove.shape, dtype=np.bool_)
+    for g, p in np.ndindex(drove.shape):
+        if drove[g, p] and lapsed[g, p, step[g]]:
+            elsewhere[g, p] = True
+            acceleration_mps2[g, p], steering_rad[g, p] = 0.0, lapsed_steering_rad[g, p, step[g]]
+    return elsewhere
 
 
 def draw_overlooked_m(overlooking: Overlooking, generator: np.random.Generator) -> float:

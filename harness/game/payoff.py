@@ -9,10 +9,11 @@ contact must be the worst of its distances).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -56,13 +57,13 @@ class Form(IntEnum):
 class Term:
     """A named term of equation 1.
 
-    `quantity` gives [G, P]. `per_second` terms are rates and are multiplied by the step length; the others are events,
-    counted in the step they happen.
+    `quantity` names the one of `Quantities` that it is made of, [G, P]. `per_second` terms are rates and are multiplied
+    by the step length; the others are events, counted in the step they happen.
     """
 
     group: str
     meaning: str
-    quantity: Callable[[Quantities], NDArray[Any]]
+    quantity: str
     form: Form
     per_second: bool = False
     parameter: str = ""
@@ -72,7 +73,7 @@ class Term:
 
 
 def _ended(group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
-    return Term(group, meaning, lambda q: q.state.outcome, form, outcome=outcome)
+    return Term(group, meaning, "state.outcome", form, outcome=outcome)
 
 
 TERMS: Mapping[str, Term] = {
@@ -81,7 +82,7 @@ TERMS: Mapping[str, Term] = {
     "clearance": Term(
         "safety",
         "nearness to the nearest surface, rail or vehicle",
-        lambda q: q.clearance_m,
+        "clearance_m",
         Form.BELOW,
         True,
         "within_m",
@@ -89,49 +90,43 @@ TERMS: Mapping[str, Term] = {
     "vehicle_clearance": Term(
         "safety",
         "nearness to the nearest vehicle",
-        lambda q: q.vehicle_clearance_m,
+        "vehicle_clearance_m",
         Form.BELOW,
         True,
         "within_m",
     ),
-    "time_gap": Term(
-        "safety", "following closer than a time gap", lambda q: q.time_gap_s, Form.BELOW, True, "within_s"
-    ),
+    "time_gap": Term("safety", "following closer than a time gap", "time_gap_s", Form.BELOW, True, "within_s"),
     "time_to_collision": Term(
         "safety",
         "being on a course to contact sooner than this",
-        lambda q: q.time_to_collision_s,
+        "time_to_collision_s",
         Form.BELOW,
         True,
         "within_s",
     ),
-    "speed_over_limit": Term(
-        "safety", "speed over the limit, as a share of it", lambda q: q.speed_over_limit, Form.OVER, True
-    ),
+    "speed_over_limit": Term("safety", "speed over the limit, as a share of it", "speed_over_limit", Form.OVER, True),
     "goal": _ended("operational", "reaching the goal, once", Form.GAINED, Outcome.GOAL),
     "timeout": _ended("operational", "not reaching the goal in time, once", Form.LOST, Outcome.TIMEOUT),
-    "progress": Term("operational", "way along the route, per 100 m", lambda q: q.advanced_m, Form.PER_100),
+    "progress": Term("operational", "way along the route, per 100 m", "advanced_m", Form.PER_100),
     "speed_under_limit": Term(
-        "operational", "speed under the limit, as a share of it", lambda q: q.speed_over_limit, Form.UNDER, True
+        "operational", "speed under the limit, as a share of it", "speed_over_limit", Form.UNDER, True
     ),
-    "lane_offset": Term(
-        "operational", "distance from the nearest lane's centre, m", lambda q: q.lane_offset_m, Form.LESS, True
-    ),
+    "lane_offset": Term("operational", "distance from the nearest lane's centre, m", "lane_offset_m", Form.LESS, True),
     "acceleration": Term(
         "operational",
         "squared acceleration or braking, as a share of 10 m/s2",
-        lambda q: q.state.acceleration_mps2,
+        "state.acceleration_mps2",
         Form.LESS_SQUARED,
         True,
     ),
     "lateral_acceleration": Term(
         "operational",
         "squared lateral acceleration, as a share of 10 m/s2",
-        lambda q: q.lateral_acceleration_mps2,
+        "lateral_acceleration_mps2",
         Form.LESS_SQUARED,
         True,
     ),
-    "time_pressure": Term("human", "every second on the way", lambda q: q.state.speed_mps, Form.ALWAYS, True),
+    "time_pressure": Term("human", "every second on the way", "state.speed_mps", Form.ALWAYS, True),
 }
 
 
@@ -154,50 +149,74 @@ class Payoff:
 
     def evaluate(self, q: Quantities, player: int) -> dict[str, FloatArray]:
         """Each term's share of the step's payoff, [G], weights applied; their sum is the payoff."""
-        return dict(zip((*(each.name for each in self.terms), *self.fuzzy), self._shares(q, player), strict=True))
+        shares, _ = self._weighed(q, player)
+        fuzzy = self._fuzzy_shares(q, player)
+        return dict(zip((*(each.name for each in self.terms), *self.fuzzy), (*shares, *fuzzy), strict=True))
 
     def total(self, q: Quantities, player: int) -> FloatArray:
         """[G] the step's payoff of one player."""
-        return _summed(self._shares(q, player))
+        _, total = self._weighed(q, player)
+        for share in self._fuzzy_shares(q, player):
+            total += share
+        return total
 
-    def _shares(self, q: Quantities, player: int) -> FloatArray:
-        """[T, G] the terms' shares, the fuzzy ones last."""
-        shares = np.empty((len(self.terms) + len(self.fuzzy), len(q.state.step)))
+    def _weighed(self, q: Quantities, player: int) -> tuple[FloatArray, FloatArray]:
+        """[T, G] the shares of the terms that are not fuzzy, and [G] their sum."""
+        values = np.empty((len(self._quantities), len(q.state.step)))
         for row, quantity in enumerate(self._quantities):
-            shares[row] = quantity(q)[:, player]
-        _weigh(shares, *self._weights, q.world.step_s)
-        for row, (weight, function) in enumerate(self.fuzzy.values(), len(self.terms)):
-            value = getattr(q, function.quantity)[:, player]
-            shares[row] = self.alpha["human"] * weight * q.world.step_s * function(value)
-        return shares
+            values[row] = quantity(q)[:, player]
+        return _weighed(values, *self._weights, q.world.step_s)
+
+    def _fuzzy_shares(self, q: Quantities, player: int) -> Iterator[FloatArray]:
+        """[G] the share of each fuzzy term."""
+        for weight, function in self.fuzzy.values():
+            yield self.alpha["human"] * weight * q.world.step_s * function(getattr(q, function.quantity)[:, player])
 
     @cached_property
     def _quantities(self) -> list[Callable[[Quantities], NDArray[Any]]]:
-        return [TERMS[each.name].quantity for each in self.terms]
+        """What the terms that are not fuzzy are made of, each once."""
+        return [attrgetter(name) for name in self._quantity_names]
 
     @cached_property
-    def _weights(self) -> tuple[IntArray, FloatArray, FloatArray, BoolArray]:
-        """Of each term that is not fuzzy: form, the form's parameter, weight with alpha, and whether it is a rate."""
+    def _quantity_names(self) -> list[str]:
+        return list(dict.fromkeys(TERMS[each.name].quantity for each in self.terms))
+
+    @cached_property
+    def _weights(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray, BoolArray]:
+        """Of each term that is not fuzzy: the row of its quantity, form, the form's parameter, weight with alpha, and
+        whether it is a rate."""
         terms = [TERMS[each.name] for each in self.terms]
         parameters = [
             float(term.outcome if each.parameter is None else each.parameter)
             for term, each in zip(terms, self.terms, strict=True)
         ]
         weights = [self.alpha[term.group] * each.weight for term, each in zip(terms, self.terms, strict=True)]
+        rows = np.array([self._quantity_names.index(term.quantity) for term in terms], dtype=np.int64)
         forms = np.array([int(term.form) for term in terms], dtype=np.int64)
         rates = np.array([term.per_second for term in terms], dtype=bool)
-        return forms, np.array(parameters, dtype=float), np.array(weights, dtype=float), rates
+        return rows, forms, np.array(parameters, dtype=float), np.array(weights, dtype=float), rates
 
 
 @compiled
-def _weigh(
-    values: FloatArray, form: IntArray, parameter: FloatArray, weight: FloatArray, per_second: BoolArray, step_s: float
-) -> None:
-    """Make terms' shares of the payoff of their quantities, in place: of the first rows of [T, G]."""
-    for row in range(len(form)):
-        scale = weight[row] * (step_s if per_second[row] else 1.0)
+def _weighed(
+    values: FloatArray,
+    row: IntArray,
+    form: IntArray,
+    parameter: FloatArray,
+    weight: FloatArray,
+    per_second: BoolArray,
+    step_s: float,
+) -> tuple[FloatArray, FloatArray]:
+    """[T, G] terms' shares of the payoff, made of their quantities' values [Q, G], and [G] their sum from the first
+    to the last."""
+    shares, total = np.empty((len(form), values.shape[1])), np.zeros(values.shape[1])
+    for term in range(len(form)):
+        scale = weight[term] * (step_s if per_second[term] else 1.0)
         for g in range(values.shape[1]):
-            values[row, g] = scale * _worth(values[row, g], form[row], parameter[row])
+            share = scale * _worth(values[row[term], g], form[term], parameter[term])
+            shares[term, g] = share
+            total[g] += share
+    return shares, total
 
 
 @compiled
@@ -219,13 +238,3 @@ def _worth(value: float, form: int, parameter: float) -> float:
     if form == Form.LOST:
         return -1.0 if value == parameter else -0.0
     return -1.0
-
-
-@compiled
-def _summed(shares: FloatArray) -> FloatArray:
-    """[G] sums over the rows of [T, G], from the first to the last."""
-    found = np.zeros(shares.shape[1])
-    for row in range(shares.shape[0]):
-        for g in range(shares.shape[1]):
-            found[g] += shares[row, g]
-    return found

@@ -15,8 +15,8 @@ from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Actuators, lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
-from harness.game.road import MARGIN_M, SPACING_M, Road, Routes, row_at
-from harness.game.state import Bodies, State
+from harness.game.road import MARGIN_M, SPACING_M, Along, Road, Routes, row_at
+from harness.game.state import Bodies, Outcome, State
 
 PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])  # where the way is looked at, from a player
 SIGHT_M = 60.0  # beyond it a body is not taken for a leader
@@ -71,14 +71,10 @@ class Quantities:
     # --- the way ahead -----------------------------------------------------------------------------------------
 
     @cached_property
-    def _rows(self) -> IntArray:
-        return self.world.road.routes.rows(self.state.station_m)
-
-    @cached_property
     def path_rows(self) -> IntArray:
         """[G, P, K] the rows of the table of routes at `PATH_M`."""
         routes = self.world.road.routes
-        return _path_rows(self._rows, routes.first_row, routes.last_row)
+        return _path_rows(routes.rows(self.state.station_m), routes.first_row, routes.last_row)
 
     @cached_property
     def path(self) -> Path:
@@ -90,27 +86,27 @@ class Quantities:
         return self.state.speed_mps
 
     @cached_property
+    def _along(self) -> Along:
+        return self.world.road.routes.along(self.state.station_m, self.lateral_offset_m)
+
+    @property
     def speed_limit_mps(self) -> FloatArray:
-        return self.world.road.routes.speed_limit_mps[self._rows]
+        return self._along.speed_limit_mps
 
     @cached_property
     def speed_over_limit(self) -> FloatArray:
         """Speed over the limit as a share of it; negative below."""
         return self.state.speed_mps / self.speed_limit_mps - 1.0
 
-    @cached_property
-    def _lane(self) -> tuple[FloatArray, FloatArray]:
-        return self.world.road.routes.nearest_lane(self._rows, self.lateral_offset_m)
-
-    @cached_property
+    @property
     def lane_offset_m(self) -> FloatArray:
         """Distance from the centre of the nearest lane."""
-        return self._lane[0]
+        return self._along.lane_offset_m
 
     @cached_property
     def lane_end_m(self) -> FloatArray:
         """Distance until the lane the player is in ends; inf if it goes on."""
-        return np.maximum(self._lane[1] - self.state.station_m, 0.0)
+        return np.maximum(self._along.lane_end_m - self.state.station_m, 0.0)
 
     @cached_property
     def goal_m(self) -> FloatArray:
@@ -166,7 +162,7 @@ class Quantities:
     @cached_property
     def vehicle_clearance_m(self) -> FloatArray:
         """Distance to the nearest other body; 0 where they touch, never over `REACH_M`."""
-        return distance_to_nearest_box(self._cars, self._boxes, self.visible, REACH_M)
+        return _vehicle_clearance_m(self._cars, self._boxes, self.state.present, self.bodies.present)
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
@@ -193,6 +189,30 @@ class Quantities:
 
 
 @compiled
+def judge(
+    outcome: IntArray,
+    drove: BoolArray,
+    taken_over: BoolArray,
+    time_is_up: BoolArray,
+    goal_m: FloatArray,
+    vehicle_clearance_m: FloatArray,
+    rail_clearance_m: FloatArray,
+) -> None:
+    """How the game of each player that drove [G, P] ended, if it did, in place: a contact counts before the goal, and
+    the goal before time [G]. Players that SUMO drives [P] touch no rail."""
+    for g, p in np.ndindex(outcome.shape):
+        if drove[g, p]:
+            if vehicle_clearance_m[g, p] <= 0.0:
+                outcome[g, p] = Outcome.COLLISION
+            elif rail_clearance_m[g, p] <= 0.0 and taken_over[p]:
+                outcome[g, p] = Outcome.RAIL
+            elif goal_m[g, p] <= 0.0:
+                outcome[g, p] = Outcome.GOAL
+            elif time_is_up[g]:
+                outcome[g, p] = Outcome.TIMEOUT
+
+
+@compiled
 def row_ahead(row: int, k: int, first_row: int, last_row: int) -> int:
     """The row of a route at `PATH_M[k]` from a row of it."""
     return min(max(row + _PATH_ROWS[k], first_row), last_row)
@@ -213,6 +233,11 @@ def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
     for g, p, b in np.ndindex(found.shape):
         found[g, p, b] = players[g, p] and bodies[g, b] and p != b
     return found
+
+
+@compiled
+def _vehicle_clearance_m(cars: Box, boxes: Box, players: BoolArray, bodies: BoolArray) -> FloatArray:
+    return distance_to_nearest_box(cars, boxes, _visible(players, bodies), REACH_M)
 
 
 @compiled

@@ -39,6 +39,14 @@ class Route:
     goal_m: float
 
 
+class Along(NamedTuple):
+    """What a route is like where a player is, [G, P]."""
+
+    speed_limit_mps: FloatArray
+    lane_offset_m: FloatArray  # distance to the centre of the nearest lane
+    lane_end_m: FloatArray  # station where that lane ends; inf if it goes on
+
+
 class Routes(NamedTuple):
     """The routes of all players in one table, so that a look-up serves them all: rows of player p begin at
     `first_row[p]`. Columns are as in `Route`."""
@@ -92,27 +100,34 @@ class Routes(NamedTuple):
         lines = (self.x_m, self.y_m, self.cos, self.sin, self.curvature_per_m)
         return _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
 
-    def nearest_lane(self, rows: IntArray, offset_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """[G, P] distance to the centre of the nearest lane, and the station where that lane ends, at rows of the
-        table and lateral offsets."""
-        return _nearest_lane(rows, offset_m, self.lane_offset_m, self.lane_end_m)
+    def along(self, station_m: FloatArray, offset_m: FloatArray) -> Along:
+        """What the players' routes are like where they are: at stations and lateral offsets [G, P]."""
+        lanes = (self.lane_offset_m, self.lane_end_m)
+        return Along(*_along(station_m, offset_m, self.speed_limit_mps, *lanes, self.first_row, self.last_row))
 
-    def find(self, player: int, x_m: float, y_m: float) -> float:
-        """Station of a player of which nothing is known but the point."""
-        first, last = self.first_row[player], self.last_row[player]
-        return (_nearestrow_at(x_m, y_m, self.x_m, self.y_m, first, last) - first) * SPACING_M - MARGIN_M
+    def find(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+        """[G, P] stations in the table nearest to players of whom nothing is known but the points [G, P]."""
+        return _find(x_m, y_m, self.x_m, self.y_m, self.first_row, self.last_row)
 
 
 @compiled
-def _nearestrow_at(
-    x_m: float, y_m: float, line_x_m: FloatArray, line_y_m: FloatArray, first_row: int, last_row: int
-) -> int:
-    nearest, nearest2 = first_row, np.inf
-    for row in range(first_row, last_row + 1):
-        away2 = (line_x_m[row] - x_m) ** 2 + (line_y_m[row] - y_m) ** 2
-        if away2 < nearest2:
-            nearest, nearest2 = row, away2
-    return nearest
+def _find(
+    x_m: FloatArray,
+    y_m: FloatArray,
+    line_x_m: FloatArray,
+    line_y_m: FloatArray,
+    first_row: IntArray,
+    last_row: IntArray,
+) -> FloatArray:
+    stations = np.empty(x_m.shape)
+    for g, p in np.ndindex(x_m.shape):
+        nearest, nearest2 = first_row[p], np.inf
+        for row in range(first_row[p], last_row[p] + 1):
+            away2 = (line_x_m[row] - x_m[g, p]) ** 2 + (line_y_m[row] - y_m[g, p]) ** 2
+            if away2 < nearest2:
+                nearest, nearest2 = row, away2
+        stations[g, p] = (nearest - first_row[p]) * SPACING_M - MARGIN_M
+    return stations
 
 
 @compiled
@@ -159,13 +174,21 @@ def _locate(
 
 
 @compiled
-def _nearest_lane(
-    rows: IntArray, offset_m: FloatArray, lane_offset_m: FloatArray, lane_end_m: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    nearest, ends = np.empty(offset_m.shape), np.empty(offset_m.shape)
+def _along(
+    station_m: FloatArray,
+    offset_m: FloatArray,
+    speed_limit_mps: FloatArray,
+    lane_offset_m: FloatArray,
+    lane_end_m: FloatArray,
+    first_row: IntArray,
+    last_row: IntArray,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    limit, nearest, ends = np.empty(offset_m.shape), np.empty(offset_m.shape), np.empty(offset_m.shape)
     for g, p in np.ndindex(offset_m.shape):
-        nearest[g, p], ends[g, p] = lane_at(rows[g, p], offset_m[g, p], lane_offset_m, lane_end_m)
-    return nearest, ends
+        row = row_at(station_m[g, p], first_row[p], last_row[p])
+        limit[g, p] = speed_limit_mps[row]
+        nearest[g, p], ends[g, p] = lane_at(row, offset_m[g, p], lane_offset_m, lane_end_m)
+    return limit, nearest, ends
 
 
 @compiled
@@ -218,7 +241,12 @@ class Rails:
 
     def distance_m(self, cars: Box, limit_m: float) -> FloatArray:
         """[G, P] distance of cars (places [G, P], sizes [P]) to the nearest rail; never over a limit within reach."""
-        return distance_to_nearest_segment(cars, self.segments, self.near(cars.x_m, cars.y_m), limit_m)
+        return _distance_m(cars, self.segments, self.origin_m, self.cells, limit_m)
+
+
+@compiled
+def _distance_m(cars: Box, segments: FloatArray, origin_m: FloatArray, cells: IntArray, limit_m: float) -> FloatArray:
+    return distance_to_nearest_segment(cars, segments, _cells_at(cars.x_m, cars.y_m, origin_m, cells), limit_m)
 
 
 @compiled

@@ -59,6 +59,18 @@ class Place:
         return self.line.tolist(), [0.0, *np.cumsum(lengths).tolist()]
 
 
+class Noise:
+    """Standard normal numbers, the last that a game's chance has, drawn when they are first asked for."""
+
+    def __init__(self, chance: np.random.Generator, shape: tuple[int, ...]) -> None:
+        self._chance, self._shape = chance, shape
+
+    @cached_property
+    def drawn(self) -> FloatArray:
+        """The numbers, of that shape."""
+        return self._chance.standard_normal(self._shape)
+
+
 @dataclass(frozen=True)
 class Start:
     """One game's start. Arrays are [P], or [P, T, ...] over its T steps."""
@@ -69,12 +81,17 @@ class Start:
     speed_mps: FloatArray
     position_m: FloatArray  # front bumper, along the start lane
     present: BoolArray
-    noise: FloatArray  # [P, T, 2] standard normal, for drivers whose decisions vary
+    variation: Noise
     lapses: tuple[Lapses, ...]
     overlooked_m: FloatArray  # how far ahead of a player others must be to be seen by it
     limits: tuple[Limits, ...]
     seed: int  # of the traffic SUMO drives
     member: tuple[int, ...]  # who of a player's drivers drives in this game
+
+    @property
+    def noise(self) -> FloatArray:
+        """[P, T, 2] standard normal, for drivers whose decisions vary."""
+        return self.variation.drawn
 
 
 @dataclass(frozen=True)
@@ -108,7 +125,6 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
         member.append(0 if len(shares) == 1 else draw_member(shares, player, *parts))
         habits.append(chances.habits[player][member[player]])
         overlooked.append(draw_overlooked_m(habits[player].overlooking, chance))
-    noise = chance.standard_normal((len(players), chances.steps, 2))
     limits = [
         NO_LIMITS if (of.missing, of.reaction, of.sight, of.uses) == _UNLIMITED else _limits(of, chances, p, *parts)
         for p, of in enumerate(habits)
@@ -121,7 +137,7 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
         np.array(speeds),
         np.array(positions),
         np.array(present),
-        noise,
+        Noise(chance, (len(players), chances.steps, 2)),
         tuple(_lapses(habits[p].attention, chances, p, limits[p].delay_steps, *parts) for p in players),
         np.array(overlooked),
         tuple(limits),

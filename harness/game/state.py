@@ -88,7 +88,7 @@ class State:
 
     def of(self, games: IntArray) -> State:
         """A copy of some games [N]."""
-        return State(**{name: array[games] for name, array in vars(self).items()})
+        return State(**{name: array.take(games, axis=0) for name, array in vars(self).items()})
 
 
 @dataclass
@@ -102,10 +102,6 @@ class Bodies:
     length_m: FloatArray
     width_m: FloatArray
     present: BoolArray
-
-    def of(self, games: IntArray) -> Bodies:
-        """A copy of some games [N]."""
-        return Bodies(**{name: array[games] for name, array in vars(self).items()})
 
     def with_nearest(self, others: Bodies, most: int, within_m: float) -> Bodies:
         """These, the players, and behind them so many of the others as are nearest to one of them, the nearest first;

@@ -3,6 +3,10 @@
 A player that the harness takes over is placed with moveToXY(keepRoute=2): exactly where the arena says, on the road
 or off it. A player left to SUMO is started here and its state read back. At this border headings become SUMO's
 compass angles, and the reference point moves from the body's centre to the front bumper.
+
+To take a car out of SUMO's traffic and add it anew costs as much as ten steps of it, and SUMO forgets the route of one
+that is only put back to its start. Where SUMO drives nobody there is nobody to whom that matters: players stay in the
+traffic from game to game.
 """
 
 from __future__ import annotations
@@ -31,6 +35,7 @@ from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
 _EXACTLY_THERE = 2  # moveToXY's keepRoute: the position as given, even off the road
 _LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
+_WITHIN_M, _WITHIN_NEAR_M = 100.0, 10.0  # where moveToXY looks for a lane: SUMO's default, and all that a car can be on
 _ANY_SPEED = 100.0  # a speed factor: SUMO would show the others no speed above the limit times this
 _FAILURES = (libsumo.TraCIException, libsumo.FatalTraCIError)
 
@@ -60,6 +65,7 @@ class LocalSimulation:
             raise SimulationError("this process has a libsumo simulation already")
         self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
         self._recorded = recorded
+        self._drives_nobody = all(self._taken_over) and not scene.has_others
         self._half_length = 0.5 * scene.world.length_m
         offset = tile_offset_m(scene.net_file, games)
         self._offsets = offset * np.arange(games)
@@ -69,8 +75,8 @@ class LocalSimulation:
         document = scene.document
         # Taken-over cars that leave a junction's lanes may kill SUMO 1.28 (SIGSEGV) if lane changes take time: they
         # do so only where there is somebody whom SUMO drives.
-        smoothly = not all(self._taken_over) or scene.has_others
-        lateral = ["--lanechange.duration", str(document.lane_change_duration_s if smoothly else 0.0)]
+        duration_s = 0.0 if self._drives_nobody else document.lane_change_duration_s
+        lateral = ["--lanechange.duration", str(duration_s)]
         if self._by_sublanes():
             lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO takes one of the two options
         self._options = [
@@ -121,23 +127,32 @@ class LocalSimulation:
         """Clear a game's tile and put its players at their start; others depart as time goes by."""
         tile = self._tiles[game]
         with self._asking(f"start game {game}"):
-            for player in list(tile.inside):
-                self.remove(game, player)
-            for player in np.flatnonzero(start.present).tolist():
-                self._add_player(game, player, start)
+            taking_part = np.flatnonzero(start.present).tolist()
+            staying = tile.inside.intersection(taking_part) if self._drives_nobody else set()
+            for player in tile.inside - staying:
+                self._take_out(game, player)
+            for player in taking_part:
+                if player not in staying:
+                    self._add_player(game, player, start)
             self._others.begin(game, departures)
 
     def halt(self, game: int, player: int) -> None:
         """Whoever drove a player, from now on it stands where `step` says."""
+        if self._taken_over[player]:
+            return
         name = self._name(game, player)
         self._self_driven.pop(name, None)
         self._placed[name] = game * len(self._taken_over) + player
 
     def remove(self, game: int, player: int) -> None:
-        """Take a player out of the traffic."""
+        """Take a player out of the traffic; where there is nobody else it stands there till the next game starts."""
+        if not self._drives_nobody:
+            with self._asking(f"remove a player from game {game}"):
+                self._take_out(game, player)
+
+    def _take_out(self, game: int, player: int) -> None:
         name = self._name(game, player)
-        with self._asking(f"remove a player from game {game}"):
-            libsumo.vehicle.remove(name)
+        libsumo.vehicle.remove(name)
         self._tiles[game].inside.discard(player)
         self._there[game, player] = False
         self._self_driven.pop(name, None)
@@ -148,10 +163,10 @@ class LocalSimulation:
         front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel().tolist()
         front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel().tolist()
         angle = compass_deg_of(heading_rad).ravel().tolist()
-        move = _libsumo.vehicle_moveToXY
+        move, within_m = _libsumo.vehicle_moveToXY, _WITHIN_NEAR_M if self._drives_nobody else _WITHIN_M
         with self._asking("step"):
             for name, k in self._placed.items():
-                move(name, "", -1, front_x[k], front_y[k], angle[k], _EXACTLY_THERE)
+                move(name, "", -1, front_x[k], front_y[k], angle[k], _EXACTLY_THERE, within_m)
             libsumo.simulationStep()
             self._others.advance()
             players = self._read_players()
