@@ -288,7 +288,8 @@ def test_train__a_payoff_that_is_no_number_stops_it_and_is_placed(
     def broken(q: Quantities) -> np.ndarray:
         return np.where(q.state.step[:, None] == 17, value, q.advanced_m)
 
-    monkeypatch.setitem(TERMS, "progress", replace(TERMS["progress"], quantity=broken))  # type: ignore[arg-type]
+    monkeypatch.setattr(Quantities, "broken", property(broken), raising=False)
+    monkeypatch.setitem(TERMS, "progress", replace(TERMS["progress"], quantity="broken"))  # type: ignore[index]
     with pytest.raises(FloatingPointError, match=r"payoff of ego is (nan|inf) in step 17 of game \d+, after \d+ steps"):
         in_one_go(alone, tmp_path)
     assert not (tmp_path / "checkpoint.safetensors").exists()
