@@ -132,6 +132,7 @@ GAME_MAY_IMPORT = {
     "itertools",
     "math",
     "numpy",
+    "operator",
     "typing",
 }
 FILE_ACCESS_CALLS = {

@@ -45,10 +45,10 @@ READS_OF_OTHER = ("getPosition", "getAngle", "getSpeed")
 LIBSUMO_CALLS_PER_RESTART = 0  # where SUMO drives nobody, players stay in the traffic from game to game
 LIBSUMO_CALLS_PER_RESTART_AMONG_OTHERS = 44  # of a game that is on: 8 for both players, out and in again, 6 an other
 FAR_READS_PER_OTHER = 0.2  # a step
-PYTHON_CALLS_PER_STEP = 120  # of all games together
+PYTHON_CALLS_PER_STEP = 112  # of all games together
 PYTHON_CALLS_PER_GAME = 0  # what each game adds: its placements are libsumo's own
 PYTHON_CALLS_PER_OTHER = 0.5
-PYTHON_CALLS_PER_RESTART = 120
+PYTHON_CALLS_PER_RESTART = 102
 BLOCKS_LEFT_BEHIND = 350  # by 500 steps: one that were left by each step would be 500; some 50 to 200 come and go
 
 FEW, MANY = 4, 16  # games
