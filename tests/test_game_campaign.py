@@ -16,7 +16,7 @@ from harness.casting import equilibrium_of
 from harness.rounds import Drives
 from harness.run_folder import RunFolder
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(700)]
 
 RESPONSE = {"steps": 1024, "starts": 2, "choice_episodes": 3}
 TABLES = ("episodes.csv", "gaps.csv", "crossplay.csv", "equilibria.csv", "generalisation.csv", "populations.csv")
@@ -81,7 +81,7 @@ def test_arms_race__the_same_bytes_when_some_of_it_is_done_again(tmp_path: Path)
     for name in names:
         shutil.rmtree(run / ".stages" / f"{name}-seed1")
     campaign = arms_race().with_suffix(".toml")
-    done = harness("campaign", campaign, "--out", run)
+    done = harness("campaign", campaign, "--out", run, timeout_s=600.0)
     assert done.returncode == 0, done.stdout + done.stderr
     assert {name: (run / name).read_bytes() for name in TABLES} == before
 

@@ -177,7 +177,7 @@ def finished(*options: object, **changes: Any) -> Path:
     """Run a campaign to its end: its run folder, beside its document."""
     campaign = write_campaign(_scratch(), **changes)
     run = campaign.with_suffix("")
-    done = harness("campaign", campaign, "--out", run, *options)
+    done = harness("campaign", campaign, "--out", run, *options, timeout_s=600.0)
     assert done.returncode == 0, done.stdout + done.stderr
     return run
 
