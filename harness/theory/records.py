@@ -25,7 +25,7 @@ class Pairing:
 @dataclass(frozen=True)
 class Response:
     """In `response_arm` the player of `role` of the pair in `pair_arm` is replaced by a best response: of several
-    trainings against the other player, who stays as they are, the best by games that are played for this choice alone."""
+    trainings against the other player, who stays as they are, the best by games played for this choice alone."""
 
     seed: int
     role: Role
