@@ -45,7 +45,8 @@ games = 8
 buffer = 512
 minibatch = 128
 network = [8]
-[retraining]
+clip = 0.1
+[non_ego_training]
 alone_share = 0.25
 [assessment]
 episodes = 4

@@ -98,7 +98,7 @@ CAMPAIGNS = [
     *no_numbers(CAMPAIGN, "episodes = 4", "assessment.episodes"),
     *no_numbers(CAMPAIGN, "significance = 0.01", "assessment.significance"),
     *no_numbers(CAMPAIGN, "learning_rate = 1e-4", "training.learning_rate"),
-    *no_numbers(CAMPAIGN, "alone_share = 0.25", "retraining.alone_share"),
+    *no_numbers(CAMPAIGN, "alone_share = 0.25", "non_ego_training.alone_share"),
     *(Bad(f"tiny.toml: named {way}", edit(CAMPAIGN, '"tiny"', f'"{name}"'), ("tiny.toml: name",)) for way, name in ODD_NAMES.items()),
     *odd_paths("scene", '"../networks/road"'),
     *odd_paths("personas[0]", '["../personas/anna.toml"]', "[", "]"),
@@ -132,7 +132,7 @@ CAMPAIGNS = [
     Bad("tiny.toml: a persona for a scene", edit(CAMPAIGN, "../networks/road", "../personas/anna.toml"), ("anna.toml",)),
     Bad("tiny.toml: a scene for a persona", edit(CAMPAIGN, "../personas/anna.toml", "../networks/road"), ("road", "is a folder")),
     Bad("tiny.toml: a scene for a policy", edit(CAMPAIGN, "../policies/mine", "../networks/road"), ("policy.json", "there is no such file")),
-    Bad("tiny.toml: no policies where they should be", several(edit(CAMPAIGN, "seeds = [1]", 'seeds = [1]\npolicies = "../policis"'), edit(CAMPAIGN, "[training]\nsteps = 2048\nlearning_rate = 1e-4\ngames = 8\nbuffer = 512\nminibatch = 128\nnetwork = [8]\n[retraining]\nalone_share = 0.25\n", "")), ("tiny.toml: policies", "'policies'")),
+    Bad("tiny.toml: no policies where they should be", several(edit(CAMPAIGN, "seeds = [1]", 'seeds = [1]\npolicies = "../policis"'), edit(CAMPAIGN, "[training]\nsteps = 2048\nlearning_rate = 1e-4\ngames = 8\nbuffer = 512\nminibatch = 128\nnetwork = [8]\nclip = 0.1\n[non_ego_training]\nalone_share = 0.25\n", "")), ("tiny.toml: policies", "'policies'")),
 ]
 
 # --- personas ---------------------------------------------------------------------------------------------------------

@@ -128,4 +128,4 @@ def test_installed__the_command_checks_it_and_a_campaign_takes_it(tmp_path: Path
     )
     checked = harness("check", campaign, env=environment)
     assert checked.returncode == 0, checked.stdout + checked.stderr
-    assert "There is nothing to train in it: rounds 0 and 1." in checked.stdout
+    assert "There is nothing to train or to tune in it: rounds 0 and 1." in checked.stdout
