@@ -62,7 +62,9 @@ def test_open_campaign__quick_is_the_same_with_fewer_steps(repository: Path, tmp
     training = quick.training.model_copy(
         update={"steps": full.training.steps, "segment_steps": full.training.segment_steps}
     )
-    assert quick.model_copy(update={"training": training}) == full
+    assert quick.reconfiguration.trials < full.reconfiguration.trials
+    search = quick.reconfiguration.model_copy(update={"trials": full.reconfiguration.trials})
+    assert quick.model_copy(update={"training": training, "reconfiguration": search}) == full
     tiny = open_campaign(write_campaign(tmp_path), quick=True).document
     assert tiny.training.steps == 2048  # never more than was asked for
 
