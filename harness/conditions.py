@@ -32,6 +32,11 @@ class Conditions:
         """A persona of the campaign; the ego's own for the empty name."""
         return self.personas[name] if name else self.ego_persona
 
+    def persona_met(self, name: str) -> Persona:
+        """Of whom a player meets by this name in a training or a search; the ego's own for nobody, and for a
+        population, whose people have each their own."""
+        return self.persona(name if name in self.personas else "")
+
     def given(self, name: str) -> GivenDriver:
         """A driver that the campaign names: its ego, or another one by name."""
         driver = self.other_egos[name] if name else self.ego_driver

@@ -92,16 +92,10 @@ def exchange(campaign: Campaign, persona: str, seed: int, tunable: bool = False)
         if round_ > PAPER_ROUNDS:
             stages += _round(campaign, persona, seed, round_, egos, non_egos)
         if campaign.stops_early and round_ % 2 == 0 and round_ < last:
-            pair = arm_of(egos[-1].name, non_egos[-1].name)
-            arm = AssessmentStage(pair, seed, persona, egos[-1].drives, non_egos[-1].drives, gates)
-            stages += plan_responses(campaign, arm)
-            gates = (*gates, gate_of(pair, seed))
+            pair = arm(egos[-1], non_egos[-1], seed)
+            stages += plan_responses(campaign, pair)
+            gates = (*gates, Gate(pair.id, *response_arms(pair.arm, seed)))
     return Exchange(tuple(egos), tuple(non_egos), tuple(stages))
-
-
-def gate_of(pair: str, seed: int) -> Gate:
-    """The gate after an arm."""
-    return Gate(stage_id(pair, seed), *response_arms(pair, seed))
 
 
 def _round(
@@ -128,10 +122,8 @@ def _round(
     training = (name, seed, persona, learner, opponent, initial, how.alone_share, attentive)
     stages.append(TrainingStage(*training, unless=unless))
     stages.append(arm(egos[-1], non_egos[-1], seed))
-    if learner == EGO:
-        stages.append(AssessmentStage(f"{name}_alone", seed, persona, latest.drives, None, unless))
-    else:
-        stages.append(AssessmentStage(f"{name}_alone", seed, persona, None, latest.drives, unless))
+    ego, non_ego = (latest.drives, None) if learner == EGO else (None, latest.drives)
+    stages.append(AssessmentStage(f"{name}_alone", seed, persona, ego, non_ego, unless))
     return stages
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from harness.documents.campaign import ROBUST, Campaign
-from harness.exchange import exchange
+from harness.exchange import PAPER_ROUNDS, exchange
 from harness.game.state import ROLES
 from harness.plan import plan
 from harness.responses import arm_responded_in, is_pair
@@ -30,7 +30,7 @@ def who_met(campaign: Campaign, personas: Sequence[str], done: Collection[str], 
     """What of a campaign is a game between strategies, among the stages that are done; None where it plays the paper's
     rounds and nothing more. `tunable` as in `plan`."""
     asks = (campaign.crossplay, campaign.best_response, campaign.retraining.against or None)
-    if all(each is None for each in asks) and campaign.rounds.count == type(campaign.rounds)().count:
+    if all(each is None for each in asks) and campaign.rounds.count == PAPER_ROUNDS:
         return None
     arms = [each for each in plan(campaign, personas, tunable) if isinstance(each, AssessmentStage) and each.id in done]
     exchanges = {persona: exchange(campaign, persona, 0, tunable) for persona in personas}

@@ -70,12 +70,13 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
     searched = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
     summary = summarise(episodes)
-    asked = questions_of(manifest)
+    campaign = _campaign(manifest)
+    asked = _questions(campaign, manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
-    game = game_of(manifest, episodes)
+    game = _game(campaign, manifest, episodes)
     tables |= vars(game) if game is not None else {}
-    if (campaign := _campaign(manifest)).population:
+    if campaign.population:
         tables["populations"] = by_who_drove(campaign, episodes)
     tables |= {"reconfiguration": searched} if is_tuned(manifest) else {}
     scene = open_scene(folder.scene)
@@ -90,18 +91,16 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     with console.status("writing the report"):
         games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
         page = render_page(
-            *(
-                manifest,
-                episodes,
-                summary,
-                comparisons,
-                training,
-                replays,
-                games,
-                scene_drawing(scene),
-                manoeuvres,
-                game,
-            ),
+            manifest,
+            episodes,
+            summary,
+            comparisons,
+            training,
+            replays,
+            games,
+            scene_drawing(scene),
+            manoeuvres,
+            game,
             populations=tables.get("populations"),
             reconfiguration=searched,
         )
@@ -109,7 +108,7 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     warn(mixed_versions(manifest["stages"]), console)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] not in FINISHED)
     found = results(manifest, episodes, summary, comparisons)
-    met = [*manifest["personas"], *(each.name for each in _campaign(manifest).population)]
+    met = [*manifest["personas"], *(each.name for each in campaign.population)]
     verdicts = [(persona, found.verdicts(each, persona)) for persona in met for each in ARMS]
     verdicts += gap_verdicts(game.gaps) if game is not None else []
     return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))
@@ -121,19 +120,18 @@ def warn(sentences: Sequence[str], console: Console) -> None:
         console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)
 
 
-def questions_of(manifest: Mapping[str, Any]) -> list[Question]:
+def _questions(campaign: Campaign, manifest: Mapping[str, Any]) -> list[Question]:
     """The questions that the finished arms of a run can answer."""
     done = _done(manifest)
     return [
         question
-        for question in questions(_campaign(manifest), manifest["personas"], is_tuned(manifest))
+        for question in questions(campaign, manifest["personas"], is_tuned(manifest))
         if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= done
     ]
 
 
-def game_of(manifest: Mapping[str, Any], episodes: pd.DataFrame) -> GameFindings | None:
+def _game(campaign: Campaign, manifest: Mapping[str, Any], episodes: pd.DataFrame) -> GameFindings | None:
     """What the finished arms of a run say of the game between strategies; None where it is not asked."""
-    campaign = _campaign(manifest)
     met = who_met(campaign, manifest["personas"], _done(manifest), is_tuned(manifest))
     if met is None:
         return None

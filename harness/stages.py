@@ -87,7 +87,7 @@ def _train(
     lesson = Lesson(
         scene,
         stage.learner,
-        (conditions.ego_persona, conditions.persona(stage.persona if stage.persona in conditions.personas else "")),
+        (conditions.ego_persona, conditions.persona_met(stage.persona)),
         Casting(conditions, folder, scene).player(stage.opponent),
         stage.alone_share,
         stage.attentive_share,
@@ -143,7 +143,7 @@ def _reconfigure(
 
     opponent = Casting(conditions, folder, scene).player(stage.opponent)
     assert opponent is not None
-    other = conditions.persona(stage.persona if stage.persona in conditions.personas else "")
+    other = conditions.persona_met(stage.persona)
     personas, settings = (conditions.ego_persona, other), conditions.document.reconfiguration
     named = ("reconfiguration", stage.seed, stage.name)
     search = Search(scene, conditions.given(""), personas, opponent, settings, named)
