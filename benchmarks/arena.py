@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 from benchmarks.bare import own_sumo, place_and_step, record
@@ -32,49 +33,23 @@ def arena_side(pace: Pace, games: int) -> None:
         played.arena.close()
 
 
-def libsumo_side(pace: Pace, games: int) -> None:
-    """Game-steps of libsumo that places the same vehicles on the same net where such an arena had them."""
-    played = Played(merge(), games)
-    played.start(list(range(games)))
-    placements = record(played, _RECORDED_STEPS)
-    played.begin_again()
-    step = 0
-    for _ in range(_WARM_UP_STEPS):
-        place_and_step(placements[step % _RECORDED_STEPS])
-        step += 1
-    pace.begin()
-    try:
-        while True:
-            done = 0
-            while not pace.due():
-                place_and_step(placements[step % _RECORDED_STEPS])
-                step += 1
-                done += games
-            pace.lap(done)
-    finally:
-        played.arena.close()
-
-
-def single_game_side(pace: Pace, by_socket: bool) -> None:
-    """Steps of one game's two vehicles, in libsumo or through a socket: placed, stepped, asked who arrived."""
+def libsumo_side(pace: Pace, games: int, by_socket: bool = False) -> None:
+    """Steps of SUMO alone, in libsumo or through a socket, that places the same vehicles on the same net where such an
+    arena had them. Counted in game-steps."""
     scene = merge()
-    played = Played(scene, 1)
-    played.start([0])
-    placements = record(played, _RECORDED_STEPS)
+    played = Played(scene, games)
+    played.start(list(range(games)))
+    placements = itertools.cycle(record(played, _RECORDED_STEPS))
     played.arena.close()
-    with own_sumo(scene, by_socket) as api:
-        step = 0
+    with own_sumo(scene, games, by_socket) as api:
         for _ in range(_WARM_UP_STEPS):
-            place_and_step(placements[step % _RECORDED_STEPS], api)
-            step += 1
+            place_and_step(next(placements), api)
         pace.begin()
         while True:
             done = 0
             while not pace.due():
-                place_and_step(placements[step % _RECORDED_STEPS], api)
-                api.simulation.getArrivedIDList()
-                step += 1
-                done += 1
+                place_and_step(next(placements), api)
+                done += games
             pace.lap(done)
 
 
@@ -88,7 +63,7 @@ def arena_vs_libsumo(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict
 
 def libsumo_vs_traci(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict[str, Any]]:
     """What it brings to have SUMO in the process rather than behind a socket."""
-    sides = {"libsumo": Side(single_game_side, (False,)), "traci": Side(single_game_side, (True,))}
+    sides = {"libsumo": Side(libsumo_side, (1,)), "traci": Side(libsumo_side, (1, True))}
     laps = take_turns(sides, budget.repeats, budget.stretch_s, tell)
     value = best(laps["libsumo"]) / best(laps["traci"])
     return {"libsumo_vs_traci": value}, {"unit": "steps/s of one game", **described(laps)}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import shutil
 import subprocess
 import tempfile
@@ -20,9 +21,9 @@ from sumolib.miscutils import getFreeSocketPort
 from benchmarks.games import Played
 from harness.game.state import ROLES
 from harness.traffic.opening import OpenScene
-from harness.traffic.tiles import tile_offset_m, tile_prefix
+from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
-EXACTLY_THERE = 2  # moveToXY's keepRoute, as the harness places its players
+EXACTLY_THERE = 2  # moveToXY's keepRoute: as given, on the road or off it
 
 Placement = tuple[str, float, float, float]
 """A vehicle, the x and y of its front bumper in metres, its compass angle in degrees."""
@@ -58,22 +59,24 @@ def place_and_step(placements: list[Placement], api: Any = libsumo) -> None:
 
 
 @contextlib.contextmanager
-def own_sumo(scene: OpenScene, by_socket: bool) -> Iterator[Any]:
-    """SUMO with one game's two vehicles in it and nothing of the harness: libsumo, or `sumo` reached by TraCI."""
+def own_sumo(scene: OpenScene, games: int, by_socket: bool = False) -> Iterator[Any]:
+    """SUMO with the two vehicles of each game in it, as anybody would add them, and nothing of the harness: libsumo, or
+    `sumo` reached by TraCI."""
     with tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
         types = Path(folder) / "types.rou.xml"
         types.write_text(scene.routes.types_xml, encoding="utf-8")
         options = [
-            *("--net-file", str(scene.net_file), "--route-files", str(types)),
+            *("--net-file", str(tiled_net(scene.net_file, games)), "--route-files", str(types)),
             *("--step-length", str(scene.world.step_s), "--collision.action", "none"),
             *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
         ]
         with _reached_by_socket(options) if by_socket else _in_process(options) as api:
-            for player, role in enumerate(ROLES):
-                api.route.add(f"route {role}", list(scene.edges[player]))
+            for game, (player, role) in itertools.product(range(games), enumerate(ROLES)):
+                prefix = tile_prefix(game, games)
+                api.route.add(f"{prefix}route {role}", [prefix + edge for edge in scene.edges[player]])
                 lane = scene.document.players[player].lane.rsplit("_", 1)[1]
                 kind = scene.vehicle(player).vehicle_type
-                api.vehicle.add(role, f"route {role}", kind, "now", lane, str(20 + 20 * player), "10")
+                api.vehicle.add(prefix + role, f"{prefix}route {role}", kind, "now", lane, str(20 + 20 * player), "10")
             yield api
 
 

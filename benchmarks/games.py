@@ -13,7 +13,7 @@ from harness.documents.reading import read_document
 from harness.game.arrays import FloatArray
 from harness.game.observation import SIZE
 from harness.game.seeding import generator_of
-from harness.game.start import draw_start
+from harness.next_games import NextGames
 from harness.policy_file import ACTIONS, Policy
 from harness.traffic.opening import OpenScene, open_scene
 
@@ -60,25 +60,18 @@ class Played:
         people = [persona("careful"), persona("distracted")]
         self.arena = Arena(scene, games, [Seat(None, each.payoff) for each in people], seed)
         self._chances = scene.chances([each.habits for each in people], [1.0, 1.0])
-        self._times_played = [0] * games
+        self._games = NextGames(self.arena, self._chances, "benchmarks")
         noise = generator_of("benchmarks", "actions").standard_normal((_ACTIONS_KEPT, games, len(people), ACTIONS))
         self._actions = _STRAIGHT_ON + _VARIED * noise
         self._steps = 0
 
     def start(self, games: list[int]) -> None:
         """Start games, each as it has not been played before."""
-        starts, departures = {}, {}
-        for game in games:
-            parts = ("benchmarks", game, self._times_played[game])
-            starts[game] = draw_start(self._chances, *parts)
-            if self.arena.scene.has_others:
-                departures[game] = self.arena.scene.departures(generator_of(*parts, "others"))
-            self._times_played[game] += 1
-        self.arena.start(starts, departures)
+        self._games.start(games)
 
     def begin_again(self, seed: int = 1) -> None:
         """Everything anew, just as it was the first time."""
-        self._times_played = [0] * self.arena.games
+        self._games = NextGames(self.arena, self._chances, "benchmarks")
         self._steps = 0
         self.arena.reload(seed)
         self.start(list(range(self.arena.games)))

@@ -109,13 +109,12 @@ class Arena:
             if self.reading is not None:
                 self.reading.present[game] = False
         games = np.array(sorted(starts), dtype=np.int64)
-        routes, where = self.world.road.routes, (self.state.x_m[games], self.state.y_m[games])
-        self.state.station_m[games], _ = routes.locate(*where, routes.find(*where))
         for player, seats in enumerate(self.seats):
             for member, seat in enumerate(seats):
                 if seat.driver is not None:
                     seat.driver.begin(games if len(seats) == 1 else games[self._member[games, player] == member])
-        self._look(games)
+        seen = self.observation[games] = observe(self._first_quantities(games))
+        check_observation(seen, games, self.state.step)
 
     def reload(self, seed: int) -> None:
         """Start SUMO anew from a seed, as assessment does before each game."""
@@ -254,17 +253,13 @@ class Arena:
         if self._asks_drivers:
             self._noise[game] = start.noise
 
-    def _look(self, games: IntArray) -> None:
-        """Look again in games where somebody came or left."""
-        seen = self.observation[games] = observe(self.quantities_of(games))
-        check_observation(seen, games, self.state.step)
-
-    def quantities_of(self, games: IntArray) -> Quantities:
-        """The quantities of some games [N], as they are now."""
-        state = self.state.of(games)
-        bodies = self._bodies(state, games)
-        state.station_m, offset = self.world.road.routes.locate(state.x_m, state.y_m, state.station_m)
-        return Quantities(self.world, state, bodies, np.zeros_like(offset), offset)
+    def _first_quantities(self, games: IntArray) -> Quantities:
+        """Of games [N] that start: nobody knows yet where along its route a player is."""
+        state, routes = self.state.of(games), self.world.road.routes
+        start = routes.find(state.x_m, state.y_m)
+        state.station_m, offset = routes.locate(state.x_m, state.y_m, start)
+        self.state.station_m[games] = state.station_m
+        return Quantities(self.world, state, self._bodies(state, games), np.zeros_like(offset), offset)
 
     def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
         """Players first, then the others nearest to them: in all games, or in some, of which the state is."""

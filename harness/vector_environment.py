@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,9 +13,9 @@ from stable_baselines3.common.vec_env import VecEnv
 from harness.arena import Arena
 from harness.game.arrays import FloatArray
 from harness.game.observation import SIZE
-from harness.game.seeding import generator_of
-from harness.game.start import Chances, draw_start
+from harness.game.start import Chances
 from harness.game.state import Outcome
+from harness.next_games import NextGames
 from harness.policy_file import ACTIONS
 
 OBSERVATION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (SIZE,), np.float32)
@@ -51,13 +51,12 @@ class ArenaVecEnv(VecEnv):
 
     def begin(self, chances: Chances, *parts: str | int) -> None:
         """Draw the games to come like this, from these named parts; `reset` starts them."""
-        self._chances, self._parts = chances, parts
-        self._played = np.zeros(self.num_envs, dtype=np.int64)
+        self._games = NextGames(self.arena, chances, *parts)
         self._payoff = np.zeros(self.num_envs)
 
     def reset(self) -> FloatArray:
         """Start every game anew: observations [G, SIZE]."""
-        self._start(range(self.num_envs))
+        self._games.start(range(self.num_envs))
         return self.arena.observation[:, self._learner].copy()
 
     def step_async(self, actions: FloatArray) -> None:
@@ -79,7 +78,7 @@ class ArenaVecEnv(VecEnv):
             for game in ended:
                 infos[game] = {"terminal_observation": self.arena.observation[game, self._learner].copy()}
                 self._finish(int(game))
-            self._start(ended.tolist())
+            self._games.start(ended.tolist())
         return self.arena.observation[:, self._learner].copy(), payoff * self._payoff_scale, done, infos
 
     def take_finished(self) -> list[Finished]:
@@ -96,17 +95,6 @@ class ArenaVecEnv(VecEnv):
         outcome = Outcome(int(state.outcome[game, self._learner]))
         self._finished.append(Finished(float(self._payoff[game]), int(state.step[game]), outcome))
         self._payoff[game] = 0.0
-
-    def _start(self, games: Sequence[int]) -> None:
-        scene = self.arena.scene
-        starts, departures = {}, {}
-        for game in games:
-            parts = (*self._parts, game, int(self._played[game]))
-            starts[game] = draw_start(self._chances, *parts)
-            if scene.has_others:
-                departures[game] = scene.departures(generator_of(*parts, "others"))
-            self._played[game] += 1
-        self.arena.start(starts, departures)
 
     # --- what SB3 asks of a vector environment and an arena has not ----------------------------------------------
 

@@ -37,7 +37,8 @@ ALLOWED: dict[str, set[str]] = {
     "mixture": {"documents", "drivers", "game"},
     "conformance": {"errors", "game", "traffic", "drivers", "arena"},
     "environments": {"errors", "documents", "game", "traffic", "drivers", "policy_file", "arena"},
-    "vector_environment": {"game", "policy_file", "arena"},
+    "next_games": {"game", "traffic", "arena"},
+    "vector_environment": {"game", "policy_file", "arena", "next_games"},
     "convergence": set(),
     "checkpoint": {"files", "policy_file"},
     "training": {

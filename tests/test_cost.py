@@ -48,7 +48,7 @@ FAR_READS_PER_OTHER = 0.2  # a step
 PYTHON_CALLS_PER_STEP = 112  # of all games together
 PYTHON_CALLS_PER_GAME = 0  # what each game adds: its placements are libsumo's own
 PYTHON_CALLS_PER_OTHER = 0.5
-PYTHON_CALLS_PER_RESTART = 102
+PYTHON_CALLS_PER_RESTART = 90
 BLOCKS_LEFT_BEHIND = 350  # by 500 steps: one that were left by each step would be 500; some 50 to 200 come and go
 
 FEW, MANY = 4, 16  # games

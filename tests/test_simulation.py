@@ -98,11 +98,19 @@ def test_step__tiles_lie_beside_one_another_and_know_nothing_of_it(busy: OpenSce
     np.testing.assert_allclose(reading.y_m, RIGHT_Y, atol=1e-6)
 
 
-def test_step__sumo_shows_the_others_the_speed_a_player_has_even_above_the_limit(
-    scene: OpenScene, opened: Open
-) -> None:
+def test_step__a_player_stays_in_the_traffic_wherever_it_is_placed(scene: OpenScene, opened: Open) -> None:
     simulation = opened()
-    simulation.restart(0, placed(scene, (40, RIGHT_Y, 0, 12), None), [])
+    simulation.restart(0, placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), [])
+    for x in (60.0, 297.0, 299.9, 310.0, 2000.0, 5.0, -400.0, 40.0):  # the road ends at 300
+        for _ in range(20):
+            simulation.step(np.array([[x, x + 6.0]]), np.array([[RIGHT_Y, LEFT_Y]]), np.zeros((1, 2)))
+            for k, name in enumerate(("ego", "non_ego")):
+                assert centre_in_sumo(name)[0] == pytest.approx(x + 6.0 * k, abs=1e-3)
+
+
+def test_step__sumo_shows_the_others_the_speed_a_player_has_even_above_the_limit(busy: OpenScene, opened: Open) -> None:
+    simulation = opened(on=busy)
+    simulation.restart(0, placed(busy, (40, RIGHT_Y, 0, 12), None), [])
     shown = []
     for k in range(1, 4):
         simulation.step(np.array([[40 + 2.5 * k, 0]]), np.array([[RIGHT_Y, 0]]), np.zeros((1, 2)))

@@ -50,6 +50,7 @@ def test_start__the_same_parts_give_the_same_start(chances: Chances) -> None:
         if field.name not in ("lapses", "variation"):
             assert np.array_equal(getattr(one, field.name), getattr(two, field.name))
     assert np.array_equal(one.noise, two.noise)
+    assert one.seed == two.seed
 
 
 @pytest.mark.parametrize("parts", [("a", 2), ("b", 1), (1, "a"), ("a", "1"), ("a",), ("a", 1, 1)])
@@ -87,7 +88,7 @@ def test_start__a_share_of_games_is_alone(chances: Chances) -> None:
 def test_start__has_noise_and_lapses_for_every_step(chances: Chances) -> None:
     start = draw_start(chances, "a", 1)
     assert start.noise.shape == (2, 250, 2)  # 25 s in steps of 0.1 s
-    assert replace(start, seed=0).noise is start.noise  # drawn once
+    assert replace(start, parts=("b", 1)).noise is start.noise  # drawn once
     assert [each.lapsed.shape for each in start.lapses] == [(250,), (250,)]
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.limits import ALL, AT_ONCE, EXACT, NOBODY, Missing, Reaction, Sight, Uses
+from harness.game.seeding import between
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.r
     time = 0.0 if starts_within else generator.exponential(attention.mean_attentive_s)
     attentive_from = 0
     while time < steps * step_s:
-        lasts = generator.uniform(*attention.lapse_s) * (1.0 - passed)
+        lasts = between(attention.lapse_s, generator.random()) * (1.0 - passed)
         turns = generator.normal(-attention.crown_rad, attention.bumps_rad)
         first = max(ceil(time / step_s), attentive_from)
         end = first + max(round(lasts / step_s), 1)
@@ -118,6 +119,7 @@ def let_go(
     return elsewhere
 
 
-def draw_overlooked_m(overlooking: Overlooking, generator: np.random.Generator) -> float:
-    """How far ahead of a player others must be to be seen by it in one game; -inf: anywhere."""
-    return overlooking.ahead_m if generator.random() < overlooking.share else -np.inf
+def overlooked_m(overlooking: Overlooking, luck: float) -> float:
+    """How far ahead of a player others must be to be seen by it in one game, by a number drawn from 0 to 1; -inf:
+    anywhere."""
+    return overlooking.ahead_m if luck < overlooking.share else -np.inf

@@ -15,7 +15,7 @@ from math import atan2, hypot
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.attention import Attention, Habits, Lapses, draw_lapses, draw_overlooked_m
+from harness.game.attention import Attention, Habits, Lapses, draw_lapses, overlooked_m
 from harness.game.limits import (
     ALL,
     AT_ONCE,
@@ -27,7 +27,7 @@ from harness.game.limits import (
     draw_misjudged,
     draw_noticed_m,
 )
-from harness.game.seeding import generator_of, seed_of
+from harness.game.seeding import between, generator_of, seed_of
 
 _UNLIMITED = (NOBODY, AT_ONCE, EXACT, ALL)  # the defaults themselves: compared at once
 
@@ -85,13 +85,18 @@ class Start:
     lapses: tuple[Lapses, ...]
     overlooked_m: FloatArray  # how far ahead of a player others must be to be seen by it
     limits: tuple[Limits, ...]
-    seed: int  # of the traffic SUMO drives
     member: tuple[int, ...]  # who of a player's drivers drives in this game
+    parts: tuple[str | int, ...]  # what names all this chance
 
     @property
     def noise(self) -> FloatArray:
         """[P, T, 2] standard normal, for drivers whose decisions vary."""
         return self.variation.drawn
+
+    @property
+    def seed(self) -> int:
+        """Of the traffic that SUMO drives."""
+        return seed_of(*self.parts, "traffic") % 2**31
 
 
 @dataclass(frozen=True)
@@ -112,37 +117,34 @@ def draw_start(chances: Chances, *parts: str | int) -> Start:
     """Draw one game from named parts."""
     chance = generator_of(*parts, "start")
     players = range(len(chances.places))
-    positions: list[float] = []
-    speeds, poses = [], []
+    luck = iter(chance.random(4 * len(players)).tolist())  # one by one they would be the same
+    poses: list[tuple[float, ...]] = []
     for place, length in zip(chances.places, chances.length_m.tolist(), strict=True):
-        position = chance.uniform(*place.position_m) + (positions[0] if place.beside_ego else 0.0)
-        positions.append(position)
-        speeds.append(chance.uniform(*place.speed_mps))
-        poses.append(place.pose(position, length))
-    present = [chance.random() < share for share in chances.present_share]
-    member, habits, overlooked = [], [], []
-    for player, shares in enumerate(chances.shares):
-        member.append(0 if len(shares) == 1 else draw_member(shares, player, *parts))
-        habits.append(chances.habits[player][member[player]])
-        overlooked.append(draw_overlooked_m(habits[player].overlooking, chance))
+        position = between(place.position_m, next(luck)) + (poses[0][-1] if place.beside_ego else 0.0)
+        speed = between(place.speed_mps, next(luck))
+        poses.append((*place.pose(position, length), speed, position))
+    present = [next(luck) < share for share in chances.present_share]
+    member = [0 if len(of) == 1 else draw_member(of, player, *parts) for player, of in enumerate(chances.shares)]
+    habits = [chances.habits[player][member[player]] for player in players]
+    overlooked = [overlooked_m(each.overlooking, next(luck)) for each in habits]
     limits = [
         NO_LIMITS if (of.missing, of.reaction, of.sight, of.uses) == _UNLIMITED else _limits(of, chances, p, *parts)
         for p, of in enumerate(habits)
     ]
-    x, y, heading = np.array(poses).T
+    x, y, heading, speeds, positions = np.array(poses).T
     return Start(
         x,
         y,
         heading,
-        np.array(speeds),
-        np.array(positions),
+        speeds,
+        positions,
         np.array(present),
         Noise(chance, (len(players), chances.steps, 2)),
         tuple(_lapses(habits[p].attention, chances, p, limits[p].delay_steps, *parts) for p in players),
         np.array(overlooked),
         tuple(limits),
-        seed_of(*parts, "traffic") % 2**31,
         tuple(member),
+        parts,
     )
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.documents.persona import Persona
 from harness.documents.scene import Actuators
-from harness.game.attention import Attention, Lapses, draw_lapses, draw_overlooked_m
+from harness.game.attention import Attention, Lapses, draw_lapses, overlooked_m
 from harness.game.seeding import generator_of
 
 DRIVES, DRIVE_S, STEP_S = 8, 60.0, 0.1
@@ -42,7 +42,7 @@ def sample(persona: Persona) -> list[Drive]:
             lapses = draw_lapses(
                 habits.attention, steps, STEP_S, generator_of("portrait", persona.name, "attention", k)
             )
-        ahead_m = draw_overlooked_m(habits.overlooking, generator_of("portrait", persona.name, "start", k))
+        ahead_m = overlooked_m(habits.overlooking, generator_of("portrait", persona.name, "start", k).random())
         changes = np.flatnonzero(np.diff(np.concatenate(([0], lapses.lapsed.astype(int), [0])))).reshape(-1, 2) * STEP_S
         found.append(Drive(tuple((float(begin), float(end)) for begin, end in changes), math.isfinite(ahead_m)))
     return found

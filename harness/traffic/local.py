@@ -1,12 +1,13 @@
 """The simulation of this process: libsumo, which has room for one.
 
-A player that the harness takes over is placed with moveToXY(keepRoute=2): exactly where the arena says, on the road
-or off it. A player left to SUMO is started here and its state read back. At this border headings become SUMO's
-compass angles, and the reference point moves from the body's centre to the front bumper.
+A player that the harness takes over is placed with moveToXY: exactly where the arena says, on the road or off it.
+A player left to SUMO is started here and its state read back. At this border headings become SUMO's compass angles, and
+the reference point moves from the body's centre to the front bumper.
 
 To take a car out of SUMO's traffic and add it anew costs as much as ten steps of it, and SUMO forgets the route of one
 that is only put back to its start. Where SUMO drives nobody there is nobody to whom that matters: players stay in the
-traffic from game to game.
+traffic from game to game, SUMO looks for their lanes along their routes only, and its models of following and changing
+lanes don't think for them.
 """
 
 from __future__ import annotations
@@ -33,9 +34,12 @@ from harness.traffic.route_file import Departure
 from harness.traffic.simulation import Reading
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
-_EXACTLY_THERE = 2  # moveToXY's keepRoute: the position as given, even off the road
+# How moveToXY places a car: its keepRoute, and how far away it looks for a lane. keepRoute's bit 2: exactly there, on
+# the road or off it; its bit 1: of the lanes near it, only those of its route count.
+_ON_ANY_LANE = (2, 100.0)  # SUMO's default distance
+_ON_ITS_ROUTE = (2 | 1, 10.0)  # which is all that a car can be on
+_HARDLY_EVER_S = 1e6  # an action step, between two thoughts of SUMO's own models for a car
 _LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
-_WITHIN_M, _WITHIN_NEAR_M = 100.0, 10.0  # where moveToXY looks for a lane: SUMO's default, and all that a car can be on
 _ANY_SPEED = 100.0  # a speed factor: SUMO would show the others no speed above the limit times this
 _FAILURES = (libsumo.TraCIException, libsumo.FatalTraCIError)
 
@@ -66,6 +70,7 @@ class LocalSimulation:
         self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
         self._recorded = recorded
         self._drives_nobody = all(self._taken_over) and not scene.has_others
+        self._placing = _ON_ITS_ROUTE if self._drives_nobody else _ON_ANY_LANE
         self._half_length = 0.5 * scene.world.length_m
         offset = tile_offset_m(scene.net_file, games)
         self._offsets = offset * np.arange(games)
@@ -127,13 +132,12 @@ class LocalSimulation:
         """Clear a game's tile and put its players at their start; others depart as time goes by."""
         tile = self._tiles[game]
         with self._asking(f"start game {game}"):
-            taking_part = np.flatnonzero(start.present).tolist()
-            staying = tile.inside.intersection(taking_part) if self._drives_nobody else set()
+            taking_part = {player for player, present in enumerate(start.present.tolist()) if present}
+            staying = tile.inside & taking_part if self._drives_nobody else set()
             for player in tile.inside - staying:
                 self._take_out(game, player)
-            for player in taking_part:
-                if player not in staying:
-                    self._add_player(game, player, start)
+            for player in sorted(taking_part - staying):
+                self._add_player(game, player, start)
             self._others.begin(game, departures)
 
     def halt(self, game: int, player: int) -> None:
@@ -163,17 +167,17 @@ class LocalSimulation:
         front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel().tolist()
         front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel().tolist()
         angle = compass_deg_of(heading_rad).ravel().tolist()
-        move, within_m = _libsumo.vehicle_moveToXY, _WITHIN_NEAR_M if self._drives_nobody else _WITHIN_M
+        move, (keep_route, within_m) = _libsumo.vehicle_moveToXY, self._placing
         with self._asking("step"):
             for name, k in self._placed.items():
-                move(name, "", -1, front_x[k], front_y[k], angle[k], _EXACTLY_THERE, within_m)
+                move(name, "", -1, front_x[k], front_y[k], angle[k], keep_route, within_m)
             libsumo.simulationStep()
             self._others.advance()
             players = self._read_players()
             if players is not None:
                 x_m = np.where(np.isnan(players[..., 0]), x_m, players[..., 0])
                 y_m = np.where(np.isnan(players[..., 1]), y_m, players[..., 1])
-            reading = self._others.read(np.where(self._there, x_m, np.nan), y_m)
+            reading = self._others.read(x_m, y_m, self._there)
             return replace(reading, players=players) if players is not None else reading
 
     def close(self) -> None:
@@ -202,7 +206,10 @@ class LocalSimulation:
         ahead = self._half_length[player]
         if self._taken_over[player]:
             self._placed[name] = game * len(self._taken_over) + player
-            libsumo.vehicle.setSpeedFactor(name, _ANY_SPEED)
+            if self._drives_nobody:
+                libsumo.vehicle.setActionStepLength(name, _HARDLY_EVER_S)
+            else:
+                libsumo.vehicle.setSpeedFactor(name, _ANY_SPEED)
         else:
             self._self_driven[name] = (game, player)
             ahead += speed * self._scene.world.step_s  # SUMO moves nobody in the step it starts them
@@ -210,7 +217,7 @@ class LocalSimulation:
         x = float(start.x_m[player] + ahead * np.cos(heading))
         y = float(start.y_m[player] + ahead * np.sin(heading) + tile.offset_m)
         # Placed there it is in the traffic at once; only added, it would have to wait for room.
-        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), _EXACTLY_THERE)
+        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), *self._placing)
 
     def _entrance(self, player: int) -> tuple[str, str, float]:
         """A player's type, the lane it starts on, and the speed above which SUMO refuses to start it: what its type

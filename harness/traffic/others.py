@@ -15,7 +15,7 @@ import numpy as np
 from libsumo import _libsumo  # its functions without the Python function around each: for what is called most
 
 from harness.errors import SimulationError
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.route_file import Departure
 from harness.traffic.simulation import NOTICED_M, Reading
@@ -86,10 +86,11 @@ class Others:
 
     def begin(self, game: int, departures: Sequence[Departure]) -> None:
         """A game starts anew: take away who is there, and let others depart as time goes by."""
-        for known in self._table.known[game, : self._table.count[game]].tolist():
-            if self._there.pop(known, None) is not None:
-                libsumo.vehicle.remove(known)
-        self._table.clear(game)
+        if self._table.count[game]:
+            for known in self._table.known[game, : self._table.count[game]].tolist():
+                if self._there.pop(known, None) is not None:
+                    libsumo.vehicle.remove(known)
+            self._table.clear(game)
         self._began[game] = self._step
         self._waiting.pop(game, None)
         if departures:
@@ -112,8 +113,8 @@ class Others:
         for game in list(self._waiting):
             self._depart(game)
 
-    def read(self, players_x_m: FloatArray, players_y_m: FloatArray) -> Reading:
-        """Who is near the players [G, P] (NaN: not there), or everyone if games are recorded."""
+    def read(self, players_x_m: FloatArray, players_y_m: FloatArray, players_there: BoolArray) -> Reading:
+        """Who is near the players [G, P] that are there, or everyone if games are recorded."""
         if not self._there:
             return self._nobody
         table = self._table
@@ -125,7 +126,7 @@ class Others:
         fronts = np.fromiter(places, float, 2 * len(due)).reshape(-1, 2)
         fronts[:, 1] -= self._offsets_m[games]
         away = np.hypot(fronts[:, :1] - players_x_m[games], fronts[:, 1:] - players_y_m[games])
-        spare = np.where(np.isnan(away), np.inf, away).min(1) - NOTICED_M
+        spare = np.where(players_there[games], away, np.inf).min(1) - NOTICED_M
         spare -= table.length_m.ravel()[due]  # it is the middle of a vehicle that is near or not
         closing = table.max_speed_mps.ravel()[due] + self._fastest_player_mps
         waits = np.clip(spare / (closing * self._step_s), 1, 1 if self._recorded else _LONGEST_WAIT).astype(np.int64)
