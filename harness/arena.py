@@ -29,6 +29,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import let_go
 from harness.game.bicycle import drive, requests
 from harness.game.limits import PlayersLimits
+from harness.game.nearby import NOTICED_M
 from harness.game.observation import SIZE, observe
 from harness.game.payoff import Payoff
 from harness.game.plausibility import check_observation, check_step, checked_decisions, slack_m
@@ -37,7 +38,7 @@ from harness.game.start import Start
 from harness.game.state import Bodies, Outcome, State
 from harness.traffic.opening import OpenScene
 from harness.traffic.route_file import Departure
-from harness.traffic.simulation import NOTICED_M, Reading, open_simulation
+from harness.traffic.simulation import Reading, open_simulation
 
 _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # NumPy would ask the enumeration each time
 NEAREST = 16  # others that a game's bodies have room for

@@ -179,10 +179,9 @@ class _Trace:
         reading = self._arena.reading
         if reading is None:
             return
-        for slot, (name, kind) in enumerate(zip(reading.names[0], reading.types[0], strict=True)):
-            if reading.present[0, slot]:
-                pose = (float(getattr(reading, each)[0, slot]) for each in ("x_m", "y_m", "heading_rad", "speed_mps"))
-                self._add(name, kind, *pose, 0.0, 0.0, False, "")
+        for slot in np.flatnonzero(reading.present[0]).tolist():
+            pose = (float(getattr(reading, each)[0, slot]) for each in ("x_m", "y_m", "heading_rad", "speed_mps"))
+            self._add(reading.names[0, slot], reading.types[0, slot], *pose, 0.0, 0.0, False, "")
 
     def _add(self, *cells: Any) -> None:
         step = int(self._arena.state.step[0])

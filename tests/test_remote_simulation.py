@@ -88,7 +88,7 @@ def test_both__give_the_same_numbers(scene: OpenScene) -> None:
                 arena.step(action)
                 seen += [arena.observation.tobytes(), arena.state.x_m.tobytes(), arena.state.outcome.tobytes()]
                 assert arena.reading is not None
-                seen += [arena.reading.x_m.tobytes(), repr(arena.reading.names).encode()]
+                seen += [arena.reading.x_m.tobytes(), repr(arena.reading.names.tolist()).encode()]
         return b"".join(seen)
 
     here, there = (played(arena) for arena in arenas)
@@ -104,7 +104,7 @@ def test_refusal__in_the_child_is_an_error_here_and_the_child_goes_on(scene: Ope
         far.restart(0, start, [wrong])
     far.reload(1)
     far.restart(0, start, [])
-    assert far.step(start.x_m[None], start.y_m[None], start.heading_rad[None]).names == [[]]
+    assert far.step(start.x_m[None], start.y_m[None], start.heading_rad[None]).names.tolist() == [[]]
 
 
 def test_refusal__to_load_leaves_no_child(scene: OpenScene, tmp_path: Path) -> None:

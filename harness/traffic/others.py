@@ -16,9 +16,10 @@ from libsumo import _libsumo  # its functions without the Python function around
 
 from harness.errors import SimulationError
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.nearby import by_game, who_is_near
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.route_file import Departure
-from harness.traffic.simulation import NOTICED_M, Reading
+from harness.traffic.simulation import Reading
 
 _LONGEST_WAIT = 50  # steps
 _NEVER = -1
@@ -82,7 +83,7 @@ class Others:
         self._waiting: dict[int, list[Departure]] = {}  # by game, the next one last
         self._there: dict[str, tuple[int, int]] = {}  # the rows and places of all in the traffic, by name in SUMO
         self._table = _Table(len(prefixes))
-        self._nobody = self._reading(np.zeros(0, dtype=np.int64), np.zeros((0, 6)))
+        self._nobody = self._reading(np.zeros(0, dtype=np.int64), np.zeros((4, 0)))
 
     def begin(self, game: int, departures: Sequence[Departure]) -> None:
         """A game starts anew: take away who is there, and let others depart as time goes by."""
@@ -121,24 +122,20 @@ class Others:
         due = np.flatnonzero(table.due == self._step)  # by game, and in a game as they departed
         if not len(due):
             return self._nobody
-        games, known = due // table.due.shape[1], table.known.ravel()[due]
-        places = chain.from_iterable(map(_libsumo.vehicle_getPosition, known.tolist()))
-        fronts = np.fromiter(places, float, 2 * len(due)).reshape(-1, 2)
-        fronts[:, 1] -= self._offsets_m[games]
-        away = np.hypot(fronts[:, :1] - players_x_m[games], fronts[:, 1:] - players_y_m[games])
-        spare = np.where(players_there[games], away, np.inf).min(1) - NOTICED_M
-        spare -= table.length_m.ravel()[due]  # it is the middle of a vehicle that is near or not
-        closing = table.max_speed_mps.ravel()[due] + self._fastest_player_mps
-        waits = np.clip(spare / (closing * self._step_s), 1, 1 if self._recorded else _LONGEST_WAIT).astype(np.int64)
-        table.due.ravel()[due] = self._step + waits
-        near = np.flatnonzero((spare <= 0.0) | self._recorded)
-        found, names = due[near], known[near].tolist()
-        motion = np.empty((len(near), 6))
-        motion[:, :2] = fronts[near]
-        motion[:, 2] = np.fromiter(map(_libsumo.vehicle_getAngle, names), float, len(near))
-        motion[:, 3] = np.fromiter(map(_libsumo.vehicle_getSpeed, names), float, len(near))
-        motion[:, 4], motion[:, 5] = table.length_m.ravel()[found], table.width_m.ravel()[found]
-        return self._reading(found, motion)
+        names = table.known.ravel()[due].tolist()
+        fronts = np.fromiter(chain.from_iterable(map(_libsumo.vehicle_getPosition, names)), float, 2 * len(due))
+        fronts = fronts.reshape(-1, 2)
+        near = who_is_near(
+            *(due, fronts, table.due, table.length_m, table.max_speed_mps, self._offsets_m),
+            *(players_x_m, players_y_m, players_there, self._fastest_player_mps),
+            *(self._step, self._step_s, 1 if self._recorded else _LONGEST_WAIT, self._recorded),
+        )
+        names = [names[k] for k in near.tolist()]
+        motion = np.empty((4, len(near)))
+        motion[:2] = fronts[near].T
+        motion[2] = np.fromiter(map(_libsumo.vehicle_getAngle, names), float, len(near))
+        motion[3] = np.fromiter(map(_libsumo.vehicle_getSpeed, names), float, len(near))
+        return self._reading(due[near], motion)
 
     def _depart(self, game: int) -> None:
         now = (self._step - self._began[game]) * self._step_s + 1e-9
@@ -161,26 +158,14 @@ class Others:
             del self._waiting[game]
 
     def _reading(self, found: IntArray, motion: FloatArray) -> Reading:
-        """Of those found, by their places in the table: front x and y, angle, speed, length and width, [n, 6]."""
-        games = found // self._table.due.shape[1]
-        counts = np.bincount(games, minlength=len(self._prefixes))
-        ends = np.cumsum(counts)
-        first = ends - counts
-        values = np.zeros((len(counts), counts.max(), 6))
-        slots = np.arange(len(games)) - first[games]
-        values[games, slots] = motion
-        present = np.arange(counts.max()) < counts[:, None]
-        bounds = list(zip(first.tolist(), ends.tolist(), strict=True))
-        names, kinds = self._table.name.ravel()[found].tolist(), self._table.kind.ravel()[found].tolist()
-        heading, half = heading_rad_of(values[..., 2]), 0.5 * values[..., 4]
-        return Reading(
-            [names[start:end] for start, end in bounds],
-            [kinds[start:end] for start, end in bounds],
-            values[..., 0] - half * np.cos(heading),
-            values[..., 1] - half * np.sin(heading),
-            heading,
-            values[..., 3].copy(),
-            values[..., 4].copy(),
-            values[..., 5].copy(),
-            present,
-        )
+        """Of those found [n], by their places in the table: front x and y, SUMO's angle, and speed, [4, n]."""
+        table, (front_x, front_y, angle, speed) = self._table, motion
+        length, width, heading = table.length_m.ravel()[found], table.width_m.ravel()[found], heading_rad_of(angle)
+        x = front_x - 0.5 * length * np.cos(heading)
+        y = front_y - 0.5 * length * np.sin(heading)
+        games, room = len(self._prefixes), table.due.shape[1]
+        columns, present = by_game(found // room, games, np.stack((x, y, heading, speed, length, width)))
+        names, types = (np.full(present.shape, None, dtype=object) for _ in range(2))
+        names[present], types[present] = table.name.ravel()[found], table.kind.ravel()[found]
+        x_m, y_m, heading_rad, speed_mps, length_m, width_m = columns
+        return Reading(names, types, x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)

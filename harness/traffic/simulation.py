@@ -6,23 +6,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.start import Start
 from harness.traffic.opening import OpenScene
 from harness.traffic.route_file import Departure
 
-NOTICED_M = 120.0  # nobody farther than this from every player matters to the game
-
 
 @dataclass
 class Reading:
-    """What SUMO's own vehicles did. Others are [G, M], padded; players that SUMO drives are [G, P], None without any.
+    """What SUMO's own vehicles did. Others are [G, M], padded where not present; players that SUMO drives are [G, P],
+    None without any.
 
-    Of the others there are at least those within `NOTICED_M` of a player, and all where games are recorded.
+    Of the others there are at least those within `nearby.NOTICED_M` of a player, and all where games are recorded.
     """
 
-    names: list[list[str]]  # by game, in the order of the arrays
-    types: list[list[str]]
+    names: NDArray[np.object_]
+    types: NDArray[np.object_]
     x_m: FloatArray
     y_m: FloatArray
     heading_rad: FloatArray
