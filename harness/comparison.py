@@ -25,15 +25,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 from scipy import stats
 
+from harness.questions import Question, ResearchQuestion
+
 Floats = npt.NDArray[np.float64]
-ResearchQuestion = Literal["RQ1", "RQ2"]
 
 COMPARISON_COLUMNS = {
     "question": "object",
@@ -77,17 +78,6 @@ class Verdict(str, Enum):
     """Every difference is the same number, not 0. For failures `mcnemar_p` still exists."""
     NOT_ENOUGH_PAIRS = "not enough pairs"
     """Fewer than two pairs could be compared."""
-
-
-@dataclass(frozen=True)
-class Question:
-    """One research question, asked of one persona and training seed: two arms of the same episodes."""
-
-    question: ResearchQuestion
-    persona: str
-    seed: int
-    baseline: str
-    treatment: str
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from harness.comparison import Question
 from harness.documents.campaign import LEARNED, ROBUST, SUMO, Campaign
 from harness.game.state import EGO, NON_EGO
+from harness.questions import Question
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from rich.console import Console
 from rich.progress import track
 
-from harness.comparison import Question, compare
+from harness.comparison import compare
 from harness.documents.campaign import Campaign
 from harness.documents.manifest import is_tuned
 from harness.errors import UsageError
@@ -22,6 +22,7 @@ from harness.manoeuvre_file import manoeuvres_of
 from harness.model_card import write_model_cards
 from harness.pairings import who_met
 from harness.populations import by_who_drove
+from harness.questions import Question
 from harness.recorded_games import recorded_games, scene_drawing
 from harness.replay import choose_games, replay_name, worst_first, write_replay
 from harness.reports.change import ARMS

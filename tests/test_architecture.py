@@ -52,7 +52,8 @@ ALLOWED: dict[str, set[str]] = {
     "assessment": {"errors", "documents", "game", "traffic", "arena", "mixture", "metrics"},
     "trace_file": {"errors", "files", "file_content", "game"},
     "seals": {"files", "file_content"},
-    "comparison": set(),
+    "questions": set(),
+    "comparison": {"questions"},
     "theory": {"errors", "comparison"},
     # theory, search_columns: what their tables' columns are
     "tables": {"errors", "files", "file_content", "comparison", "theory", "search_columns"},
@@ -60,7 +61,7 @@ ALLOWED: dict[str, set[str]] = {
     "reconfigured": {
         *("errors", "files", "documents", "drivers", "attempts", "tables", "search_columns", "reconfiguration"),
     },
-    "rounds": {"documents", "game", "comparison"},
+    "rounds": {"documents", "game", "questions"},
     "responses": {"documents", "game", "rounds"},
     "exchange": {"documents", "game", "rounds", "plan_searches", "responses"},
     "plan_searches": {"documents", "rounds"},
@@ -104,9 +105,9 @@ ALLOWED: dict[str, set[str]] = {
     "persona_template": {"errors", "documents", "game", "plan"},
     "portraits": {"errors", "files", "documents", "game", "reports"},  # reports: the style of its figures and pages
     "run_results": {
-        *("errors", "files", "documents", "traffic", "comparison", "tables", "summary", "rounds", "run_folder"),
-        *("reports", "replay", "trace_file", "recorded_games", "manoeuvre_file", "model_card", "pairings"),
-        *("populations", "search_columns", "theory"),
+        *("errors", "files", "documents", "traffic", "questions", "comparison", "tables", "summary", "rounds"),
+        *("run_folder", "reports", "replay", "trace_file", "recorded_games", "manoeuvre_file", "model_card"),
+        *("pairings", "populations", "search_columns", "theory"),
     },
     "campaign_run": {
         *("documents", "preflight", "plan", "rounds", "run_folder", "conditions", "stage_keys", "workers", "progress"),
@@ -279,10 +280,21 @@ def test_judging__loads_neither_sumo_nor_a_learner(part: str) -> None:
         for path in SOURCES
         if part_of(path) == part
     ]
-    program = f"import sys, {', '.join(modules)}; print(*sorted(set(sys.modules) & {SUMO | LEARNERS!r}))"
+    assert loaded_with(*modules).isdisjoint(SUMO | LEARNERS)
+
+
+def test_checking__loads_no_learner_and_no_statistics() -> None:
+    """`harness check` is run often, and these take longer to load than all it does."""
+    loaded = loaded_with("harness.preflight")
+    assert "numpy" in loaded
+    assert loaded.isdisjoint(LEARNERS | {"pandas", "scipy.stats", "plotly", "optuna"})
+
+
+def loaded_with(*modules: str) -> set[str]:
+    program = f"import sys, {', '.join(modules)}; print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
-    assert run.stdout.split() == []
+    return set(run.stdout.split())
 
 
 # --- names, docstrings, length ---

@@ -19,8 +19,9 @@ from markupsafe import escape
 from scipy import stats
 from tiny import BY_SUMO, CAREFUL, SPEEDY, harness, learned_run, sumo_run, tables, write_campaign, write_persona
 
-from harness.comparison import COMPARISON_COLUMNS, Question, compare
+from harness.comparison import COMPARISON_COLUMNS, compare
 from harness.policy_file import read_policy
+from harness.questions import Question
 from harness.replay import replay_name
 from harness.tables import EPISODE_COLUMNS, SUMMARY_COLUMNS, TRAINING_COLUMNS, read_csv
 from harness.trace_file import read_trace

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from harness.comparison import COMPARISON_COLUMNS, METRICS, Question, Verdict, compare, holm
+from harness.comparison import COMPARISON_COLUMNS, METRICS, Verdict, compare, holm
+from harness.questions import Question
 
 RQ1 = Question("RQ1", "speedy", 1, "naive_alone", "naive_vs_speedy")
 RQ2 = Question("RQ2", "speedy", 1, "naive_vs_speedy", "retrained_vs_speedy")

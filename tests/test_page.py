@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 from recorded import SCENE, manoeuvres, recorded
 
-from harness.comparison import Question, Verdict, compare
+from harness.comparison import Verdict, compare
+from harness.questions import Question
 from harness.replay.choice import choose_games, replay_name, worst_first
 from harness.reports import page as page_module
 from harness.reports.page import duration, render_page

@@ -9,8 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from harness.comparison import Question, compare
+from harness.comparison import compare
 from harness.errors import UsageError
+from harness.questions import Question
 from harness.summary import summarise
 from harness.tables import SUMMARY_COLUMNS, TABLES, read_csv, typed, write_csv
 

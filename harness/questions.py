@@ -1,0 +1,19 @@
+"""What is asked of two arms. Planning asks it, and has no use for the statistics that answer it (`comparison`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+ResearchQuestion = Literal["RQ1", "RQ2"]
+
+
+@dataclass(frozen=True)
+class Question:
+    """One research question, asked of one persona and training seed: two arms of the same episodes."""
+
+    question: ResearchQuestion
+    persona: str
+    seed: int
+    baseline: str
+    treatment: str
