@@ -54,7 +54,8 @@ def write_checkpoint(model: PPO, progress: Progress, key: str, path: Path) -> No
 
 
 def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
-    """Put a checkpoint into a freshly made learner. None if there is none, it is damaged, or from other inputs."""
+    """Put a checkpoint into a freshly made learner. None if there is none, it is damaged, is of another learner than
+    this, or from other inputs: the learner is as it was then."""
     if not path.is_file():
         return None
     try:
@@ -63,28 +64,53 @@ def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
             if metadata.get("key") != key:
                 return None
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-        if metadata.get("digest") not in (
-            _digest(tensors, metadata["progress"]),
-            None,
-        ):  # None: of before there were any
+        was = metadata.get("digest")  # there were none at first
+        if was is not None and was != _digest(tensors, metadata["progress"]):
             return None
-    except (SafetensorError, OSError, KeyError):
+        progress = _progress(metadata["progress"])
+    except (SafetensorError, OSError, KeyError, TypeError, ValueError):
         return None
-    model.policy.load_state_dict({k.removeprefix("policy/"): v for k, v in tensors.items() if k.startswith("policy/")})
-    optimizer = model.policy.optimizer.state_dict()
-    optimizer["state"] = {}
+    policy = {name.removeprefix("policy/"): value for name, value in tensors.items() if name.startswith("policy/")}
+    state = _optimizer_state(tensors)
+    if not _fits(model, policy, state):
+        return None
+    model.policy.load_state_dict(policy)
+    model.policy.optimizer.load_state_dict({**model.policy.optimizer.state_dict(), "state": state})
+    return progress
+
+
+def _progress(text: str) -> Progress:
+    """Raises ValueError, TypeError or KeyError where it is none."""
+    stored: dict[str, Any] = json.loads(text)
+    curve = [Window(**window) for window in stored["curve"]]
+    return Progress(stored["segments"], stored["steps"], stored["segment_payoffs"], curve)
+
+
+def _optimizer_state(tensors: Mapping[str, torch.Tensor]) -> dict[int, dict[str, torch.Tensor]]:
+    """What Adam keeps of each parameter, by its number."""
+    state: dict[int, dict[str, torch.Tensor]] = {}
     for name, value in tensors.items():
-        if name.startswith("optimizer/"):
-            _, index, entry = name.split("/")
-            optimizer["state"].setdefault(int(index), {})[entry] = value
-    model.policy.optimizer.load_state_dict(optimizer)
-    stored: dict[str, Any] = json.loads(metadata["progress"])
-    return Progress(
-        stored["segments"],
-        stored["steps"],
-        stored["segment_payoffs"],
-        [Window(**window) for window in stored["curve"]],
+        part, *place = name.split("/")
+        if part == "optimizer" and len(place) == 2 and place[0].isdecimal():
+            state.setdefault(int(place[0]), {})[place[1]] = value
+    return state
+
+
+def _fits(model: PPO, policy: Mapping[str, torch.Tensor], optimizer: Mapping[int, Mapping[str, torch.Tensor]]) -> bool:
+    """Whether a checkpoint's tensors are those of this learner."""
+    own = model.policy.state_dict()
+    if {name: value.shape for name, value in policy.items()} != {name: value.shape for name, value in own.items()}:
+        return False
+    parameters = list(model.policy.parameters())
+    return all(
+        index < len(parameters)
+        and kept.keys() == _OF_ADAM
+        and kept["exp_avg"].shape == kept["exp_avg_sq"].shape == parameters[index].shape
+        for index, kept in optimizer.items()
     )
+
+
+_OF_ADAM = {"step", "exp_avg", "exp_avg_sq"}
 
 
 def _digest(tensors: Mapping[str, torch.Tensor], progress: str) -> str:

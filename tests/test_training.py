@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 from tiny import CAREFUL, DISTRACTED, SPEEDY, settings
 
@@ -142,6 +143,42 @@ def test_train__a_checkpoint_that_is_not_ours_counts_for_nothing(
     short = replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive"))
     train(short, checkpoint, "another key", {})
     spoil(checkpoint)
+    assert same(in_one_go(alone, tmp_path), trained, tmp_path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda tensors, about: tensors.pop("policy/log_std"),
+        lambda tensors, about: tensors.update({"policy/action_net.weight": np.zeros((3, 3), np.float32)}),
+        lambda tensors, about: tensors.update({"policy/more": np.zeros(1, np.float32)}),
+        lambda tensors, about: tensors.update({"optimizer/0/exp_avg": np.zeros(7, np.float32)}),
+        lambda tensors, about: tensors.update({"optimizer/99/step": np.zeros((), np.float32)}),
+        lambda tensors, about: about.update(progress="[1, 2]"),
+        lambda tensors, about: about.update(progress="{"),
+        lambda tensors, about: about.update(progress='{"segments": 1, "steps": 1024, "segment_payoffs": []}'),
+    ],
+    ids=[
+        "parameter missing",
+        "shape",
+        "parameter too many",
+        "moments",
+        "no such parameter",
+        "list",
+        "torn",
+        "no curve",
+    ],
+)
+def test_train__a_checkpoint_of_another_learner_counts_for_nothing(
+    change: Callable[[dict[str, Any], dict[str, str]], object], alone: Lesson, trained: Trained, tmp_path: Path
+) -> None:
+    checkpoint = tmp_path / "checkpoint.safetensors"
+    in_one_go(replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive")), tmp_path)
+    with safe_open(checkpoint, framework="np") as file:
+        about = {name: text for name, text in file.metadata().items() if name != "digest"}
+    tensors = load_file(checkpoint)
+    change(tensors, about)
+    save_file(tensors, checkpoint, about)
     assert same(in_one_go(alone, tmp_path), trained, tmp_path)
 
 
