@@ -118,11 +118,15 @@ def table(
 @app.command()
 def step(
     seconds: Annotated[float, typer.Option(metavar="S", help="How long to measure.")] = 10.0,
+    others: Annotated[
+        int,
+        typer.Option(metavar="N", min=0, help="Others that SUMO drives in each game, on the merge with longer roads."),
+    ] = 0,
 ) -> None:
     """Print where the time of an arena's step goes, as a table in Markdown."""
     from benchmarks.step import step_table
 
-    print(step_table(seconds))
+    print(step_table(seconds, others))
 
 
 def _bars(console: Console) -> Progress:

@@ -6,18 +6,24 @@ under its name is counted to the rest.
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
-from benchmarks.bare import place_and_step, record
+from benchmarks.bare import Placement, place_and_step, record
 from benchmarks.games import GAMES, Played, merge
+from benchmarks.traffic import write_scene
 from harness import arena as stepping
+from harness.traffic.opening import open_scene
+from harness.traffic.others import Others
 
-_WARM_UP_STEPS = 200
+_ALONE_STEPS, _AMONG_OTHERS_STEPS = 300, 100
 _PARTS = (
     ("drivers, attention, requests", "decide", stepping.Arena, "_decide"),
     ("the players' cars move", "drive", stepping, "drive"),
+    ("others near the players read", "read", Others, "read"),
     ("where each is along its route", "locate", stepping.Arena, "_locate"),
     ("contact, goal, time", "judge", stepping.Arena, "_judge"),
     ("payoffs", "pay", stepping.Arena, "_pay"),
@@ -32,7 +38,14 @@ class _Clock:
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self.kept: dict[str, float] = {}
         self._inside = [0.0]
+
+    def keep(self) -> None:
+        """Add what was measured since the last time to what is kept."""
+        for part, taken in self.seconds.items():
+            self.kept[part] = self.kept.get(part, 0.0) + taken
+        self.seconds.clear()
 
     def around(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
         def timed(*arguments: Any, **keywords: Any) -> Any:
@@ -48,30 +61,42 @@ class _Clock:
         return timed
 
 
-def step_table(seconds: float) -> str:
-    """The parts of a step of 64 games in Markdown, in microseconds of a game-step.
+def step_table(seconds: float, others: int = 0) -> str:
+    """The parts of a step of 64 games in Markdown, in microseconds of a game-step: on the merge, where games that end
+    start anew; or with so many others a game on the merge with longer roads, again and again from the same start.
 
     It patches the arena for good: for a process of its own.
     """
-    played = Played(merge(), GAMES)
-    played.start(list(range(GAMES)))
-    for _ in range(_WARM_UP_STEPS):
-        played.step()
+    if not others:
+        return _table(Played(merge(), GAMES), seconds, _ALONE_STEPS, restart=True)
+    with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
+        scene = open_scene(write_scene(Path(scratch) / "scene", others))
+        return _table(Played(scene, GAMES), seconds, _AMONG_OTHERS_STEPS, restart=False)
+
+
+def _table(played: Played, seconds: float, stretch: int, restart: bool) -> str:
+    played.begin_again()
+    placements = record(played, stretch, restart)
+    played.begin_again()
+    bare_us = _bare_us(placements)
     clock = _Clock()
     for _, part, owner, name in _PARTS:
         if hasattr(owner, name):
             setattr(owner, name, clock.around(part, getattr(owner, name)))
     simulation: Any = played.arena.simulation
     simulation.step = clock.around("simulation", simulation.step)
-    whole = clock.around("rest", played.step)
+    whole = clock.around("rest", lambda: played.step(restart))
     steps, until = 0, time.perf_counter() + seconds
     while time.perf_counter() < until:
-        whole()
-        steps += 1
-    microseconds = {part: 1e6 * taken / (steps * GAMES) for part, taken in clock.seconds.items()}
-    bare_us = _bare_us(played)
+        played.begin_again()
+        clock.seconds.clear()  # what it takes to begin is no part of a step
+        for _ in range(stretch):
+            whole()
+        clock.keep()
+        steps += stretch
     played.arena.close()
-    rows = [(words, microseconds.get(part, 0.0)) for words, part, *_ in _PARTS]
+    microseconds = {part: 1e6 * taken / (steps * GAMES) for part, taken in clock.kept.items()}
+    rows = [(words, microseconds.get(part, 0.0)) for words, part, *_ in _PARTS if part in microseconds]
     rows.insert(2, ("SUMO alone: placements and its step", bare_us))
     rows.insert(3, ("around SUMO: poses there, readings back", microseconds["simulation"] - bare_us))
     rows.append(("the rest", microseconds["rest"]))
@@ -81,9 +106,7 @@ def step_table(seconds: float) -> str:
     return "\n".join([*lines, f"| all | {whole_us:.2f} | {1e6 / whole_us:,.0f} game-steps/s |"])
 
 
-def _bare_us(played: Played) -> float:
-    placements = record(played, 300)
-    played.begin_again()
+def _bare_us(placements: list[list[Placement]]) -> float:
     began = time.perf_counter()
     for each in placements:
         place_and_step(each)
