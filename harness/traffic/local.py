@@ -7,7 +7,7 @@ the reference point moves from the body's centre to the front bumper.
 To take a car out of SUMO's traffic and add it anew costs as much as ten steps of it, and SUMO forgets the route of one
 that is only put back to its start. Where SUMO drives nobody there is nobody to whom that matters: players stay in the
 traffic from game to game, SUMO looks for their lanes along their routes only, and its models of following and changing
-lanes don't think for them.
+lanes don't think for them (so that SUMO has their poses, but not always their speeds).
 """
 
 from __future__ import annotations
