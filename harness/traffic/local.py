@@ -14,9 +14,11 @@ from __future__ import annotations
 
 import tempfile
 import weakref
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import repeat
 from pathlib import Path
 
 import libsumo
@@ -38,6 +40,7 @@ from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 # the road or off it; its bit 1: of the lanes near it, only those of its route count.
 _ON_ANY_LANE = (2, 100.0)  # SUMO's default distance
 _ON_ITS_ROUTE = (2 | 1, 10.0)  # which is all that a car can be on
+_ANY_EDGE, _ANY_LANE = repeat(""), repeat(-1)
 _HARDLY_EVER_S = 1e6  # an action step, between two thoughts of SUMO's own models for a car
 _LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
 _ANY_SPEED = 100.0  # a speed factor: SUMO would show the others no speed above the limit times this
@@ -164,13 +167,13 @@ class LocalSimulation:
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
         """Place the players that are taken over at poses [G, P] of their centres, let SUMO step, read the rest."""
-        front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel().tolist()
-        front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel().tolist()
-        angle = compass_deg_of(heading_rad).ravel().tolist()
-        move, (keep_route, within_m) = _libsumo.vehicle_moveToXY, self._placing
+        seats = list(self._placed.values())
+        front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel()[seats].tolist()
+        front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel()[seats].tolist()
+        angle = compass_deg_of(heading_rad).ravel()[seats].tolist()
         with self._asking("step"):
-            for name, k in self._placed.items():
-                move(name, "", -1, front_x[k], front_y[k], angle[k], keep_route, within_m)
+            where = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._placing))
+            deque(map(_libsumo.vehicle_moveToXY, self._placed, *where), maxlen=0)  # one after another, without a loop
             libsumo.simulationStep()
             self._others.advance()
             players = self._read_players()
