@@ -20,7 +20,7 @@ from sumolib.miscutils import getFreeSocketPort
 
 from benchmarks.games import Played
 from harness.game.state import ROLES
-from harness.traffic.opening import OpenScene
+from harness.traffic.scene import OpenScene
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
 EXACTLY_THERE = 2  # moveToXY's keepRoute: as given, on the road or off it

@@ -20,16 +20,16 @@ from rich.console import Console
 from benchmarks.budget import Budget
 from benchmarks.games import MERGE, REPOSITORY, coasting_policy, persona_file
 from benchmarks.sides import Pace, Side, Tell, opened
-from harness import campaign_run
-from harness.conditions import conditions_of
-from harness.plan import plan
-from harness.policy_file import write_policy
-from harness.preflight import open_campaign
-from harness.rounds import Stage, TrainingStage
-from harness.run_folder import RunFolder
-from harness.stage_keys import stage_keys
-from harness.stages import carry_out
-from harness.workers import Event
+from harness.campaign.execution import run_campaign as campaign_run
+from harness.campaign.execution.cache_keys import stage_keys
+from harness.campaign.execution.run_context import conditions_of
+from harness.campaign.execution.run_stage import carry_out
+from harness.campaign.execution.worker_pool import Event
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import Stage, TrainingStage
+from harness.campaign.preflight import open_campaign
+from harness.campaign.storage.run_folder import RunFolder
+from harness.drivers.policy_file import write_policy
 
 _STEPS = 3_000_000
 _WORKERS = 2
@@ -110,7 +110,7 @@ def campaign_side(pace: Pace, steps: int, episodes: int) -> None:
 
 def laid_out(stages: Mapping[str, tuple[float, Sequence[str]]], workers: int) -> float:
     """Seconds until all stages (their seconds, and what they need) are done: whoever is free takes, of what can be
-    done, that which most others wait for, as `harness.workers` hands it out."""
+    done, that which most others wait for, as `harness.campaign.execution.worker_pool` hands it out."""
     waiting, running, done = dict(stages), dict[str, float](), set[str]()
     now = 0.0
     while waiting or running:

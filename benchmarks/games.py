@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.arena import Arena, Seat
-from harness.documents.persona import Persona
-from harness.documents.reading import read_document
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.policy_file import ACTIONS, Policy
+from harness.environments.arena import Arena, Seat
+from harness.environments.auto_reset import NextGames
 from harness.game.arrays import FloatArray
 from harness.game.observation import SIZE
 from harness.game.seeding import generator_of
-from harness.next_games import NextGames
-from harness.policy_file import ACTIONS, Policy
-from harness.traffic.opening import OpenScene, open_scene
+from harness.traffic.scene import OpenScene, open_scene
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 MERGE = REPOSITORY / "networks" / "merge"

@@ -8,7 +8,7 @@ import platform
 from pathlib import Path
 from typing import Any
 
-from harness.workers import cores
+from harness.campaign.execution.worker_pool import cores
 
 _PACKAGES = {
     "harness": "harness",

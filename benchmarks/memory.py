@@ -30,7 +30,7 @@ def memory_mb() -> tuple[float, float]:
 
 def worker_side(pace: Pace) -> None:
     """Training in a process that has loaded what a campaign's worker has loaded."""
-    importlib.import_module("harness.workers")
+    importlib.import_module("harness.campaign.execution.worker_pool")
     from benchmarks.training import endless, train_in_laps
 
     def weigh() -> dict[str, float]:

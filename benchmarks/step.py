@@ -1,4 +1,4 @@
-"""Where the time of an arena's step goes, part by part as the table in `harness.arena` has them.
+"""Where the time of an arena's step goes, part by part as the table in `harness.environments.arena` has them.
 
 Each part is timed with a clock around it, less what the parts inside it take. A part that the arena no longer has
 under its name is counted to the rest.
@@ -15,9 +15,9 @@ from typing import Any
 from benchmarks.bare import Placement, place_and_step, record
 from benchmarks.games import GAMES, Played, merge
 from benchmarks.traffic import write_scene
-from harness import arena as stepping
-from harness.traffic.opening import open_scene
-from harness.traffic.others import Others
+from harness.environments.gymnasium_env import arena as stepping
+from harness.traffic.background_traffic import Others
+from harness.traffic.scene import open_scene
 
 _ALONE_STEPS, _AMONG_OTHERS_STEPS = 300, 100
 _PARTS = (

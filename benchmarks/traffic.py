@@ -16,7 +16,7 @@ from benchmarks.bare import place_and_step, record
 from benchmarks.budget import Budget
 from benchmarks.games import GAMES, Played
 from benchmarks.sides import Pace, Side, Tell, best, described, take_turns
-from harness.traffic.opening import open_scene
+from harness.traffic.scene import open_scene
 
 OTHERS = (0, 10, 50, 200)
 _APPROACH_M, _TAPER_M, _EXIT_M = 1600.0, 30.0, 2400.0

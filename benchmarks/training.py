@@ -1,7 +1,7 @@
 """Training as campaigns train: against the same learner on an environment that costs nothing, and on one that is
 stepped game by game in SB3's subprocesses.
 
-All three sides are `harness.training.train` with a campaign's own settings; only the world under it is another.
+All three sides are `harness.training.ppo.train` with a campaign's own settings; only the world under it is another.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 from benchmarks.budget import Budget
 from benchmarks.games import GAMES, MERGE, coasting_policy, merge, persona, persona_file
 from benchmarks.sides import Pace, Side, Tell, best, described, take_turns
-from harness.documents.campaign import Retraining, Training
-from harness.drivers.learned import LearnedDriver
-from harness.environments import DrivingEnv
+from harness.campaign.execution.worker_pool import cores
+from harness.config.campaign import Retraining, Training
+from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import write_policy
+from harness.environments.gymnasium_env import DrivingEnv
+from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.game.arrays import FloatArray
 from harness.game.state import EGO
-from harness.policy_file import write_policy
-from harness.training import Lesson, train
-from harness.vector_environment import ACTION_SPACE, OBSERVATION_SPACE
-from harness.workers import cores
+from harness.training.ppo import Lesson, train
 
 _ENDLESS = 1_000_000_000
 _WARM_UP_UPDATES = 3
@@ -72,7 +72,7 @@ def arena_side(pace: Pace) -> None:
 
 def free_side(pace: Pace) -> None:
     """On nothing."""
-    with patch.multiple("harness.training", Arena=_NoArena, ArenaVecEnv=_FreeGames):
+    with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=_FreeGames):
         train_in_laps(pace, endless())
 
 
@@ -81,7 +81,7 @@ def subprocess_side(pace: Pace, environments: int, policy: Path) -> None:
     one = partial(DrivingEnv, MERGE, "ego", persona_file("careful"), policy, persona_file(_OPPONENT))
     default = Training()
     settings = endless(games=environments, buffer=default.buffer // environments * environments)
-    with patch.multiple("harness.training", Arena=_NoArena, ArenaVecEnv=partial(_SubprocessGames, one)):
+    with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=partial(_SubprocessGames, one)):
         train_in_laps(pace, settings)
 
 

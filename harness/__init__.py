@@ -14,17 +14,17 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from harness.arena import Arena, Seat, Step
-    from harness.documents.persona import Persona
-    from harness.documents.reading import read_document
-    from harness.drivers.learned import LearnedDriver
+    from harness.config.persona import Persona
+    from harness.config.toml_reading import read_document
+    from harness.drivers.policy import LearnedDriver
+    from harness.drivers.policy_file import Policy, read_policy
     from harness.drivers.protocol import Driver
     from harness.drivers.sumo import SumoDriver
-    from harness.environments import DrivingEnv, ParallelDrivingEnv
+    from harness.environments.arena import Arena, Seat, Step
+    from harness.environments.gymnasium_env import DrivingEnv, ParallelDrivingEnv
+    from harness.environments.vector_env import ArenaVecEnv
     from harness.errors import HarnessError, SimulationError, UsageError
-    from harness.policy_file import Policy, read_policy
-    from harness.traffic.opening import OpenScene, open_scene
-    from harness.vector_environment import ArenaVecEnv
+    from harness.traffic.scene import OpenScene, open_scene
 
 __version__ = "0.1.0"
 
@@ -50,17 +50,17 @@ __all__ = [
 ]
 
 _HOMES = {
-    "arena": ("Arena", "Seat", "Step"),
-    "documents.persona": ("Persona",),
-    "documents.reading": ("read_document",),
-    "drivers.learned": ("LearnedDriver",),
+    "config.persona": ("Persona",),
+    "config.toml_reading": ("read_document",),
+    "drivers.policy": ("LearnedDriver",),
+    "drivers.policy_file": ("Policy", "read_policy"),
     "drivers.protocol": ("Driver",),
     "drivers.sumo": ("SumoDriver",),
-    "environments": ("DrivingEnv", "ParallelDrivingEnv"),
+    "environments.arena": ("Arena", "Seat", "Step"),
+    "environments.gymnasium_env": ("DrivingEnv", "ParallelDrivingEnv"),
+    "environments.vector_env": ("ArenaVecEnv",),
     "errors": ("HarnessError", "SimulationError", "UsageError"),
-    "policy_file": ("Policy", "read_policy"),
-    "traffic.opening": ("OpenScene", "open_scene"),
-    "vector_environment": ("ArenaVecEnv",),
+    "traffic.scene": ("OpenScene", "open_scene"),
 }
 
 
@@ -83,7 +83,7 @@ def _register() -> None:
 
     for name, player in (("harness/Ego-v0", "ego"), ("harness/NonEgo-v0", "non_ego")):
         if name not in registry:
-            register(name, entry_point="harness.environments:DrivingEnv", kwargs={"player": player})
+            register(name, entry_point="harness.environments.gymnasium_env:DrivingEnv", kwargs={"player": player})
 
 
 class _OnImport:

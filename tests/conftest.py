@@ -15,13 +15,14 @@ import sumo
 from harness.game.arrays import FloatArray
 from harness.game.quantities import Quantities, World
 from harness.game.state import Bodies, State
-from harness.traffic.opening import OpenScene, open_scene
+from harness.traffic.scene import OpenScene, open_scene
+from tests.support.repository import REPOSITORY
 
 
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """The top level of the repository: networks/, personas/ and campaigns/ lie in it."""
-    return Path(__file__).resolve().parent.parent
+    return REPOSITORY
 
 
 @pytest.fixture(scope="session")

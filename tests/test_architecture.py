@@ -1,4 +1,7 @@
-"""Holds the cut of the package: who may import whom, what files are called, and how long they get."""
+"""The rooms of the package: which may import which, what files are called, how long they get.
+
+Each test checks every file and reports all violations at once.
+"""
 
 from __future__ import annotations
 
@@ -13,143 +16,52 @@ from pathlib import Path
 
 import pytest
 
-REPOSITORY = Path(__file__).resolve().parent.parent
+from tests.support.repository import REPOSITORY
+
 PACKAGE = REPOSITORY / "harness"
 
-# Which part (a module or a folder directly under harness/) may import which others. The parts stand in the
-# order of the design: what a campaign is made of first, what runs it last. Not every part may import all
-# that stand above it, and a new arrow is a decision: it is drawn here first. The table has no cycle.
-# "harness" is the public face, harness/__init__.py: nothing inside may import from it.
-ALLOWED: dict[str, set[str]] = {
+# Which room may import which others, from the lowest floor to the highest. A room is a module or folder directly under
+# harness/, or a folder under harness/campaign/. A new arrow is a decision: add it here first. "harness" is the public
+# face, harness/__init__.py: no room imports it.
+GROUND = {"errors", "files", "game", "config"}
+CAMPAIGN = {"campaign", "campaign.plan", "campaign.storage", "campaign.execution", "campaign.results"}
+ROOMS: dict[str, set[str]] = {
     "errors": set(),
     "files": set(),
-    "versions": set(),
-    "locking": set(),
-    "attempts": set(),
-    "file_content": set(),
-    "compiling": set(),
-    "game": {"compiling"},
-    "documents": {"errors", "file_content", "game"},  # game: payoff terms and what a persona is made of
-    "traffic": {"errors", "file_content", "documents", "game"},
-    "policy_file": {"errors", "files", "file_content", "documents", "game"},
-    "drivers": {"errors", "documents", "game", "policy_file"},
-    "arena": {"errors", "documents", "game", "traffic", "drivers"},
-    "mixture": {"documents", "drivers", "game"},
-    "conformance": {"errors", "game", "traffic", "drivers", "arena"},
-    "environments": {"errors", "documents", "game", "traffic", "drivers", "policy_file", "arena"},
-    "next_games": {"game", "traffic", "arena"},
-    "vector_environment": {"game", "policy_file", "arena", "next_games"},
-    "convergence": set(),
-    "checkpoint": {"files", "policy_file"},
-    "training": {
-        *("errors", "documents", "game", "traffic", "drivers", "policy_file"),
-        *("arena", "mixture", "vector_environment", "checkpoint", "convergence"),
-    },
-    "metrics": {"game"},
-    "paired_games": {"documents", "game", "traffic", "drivers", "arena", "mixture"},
-    "reconfiguration": {"errors", "files", "documents", "game", "traffic", "drivers", "mixture", "paired_games"},
-    "search_columns": set(),
-    "assessment": {"errors", "documents", "game", "traffic", "arena", "mixture", "metrics"},
-    "trace_file": {"errors", "files", "file_content", "game"},
-    "seals": {"files", "file_content"},
-    "questions": set(),
-    "comparison": {"questions"},
-    "theory": {"errors", "comparison"},
-    # theory, search_columns: what their tables' columns are
-    "tables": {"errors", "files", "file_content", "comparison", "theory", "search_columns"},
-    "summary": {"comparison", "tables"},
-    "reconfigured": {
-        *("errors", "files", "documents", "drivers", "attempts", "tables", "search_columns", "reconfiguration"),
-    },
-    "rounds": {"documents", "game", "questions"},
-    "responses": {"documents", "game", "rounds"},
-    "exchange": {"documents", "game", "rounds", "plan_searches", "responses"},
-    "plan_searches": {"documents", "rounds"},
-    "plan": {"documents", "rounds", "responses", "exchange", "plan_searches"},
-    "plan_names": {"errors", "documents", "rounds", "responses", "plan"},
-    "pairings": {"documents", "game", "rounds", "responses", "exchange", "plan", "theory"},
-    "preflight": {"errors", "documents", "game", "traffic", "policy_file", "drivers", "rounds", "plan", "plan_names"},
-    "run_folder": {"errors", "files", "file_content", "documents", "rounds", "locking", "seals"},
-    "series": {"game"},
-    "manoeuvres": {"game", "series"},
-    "populations": {"documents", "game", "assessment", "tables", "summary"},
-    "manoeuvre_file": {"traffic", "manoeuvres", "tables", "run_folder", "trace_file"},
-    "segments": {
-        *("files", "assessment", "trace_file", "tables", "seals", "versions", "attempts", "manoeuvre_file"),
-    },
-    "conditions": {"documents", "drivers", "preflight", "rounds", "run_folder"},
-    "stage_keys": {"policy_file", "preflight", "responses", "rounds", "versions"},
-    "settling": {"rounds", "run_folder", "tables", "theory"},
-    "casting": {
-        *("errors", "documents", "game", "traffic", "drivers", "policy_file", "mixture", "assessment", "tables"),
-        *("rounds", "run_folder", "conditions", "theory", "reconfigured"),
-    },
-    "stages": {
-        *("errors", "files", "game", "traffic", "policy_file", "convergence", "training", "mixture"),
-        *("assessment", "segments", "tables", "rounds", "responses", "run_folder", "manoeuvre_file"),
-        *("attempts", "versions", "conditions", "settling", "casting", "reconfiguration", "reconfigured"),
-    },
-    "deaths": {"rounds", "attempts"},
-    "workers": {
-        *("errors", "files", "rounds", "locking", "run_folder", "attempts", "deaths", "conditions", "stages"),
-    },
-    "reports": {"errors", "comparison", "theory", "tables", "search_columns", "manoeuvres"},
-    "replay": {"errors", "game", "traffic"},  # traffic: SUMO-GUI, steered
-    "recorded_games": {"game", "traffic", "series", "trace_file", "reports", "replay"},
-    "model_card": {"errors", "documents", "files", "game", "policy_file", "reports", "plan", "rounds", "run_folder"},
-    "watching": {
-        *("errors", "documents", "traffic", "replay", "rounds", "run_folder", "tables", "trace_file", "manoeuvres"),
-    },
-    "progress": {"rounds", "workers"},
-    "schema_files": {"errors", "files", "documents"},
-    "persona_template": {"errors", "documents", "game", "plan"},
-    "portraits": {"errors", "files", "documents", "game", "reports"},  # reports: the style of its figures and pages
-    "run_results": {
-        *("errors", "files", "documents", "traffic", "questions", "comparison", "tables", "summary", "rounds"),
-        *("run_folder", "reports", "replay", "trace_file", "recorded_games", "manoeuvre_file", "model_card"),
-        *("pairings", "populations", "search_columns", "theory"),
-    },
-    "campaign_run": {
-        *("documents", "preflight", "plan", "rounds", "run_folder", "conditions", "stage_keys", "workers", "progress"),
-        *("reports", "run_results", "versions"),
-    },
+    "game": set(),
+    "config": {"errors", "files", "game"},
+    "traffic": GROUND,
+    "drivers": GROUND,
+    "evaluation": {"errors", "files", "game"},
+    "environments": GROUND | {"traffic", "drivers", "evaluation"},
+    "replay": {"errors", "game", "traffic"},
+    "reports": GROUND | {"evaluation"},
+    "training": GROUND | {"traffic", "drivers", "environments"},
+    "campaign.plan": {"errors", "game", "config", "evaluation"},
+    "campaign.storage": {"errors", "files", "config", "traffic", "evaluation", "campaign.plan"},
+    "campaign": GROUND | {"traffic", "drivers", "campaign.plan"},  # preflight
+    "campaign.results": GROUND
+    | {"traffic", "drivers", "evaluation", "environments", "replay", "reports", "campaign.plan", "campaign.storage"},
+    "campaign.execution": GROUND
+    | {"traffic", "drivers", "evaluation", "environments", "reports", "training"}
+    | CAMPAIGN,
+    "cli": GROUND | {"environments", "reports"} | CAMPAIGN,
+    "__main__": {"cli"},
+    "harness": GROUND | {"traffic", "drivers", "environments"},
 }
-ALLOWED["cli_documents"] = set(ALLOWED)
-ALLOWED["cli"] = set(ALLOWED)
-ALLOWED["__main__"] = {"cli"}
-ALLOWED["harness"] = set(ALLOWED) - {"cli", "cli_documents", "__main__"}
 
 SUMO = {"libsumo", "sumo", "sumolib", "traci"}
 LEARNERS = {"torch", "stable_baselines3"}
+PURE = ("evaluation", "reports")
+"""Rooms that judge: they neither import nor load SUMO or a learner."""
 GAME_MAY_IMPORT = {
-    "__future__",
-    "abc",
-    "bisect",
-    "collections",
-    "dataclasses",
-    "enum",
-    "functools",
-    "harness",
-    "hashlib",
-    "itertools",
-    "math",
-    "numpy",
-    "operator",
-    "typing",
+    *("__future__", "abc", "bisect", "collections", "dataclasses", "enum", "functools", "harness", "hashlib"),
+    *("itertools", "math", "numpy", "operator", "typing"),
 }
+JIT_MAY_IMPORT = GAME_MAY_IMPORT | {"contextlib", "fcntl", "numba", "pathlib", "platformdirs", "threading"}
 FILE_ACCESS_CALLS = {
-    "fromfile",
-    "genfromtxt",
-    "load",
-    "loadtxt",
-    "memmap",
-    "open",
-    "save",
-    "savetxt",
-    "savez",
-    "tofile",
+    *("fromfile", "genfromtxt", "load", "loadtxt", "memmap", "open", "save", "savetxt", "savez", "tofile"),
 }
-
 FORBIDDEN_WORDS = {"utils", "helpers", "common", "base", "core", "manager", "handler", "misc"}
 LONGEST = {".py": 300, ".jinja": 400, ".css": 400, ".js": 400}
 SEEDED_RANDOMNESS = {"Generator", "BitGenerator", "SeedSequence", "PCG64", "Philox", "default_rng"}
@@ -161,18 +73,21 @@ def label(path: Path) -> str:
     return path.relative_to(REPOSITORY).as_posix()
 
 
-each_source = pytest.mark.parametrize("path", SOURCES, ids=label)
-
-
 @cache
 def tree_of(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), str(path))
 
 
-def part_of(path: Path) -> str:
-    """The module or folder directly under harness/ that a file belongs to; "harness" for its __init__."""
-    first = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-    return "harness" if first == "__init__" else first
+def module_of(path: Path) -> str:
+    return ".".join(path.relative_to(REPOSITORY).with_suffix("").parts).removesuffix(".__init__")
+
+
+def room_of(module: str) -> str:
+    """The room of a dotted module of the harness."""
+    parts = module.split(".")[1:]
+    if parts[:1] == ["campaign"] and (PACKAGE / "campaign" / "/".join(parts[1:2])).is_dir():
+        return ".".join(parts[:2])
+    return parts[0] if parts else "harness"
 
 
 def is_module(dotted: str) -> bool:
@@ -191,103 +106,89 @@ def imported_modules(tree: ast.AST, path: Path) -> Iterator[str]:
             origin = ".".join(filter(None, (above, node.module)))
             for alias in node.names:
                 deeper = f"{origin}.{alias.name}"
-                yield deeper if origin.split(".")[0] == "harness" and is_module(deeper) else origin
+                yield deeper if origin.split(".")[0] in ("harness", "tests") and is_module(deeper) else origin
 
 
 def imported_packages(path: Path) -> set[str]:
     return {module.split(".")[0] for module in imported_modules(tree_of(path), path)}
 
 
-def imported_parts(path: Path) -> set[str]:
-    """The other parts of the harness that a file imports."""
-    modules = [module.split(".") for module in imported_modules(tree_of(path), path)]
-    parts = {module[1] if len(module) > 1 else "harness" for module in modules if module[0] == "harness"}
-    return parts - {part_of(path)}
+def imported_from_harness(path: Path) -> set[str]:
+    modules = imported_modules(tree_of(path), path)
+    return {module for module in modules if module.split(".")[0] == "harness"} - {module_of(path)}
 
 
-def graph() -> dict[str, set[str]]:
-    arrows: dict[str, set[str]] = {part_of(path): set() for path in SOURCES}
-    for path in SOURCES:
-        arrows[part_of(path)] |= imported_parts(path)
-    return arrows
+def in_room(room: str) -> list[Path]:
+    return [path for path in SOURCES if room_of(module_of(path)) == room]
 
 
-def reached_from(part: str) -> set[str]:
-    """A part and all that it imports through the harness, however far away."""
-    arrows, seen, waiting = graph(), set[str](), [part]
+def reached_from(room: str) -> set[str]:
+    """A room and all rooms that it imports, directly or through others."""
+    seen, waiting = set[str](), [room]
     while waiting:
         current = waiting.pop()
         if current not in seen:
             seen.add(current)
-            waiting.extend(arrows.get(current, ()))
+            waiting += [room_of(module) for path in in_room(current) for module in imported_from_harness(path)]
     return seen
 
 
 # --- import direction ---
 
 
-@each_source
-def test_imports__only_along_the_arrows_of_the_design(path: Path) -> None:
-    part = part_of(path)
-    assert part in ALLOWED, f"harness/{part} is not in the table ALLOWED: give it its place there"
-    not_allowed = imported_parts(path) - ALLOWED[part]
-    assert not not_allowed, f"{part} may not import {sorted(not_allowed)}"
+def test_imports__only_along_the_table_of_rooms() -> None:
+    wrong = [
+        f"{label(path)} imports {module}"
+        for path in SOURCES
+        for module in sorted(imported_from_harness(path))
+        if room_of(module) not in ROOMS[room_of(module_of(path))] | {room_of(module_of(path))}
+    ]
+    assert not wrong
 
 
-@pytest.mark.parametrize("arrows", [ALLOWED, graph()], ids=["table", "package"])
-def test_imports__run_in_no_circle(arrows: dict[str, set[str]]) -> None:
+@pytest.mark.parametrize("graph", ["rooms", "modules"])
+def test_imports__run_in_no_circle(graph: str) -> None:
+    arrows = {
+        "rooms": {room: allowed - {room} for room, allowed in ROOMS.items()},
+        "modules": {module_of(path): imported_from_harness(path) for path in SOURCES},
+    }
     try:
-        TopologicalSorter(arrows).prepare()
+        TopologicalSorter(arrows[graph]).prepare()
     except CycleError as error:
         pytest.fail("imports run in a circle: " + " -> ".join(error.args[1]))
 
 
-@each_source
-def test_imports__only_traffic_imports_sumo(path: Path) -> None:
-    if part_of(path) != "traffic":
-        assert not imported_packages(path) & SUMO
+def test_imports__only_traffic_imports_sumo() -> None:
+    outside = [path for path in SOURCES if room_of(module_of(path)) != "traffic"]
+    assert [label(path) for path in outside if imported_packages(path) & SUMO] == []
 
 
-@pytest.mark.parametrize("path", [path for path in SOURCES if part_of(path) == "game"], ids=label)
-def test_game__is_pure_numpy(path: Path) -> None:
-    assert imported_packages(path) <= GAME_MAY_IMPORT
+def test_game__is_pure_numpy_and_opens_no_files() -> None:
+    """But for `jit`, which stores compiled code."""
+    wrong = []
+    for path in in_room("game"):
+        jit = path.stem == "jit"
+        wrong += [
+            (label(path), each) for each in imported_packages(path) - (JIT_MAY_IMPORT if jit else GAME_MAY_IMPORT)
+        ]
+        calls = [node.func for node in ast.walk(tree_of(path)) if isinstance(node, ast.Call)]
+        names = {ast.unparse(call).split(".")[-1] for call in calls}
+        wrong += [(label(path), each) for each in names & FILE_ACCESS_CALLS if not jit]
+    assert wrong == []
 
 
-@pytest.mark.parametrize("path", [path for path in SOURCES if part_of(path) == "game"], ids=label)
-def test_game__opens_no_files(path: Path) -> None:
-    calls = [node.func for node in ast.walk(tree_of(path)) if isinstance(node, ast.Call)]
-    names = {ast.unparse(call).split(".")[-1] for call in calls}
-    assert not names & FILE_ACCESS_CALLS
-
-
-@pytest.mark.parametrize("part", ["comparison", "theory", "reports"])
-def test_judging__reaches_neither_sumo_nor_a_learner(part: str) -> None:
-    reached = reached_from(part)
-    guilty = {
-        label(path): found
-        for path in SOURCES
-        if part_of(path) in reached and (found := imported_packages(path) & (SUMO | LEARNERS))
-    }
-    assert not guilty
-
-
-@pytest.mark.parametrize("part", ["comparison", "theory", "reports"])
-def test_judging__loads_neither_sumo_nor_a_learner(part: str) -> None:
-    if not any(part_of(path) == part for path in SOURCES):
-        pytest.skip(f"there is no harness.{part}")
-    modules = [
-        ".".join(path.relative_to(REPOSITORY).with_suffix("").parts).removesuffix(".__init__")
-        for path in SOURCES
-        if part_of(path) == part
-    ]
-    assert loaded_with(*modules).isdisjoint(SUMO | LEARNERS)
+@pytest.mark.parametrize("room", PURE)
+def test_judging__reaches_and_loads_neither_sumo_nor_a_learner(room: str) -> None:
+    reached = [path for each in reached_from(room) for path in in_room(each)]
+    assert {label(path): found for path in reached if (found := imported_packages(path) & (SUMO | LEARNERS))} == {}
+    assert loaded_with(*map(module_of, in_room(room))).isdisjoint(SUMO | LEARNERS)
 
 
 def test_checking__loads_no_learner_and_no_statistics() -> None:
     """`harness check` is run often, and these take longer to load than all it does."""
-    loaded = loaded_with("harness.preflight")
+    loaded = loaded_with("harness.campaign.preflight")
     assert "numpy" in loaded
-    assert loaded.isdisjoint(LEARNERS | {"pandas", "scipy.stats", "plotly", "optuna"})
+    assert loaded.isdisjoint(LEARNERS | {"pandas", "scipy.stats", "optuna"})
 
 
 def loaded_with(*modules: str) -> set[str]:
@@ -300,26 +201,32 @@ def loaded_with(*modules: str) -> set[str]:
 # --- names, docstrings, length ---
 
 
-@each_source
-def test_module__says_what_it_is(path: Path) -> None:
-    assert (ast.get_docstring(tree_of(path)) or "").strip(), "no docstring"
+def test_modules__each_says_what_it_is() -> None:
+    assert [label(path) for path in SOURCES if not (ast.get_docstring(tree_of(path)) or "").strip()] == []
 
 
-@each_source
-def test_names__say_something(path: Path) -> None:
+def test_names__say_something() -> None:
+    assert {label(path): found for path in SOURCES if (found := words_of(path) & FORBIDDEN_WORDS)} == {}
+
+
+def words_of(path: Path) -> set[str]:
     words = {word for name in path.relative_to(PACKAGE).with_suffix("").parts for word in name.split("_")}
     for node in ast.walk(tree_of(path)):
         if isinstance(node, ast.ClassDef):
             words |= {word.lower() for word in re.findall(r"[A-Z][a-z0-9]*", node.name)}
         elif isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             words.add(node.name.strip("_"))
-    assert not words & FORBIDDEN_WORDS
+    return words
 
 
-@pytest.mark.parametrize("path", sorted(path for path in PACKAGE.rglob("*") if path.suffix in LONGEST), ids=label)
-def test_file__stays_short(path: Path) -> None:
-    lines = len(path.read_text(encoding="utf-8").splitlines())
-    assert lines <= LONGEST[path.suffix], "a file this long is looking for its second noun"
+def test_files__stay_short() -> None:
+    """A file longer than this is looking for its second noun."""
+    lengths = {
+        path: len(path.read_text(encoding="utf-8").splitlines())
+        for path in PACKAGE.rglob("*.*")
+        if path.suffix in LONGEST
+    }
+    assert {label(path): lines for path, lines in lengths.items() if lines > LONGEST[path.suffix]} == {}
 
 
 # --- randomness ---
@@ -342,9 +249,8 @@ def global_randomness(tree: ast.AST) -> Iterator[str]:
             yield ast.unparse(node)
 
 
-@each_source
-def test_randomness__comes_from_a_generator_argument(path: Path) -> None:
-    assert list(global_randomness(tree_of(path))) == []
+def test_randomness__comes_from_a_generator_argument() -> None:
+    assert {label(path): found for path in SOURCES if (found := list(global_randomness(tree_of(path))))} == {}
 
 
 # --- the test's own eyes ---

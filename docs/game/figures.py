@@ -16,7 +16,7 @@ from typing import Annotated
 import pandas as pd
 import typer
 
-from harness.tables import read_csv
+from harness.evaluation.tables import read_csv
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 Run = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, or one of its tables.")]

@@ -16,13 +16,13 @@ import numpy as np
 import pandas as pd
 import typer
 
+from harness.evaluation.trace_file import read_traces
+from harness.evaluation.trace_quantities import drove_in, quantities_of
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities, World
 from harness.game.state import NON_EGO
 from harness.replay.vehicles import types_of_vehicles
-from harness.series import drove_in, quantities_of
-from harness.trace_file import read_traces
-from harness.traffic.opening import OpenScene, open_scene
+from harness.traffic.scene import OpenScene, open_scene
 
 LEARNED = ("naive", "retrained", "robust")  # the egos that a campaign trains
 WINDOWS = 3  # of the learning curve, at its end

@@ -17,13 +17,13 @@ import numpy as np
 import pandas as pd
 import typer
 
-from harness.assessment import Arm, assess
-from harness.documents.persona import Persona
-from harness.documents.reading import read_document
-from harness.drivers.learned import LearnedDriver
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import read_policy
 from harness.drivers.sumo import SumoDriver
-from harness.policy_file import read_policy
-from harness.traffic.opening import open_scene
+from harness.environments.rollout import Arm, assess
+from harness.traffic.scene import open_scene
 
 ROOT = Path(__file__).parents[2]
 PERSONAS = ("speedy", "distracted")

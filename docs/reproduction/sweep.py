@@ -20,11 +20,11 @@ import typer
 from pydantic import Field
 from rich.console import Console
 
-from harness.campaign_run import run_campaign
-from harness.documents.reading import Document, read_document
-from harness.preflight import open_campaign
-from harness.run_folder import RunFolder
-from harness.workers import cores
+from harness.campaign.execution.run_campaign import run_campaign
+from harness.campaign.execution.worker_pool import cores
+from harness.campaign.preflight import open_campaign
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.toml_reading import Document, read_document
 
 COLUMNS = [
     *("persona", "key", "value", "arm", "episodes", "failure_rate", "mean_speed_mps"),

@@ -16,8 +16,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from harness.documents.driver import OUTPUTS, Fmu
-from harness.documents.reading import nearest
+from harness.config.driver import OUTPUTS, Fmu
+from harness.config.toml_reading import nearest
 from harness.drivers.car import Car
 from harness.drivers.process import ProcessDriver
 from harness.errors import Problem, UsageError

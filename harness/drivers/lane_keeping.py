@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from harness.documents.rules import LaneKeeping
-from harness.drivers.surroundings import View
+from harness.config.rule_driver import LaneKeeping
+from harness.drivers.perception import View
 from harness.game.arrays import FloatArray
 from harness.game.observation import AHEAD_M
 

@@ -11,13 +11,13 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from harness.documents.rules import Reacting, Rules
-from harness.drivers import dangers
+from harness.config.rule_driver import Reacting, Rules
+from harness.drivers import emergency_braking
+from harness.drivers.adaptive_cruise import cruise_mps2
 from harness.drivers.car import Car
-from harness.drivers.following import cruise_mps2
 from harness.drivers.lane_keeping import steering_rad
-from harness.drivers.reflex import Alert, Manner, react
-from harness.drivers.surroundings import Encounters, View, look
+from harness.drivers.perception import Encounters, View, look
+from harness.drivers.reaction import Alert, Manner, react
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 
 UNKNOWN_LIMIT_MPS = 5.0
@@ -86,13 +86,13 @@ class RulesDriver:
         rules, own = self._rules, view.speed_mps[:, None]
         began = alert.braking_mps2[:, None]
         if (braking := rules.emergency_braking) is not None:
-            return dangers.emergency(met, own, began > braking.warning_braking_mps2, braking)
+            return emergency_braking.emergency(met, own, began > braking.warning_braking_mps2, braking)
         if (person := rules.careful_and_competent) is not None:
-            return dangers.careful_and_competent(met, own, began > person.coasting_mps2, person)
+            return emergency_braking.careful_and_competent(met, own, began > person.coasting_mps2, person)
         if rules.rss is not None:
-            return dangers.rss(met, own, rules.rss)
+            return emergency_braking.rss(met, own, rules.rss)
         assert rules.fuzzy is not None, "who has a manner of reacting has one of the four"
-        return dangers.fuzzy(met, own, view.acceleration_mps2[:, None], rules.fuzzy)
+        return emergency_braking.fuzzy(met, own, view.acceleration_mps2[:, None], rules.fuzzy)
 
 
 def _manner(rules: Rules) -> Manner | None:

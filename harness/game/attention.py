@@ -12,9 +12,9 @@ from math import ceil
 
 import numpy as np
 
-from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.limits import ALL, AT_ONCE, EXACT, NOBODY, Missing, Reaction, Sight, Uses
+from harness.game.human_limits import ALL, AT_ONCE, EXACT, NOBODY, Missing, Reaction, Sight, Uses
+from harness.game.jit import compiled
 from harness.game.seeding import between
 
 

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.jit import compiled
 from harness.game.state import State
 
 GRAVITY_MPS2 = 9.81

@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from harness.compiling import compiled
 from harness.game.arrays import FloatArray
+from harness.game.jit import compiled
 
 
 @dataclass(frozen=True)

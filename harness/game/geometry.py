@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.jit import compiled
 
 
 class Box(NamedTuple):

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.jit import compiled
 from harness.game.quantities import PATH_M, Quantities, along_route, row_ahead
 from harness.game.road import Routes, lane_at, row_at
 

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction
+from harness.game.jit import compiled
 from harness.game.quantities import Quantities
 from harness.game.state import Outcome
 

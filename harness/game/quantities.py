@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Actuators, lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
+from harness.game.jit import compiled
 from harness.game.road import MARGIN_M, SPACING_M, Along, Road, Routes, row_at
 from harness.game.state import Bodies, Outcome, State
 

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from harness.compiling import compiled
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.geometry import Box, distance_to_nearest_segment
+from harness.game.jit import compiled
 
 SPACING_M = 0.5  # between stations of a route
 MARGIN_M = 100.0  # how far a route's table goes on, straight, before its start and beyond its end

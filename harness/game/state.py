@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.compiling import compiled
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.jit import compiled
 
 EGO, NON_EGO = 0, 1
 ROLES = ("ego", "non_ego")

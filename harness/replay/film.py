@@ -19,8 +19,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from harness.errors import HarnessError, Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.replay.desktop import find_sumo_gui, home_of, screen_problem
 from harness.replay.encoding import FORMATS, encode, encoding_problem
+from harness.replay.sumo_gui import find_sumo_gui, home_of, screen_problem
 from harness.replay.vehicles import PLAYER_COLOURS
 from harness.replay.virtual_screen import find_xvfb, virtual_screen
 from harness.traffic.gui import WindowClosed, gui_environment, steered_gui

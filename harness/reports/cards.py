@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from harness.comparison import Verdict
+from harness.evaluation.comparison import Verdict
 from harness.reports import wording
 from harness.reports.distributions import MOST_LINES, paired_figure, pairs_of, spread_figure, spreads_of
 from harness.reports.figures import Column, Point, rate_figure, speed_figure

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from harness.reports.figures import INK, SERIES, figure_of, svg
-from harness.reports.games import FloatArray
+from harness.reports.player_data import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from harness.reports.games import FloatArray, RecordedGame, SceneDrawing, Track, key
+from harness.reports.player_data import FloatArray, RecordedGame, SceneDrawing, Track, key
 
 SCALES = {
     "x_m": 0.01,

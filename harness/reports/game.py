@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from harness.comparison import Verdict
-from harness.reports.cells import Table, table
+from harness.evaluation.comparison import Verdict
+from harness.reports.data_table import Table, table
 from harness.reports.game_wording import equilibrium_sentences, gap_verdicts, last_pairs, other_pairs
 from harness.reports.heatmaps import View, views
 from harness.reports.wording import Answer, Row, Verdicts, interval, number, p_number, percent, trimmed
-from harness.tables import typed
-from harness.theory.records import GameFindings
+from harness.evaluation.tables import typed
+from harness.evaluation.game_theory.records import GameFindings
 
 CAPTIONS = {
     "gaps": "A row per best response.",

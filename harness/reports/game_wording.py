@@ -12,8 +12,8 @@ from typing import Any
 import pandas as pd
 
 from harness.reports.wording import (NO_SPACE, Answer, Row, Tone, Verdicts, interval, left_out, number, p_text, percent, trimmed)
-from harness.theory.equilibria import ALL, SolutionKind
-from harness.theory.gaps import NOTHING_TO_GAIN, GapVerdict
+from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
+from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
 
 QUESTION = "Equilibrium"
 NO, NEAR, OPEN = "no", "not refuted", "not decided"

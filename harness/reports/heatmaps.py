@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 from harness.reports.figures import INK, SERIES, figure_of, svg
 from harness.reports.wording import number, trimmed
-from harness.theory.crossplay import Matrices, matrices
+from harness.evaluation.game_theory.crossplay import Matrices, matrices
 
 Floats = npt.NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pandas as pd
 
-from harness.manoeuvres import Manoeuvre, Pair, pairs_in
-from harness.reports.games import key
+from harness.evaluation.manoeuvres import Manoeuvre, Pair, pairs_in
+from harness.reports.player_data import key
 
 NONE_NAMED = "–"
 RUN_UP_S = 1.5
@@ -54,7 +54,7 @@ def words(manoeuvre: str) -> str:
 
 def failures_by_pair(manoeuvres: pd.DataFrame, episodes: pd.DataFrame) -> tuple[list[str], list[Failures]]:
     """The arms in which the ego failed, and its failures grouped by the pair of manoeuvres that led to each
-    (`harness.manoeuvres.pairs`), the most frequent pair first, those without a name last.
+    (`harness.evaluation.manoeuvres.pairs`), the most frequent pair first, those without a name last.
     """
     failed = episodes[episodes["ego_failed"].fillna(0).astype(bool)]
     arms = list(dict.fromkeys(failed["arm"]))

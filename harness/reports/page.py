@@ -11,21 +11,21 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from harness.reports.cards import card
-from harness.reports.cells import table
+from harness.reports.data_table import table
 from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
 from harness.reports.figures import steps_text
 from harness.reports.game import game_section
-from harness.reports.games import RecordedGame, SceneDrawing, key
+from harness.reports.player_data import RecordedGame, SceneDrawing, key
 from harness.reports.learning import learning, stopped
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
 from harness.reports.provenance import mixed_versions
 from harness.reports.replays import failures, keys, replay_list, worst_game
 from harness.reports.results import results, unplayed
 from harness.reports.search import searches
-from harness.search_columns import RECONFIGURATION_COLUMNS
-from harness.tables import typed
-from harness.theory.records import GameFindings
+from harness.evaluation.tables import RECONFIGURATION_COLUMNS
+from harness.evaluation.tables import typed
+from harness.evaluation.game_theory.records import GameFindings
 
 MOST_ROWS = 3_000
 """A table longer than this is left to its CSV file, and the page says so."""
@@ -74,7 +74,7 @@ def render_page(
     """The report as HTML. Equal input gives equal text.
 
     `manifest` is the content of manifest.json, the frames are those of the CSV files with the columns of
-    `harness.tables.TABLES`, `replays` the names of the folders under `replays/`, in any order. `games`, the ones
+    `harness.evaluation.tables.TABLES`, `replays` the names of the folders under `replays/`, in any order. `games`, the ones
     to watch first on top, are taken until the page is full (`PAGE_BYTES`); without a `scene` there are none.
     Without `manoeuvres` nothing is said of them, without `game` nothing of equilibria, without `reconfiguration`
     nothing of searches.

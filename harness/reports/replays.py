@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from harness.reports import wording
-from harness.reports.games import key
+from harness.reports.player_data import key
 
 FAILURES = ("collision", "rail", "timeout")
 """Outcomes in the order they are worth watching; games that went well follow."""
@@ -41,7 +41,7 @@ def failures(episodes: pd.DataFrame, among: Sequence[str] | None = None) -> int:
 
 
 def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[Replay]:
-    """The replays, worst first, in the order of `harness.replay.choice.worst_first`, which reports can't import.
+    """The replays, worst first, in the order of `harness.replay.selection.worst_first`, which reports can't import.
 
     `embedded` are the keys of the games that the page can play.
     """

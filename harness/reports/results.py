@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.reports import wording
-from harness.reports.change import ARMS, RECONFIGURED, RETRAINED, Change
+from harness.reports.treatment import ARMS, RECONFIGURED, RETRAINED, Change
 from harness.reports.wording import Row, Verdicts, played
 
 

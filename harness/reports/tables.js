@@ -8,7 +8,7 @@ function exactOf(cell) {
   return cell.closest(".data") ? text : text.trim().replace(/\s+/g, " ");
 }
 
-/** A cell as CSV writes it, as harness.tables does. */
+/** A cell as CSV writes it, as harness.evaluation.tables does. */
 function quoted(text) {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }

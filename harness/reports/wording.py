@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from harness.comparison import Verdict
-from harness.reports.change import ARMS, RETRAINED, Change
+from harness.evaluation.comparison import Verdict
+from harness.reports.treatment import ARMS, RETRAINED, Change
 
 Row = Mapping[Any, Any]
 Number = Callable[[float], str]

@@ -9,7 +9,7 @@ from typing import TypeVar
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 
-from harness.documents.reading import nearest
+from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, attempt
 from harness.game.state import ROLES
 from harness.traffic import network

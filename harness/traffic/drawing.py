@@ -10,7 +10,7 @@ from sumolib.net import Net
 
 from harness.game.arrays import FloatArray
 from harness.traffic.network import car_lanes, drivable_area, lane_line
-from harness.traffic.opening import OpenScene
+from harness.traffic.scene import OpenScene
 
 
 def surfaces(net: Net) -> list[list[FloatArray]]:

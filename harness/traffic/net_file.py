@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from harness.documents.reading import nearest
+from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError
 from harness.game.arrays import FloatArray
 from harness.traffic.schema import kinds, problems_in

@@ -18,7 +18,7 @@ from sumolib.net.connection import Connection
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
-from harness.documents.reading import nearest
+from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.road import Rails

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import sumo
 from sumolib.net.lane import SUMO_VEHICLE_CLASSES
 
-from harness.documents.reading import nearest
+from harness.config.toml_reading import nearest
 from harness.errors import Problem
 
 _XSD = "{http://www.w3.org/2001/XMLSchema}"

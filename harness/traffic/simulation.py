@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -10,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.start import Start
-from harness.traffic.opening import OpenScene
+from harness.game.initial_state import Start
 from harness.traffic.route_file import Departure
 
 
@@ -56,21 +54,3 @@ class Simulation(Protocol):
 
     def close(self) -> None:
         """Give SUMO back. Closing twice is closing once."""
-
-
-def open_simulation(
-    scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
-) -> Simulation:
-    """Load SUMO with a tile for each game: in this process if its libsumo is free, otherwise in a child process.
-
-    `recorded`: every other is read in every step, near or not, which costs as much as SUMO's own work on it.
-    Both give the same numbers; only the second costs a message each way per verb. Raises SimulationError if SUMO
-    can't load the scene.
-    """
-    from harness.traffic.local import LocalSimulation
-
-    if not LocalSimulation.in_use():
-        return LocalSimulation(scene, games, taken_over, seed, recorded)
-    from harness.traffic.remote import RemoteSimulation
-
-    return RemoteSimulation(scene, games, taken_over, seed, recorded)

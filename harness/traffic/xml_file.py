@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 from defusedxml import ElementTree as SafeElementTree
 from defusedxml.common import DefusedXmlException
 
-from harness.documents.reading import nearest
+from harness.config.toml_reading import nearest
 from harness.errors import UsageError
-from harness.file_content import content_of
+from harness.files import content_of
 
 _MOST_BYTES = 200_000_000
 _REMEDY = "open it in netedit and save it again"

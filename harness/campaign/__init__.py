@@ -1,0 +1,1 @@
+"""A campaign from its document to its report: checked, planned, carried out, stored, evaluated."""

@@ -1,0 +1,114 @@
+"""Carrying out an arm in segments of games, each on the disk when it is played, put together when all are.
+
+<work>/segments/<first>-<last>.json            seal: the segment is whole; says by which versions it was played
+<work>/segments/<first>-<last>.<table>         its records, its manoeuvres, its traces
+
+So an arm goes on where it stopped, and needs the memory of one segment, however many games it has. A game depends on
+nothing but itself: the files of an arm are the same bytes whatever interrupted it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from harness.campaign.execution.crash_retries import Attempt, Begin, Report
+from harness.campaign.storage.checksums import broken, read_seal, write_seal
+from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES, name_manoeuvres
+from harness.campaign.storage.versions import versions_of_numbers
+from harness.environments.rollout import Arm, Game, assess
+from harness.evaluation.tables import EPISODE_COLUMNS, join_csv, typed, write_csv
+from harness.evaluation.trace_file import TraceWriter, join_traces
+from harness.files import make_folder
+
+SEGMENT_EPISODES = 50
+_TRACES = "traces.parquet"
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Some games of an arm, one after the other, and where they are kept."""
+
+    folder: Path
+    episodes: range
+
+    def file(self, name: str) -> Path:
+        """One of its files."""
+        return self.folder / f"{self.episodes[0]:06d}-{self.episodes[-1]:06d}.{name}"
+
+    def errors(self) -> int | None:
+        """How many of its games could not be played; None if it has not been played whole, by these versions."""
+        said = read_seal(self.file("json"))
+        if said is None or said.get("versions") != versions_of_numbers() or broken(said, self.folder):
+            return None
+        errors = said.get("errors")
+        return errors if isinstance(errors, int) else None
+
+    def play(self, games: Iterator[Game], labels: Mapping[str, Any], arm: Arm, tell: Callable[[], None]) -> int:
+        """Play it: the next of `games` are its own. How many of them could not be played."""
+        records = []
+        with TraceWriter(self.file(_TRACES)) as traces:
+            for _ in self.episodes:
+                game = next(games)
+                records.append({**game.record, **labels})
+                if game.trace is not None:
+                    traces.add(game.trace)
+                tell()
+        table = typed(pd.DataFrame(records).reindex(columns=list(EPISODE_COLUMNS)))
+        write_csv(table, self.file(EPISODES))
+        write_csv(name_manoeuvres(table, self.file(_TRACES), arm.scene), self.file(MANOEUVRES))
+        files = [self.file(name) for name in (EPISODES, MANOEUVRES, _TRACES)]
+        errors = int((table["error"] != "").sum())
+        write_seal(self.file("json"), self.folder, files, {"errors": errors, "versions": versions_of_numbers()})
+        return errors
+
+
+def segments_of(folder: Path, episodes: int) -> list[Segment]:
+    """The segments of an arm of so many games."""
+    firsts = range(0, episodes, SEGMENT_EPISODES)
+    return [Segment(folder, range(first, min(first + SEGMENT_EPISODES, episodes))) for first in firsts]
+
+
+def play_segments(
+    arm: Arm,
+    segments: Sequence[Segment],
+    labels: Mapping[str, Any],
+    attempt: Attempt,
+    begin: Begin,
+    report: Report,
+) -> int:
+    """Play what is missing of an arm; how many of all its games could not be played.
+
+    `labels` are the cells that all its records share. `begin` is told of each game before it is played, `report` of
+    the games played and of all there are. Raises as `assess` does.
+    """
+    make_folder(segments[0].folder)
+    errors = {segment: segment.errors() for segment in segments}
+    missing = [each for each, found in errors.items() if found is None or (found and attempt.first)]
+    total = segments[-1].episodes.stop
+    done = total - sum(len(segment.episodes) for segment in missing)
+
+    def tell() -> None:
+        nonlocal done
+        done += 1
+        report(done, total)
+
+    episodes = chain.from_iterable(segment.episodes for segment in missing)
+    with closing(assess(arm, episodes, begin, attempt.given_up)) as games:  # type: ignore[type-var]
+        for segment in missing:
+            segment.file("json").unlink(missing_ok=True)
+            errors[segment] = segment.play(games, labels, arm, tell)
+    return sum(found or 0 for found in errors.values())
+
+
+def join_segments(segments: Sequence[Segment], episodes: Path, manoeuvres: Path, traces: Path) -> None:
+    """Put the segments of an arm together into its files."""
+    join_csv([segment.file(EPISODES) for segment in segments], episodes)
+    join_csv([segment.file(MANOEUVRES) for segment in segments], manoeuvres)
+    join_traces([segment.file(_TRACES) for segment in segments], traces)

@@ -1,0 +1,112 @@
+"""Running a campaign: from its document to its run folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+
+from harness.campaign.execution.cache_keys import stage_keys
+from harness.campaign.execution.progress import StageProgress
+from harness.campaign.execution.run_context import conditions_of
+from harness.campaign.execution.worker_pool import Event, run_stages
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, Stage, TrainingStage
+from harness.campaign.preflight import OpenCampaign
+from harness.campaign.results.results import FINISHED, Outcome, warn, write_results
+from harness.campaign.storage.run_folder import FORMAT, RunFolder
+from harness.campaign.storage.versions import versions, versions_of_numbers
+from harness.reports.provenance import mixed_versions
+
+_KINDS = {TrainingStage: "training", AssessmentStage: "assessment", ReconfigurationStage: "reconfiguration"}
+
+
+def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: Console) -> Outcome:
+    """Carry out what is left of a campaign, and write its tables, replays and report.
+
+    Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
+    """
+    folder.claim(campaign.document.name, campaign.quick)
+    with folder.held():
+        stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
+        keys = stage_keys(campaign, stages)
+        ledger = _Ledger(campaign, folder, stages, keys)
+        scene = campaign.scene.document
+        folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
+        finished = [stage.id for stage in stages if ledger.status(stage) in FINISHED]
+        if len(finished) < len(stages):
+            ledger.warn_of_versions(console)
+            with StageProgress(stages, len(finished), console) as progress:
+
+                def tell(event: Event) -> None:
+                    ledger.note(event)
+                    progress.tell(event)
+
+                run_stages(stages, finished, conditions_of(campaign, folder, keys), jobs, tell)
+        return write_results(folder, console)
+
+
+class _Ledger:
+    """Keeps the manifest true to what happens."""
+
+    def __init__(
+        self, campaign: OpenCampaign, folder: RunFolder, stages: Sequence[Stage], keys: Mapping[str, str]
+    ) -> None:
+        self._folder = folder
+        self._manifest: dict[str, Any] = {
+            "format": FORMAT,
+            "name": campaign.document.name,
+            "quick": campaign.quick,
+            "campaign": campaign.document.recorded(),
+            "personas": [persona.name for persona in campaign.personas],
+            "ego_persona": campaign.ego_persona.model_dump(mode="json"),
+            "ego_driver": campaign.ego_driver.recorded if campaign.ego_driver is not None else None,
+            "persona_documents": {each.name: each.model_dump(mode="json") for each in campaign.personas},
+            "seeds": list(campaign.document.seeds),
+            "hashes": dict(campaign.hashes),
+            "versions": versions(),
+            "stages": {stage.id: self._entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages},
+        }
+        self._folder.write_manifest(self._manifest)
+
+    def status(self, stage: Stage) -> str:
+        """done, settled, failed or pending."""
+        return str(self._manifest["stages"][stage.id]["status"])
+
+    def warn_of_versions(self, console: Console) -> None:
+        """Say if what is left is about to be made by other versions than what is done."""
+        now = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
+        warn(mixed_versions(self._manifest["stages"] | now), console)
+
+    def note(self, event: Event) -> None:
+        """Write down what happened to a stage."""
+        entry = self._manifest["stages"][event.stage]
+        if event.kind == "done":
+            entry.update({"message": "", **event.info}, status=_status(event.info))
+        elif event.kind == "failed":
+            entry.update(status="failed", message=event.message)
+        elif event.kind == "skipped":
+            entry.update(status="pending", message=event.message)
+        else:
+            return
+        self._folder.write_manifest(self._manifest)
+
+    @staticmethod
+    def _entry(stage: Stage, info: Mapping[str, Any] | None) -> dict[str, Any]:
+        kind = _KINDS[type(stage)]
+        name = stage.arm if isinstance(stage, AssessmentStage) else stage.name
+        entry = {
+            "kind": kind,
+            "name": name,
+            "persona": stage.persona,
+            "seed": stage.seed,
+            "status": "pending",
+            "message": "",
+        }
+        return {**entry, **info, "status": _status(info)} if info is not None else entry
+
+
+def _status(info: Mapping[str, Any]) -> str:
+    """The status of a stage that came to its end: settled where there was nothing to do."""
+    return "settled" if info.get("settled") else "done"

@@ -1,0 +1,73 @@
+"""What a reconfiguration leaves in a run folder: its table, and the driver that it found, as a document to use."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from harness.campaign.execution.crash_retries import Begin, Report
+from harness.config.driver import read_driver
+from harness.config.toml_writing import toml_of
+from harness.config.tunable import Adjustable, Tunable
+from harness.drivers.external import GivenDriver
+from harness.errors import StageFailed
+from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed, write_csv
+from harness.files import make_folder, write_atomically
+from harness.training.parameter_search import Search, Trial, best, run_search
+
+DRIVER = "driver.toml"
+TABLE = "reconfiguration.csv"
+
+
+def reconfigure(
+    search: Search, labels: Mapping[str, Any], kept: Path, folder: Path, report: Report, begin: Begin
+) -> tuple[dict[str, Any], list[Path]]:
+    """Carry out a search, and write what it found into `folder` and its table beside `kept`, its trials: what came of
+    it, and the files. `labels` are the cells that all rows of the table share. Raises as `run_search` does."""
+    trials = run_search(search, kept, report, begin)
+    chosen = best(trials)
+    first, found = trials[0], trials[chosen]
+    said = [
+        f"{search.driver.in_words}, reconfigured against the persona {labels['persona']}, seed {labels['seed']}.",
+        f"Found in {len(trials)} trials of {search.settings.games} games each, as trial {chosen}: mean payoff "
+        f"{found.mean_payoff:.4g} instead of {first.mean_payoff:.4g}.",
+        "A campaign takes this file as [ego] driver; paths in it are relative to its folder.",
+    ]
+    driver = search.driver.tuned(found.values) if chosen else search.driver
+    make_folder(folder)
+    write_atomically(folder / DRIVER, toml_of(driver.document_in(folder), said).encode())
+    _write_table(trials, search.driver.searched, labels, kept.with_name(TABLE))
+    unplayed = sum(each.mean_payoff is None for each in trials)
+    info = {"trials": len(trials), "trials_unplayed": unplayed, "chosen_trial": chosen}
+    return info, [folder / DRIVER, kept.with_name(TABLE)]
+
+
+def read_found(given: GivenDriver, folder: Path) -> GivenDriver:
+    """The ego as the search that wrote into this folder reconfigured it."""
+    document = read_driver(folder / DRIVER)
+    if not isinstance(document, Adjustable):
+        raise StageFailed(f"{folder / DRIVER}: is not what a search found")
+    return given.tuned({key: document.numbers[key] for key in given.numbers})
+
+
+def _write_table(trials: Sequence[Trial], searched: Sequence[Tunable], labels: Mapping[str, Any], file: Path) -> None:
+    """A row for each trial and parameter."""
+    chosen, so_far = best(trials), float("-inf")
+    rows = []
+    for number, trial in enumerate(trials):
+        so_far = max(so_far, so_far if trial.mean_payoff is None else trial.mean_payoff)
+        came = {
+            "mean_payoff": trial.mean_payoff,
+            "failure_rate": trial.failure_rate,
+            "best_payoff": so_far,
+            "chosen": number == chosen,
+            "error": trial.error,
+        }
+        rows += [
+            {**labels, "trial": number, "parameter": key, "value": trial.values[key], "low": low, "high": high, **came}
+            for key, low, high in searched
+        ]
+    write_csv(typed(pd.DataFrame(rows).reindex(columns=list(RECONFIGURATION_COLUMNS))), file)

@@ -1,0 +1,1 @@
+"""Which trainings, searches and arms follow from a campaign document."""

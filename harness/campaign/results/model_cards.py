@@ -1,0 +1,268 @@
+"""Model cards: a README.md beside each policy of a run that says who it is, how it came about and how it fares.
+
+Everything in a card is from the run's manifest, its summary and the policy's own JSON, without timings: the same
+campaign gives the same card.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import pandas as pd
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from pydantic import ConfigDict, Field, ValidationError
+
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.storage.manifest import is_tuned
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.campaign import Campaign
+from harness.config.human_limits import Perception
+from harness.config.persona import Parametrised, Persona
+from harness.config.toml_reading import Document
+from harness.drivers.policy_file import policy_files, read_card
+from harness.errors import UsageError
+from harness.files import write_atomically
+from harness.game.payoff import GROUPS, TERMS
+from harness.game.state import NON_EGO, ROLES
+from harness.reports.wording import interval, number, percent
+
+CARD = "README.md"
+_PROGRAMS = ("python", "eclipse-sumo", "torch", "stable-baselines3", "numpy")
+
+
+@dataclass(frozen=True)
+class _Term:
+    """A row of the payoff's table."""
+
+    group: str
+    name: str
+    weight: str
+    counts: str
+    meaning: str
+
+
+def write_model_cards(folder: RunFolder, manifest: Mapping[str, Any], summary: pd.DataFrame) -> None:
+    """Write the card of every policy that a run trained. A run of before there were cards gets none."""
+    if "persona_documents" not in manifest:
+        return
+    cards = {
+        folder.policy(stage) / CARD: model_card(stage, manifest, summary, _policy_card(folder.policy(stage)))
+        for stage, entry in manifest["stages"].items()
+        if entry["kind"] == "training" and entry["status"] == "done"
+    }
+    for file, card in cards.items():
+        write_atomically(file, card.encode())
+
+
+class _PolicyCard(Document):
+    """What a card tells of a policy's JSON."""
+
+    model_config = ConfigDict(extra="ignore")
+    player: Literal["ego", "non_ego"]
+    scene: str = Field(max_length=1000)
+    against: str | None = Field(max_length=1000)
+    began_from: str | None = Field(max_length=1000)
+    training: dict[str, bool | int | float | str | list[int] | None]
+
+
+def _policy_card(folder: Path) -> dict[str, Any]:
+    """The content of a policy's JSON. Raises UsageError where it is not what a training wrote."""
+    card = read_card(folder)
+    try:
+        _PolicyCard.model_validate(card)
+    except ValidationError as error:
+        key, said = ".".join(map(str, error.errors()[0]["loc"])), error.errors()[0]["msg"]
+        raise UsageError.of(policy_files(folder)[0], key, f"is damaged: {said}", "train the policy again") from None
+    return card
+
+
+def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, policy: Mapping[str, Any]) -> str:
+    """The card of the policy that a training stage made; `policy` is the content of its policy.json."""
+    entry = manifest["stages"][stage]
+    is_ego = policy["player"] != ROLES[NON_EGO]
+    document = manifest["ego_persona"] if is_ego else manifest["persona_documents"][entry["persona"]]
+    persona = Persona.model_validate(document, strict=False)
+    versions = manifest["versions"]
+    environment = Environment(
+        loader=PackageLoader("harness", "campaign/results"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["one_line"] = _one_line
+    text = environment.get_template("model_card.md.jinja").render(
+        stage=stage,
+        intro=_intro(entry, is_ego),
+        campaign=manifest["name"],
+        version=versions["harness"],
+        quick=manifest.get("quick"),
+        facts=list(_facts(entry, manifest, policy, persona)),
+        persona=persona,
+        alpha=" + ".join(f"{getattr(persona, group).weight:g} × {group}" for group in GROUPS),
+        terms=list(_terms(persona)),
+        sources=persona.sources,
+        seed=entry["seed"],
+        intervals="Clopper-Pearson of rates" + (", t of speeds" if is_ego else ""),
+        headings=_HEADINGS[is_ego],
+        figures=list(_figures(stage, entry["seed"], manifest, summary, is_ego)),
+        purpose=_purpose(persona, is_ego),
+        scene=policy["scene"],
+        snippet=_snippet(stage, entry, is_ego),
+        settings=[(name, _shown(value)) for name, value in policy["training"].items()],
+        versions=", ".join(f"{name} {versions[name]}" for name in _PROGRAMS if name in versions),
+    )
+    return text.strip() + "\n"
+
+
+def _one_line(text: str) -> str:
+    """A person's words as one line of plain text: no heading, no table and no element can be made of them."""
+    return " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
+
+
+def _intro(entry: Mapping[str, Any], is_ego: bool) -> str:
+    if not is_ego:
+        return f"A non-ego: a person of kind `{entry['persona']}`, who drives for reasons of their own."
+    if entry["persona"]:
+        return f"The ego, retrained against the person `{entry['persona']}`."
+    return "The naive ego: it learned alone on the road."
+
+
+def _facts(
+    entry: Mapping[str, Any], manifest: Mapping[str, Any], policy: Mapping[str, Any], persona: Persona
+) -> Iterator[tuple[str, str]]:
+    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    against = policy["against"]
+    yield "player", policy["player"]
+    yield "persona", f"`{persona.name}`"
+    yield "scene", f"`{policy['scene']}`"
+    partner = {None: "nobody", "sumo": "SUMO's own driver", "given": _given(manifest, campaign)}
+    yield "against", partner.get(against, f"`{against}`")
+    if against is not None:
+        how = campaign.retraining if entry["name"] != entry["persona"] else campaign.non_ego_training
+        yield "games without the other", percent(how.alone_share)
+    yield "began from", f"`{policy['began_from']}`" if policy["began_from"] else "nothing"
+    ended = {"converged": "stopped by convergence", "budget": "the whole budget"}.get(entry["stopped"], "")
+    yield "trained for", f"{entry['steps']:,} of at most {entry['budget_steps']:,} steps: {ended}"
+    if entry.get("rule"):
+        yield "convergence", entry["rule"]
+    yield "training seed", str(entry["seed"])
+    yield "decisions", "its most likely action" if persona.decisions == "mode" else "sampled from its distribution"
+    if persona.attention is not None:
+        lapse = "–".join(f"{each:g}" for each in persona.attention.lapse_s)
+        yield "attention", f"lapses for {lapse} s after {persona.attention.mean_attentive_s:g} s on average"
+        if policy["player"] == ROLES[NON_EGO]:
+            yield "no lapses in", f"the first {percent(campaign.non_ego_training.attentive_share)} of the budget"
+    if persona.perception is not None:
+        share, up_to_m = percent(persona.perception.overlooks_share), persona.perception.overlooked_up_to_m
+        if persona.perception.overlooks_share:
+            yield "overlooks", f"in {share} of drives, others whose centre is less than {up_to_m:g} m ahead of its own"
+        yield from _sight(persona.perception)
+    if persona.reaction is not None:
+        yield "reaction", f"decisions count {'–'.join(f'{each:g}' for each in persona.reaction.delay_s)} s later"
+    if persona.actuators is not None:
+        uses = persona.actuators
+        shares = (uses.throttle_share, uses.braking_share, uses.steering_share)
+        throttle, braking, steering = map(percent, shares)
+        yield "uses of the car", f"{throttle} of its acceleration, {braking} of its braking, {steering} of its steering"
+
+
+def _sight(perception: Perception) -> Iterator[tuple[str, str]]:
+    if perception.misses_share:
+        share, within_m = percent(perception.misses_share), perception.noticed_within_m
+        yield "misses", f"in {share} of drives, others that are more than {within_m:g} m away"
+    if perception.range_m is not None:
+        yield "sees", f"others up to {perception.range_m:g} m away"
+    if perception.distance_error or perception.closing_error_per_s:
+        closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance a second"
+        yield "misjudges", f"distances by {percent(perception.distance_error)}, {closing}, for {perception.error_s:g} s"
+
+
+def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
+    recorded = manifest.get("ego_driver")
+    return str(recorded["in_words"]) if recorded else f"the policy `{campaign.ego.driver}`"
+
+
+def _terms(persona: Persona) -> Iterator[_Term]:
+    for group in GROUPS:
+        for name, given in getattr(persona, group).terms.items():
+            term, weight, limit = TERMS[name], given, ""
+            if isinstance(given, Parametrised):
+                weight = given.weight
+                limit = f", within {given.within_s:g} s" if given.within_m is None else f", within {given.within_m:g} m"
+            counts = "per second" if term.per_second else "as it happens"
+            yield _Term(group, name, f"{weight:g}", counts, term.meaning + limit)
+    for each in persona.human.fuzzy:
+        sets = "; ".join(
+            f"{of.name} ({', '.join(f'{x:g}: {y:g}' for x, y in of.points)}) is worth {of.value:g}" for of in each.sets
+        )
+        yield _Term("human", each.name, f"{each.weight:g}", "per second", f"fuzzy, of `{each.quantity}`: {sets}")
+
+
+_HEADINGS = {
+    True: ("games", "failure rate", "mean speed (m/s)"),
+    False: ("games", "reaches its goal", "mean speed (m/s)"),
+}
+
+
+def _figures(
+    stage: str, seed: int, manifest: Mapping[str, Any], summary: pd.DataFrame, is_ego: bool
+) -> Iterator[tuple[str, Sequence[str]]]:
+    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    rows = {row["arm"]: row for row in summary[summary["seed"] == seed].to_dict("records")}
+    for arm in plan(campaign, manifest["personas"], is_tuned(manifest)):
+        if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.arm not in rows:
+            continue
+        player = arm.ego if is_ego else arm.non_ego
+        if player is not None and player.stage == stage:
+            yield arm.arm, _of_ego(rows[arm.arm]) if is_ego else _of_non_ego(rows[arm.arm])
+
+
+def _of_ego(row: Mapping[Any, Any]) -> Sequence[str]:
+    rate = _with(percent(row["failure_rate"]), interval(row["failure_rate_low"], row["failure_rate_high"]))
+    low, high = (number(row[f"mean_speed_{end}_mps"], 2) for end in ("low", "high"))
+    speed = _with(number(row["mean_speed_mps"], 2), f"{low}–{high}" if low != "–" else "–")
+    return str(row["episodes"] - row["errors"]), rate, speed
+
+
+def _of_non_ego(row: Mapping[Any, Any]) -> Sequence[str]:
+    span = interval(row["non_ego_goal_rate_low"], row["non_ego_goal_rate_high"])
+    rate = _with(percent(row["non_ego_goal_rate"]), span)
+    return str(row["episodes"] - row["errors"]), rate, number(row["non_ego_mean_speed_mps"], 2).replace("–", "")
+
+
+def _with(value: str, span: str) -> str:
+    if value == "–":
+        return ""
+    return value if span == "–" else f"{value} ({span})"
+
+
+def _purpose(persona: Persona, is_ego: bool) -> str:
+    if is_ego:
+        return "For campaigns of this harness: as the ego under study, or to be compared with another ego."
+    return f"For campaigns of this harness: to find out how an ego copes with a person who is `{persona.name}`."
+
+
+def _snippet(stage: str, entry: Mapping[str, Any], is_ego: bool) -> str:
+    if is_ego:
+        return f'[ego]\ndriver = "policies/{stage}"    # the path of this folder'
+    lines = [
+        f'personas = ["personas/{entry["persona"]}.toml"]',
+        f"seeds = [{entry['seed']}]",
+        'policies = "policies"    # the path of the folder that holds this one',
+        "",
+        "[ego]",
+        'driver = "sumo"          # or the folder of a policy: your own',
+    ]
+    return "\n".join(lines)
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list):
+        return ", ".join(map(str, value))
+    return f"{value:,}" if isinstance(value, int) else str(value)

@@ -1,0 +1,123 @@
+"""Recorded games as the report's player shows them: from traces and the scene they were played on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from harness.evaluation.trace_file import read_trace
+from harness.evaluation.trace_quantities import series_of
+from harness.game.state import ROLES
+from harness.replay import choose_games, worst_first
+from harness.replay.contact import contacts
+from harness.replay.vehicles import types_of_vehicles
+from harness.reports.player_data import PlayerTrack, RecordedGame, SceneDrawing, Touch, Track
+from harness.traffic import drawing
+from harness.traffic.network import read_net
+from harness.traffic.scene import OpenScene
+
+TAKE_TURNS = 20  # games of an arm and seed: where not all fit on a page, there are some of each, good ones too
+
+
+def recorded_games(
+    episodes: pd.DataFrame, traces: Callable[[str, int], Path], scene: OpenScene
+) -> Iterator[RecordedGame]:
+    """Every game that was played, the ones to watch first on top, each read when it is asked for.
+
+    Those that became replays come first, `TAKE_TURNS` of every arm and seed before more of any, worst first, each
+    followed by the game of the same episode that it is compared with; then the rest. `traces` is where the traces of an
+    arm and seed are.
+    """
+    for game in watching_order(episodes).itertuples():
+        trace = read_trace(traces(game.arm, game.seed), game.episode)
+        if not trace.empty:
+            yield recorded_game(trace, scene, game)
+
+
+def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
+    """The rows of `episodes` that were played, in the order of `recorded_games`."""
+    played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
+    rows = {(game.arm, game.seed, game.episode): game.Index for game in played.itertuples()}
+    order: dict[Any, None] = {}
+    chosen = worst_first(choose_games(played))
+    turn = chosen.groupby(["arm", "seed"]).cumcount() // TAKE_TURNS
+    turn[chosen["ego_outcome"].where(chosen["ego_outcome"] != "", chosen["non_ego_outcome"]) == "goal"] = 0
+    for game in chosen.loc[turn.sort_values(kind="stable").index].itertuples():
+        order[game.Index] = None
+        for arm in _counterparts(game.arm):
+            counterpart = rows.get((arm, game.seed, game.episode))
+            if counterpart is not None:
+                order[counterpart] = None
+    order |= dict.fromkeys(worst_first(played).index)
+    return played.loc[list(order)]
+
+
+def _counterparts(arm: str) -> list[str]:
+    """The arms that an arm may be shown beside: naive beside retrained or reconfigured."""
+    before, against, persona = arm.partition("_vs_")
+    others = {"naive": ("retrained", "reconfigured"), "retrained": ("naive",), "reconfigured": ("naive",)}
+    return [other + against + persona for other in others.get(before, (before,))]
+
+
+def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedGame:
+    """One game's trace as tracks; `game` is its row of `episodes`."""
+    types = types_of_vehicles(trace, scene.routes.path)
+    sizes_m = {name: (kind.length_m, kind.width_m) for name, kind in types.items()}
+    series = series_of(trace, scene.world, sizes_m)
+    by_name = {str(name): rows.sort_values("step") for name, rows in trace.groupby("player", sort=True)}
+    players = []
+    for place, role in enumerate(ROLES):
+        if role in by_name:
+            rows = by_name.pop(role)
+            steps = rows["step"].to_numpy()
+            ended = rows[rows["outcome"] != ""].head(1)
+            players.append(
+                PlayerTrack(
+                    **_track(role, rows, sizes_m),
+                    acceleration_mps2=rows["acceleration_mps2"].to_numpy(),
+                    steering_rad=rows["steering_rad"].to_numpy(),
+                    lapsed=rows["lapsed"].to_numpy(dtype=bool),
+                    leader_gap_m=series.leader_gap_m[steps, place],
+                    time_to_collision_s=series.time_to_collision_s[steps, place],
+                    outcome="".join(ended["outcome"]),
+                    ended_step=int(ended["step"].iloc[0]) if len(ended) else None,
+                )
+            )
+    return RecordedGame(
+        game.arm,
+        game.persona,
+        int(game.seed),
+        int(game.episode),
+        scene.world.step_s,
+        int(trace["step"].max()),
+        game.ego_outcome or game.non_ego_outcome,
+        players,
+        [Track(**_track(name, piece, sizes_m)) for name, rows in by_name.items() for piece in _pieces(rows)],
+        [Touch(touch.time_s, touch.x_m, touch.y_m, touch.label) for touch in contacts(trace, types, scene.rail_lines)],
+    )
+
+
+def _track(name: str, rows: pd.DataFrame, sizes_m: Mapping[str, tuple[float, float]]) -> dict[str, Any]:
+    motion = {column: rows[column].to_numpy() for column in ("x_m", "y_m", "heading_rad", "speed_mps")}
+    length_m, width_m = sizes_m[name]
+    first = int(rows["step"].iloc[0])
+    return {"name": name, "length_m": length_m, "width_m": width_m, "first_step": first, **motion}
+
+
+def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    """A road user's rows, cut where it was not there for a while."""
+    cuts = np.flatnonzero(np.diff(rows["step"].to_numpy()) > 1) + 1
+    edges = [0, *cuts.tolist(), len(rows)]
+    for first, end in pairwise(edges):
+        yield rows.iloc[first:end]
+
+
+def scene_drawing(scene: OpenScene) -> SceneDrawing:
+    """What the player draws of a scene."""
+    net = read_net(scene.net_file)
+    return SceneDrawing(drawing.surfaces(net), drawing.lane_marks(net), scene.rail_lines, drawing.goal_line(scene, net))

@@ -1,0 +1,147 @@
+"""Finding a recorded game in a run folder and showing it: in SUMO-GUI, or as a film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import pandas as pd
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+from rich.text import Text
+
+from harness.campaign.plan.stages import stage_id
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.toml_reading import nearest
+from harness.errors import UsageError, plain
+from harness.evaluation.manoeuvres import pairs_in
+from harness.evaluation.tables import read_csv
+from harness.evaluation.trace_file import read_trace
+from harness.replay import follow_in_sumo_gui, replay_name, worst_first, write_film, write_replay
+from harness.traffic.scene import open_scene
+
+
+def game_table(run: Path, arm: str | None) -> Table:
+    """The games of a run, or of one arm of it, worst first, with what the non-ego did and how the ego answered."""
+    folder = RunFolder(run)
+    episodes = _episodes(folder)
+    named = folder.path / "manoeuvres.csv"
+    pairs = pairs_in(read_csv(named)) if named.is_file() else {}
+    missing = "" if named.is_file() else f"; name the manoeuvres: harness report {run}"
+    if arm is not None:
+        episodes = _of_arm(run, episodes, arm)
+    table = Table(
+        title=Text(f"Games of {run}, worst first"),
+        title_justify="left",
+        caption=Text(f"watch one: harness replay RUN ARM EPISODE{missing}"),
+        box=SIMPLE,
+        padding=0,
+    )
+    for name in ("arm", "seed", "episode", "ego", "non-ego", "manoeuvres", "TTC (s)"):
+        table.add_column(name, overflow="fold", no_wrap=name in ("arm", "ego", "non-ego"))
+    for game in worst_first(episodes).itertuples():
+        ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
+        pair = pairs.get((game.arm, game.seed, game.episode))
+        words = (str(game.seed), str(game.episode), game.ego_outcome, game.non_ego_outcome, pair.words if pair else "")
+        table.add_row(*(Text(plain(cell)) for cell in (game.arm, *words, ttc)))  # text, whatever the table says
+    return table
+
+
+@dataclass(frozen=True)
+class FoundGame:
+    """A recorded game, ready to be shown."""
+
+    replay: Path
+    trace: pd.DataFrame
+    title: str
+    step_length_s: float
+
+
+@contextmanager
+def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
+    """A game with a replay folder, made of its trace for as long as the block lasts. What lies under `replays/` is for
+    SUMO alone: a configuration there could have SUMO read and write anything, so it is not opened here.
+
+    Raises UsageError if there is no such game, or it could not be played.
+    """
+    folder = RunFolder(run)
+    chosen_seed = folder.manifest()["seeds"][0] if seed is None else seed
+    games = _of_arm(run, _episodes(folder), arm)
+    found = games[(games["episode"] == episode) & (games["seed"] == chosen_seed)]
+    if found.empty:
+        raise UsageError.of(
+            run,
+            f"{arm} {episode}",
+            f"has no such game of seed {chosen_seed}",
+            f"episodes go from {games['episode'].min()} to {games['episode'].max()}",
+        )
+    if found.iloc[0]["error"]:
+        raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {found.iloc[0]['error']}", "choose another")
+    if not folder.traces(stage_id(arm, chosen_seed)).is_file():
+        raise UsageError.of(
+            run,
+            f"{arm} {episode}",
+            "was recorded, but the traces are not in this folder",
+            f"watch it in {run / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
+        )
+    scene = open_scene(folder.scene)
+    trace = read_trace(folder.traces(stage_id(arm, chosen_seed)), episode)
+    title = f"{arm}, seed {chosen_seed}, episode {episode}"
+    name = replay_name(arm, chosen_seed, episode)
+    if trace.empty:
+        traces = folder.traces(stage_id(arm, chosen_seed))
+        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
+    with TemporaryDirectory(prefix="harness-replay-") as scratch:
+        replay = Path(scratch) / name
+        write_replay(
+            trace,
+            scene.net_file,
+            scene.routes.path,
+            replay,
+            title=title,
+            step_length_s=scene.world.step_s,
+            rails=scene.rail_lines,
+        )
+        yield FoundGame(replay, trace, title, scene.world.step_s)
+
+
+def watch(game: FoundGame, console: Console) -> None:
+    """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen or no SUMO-GUI."""
+    message = (
+        f"SUMO-GUI plays {game.replay} at half the speed of life, following the ego. It halts at a contact and at the "
+        "end: its play button goes on. Closing it ends this command."
+    )
+    follow_in_sumo_gui(game.replay, lambda: console.print(message, highlight=False, markup=False, soft_wrap=True))
+
+
+def film(game: FoundGame, file: Path, console: Console) -> None:
+    """Write a game as a film, with a bar that says how long it will take. Raises UsageError for what is missing."""
+    columns = (TextColumn("filming"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
+        task = bar.add_task("filming", total=None)
+        pictures = write_film(
+            game.replay,
+            game.trace,
+            file,
+            title=game.title,
+            step_length_s=game.step_length_s,
+            report=lambda done, total: bar.update(task, completed=done, total=total),
+        )
+    console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
+
+
+def _episodes(folder: RunFolder) -> pd.DataFrame:
+    folder.manifest()
+    return read_csv(folder.path / "episodes.csv")
+
+
+def _of_arm(run: Path, episodes: pd.DataFrame, arm: str) -> pd.DataFrame:
+    arms = sorted(set(episodes["arm"]))
+    if arm not in arms:
+        raise UsageError.of(run, arm, "has no such arm", nearest(arm, arms or ["(no arm is done yet)"]))
+    return episodes[episodes["arm"] == arm]

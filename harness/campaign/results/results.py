@@ -1,0 +1,204 @@
+"""What a run came to: tables, replays and report, from its folder alone."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from pydantic import ValidationError
+from rich.console import Console
+from rich.progress import track
+
+from harness.campaign.plan.paper_rounds import questions
+from harness.campaign.plan.stages import stage_id
+from harness.campaign.results.matchups import who_met
+from harness.campaign.results.model_cards import write_model_cards
+from harness.campaign.results.population_summary import by_who_drove
+from harness.campaign.results.recorded_games import recorded_games, scene_drawing
+from harness.campaign.storage.manifest import is_tuned
+from harness.campaign.storage.manoeuvre_table import manoeuvres_of
+from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.config.campaign import Campaign
+from harness.errors import UsageError
+from harness.evaluation.comparison import compare
+from harness.evaluation.game_theory.findings import find
+from harness.evaluation.game_theory.records import GameFindings
+from harness.evaluation.research_questions import Question
+from harness.evaluation.summary import summarise
+from harness.evaluation.tables import (
+    EPISODE_COLUMNS,
+    MANOEUVRE_COLUMNS,
+    RECONFIGURATION_COLUMNS,
+    TRAINING_COLUMNS,
+    is_of_a_search,
+    read_csv,
+    typed,
+    write_csv,
+)
+from harness.evaluation.trace_file import check_traces, read_trace
+from harness.files import write_atomically
+from harness.replay import choose_games, replay_name, worst_first, write_replay
+from harness.reports.game_wording import gap_verdicts
+from harness.reports.page import render_page
+from harness.reports.provenance import mixed_versions
+from harness.reports.results import results
+from harness.reports.treatment import ARMS
+from harness.reports.wording import Verdicts
+from harness.traffic.scene import OpenScene, open_scene
+
+FINISHED = ("done", "settled")
+"""Statuses of a stage that came to its end."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run came to."""
+
+    verdicts: Sequence[tuple[str, Verdicts]]
+    """Of each persona and question."""
+    failed_stages: tuple[str, ...]
+    error_games: int
+
+
+def write_results(folder: RunFolder, console: Console) -> Outcome:
+    """Tables, replays and report of what is done, from the run folder alone."""
+    manifest = folder.manifest()
+    folder.check_whole(manifest)
+    done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
+    episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
+    training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
+    searched = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
+    summary = summarise(episodes)
+    campaign = _campaign(manifest)
+    asked = _questions(campaign, manifest)
+    comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
+    tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
+    game = _game(campaign, manifest, episodes)
+    tables |= vars(game) if game is not None else {}
+    if campaign.population:
+        tables["populations"] = by_who_drove(campaign, episodes)
+    tables |= {"reconfiguration": searched} if is_tuned(manifest) else {}
+    scene = open_scene(folder.scene)
+    _check_traces(folder, episodes)
+    write_model_cards(folder, manifest, summary)
+    for name, table in tables.items():
+        write_csv(table, folder.path / f"{name}.csv")
+    with console.status("naming manoeuvres"):
+        manoeuvres = _manoeuvres(folder, done, scene)
+    write_csv(manoeuvres, folder.path / "manoeuvres.csv")
+    replays = _write_replays(folder, scene, episodes, console)
+    with console.status("writing the report"):
+        games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
+        page = render_page(
+            manifest,
+            episodes,
+            summary,
+            comparisons,
+            training,
+            replays,
+            games,
+            scene_drawing(scene),
+            manoeuvres,
+            game,
+            populations=tables.get("populations"),
+            reconfiguration=searched,
+        )
+    write_atomically(folder.path / "report.html", page.encode())
+    warn(mixed_versions(manifest["stages"]), console)
+    failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] not in FINISHED)
+    found = results(manifest, episodes, summary, comparisons)
+    met = [*manifest["personas"], *(each.name for each in campaign.population)]
+    verdicts = [(persona, found.verdicts(each, persona)) for persona in met for each in ARMS]
+    verdicts += gap_verdicts(game.gaps) if game is not None else []
+    return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))
+
+
+def warn(sentences: Sequence[str], console: Console) -> None:
+    """Say sentences that should not be overlooked."""
+    for sentence in sentences:
+        console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)
+
+
+def _questions(campaign: Campaign, manifest: Mapping[str, Any]) -> list[Question]:
+    """The questions that the finished arms of a run can answer."""
+    done = _done(manifest)
+    return [
+        question
+        for question in questions(campaign, manifest["personas"], is_tuned(manifest))
+        if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= done
+    ]
+
+
+def _game(campaign: Campaign, manifest: Mapping[str, Any], episodes: pd.DataFrame) -> GameFindings | None:
+    """What the finished arms of a run say of the game between strategies; None where it is not asked."""
+    met = who_met(campaign, manifest["personas"], _done(manifest), is_tuned(manifest))
+    if met is None:
+        return None
+    return find(met.pairings, met.responses, met.personas_of, episodes, campaign.assessment.significance)
+
+
+def _campaign(manifest: Mapping[str, Any]) -> Campaign:
+    try:
+        return Campaign.model_validate(manifest["campaign"], strict=False)
+    except ValidationError as error:
+        raise UsageError.of(MANIFEST, "campaign", f"is damaged: {error}", "run the campaign again") from None
+
+
+def _done(manifest: Mapping[str, Any]) -> set[str]:
+    return {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
+
+
+def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, columns: list[str]) -> pd.DataFrame:
+    frames = []
+    for name, entry in done.items():
+        if entry["kind"] == kind:
+            file = folder.work(name) / table
+            frame = read_csv(file)
+            of = frame["arm" if kind == "assessment" else "stage"]
+            theirs = ((of == entry["name"]) & (frame["seed"] == entry["seed"])).all()
+            if not theirs or (kind == "reconfiguration" and not is_of_a_search(frame)):
+                raise UsageError.of(file, "", f"has rows that are not of {name}", "run the campaign again")
+            frames.append(frame)
+    return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))
+
+
+def _check_traces(folder: RunFolder, episodes: pd.DataFrame) -> None:
+    played = episodes[episodes["error"] == ""]
+    for (arm, seed), games in played.groupby(["arm", "seed"], sort=False):
+        check_traces(folder.traces(stage_id(str(arm), seed)), games["episode"])
+
+
+def _manoeuvres(folder: RunFolder, done: Mapping[str, Any], scene: OpenScene) -> pd.DataFrame:
+    arms = [name for name, entry in done.items() if entry["kind"] == "assessment"]
+    frames = [manoeuvres_of(folder, name, scene) for name in arms]
+    return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
+
+
+def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, console: Console) -> list[str]:
+    chosen = worst_first(choose_games(episodes))
+    folder.replays.mkdir(exist_ok=True)
+    names = [replay_name(game.arm, game.seed, game.episode) for game in chosen.itertuples()]
+    games = list(zip(chosen.itertuples(), names, strict=True))
+    quiet = not console.is_terminal
+    for game, name in track(games, "writing replays", console=console, transient=True, disable=quiet):
+        write_replay(
+            read_trace(folder.traces(stage_id(game.arm, game.seed)), game.episode),
+            scene.net_file,
+            scene.routes.path,
+            folder.replays / name,
+            title=f"{game.arm}, seed {game.seed}, episode {game.episode}",
+            step_length_s=scene.world.step_s,
+            rails=scene.rail_lines,
+        )
+    _drop_stale(folder.replays, set(names))
+    return names
+
+
+def _drop_stale(replays: Path, names: set[str]) -> None:
+    for old in replays.iterdir():
+        if old.is_dir() and old.name not in names:
+            shutil.rmtree(old)

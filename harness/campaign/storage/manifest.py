@@ -1,0 +1,108 @@
+"""The manifest of a run folder, as far as others rely on it: written by the harness, read as anybody's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import ConfigDict, Field, ValidationError
+
+from harness.config.campaign import Campaign, CampaignName, Seed
+from harness.config.persona import Persona
+from harness.config.scene import Name
+from harness.config.toml_reading import Document
+
+Count = Annotated[int, Field(ge=0, le=10**15)]
+Text = Annotated[str, Field(max_length=10_000)]
+_SAID = 3
+
+
+class _Record(Document):
+    model_config = ConfigDict(extra="ignore")  # a later version of the same format may say more
+
+
+class StageEntry(_Record):
+    """What a manifest says of a stage."""
+
+    kind: Literal["training", "assessment", "reconfiguration"]
+    name: Text
+    persona: Name | Literal[""] = ""
+    seed: Seed
+    status: Text
+    message: Text = ""
+    steps: Count | None = None
+    budget_steps: Count | None = None
+    stopped: Text | None = None
+    rule: Text | None = None
+    seconds: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
+    episodes: Count | None = None
+    errors: Count | None = None
+    trials: Count | None = None
+    trials_unplayed: Count | None = None
+    chosen_trial: Count | None = None
+    settled: Text | None = None
+
+
+class Manifest(_Record):
+    """What a manifest says."""
+
+    format: int
+    name: CampaignName
+    quick: bool = False
+    campaign: dict[str, Any]
+    personas: list[Name]
+    seeds: list[Seed] = Field(min_length=1)
+    hashes: dict[Text, Text] = Field(default_factory=dict)
+    versions: dict[Text, Text] = Field(default_factory=dict)
+    stages: dict[Text, StageEntry]
+    ego_persona: dict[str, Any] | None = None
+    persona_documents: dict[Name, dict[str, Any]] = Field(default_factory=dict)
+
+
+def check_manifest(content: bytes, known_format: int) -> Manifest:
+    """A manifest's text as a record. Raises ValueError saying which keys are wrong, and how."""
+    try:
+        manifest = Manifest.model_validate_json(content)
+    except ValidationError as error:
+        raise ValueError(_words(error)) from None
+    if manifest.format != known_format:
+        raise ValueError(f"format: it is {manifest.format}, not {known_format}")
+    return manifest
+
+
+def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Key and what is wrong there, of what only reports and model cards rely on."""
+    try:
+        Campaign.model_validate(manifest["campaign"], strict=False)
+    except ValidationError as error:
+        yield "campaign", _words(error)
+    if "persona_documents" not in manifest:
+        return  # a run of before there were model cards
+    documents = {"ego_persona": manifest.get("ego_persona")}
+    documents |= {f"persona_documents.{name}": each for name, each in manifest["persona_documents"].items()}
+    for key, document in documents.items():
+        try:
+            Persona.model_validate(document, strict=False)
+        except ValidationError as error:
+            yield key, _words(error)
+    if "harness" not in manifest.get("versions", {}):
+        yield "versions.harness", "is missing"
+    populations = {each.get("name") for each in manifest["campaign"].get("population", ())}
+    for name, entry in manifest["stages"].items():
+        if entry.get("persona", "") not in {"", *manifest["persona_documents"], *populations}:
+            yield f"stages.{name}.persona", f"there is no document of persona {entry['persona']!r}"
+        if entry["kind"] == "training" and entry["status"] == "done":
+            for key in ("steps", "budget_steps", "stopped"):
+                if entry.get(key) is None:
+                    yield f"stages.{name}.{key}", "is missing"
+
+
+def is_tuned(manifest: Mapping[str, Any]) -> bool:
+    """Whether the campaign's ego has something to tune, which round 2 searches."""
+    return any(entry["kind"] == "reconfiguration" for entry in manifest["stages"].values())
+
+
+def _words(error: ValidationError) -> str:
+    found = [f"{'.'.join(map(str, each['loc'])) or 'it'}: {each['msg']}" for each in error.errors()]
+    more = f"; and {len(found) - _SAID} more" if len(found) > _SAID else ""
+    return "; ".join(found[:_SAID]) + more

@@ -1,0 +1,281 @@
+"""A run folder: what one run of a campaign wrote, and how far it has come.
+
+    manifest.json            campaign, versions, seeds, hashes, status of every stage
+    policies/<stage>/        policy.safetensors, policy.json, README.md (its model card)
+                             of a reconfiguration: driver.toml
+    traces/<stage>.parquet   one file per arm
+    scene/                   a copy of the scene's files
+    .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, trials, segments, tables,
+                             done.json
+    .stages/{lock,workers}   whose the folder is at the moment: one command's and its workers'
+    .stages/scratch/         temporary files of the workers
+
+A stage is done when `done.json` is there, the seal (`checksums`) of all that its numbers are read from, with the
+key of its inputs; it is written last. A folder is a run folder from its manifest on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+import shutil
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from harness.campaign.plan.stages import stage_id
+from harness.campaign.storage.checksums import broken, read_seal, write_seal
+from harness.campaign.storage.locks import InUse, only_one, wait_for_all
+from harness.campaign.storage.manifest import StageEntry, check_manifest, problems_for_report
+from harness.errors import Problem, UsageError
+from harness.files import content_of, drop_scratch, leads_out, make_folder, write_atomically
+
+FORMAT = 1
+MANIFEST = "manifest.json"
+_PATIENCE_S = 10.0  # how long workers of a command that was killed may take to notice
+_MOST_MANIFEST_BYTES = 50_000_000
+_MOST_SCENE_BYTES = 1_000_000_000
+_ANY_STAGE = {"kind": "training", "name": "", "seed": 0, "status": "done"}
+_STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
+
+
+def _check(content: bytes) -> dict[str, Any]:
+    """A manifest that is one of ours, as far as others rely on it; names in it become names of files."""
+    manifest = check_manifest(content, FORMAT)
+    for name, entry in manifest.stages.items():
+        if name != stage_id(entry.name, entry.seed) or not _STAGE.fullmatch(name):
+            raise ValueError(f"{name!r} is no stage")
+    return dict(json.loads(content))
+
+
+def _only_begun(folder: Path) -> bool:
+    """Whether all that there is in a folder are other folders, and locks: as a command leaves it that was killed in
+    its first moment."""
+    begun = ("lock", "workers")
+    return all(name in begun or name.startswith(f".{MANIFEST}.") for _, _, files in os.walk(folder) for name in files)
+
+
+def _is_one_of(file: Path, hashes: Mapping[str, str]) -> bool:
+    try:
+        return hashlib.sha256(content_of(file, _MOST_SCENE_BYTES)).hexdigest() in hashes.values()
+    except OSError:
+        return False
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Where everything of a run is."""
+
+    path: Path
+
+    @property
+    def manifest_file(self) -> Path:
+        return self.path / MANIFEST
+
+    @property
+    def scene(self) -> Path:
+        return self.path / "scene"
+
+    @property
+    def replays(self) -> Path:
+        return self.path / "replays"
+
+    def policy(self, stage: str) -> Path:
+        """The folder of the policy that a stage made."""
+        return self.path / "policies" / stage
+
+    def traces(self, stage: str) -> Path:
+        """The traces of an arm."""
+        return self.path / "traces" / f"{stage}.parquet"
+
+    def tensorboard(self, stage: str) -> Path:
+        """TensorBoard's event files of a training."""
+        return self.path / "tensorboard" / stage
+
+    def work(self, stage: str) -> Path:
+        """What a stage keeps for itself."""
+        return self.path / ".stages" / stage
+
+    @property
+    def scratch(self) -> Path:
+        """Where workers keep temporary files."""
+        return self.path / ".stages" / "scratch"
+
+    @property
+    def workers_lock(self) -> Path:
+        """What every worker shares as long as it lives."""
+        return self.path / ".stages" / "workers"
+
+    def segments(self, stage: str) -> Path:
+        """The segments of an arm that is not done."""
+        return self.work(stage) / "segments"
+
+    # --- stages --------------------------------------------------------------------------------------------------
+
+    def done(self, stage: str) -> dict[str, Any] | None:
+        """What the seal of a stage says, whether it holds or not; None if there is none."""
+        said = read_seal(self.work(stage) / "done.json")
+        try:
+            StageEntry.model_validate({**_ANY_STAGE, **(said or {})["info"]})
+        except (ValueError, LookupError, TypeError):
+            return None
+        return said
+
+    def finished(self, stage: str, key: str) -> dict[str, Any] | None:
+        """What came of a stage when it was done from these very inputs, without an error; None if it is not done, or
+        its work is gone or damaged."""
+        said = self.done(stage)
+        made = any((self.policy(stage) / name).is_file() for name in ("policy.safetensors", "driver.toml"))
+        made = made or self.traces(stage).is_file()
+        if said is None or said.get("key") != key or said["info"].get("errors"):
+            return None
+        if not made and not said["info"].get("settled"):
+            return None
+        return None if broken(said, self.path) else dict(said["info"])
+
+    def begin(self, stage: str, key: str) -> None:
+        """A stage is begun, or gone on with: it is not done any more. What it wrote from other inputs is dropped."""
+        work = self.work(stage)
+        (work / "done.json").unlink(missing_ok=True)
+        if not (work / "key").is_file() or (work / "key").read_bytes() != key.encode():
+            self.forget(stage)
+            make_folder(work)
+            write_atomically(work / "key", key.encode())
+
+    def finish(self, stage: str, key: str, info: Mapping[str, Any], files: Sequence[Path] = ()) -> None:
+        """A stage is done: everything it wrote is there, and `files` are what its numbers are read from."""
+        write_seal(self.work(stage) / "done.json", self.path, files, {"key": key, "info": dict(info)})
+
+    def drop_segments(self, stage: str) -> None:
+        """Drop the segments of an arm that is done: its files hold them."""
+        shutil.rmtree(self.segments(stage), ignore_errors=True)
+
+    # --- the manifest --------------------------------------------------------------------------------------------
+
+    def manifest(self) -> dict[str, Any]:
+        """The manifest. Raises UsageError if the folder has none that can be read."""
+        try:
+            manifest = _check(content_of(self.manifest_file, _MOST_MANIFEST_BYTES))
+        except (FileNotFoundError, NotADirectoryError):
+            raise UsageError.of(
+                self.path, "", f"is not a run folder: it has no {MANIFEST}", "name the folder a campaign wrote"
+            ) from None
+        except (OSError, ValueError, RecursionError) as error:
+            text = error.strerror if isinstance(error, OSError) else error
+            raise UsageError.of(
+                self.manifest_file, "", f"is damaged: {text}", "run the campaign again into another folder, with --out"
+            ) from None
+        self._check_links()
+        return manifest
+
+    def _check_links(self) -> None:
+        """Raises UsageError where the folder has a link that leads out of it: what is behind it is not the run's, to
+        be read or to be written over."""
+        for folder, folders, files in os.walk(self.path):
+            for name in (*folders, *files):
+                place = Path(folder) / name
+                if place.is_symlink() and leads_out(place, self.path):
+                    message = "is a link that leads out of the run folder"
+                    raise UsageError.of(place, "", message, "put there what it points to")
+
+    def check_whole(self, manifest: Mapping[str, Any]) -> None:
+        """Raises UsageError where what the stages wrote is gone, as in a folder that was published without it, or is
+        not what they wrote, or the manifest says what no campaign can be."""
+        done = [name for name, entry in manifest["stages"].items() if entry["status"] == "done"]
+        if done and not any(self.work(name).is_dir() for name in done):
+            raise UsageError.of(
+                self.path,
+                "",
+                "holds a report and its tables, but not what they are made of",
+                f"read its report.html, or play the games: run campaign {manifest['name']!r} again",
+            )
+        remedy = "run the campaign again"
+        found = [
+            Problem(str(self.manifest_file), key, f"is damaged: {message}", remedy)
+            for key, message in problems_for_report(manifest)
+        ]
+        damaged = [file for name in done for file in self._damaged(name, manifest["stages"][name])]
+        if isinstance(hashes := manifest.get("hashes"), dict):
+            damaged += [file for file in sorted(self.scene.glob("*")) if not _is_one_of(file, hashes)]
+        found += [Problem(str(file), "", "is gone, or is not what the campaign wrote", remedy) for file in damaged]
+        if found:
+            raise UsageError(found)
+
+    def _damaged(self, stage: str, entry: Mapping[str, Any]) -> list[Path]:
+        said = self.done(stage)
+        if said is None:  # a manifest that names no versions is of before stages with errors had a seal
+            return [self.work(stage) / "done.json"] if "versions" in entry else []
+        return broken(said, self.path)
+
+    def write_manifest(self, manifest: Mapping[str, Any]) -> None:
+        """Replace the manifest."""
+        write_atomically(self.manifest_file, (json.dumps(manifest, indent=2) + "\n").encode())
+
+    def claim(self, campaign: str, quick: bool = False) -> None:
+        """Make the folder this campaign's. Raises UsageError if it is another's, holds its full run and this is a
+        quick one (or the other way round), or is no run folder and not empty."""
+        try:
+            self._check_owner(campaign, quick)
+            for name in ("policies", "traces", "tensorboard", ".stages"):
+                make_folder(self.path / name)
+        except OSError as error:
+            raise UsageError.of(
+                self.path, "", f"can't be written: {error.strerror}", "choose a folder with --out"
+            ) from None
+
+    def _check_owner(self, campaign: str, quick: bool) -> None:
+        if self.path.exists() and not self.path.is_dir():
+            raise UsageError.of(self.path, "", "is a file", "choose a folder with --out")
+        if self.manifest_file.exists():
+            manifest = self.manifest()
+            wrong = ""
+            if manifest["name"] != campaign:
+                wrong = f"belongs to campaign {manifest['name']!r}, not {campaign!r}"
+            elif bool(manifest.get("quick")) != quick:
+                kinds = ("a full run, which a quick one", "a quick run, which a full one")
+                wrong = f"holds {kinds[not quick]} would overwrite"
+            if wrong:
+                raise UsageError.of(self.path, "", wrong, "choose another folder with --out")
+        elif self.path.is_dir() and not _only_begun(self.path):
+            raise UsageError.of(self.path, "", "is not empty and not a run folder", "choose another folder with --out")
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Nobody else writes into the folder meanwhile. What killed commands left half written is taken away.
+
+        Raises UsageError if another command is at it.
+        """
+        lock = self.path / ".stages" / "lock"
+        if not lock.parent.is_dir():  # a folder that was published: there is nothing in it to write from
+            yield
+            return
+        try:
+            with only_one(lock):
+                wait_for_all(self.workers_lock, _PATIENCE_S)
+                drop_scratch(self.path)
+                shutil.rmtree(self.scratch, ignore_errors=True)
+                try:
+                    yield
+                finally:
+                    shutil.rmtree(self.scratch, ignore_errors=True)
+        except InUse as who:
+            raise UsageError.of(
+                self.path, "", f"is in use by {who}", "wait until it has ended, or choose another folder with --out"
+            ) from None
+
+    def keep_scene(self, folder: Path, files: tuple[str, ...]) -> None:
+        """Copy a scene's files, so that the run can be looked at when the scene has changed."""
+        make_folder(self.scene)
+        for name in files:
+            write_atomically(self.scene / name, (folder / name).read_bytes())
+
+    def forget(self, stage: str) -> None:
+        """Drop what a stage wrote from other inputs."""
+        shutil.rmtree(self.work(stage), ignore_errors=True)
+        shutil.rmtree(self.policy(stage), ignore_errors=True)
+        shutil.rmtree(self.tensorboard(stage), ignore_errors=True)
+        self.traces(stage).unlink(missing_ok=True)

@@ -1,0 +1,130 @@
+"""The commands about what a person writes: personas, drivers, and the schemas of all documents."""
+
+from __future__ import annotations
+
+import io
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+NOT_CONFORMANT = 1
+
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code",
+        help="Let a driver run that is code which comes as a file: a program, an FMU, a file of Stable-Baselines3. "
+        "It can do whatever you can: use this for files you trust.",
+    ),
+]
+persona_app = typer.Typer(
+    no_args_is_help=True, help="Write a person of your own, and see what a persona's document means."
+)
+
+
+@persona_app.command("new")
+def new_persona(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="What the person is called, such as late_merger.", show_default=False)
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The file.  [default: personas/NAME.toml]", show_default=False),
+    ] = None,
+) -> None:
+    """Write a commented template of a persona: valid as it stands, with every key there is. Overwrites nothing."""
+    from harness.cli.persona_template import create_persona
+
+    file = create_persona(name, out)
+    print(f"{file}: a careful driver so far. What it means: harness persona show {file}")
+
+
+@persona_app.command("show")
+def show_persona(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The persona's TOML document.", show_default=False)],
+    html: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write it as a page, too, that opens offline.", show_default=False),
+    ] = None,
+) -> None:
+    """Draw what a persona means: what everything is worth to it, membership curves, a sample of its lapses."""
+    from rich.console import Console
+
+    from harness.config.persona import Persona
+    from harness.config.toml_reading import read_document
+    from harness.reports.persona.profile import portrait_of
+    from harness.reports.persona.terminal import show
+
+    portrait = portrait_of(read_document(file, Persona))
+    if html is not None:
+        from harness.reports.persona.page import write_portrait
+
+        write_portrait(portrait, html)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # of a terminal that does not know every character
+    console = Console()
+    show(portrait, console)
+    if html is not None:
+        console.print(f"Page: {html}", highlight=False, markup=False, soft_wrap=True)
+
+
+def schema(
+    document: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="DOCUMENT",
+            help="Which: campaign, persona, scene or driver.  [default: all, with --out]",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write DOCUMENT.schema.json into this folder.", show_default=False),
+    ] = None,
+) -> None:
+    """Print the JSON Schema of a kind of document, or write it, or all: editors complete and check TOML by them."""
+    from harness.cli.schema_files import write_schemas
+    from harness.config.json_schema import DOCUMENTS, schema_text
+    from harness.errors import UsageError
+
+    if out is not None:
+        for written in write_schemas(out, document):
+            print(written)
+    elif document is not None:
+        print(schema_text(document), end="")
+    else:
+        kinds = ", ".join(DOCUMENTS)
+        raise UsageError.of(
+            "harness schema", "DOCUMENT", "is missing", f"one of {kinds}; or all of them with --out DIR"
+        )
+
+
+def check_driver(
+    driver: Annotated[
+        str,
+        typer.Argument(
+            metavar="DRIVER", help="A driver document, a policy's folder, or an installed driver.", show_default=False
+        ),
+    ],
+    scene: Annotated[
+        Path, typer.Option(metavar="DIR", help="The scene it drives on.  [default: networks/merge]", show_default=False)
+    ] = Path("networks/merge"),
+    games: Annotated[int, typer.Option(min=2, max=1000, metavar="N", help="Games to play.")] = 3,
+    allow_code: AllowCode = False,
+) -> None:
+    """Check that a driver keeps to the protocol, and say in words where it does not.
+
+    Plays seeded games twice, and shows them again all at once. Exit code 1: it does not keep to it.
+    """
+    from rich.console import Console
+
+    from harness.environments.conformance import check_named
+
+    found = check_named(driver, scene, games, allow_code)
+    console = Console()
+    for line in found.lines():
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    if found.wrong:
+        raise typer.Exit(NOT_CONFORMANT)

@@ -1,0 +1,110 @@
+"""A road scene: `scene.toml` beside SUMO's net and route files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, model_validator
+
+from harness.config.toml_reading import Document
+
+
+def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] > interval[1]:
+        raise ValueError(f"the interval [{interval[0]:g}, {interval[1]:g}] is empty: put the lower end first")
+    return interval
+
+
+Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
+PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
+Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
+
+
+class Goal(Document):
+    """Where the players want to go."""
+
+    edge: str
+    """The edge of the net the goal is on."""
+    position_m: float = Field(ge=0.0)
+    """Distance along that edge."""
+
+
+class Actuators(Document):
+    """What the players' cars can do beyond what their vehicle type in the route file says."""
+
+    max_acceleration_mps2: float = Field(3.0, gt=0.0, le=15.0)
+    """Acceleration at full throttle."""
+    max_braking_mps2: float = Field(8.0, gt=0.0, le=15.0)
+    """Deceleration at full brake."""
+    max_steering_rad: float = Field(0.6, gt=0.0, le=1.2)
+    """Road wheel angle at full lock."""
+    max_steering_rate_radps: float = Field(0.8, gt=0.0, le=10.0)
+    """How fast the road wheels turn."""
+    wheelbase_m: float = Field(2.7, gt=0.5, le=12.0)
+    """Distance between the axles."""
+
+
+class Player(Document):
+    """A vehicle of the route file that the harness takes over, and where it starts in each episode."""
+
+    vehicle: str
+    """Its id in the route file."""
+    lane: str
+    """The lane it starts in."""
+    position_m: Interval | None = None
+    """Range of its front bumper's start along the lane."""
+    beside_ego_m: Interval | None = None
+    """Instead of `position_m`: range of its start relative to the ego's, ahead (+) or behind (-)."""
+    speed_mps: Interval
+    """Range of its speed at the start."""
+    actuators: Actuators = Actuators()
+
+    @model_validator(mode="after")
+    def _one_position(self) -> Player:
+        if (self.position_m is None) == (self.beside_ego_m is None):
+            raise ValueError("give either position_m or beside_ego_m")
+        if self.speed_mps[0] < 0.0:
+            raise ValueError("speed_mps must not be negative")
+        return self
+
+
+class Scene(Document):
+    """The road, who drives on it, and how a game on it starts and ends."""
+
+    name: Name
+    """What the scene is called."""
+    net: PlainFile
+    """The SUMO net, a file of the scene's folder."""
+    routes: PlainFile
+    """The SUMO routes, vehicle types and vehicles, a file of the scene's folder."""
+    step_length_s: float = Field(0.1, ge=0.01, le=0.2)
+    """Contact is looked for once a step: in a longer one a car could jump over another."""
+    time_limit_s: float = Field(gt=0.0, le=600.0)
+    """A player that has not reached its goal by then has failed."""
+    friction: float = Field(0.8, gt=0.0, le=1.5)
+    """Tyre on road, as a share of g."""
+    lane_change_duration_s: float = Field(2.0, ge=0.0, le=10.0)
+    """How long vehicles that SUMO drives take to change lanes."""
+    goal: Goal
+    ego: Player
+    non_ego: Player
+
+    @model_validator(mode="after")
+    def _ego_leads(self) -> Scene:
+        if self.ego.beside_ego_m is not None:
+            raise ValueError("ego.beside_ego_m: the ego can't start beside itself, give ego.position_m")
+        return self
+
+    @property
+    def players(self) -> tuple[Player, Player]:
+        """Ego and non-ego, in the order of the players' axis."""
+        return self.ego, self.non_ego
+
+
+SCENE_FILE = "scene.toml"
+
+
+def scene_file(folder: Path) -> Path:
+    """The scene document of a scene's folder."""
+    return folder / SCENE_FILE

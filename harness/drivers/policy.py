@@ -1,0 +1,32 @@
+"""A learned policy as a driver: the actor's network in NumPy, so that no framework is needed to drive."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from harness.drivers.policy_file import Policy
+from harness.game.arrays import FloatArray, IntArray
+
+
+class LearnedDriver:
+    """Drives by a policy: by its most likely action, or varied as the policy itself varies."""
+
+    takes_over = True
+
+    def __init__(self, policy: Policy, sampled: bool) -> None:
+        self._layers = [(weight.T.copy(), bias) for weight, bias in policy.layers("actor")]
+        self._deviation = np.exp(policy.tensors["log_deviation"]) if sampled else None
+
+    def begin(self, games: IntArray) -> None:
+        """Nothing to forget: each decision is made from what is seen at that moment."""
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """Actions [N, 2] from observations [N, SIZE]; `noise` [N, 2] is used where decisions vary."""
+        hidden = observation
+        for weight, bias in self._layers[:-1]:
+            hidden = np.tanh(hidden @ weight + bias)
+        weight, bias = self._layers[-1]
+        action = hidden @ weight + bias
+        if self._deviation is not None:
+            action = action + self._deviation * noise
+        return np.clip(action, -1.0, 1.0)

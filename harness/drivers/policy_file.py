@@ -1,0 +1,156 @@
+"""A learned policy on disk: parameters as safetensors, the rest as JSON. Opening one runs no code.
+
+<name>/policy.safetensors    actor.<k>.weight [out, in], actor.<k>.bias [out], log_deviation [2]; critic likewise
+<name>/policy.json           format, what was learned where, the names of the observation's entries
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_tensors
+from safetensors.numpy import save as save_tensors
+
+from harness.config.toml_reading import nearest
+from harness.errors import UsageError
+from harness.files import content_of, write_atomically
+from harness.game.arrays import FloatArray
+from harness.game.observation import LAYOUT
+
+FORMAT = 1
+ACTIONS = 2
+ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
+_MOST_TENSOR_BYTES, _MOST_CARD_BYTES = 100_000_000, 1_000_000
+_MOST = 1e6  # no parameter of a network that learned anything is larger
+_PARAMETER = re.compile(r"(actor|critic)\.(\d{1,2})\.(weight|bias)", re.ASCII)
+_NAMED = "name the folder of a policy, as under <run>/policies/"
+
+
+@dataclass(frozen=True)
+class Policy:
+    """Actor and critic as plain arrays: layers with tanh between them, and the actions' log deviation [2]."""
+
+    tensors: Mapping[str, FloatArray]
+    card: Mapping[str, Any] = field(default_factory=dict)
+
+    def layers(self, part: str) -> list[tuple[FloatArray, FloatArray]]:
+        """Weights [out, in] and biases [out] of `actor` or `critic`, in order."""
+        count = sum(name.startswith(f"{part}.") and name.endswith(".weight") for name in self.tensors)
+        return [(self.tensors[f"{part}.{k}.weight"], self.tensors[f"{part}.{k}.bias"]) for k in range(count)]
+
+
+def write_policy(policy: Policy, folder: Path) -> None:
+    """Write a policy's folder. The same policy gives the same bytes."""
+    folder.mkdir(parents=True, exist_ok=True)
+    card_file, tensor_file = policy_files(folder)
+    card = {"format": FORMAT, "observation": list(LAYOUT), **policy.card}
+    write_atomically(
+        tensor_file,
+        save_tensors({k: np.ascontiguousarray(v) for k, v in policy.tensors.items()}),
+    )
+    write_atomically(card_file, (json.dumps(card, indent=2) + "\n").encode())
+
+
+def policy_files(folder: Path) -> tuple[Path, Path]:
+    """What a policy is made of: its JSON and its parameters."""
+    return folder / "policy.json", folder / "policy.safetensors"
+
+
+def read_policy(folder: Path) -> Policy:
+    """Read a policy's folder. Raises UsageError if it is missing, damaged, or was made for other observations."""
+    card = read_card(folder)
+    if card["format"] != FORMAT or card["observation"] != list(LAYOUT):
+        raise UsageError.of(
+            policy_files(folder)[0],
+            "observation",
+            "was learned from other observations than this version's",
+            "train it again",
+        )
+    tensor_file = policy_files(folder)[1]
+    try:
+        policy = Policy(load_tensors(_content(tensor_file, _MOST_TENSOR_BYTES)), card)
+        _check_shapes(policy)
+    except (SafetensorError, ValueError, LookupError, TypeError, AttributeError, OverflowError, MemoryError) as error:
+        raise UsageError.of(tensor_file, "", f"is damaged: {error}", "train the policy again") from None
+    return policy
+
+
+def read_card(folder: Path) -> dict[str, Any]:
+    """What a policy's JSON says. Raises UsageError if it is missing or damaged."""
+    file = policy_files(folder)[0]
+    try:
+        card = json.loads(_content(file, _MOST_CARD_BYTES).decode("utf-8"))
+        if not isinstance(card, dict):
+            raise TypeError("it holds no table")
+        if missing := [key for key in ("format", "observation") if key not in card]:
+            raise ValueError(f"it has no {missing[0]!r}")
+    except (ValueError, LookupError, TypeError, RecursionError) as error:
+        raise UsageError.of(file, "", f"is damaged: {error}", "train the policy again") from None
+    return card
+
+
+def _content(file: Path, most_bytes: int) -> bytes:
+    try:
+        return content_of(file, most_bytes)
+    except (FileNotFoundError, NotADirectoryError):
+        raise UsageError.of(file, "", "there is no such file", _NAMED) from None
+    except OSError as error:
+        raise UsageError.of(file, "", str(error.strerror), _NAMED) from None
+
+
+def _check_shapes(policy: Policy) -> None:
+    _check_names(policy.tensors)
+    for part, outputs in (("actor", ACTIONS), ("critic", 1)):
+        width = len(LAYOUT)
+        for weight, bias in policy.layers(part):
+            if weight.ndim != 2 or not weight.size or weight.shape[1] != width or bias.shape != weight.shape[:1]:
+                raise ValueError(f"the {part}'s layers do not fit each other")
+            width = weight.shape[0]
+        if width != outputs:
+            raise ValueError(f"the {part} has {width} outputs, not {outputs}")
+    if policy.tensors["log_deviation"].shape != (ACTIONS,):
+        raise ValueError("log_deviation does not fit the actions")
+    for name, tensor in policy.tensors.items():
+        if tensor.dtype != np.float32:
+            raise ValueError(f"{name} is {tensor.dtype}, not float32")
+        if not np.isfinite(tensor).all():
+            raise ValueError(f"{name} is not finite")
+        if np.abs(tensor).max() > _MOST:
+            raise ValueError(f"{name} has parameters over {_MOST:g}")
+
+
+def _check_names(given: Iterable[str]) -> None:
+    """Raises ValueError for a parameter that no policy has, and for one that is missing between those there are."""
+    matches = {name: _PARAMETER.fullmatch(name) for name in given}
+    layers = {(match[1], int(match[2])) for match in matches.values() if match}
+    parts = {part: max((k for of, k in layers if of == part), default=0) for part in ("actor", "critic")}
+    expected = {f"{part}.{k}.{each}" for part, k in layers for each in ("weight", "bias")} | {"log_deviation"}
+    for name, match in matches.items():
+        if match is None and name != "log_deviation":
+            raise ValueError(f"unknown parameters {name[:100]!r}: {nearest(name, expected)}")
+    expected |= {f"{part}.{k}.{each}" for part, n in parts.items() for k in range(n + 1) for each in ("weight", "bias")}
+    if missing := sorted(expected - matches.keys()):
+        raise ValueError(f"there are no parameters {missing[0]!r}")
+
+
+def check_no_archive(file: Path, key: str, written: str, named: Path, more: str = "") -> None:
+    """Raise UsageError where a file is named, under `key` in `file`, as if it were a policy.
+
+    A learner's own archive is not opened, not even to look into it: pickles in it are programs.
+    """
+    if named.suffix.lower() in ARCHIVES or os.path.isfile(named):
+        raise UsageError.of(
+            file,
+            key,
+            f"{written!r} is a file: archives such as .zip, .pt and .pkl can carry pickles, which run code when they "
+            "are opened, so they are not read",
+            "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/" + more,
+        )

@@ -1,0 +1,194 @@
+"""Assessing one arm: its seeded games, one after the other, into records and traces.
+
+Each game has a simulation of its own load, seeded by the episode alone: episode k starts alike in every arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from harness.config.persona import Persona
+from harness.drivers.mixture import Player, mixture_of
+from harness.environments.arena import Arena, Seat, Step
+from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, Drive
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.initial_state import Chances, draw_start
+from harness.game.seeding import generator_of
+from harness.game.state import EGO, NON_EGO, ROLES, Outcome
+from harness.traffic.scene import OpenScene
+
+_UNMEASURED = np.full((1, len(ROLES)), np.nan)  # [G, P] of one game
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A pairing that is assessed. A driver of None: the player does not take part; a mixture: several, in turn."""
+
+    name: str
+    scene: OpenScene
+    drivers: tuple[Player, Player]
+    personas: tuple[Persona, Persona]
+    """Of the drivers; each of a mixture has its own."""
+    seed: int
+
+
+@dataclass(frozen=True)
+class Game:
+    """A game that was played: the cells of its record, and its trace as columns (None if it could not be played)."""
+
+    record: dict[str, Any]
+    trace: Mapping[str, Sequence[Any]] | None
+
+
+def assess(
+    arm: Arm,
+    episodes: int | Iterable[int],
+    begin: Callable[[int], None] = lambda episode: None,
+    given_up: Mapping[int, str] = MappingProxyType({}),
+) -> Iterator[Game]:
+    """Play episodes: so many from 0 on, or those given. A game that can't be played, or has numbers that can't be
+    right, is a record with outcome `error`.
+
+    `begin` is told of each before it is played. Those `given_up` are not played, and why is the error of their record.
+    Raises SimulationError if SUMO can't load the scene at all.
+    """
+    players = [mixture_of(each or _Absent(), persona) for each, persona in zip(arm.drivers, arm.personas, strict=True)]
+    present = [0.0 if driver is None else 1.0 for driver in arm.drivers]
+    chances = arm.scene.chances([each.habits for each in players], present, [each.shares for each in players])
+    seats = [[Seat(member.driver, member.persona.payoff) for member in each.members] for each in players]
+    arena = Arena(arm.scene, 1, seats, recorded=True)
+    try:
+        for episode in range(episodes) if isinstance(episodes, int) else episodes:
+            if episode in given_up:
+                yield Game(_failed(arm, episode, given_up[episode]), None)
+                continue
+            begin(episode)
+            try:
+                yield _play(arena, arm, chances, episode)
+            except MemoryError:
+                raise
+            except Exception as error:  # a driver may raise whatever it likes: the other games are played
+                yield Game(_failed(arm, episode, f"{type(error).__name__}: {error}"), None)
+    finally:
+        arena.close()
+
+
+class _Absent:
+    """Nobody: has a seat, but never takes part."""
+
+    takes_over = True
+
+    def begin(self, games: Any) -> None:
+        """Nothing to forget."""
+
+    def decide(self, games: Any, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """No player, no decisions."""
+        return np.zeros((len(games), 2))
+
+
+def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
+    """What names the chance of an episode, in every arm."""
+    return ("assessment", seed, "episode", episode)
+
+
+def _play(arena: Arena, arm: Arm, chances: Chances, episode: int) -> Game:
+    parts = parts_of(arm.seed, episode)
+    start = draw_start(chances, *parts)
+    arena.reload(start.seed)
+    arena.start({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
+    trace = _Trace(arm, arena, episode)
+    trace.add_players(arena.state.present[0])
+    steps: list[Step] = []
+    while arena.state.running.any():
+        there = arena.state.present[0].copy()
+        step = arena.step()
+        steps.append(step)
+        trace.add_players(there, step)
+        trace.add_others()
+    return Game(_record(arm, arena, episode, steps), trace.columns)
+
+
+def _record(arm: Arm, arena: Arena, episode: int, steps: Sequence[Step]) -> dict[str, Any]:
+    outcomes = [Outcome(int(outcome)) for outcome in arena.state.outcome[0]]
+    record: dict[str, Any] = {"episode": episode, "duration_s": len(steps) * arm.scene.world.step_s, "error": ""}
+    for player, metrics in ((EGO, OF_EGO), (NON_EGO, OF_NON_EGO)):
+        takes_part = arm.drivers[player] is not None
+        record[f"{ROLES[player]}_outcome"] = outcomes[player].word if takes_part else ""
+        drive = _drive(arm, steps, player, outcomes[player]) if takes_part else None
+        for name, metric in metrics.items():
+            record[name] = metric(drive) if drive is not None else None
+    record["ego_failed"] = int(outcomes[EGO] is not Outcome.GOAL) if arm.drivers[EGO] is not None else None
+    return record
+
+
+def _drive(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> Drive:
+    driver = arm.drivers[player]
+    has_wheel = driver is not None and driver.takes_over  # SUMO steers nobody: its cars change lanes without a wheel
+    drove = [step for step in steps if step.drove[0, player]]
+
+    def series(value: Callable[[Step], FloatArray]) -> FloatArray:
+        return np.array([value(step)[0, player] for step in drove], dtype=float)
+
+    return Drive(
+        outcome,
+        arm.scene.world.step_s,
+        series(lambda step: step.quantities.state.speed_mps),
+        series(lambda step: step.quantities.state.acceleration_mps2),
+        series(lambda step: step.quantities.lateral_acceleration_mps2 if has_wheel else _UNMEASURED),
+        series(lambda step: step.quantities.leader_gap_m),
+        series(lambda step: step.quantities.time_to_collision_s),
+        series(lambda step: step.payoff),
+    )
+
+
+def _failed(arm: Arm, episode: int, error: str) -> dict[str, Any]:
+    return {
+        "episode": episode,
+        "ego_outcome": Outcome.ERROR.word if arm.drivers[EGO] is not None else "",
+        "non_ego_outcome": Outcome.ERROR.word if arm.drivers[NON_EGO] is not None else "",
+        "error": error,
+    }
+
+
+class _Trace:
+    """The recording of one game, column by column."""
+
+    def __init__(self, arm: Arm, arena: Arena, episode: int) -> None:
+        self._arm, self._arena, self._episode = arm, arena, episode
+        self.columns: dict[str, list[Any]] = {name: [] for name in TRACE_COLUMNS}
+
+    def add_players(self, there: BoolArray, step: Step | None = None) -> None:
+        """A row for each player that was there, with the outcome it has reached."""
+        state = step.quantities.state if step is not None else self._arena.state
+        for player in np.flatnonzero(there):
+            self._add(
+                ROLES[player],
+                self._arm.scene.vehicle(int(player)).vehicle_type,
+                *(float(getattr(state, name)[0, player]) for name in _MOTION),
+                bool(state.lapsed[0, player]),
+                Outcome(int(state.outcome[0, player])).word,
+            )
+
+    def add_others(self) -> None:
+        """A row for each road user that SUMO drives by itself."""
+        reading = self._arena.reading
+        if reading is None:
+            return
+        for slot in np.flatnonzero(reading.present[0]).tolist():
+            pose = (float(getattr(reading, each)[0, slot]) for each in ("x_m", "y_m", "heading_rad", "speed_mps"))
+            self._add(reading.names[0, slot], reading.types[0, slot], *pose, 0.0, 0.0, False, "")
+
+    def _add(self, *cells: Any) -> None:
+        step = int(self._arena.state.step[0])
+        row = (self._episode, step, step * self._arm.scene.world.step_s, *cells)
+        for name, cell in zip(TRACE_COLUMNS, row, strict=True):
+            self.columns[name].append(cell)
+
+
+_MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad")
+TRACE_COLUMNS = ("episode", "step", "time_s", "player", "vehicle_type", *_MOTION, "lapsed", "outcome")

@@ -1,0 +1,240 @@
+"""Paired comparisons of arms: is the persona's effect real, and did retraining mend it?
+
+Pure: a table of games in, a table of comparisons out. Method: SafeDriveRL section 4.2, the paired-samples
+one-tailed t-test of H0 (mu_diff = 0) against H1 (mu_diff > 0). The paper writes H1 as mu_diff > 0 for both
+questions without saying what is subtracted from what; the direction is the one its sections 4.3.1 and
+4.3.2 report, so that in every row a positive `mean_difference` is in favour of H1:
+
+    question  arms (baseline -> treatment)                     metric      difference (H1: its mean > 0)
+    RQ1       naive_alone -> naive_vs_<persona>                failure     treatment - baseline (fails more)
+    RQ1                                                        mean_speed  baseline - treatment (slower)
+    RQ2       naive_vs_<persona> -> retrained_vs_<persona>     failure     baseline - treatment (fails less)
+    RQ2                                                        mean_speed  treatment - baseline (faster)
+
+Beside the paper's test, in the same row: the two-sided 95 % t interval of the mean difference; the effect
+size (Cohen's d_z, mean / standard deviation of the differences); for failures McNemar's exact test,
+one-tailed in the direction of H1 like the t-test (of the pairs in which only one side failed, are more than
+half on H1's side? Binomial with p = 1/2; 1 when there are none); and Holm's correction over all t-tests of
+the table, which is the whole campaign's.
+
+`rejects_h0` is the paper's criterion, the uncorrected p-value. The verdict is stricter: see `Verdict`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy import stats
+
+from harness.evaluation.research_questions import Question, ResearchQuestion
+
+Floats = npt.NDArray[np.float64]
+
+COMPARISON_COLUMNS = {
+    "question": "object",
+    "persona": "object",
+    "seed": "int64",
+    "metric": "object",
+    "pairs": "int64",
+    "pairs_left_out": "int64",
+    "mean_difference": "float64",
+    "ci_low": "float64",
+    "ci_high": "float64",
+    "t": "float64",
+    "p_value": "float64",
+    "p_holm": "float64",
+    "effect_size": "float64",
+    "mcnemar_p": "float64",
+    "rejects_h0": "bool",
+    "verdict": "object",
+}
+"""Columns of `comparisons.csv` in order, each with its pandas dtype."""
+
+CONFIDENCE = 0.95
+"""Of every interval in the tables, whatever the campaign's significance is."""
+
+ROUNDING = 1e-12
+"""Differences that spread less than this share of the largest value are equal but for rounding: without it
+0.3 - 0.2 against 0.2 - 0.1 would be a minute standard deviation and an enormous t."""
+
+
+class Verdict(str, Enum):
+    """Every value the column `verdict` can have."""
+
+    SIGNIFICANT = "significant"
+    """p_holm < significance (and so p_value < significance)."""
+    BEFORE_HOLM_ONLY = "significant before Holm's correction only"
+    """p_value < significance <= p_holm."""
+    NOT_SIGNIFICANT = "not significant"
+    NO_DIFFERENCE = "no difference"
+    """Every difference is 0, so there is no t statistic."""
+    ALL_EQUAL = "no t statistic: all differences equal"
+    """Every difference is the same number, not 0. For failures `mcnemar_p` still exists."""
+    NOT_ENOUGH_PAIRS = "not enough pairs"
+    """Fewer than two pairs could be compared."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """What is compared, and its direction: `sign[question] * (treatment - baseline)` is > 0 under H1."""
+
+    name: str
+    column: str
+    sign: Mapping[ResearchQuestion, int]
+
+
+METRICS = (
+    Metric("failure", "ego_failed", {"RQ1": +1, "RQ2": -1}),
+    Metric("mean_speed", "ego_mean_speed_mps", {"RQ1": -1, "RQ2": +1}),
+)
+
+
+def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
+    """Answer each question by each metric; a row for each, in that order, with `COMPARISON_COLUMNS`.
+
+    `episodes` has the columns of episodes.csv: arm, seed, episode, ego_outcome, error, and the metrics'.
+    Games are paired by seed and episode. A pair is left out, and counted in `pairs_left_out`, when either
+    game errored, has an empty value, or is missing. What can't be computed is NaN. Where all differences are
+    equal, or there are fewer than two pairs, there is no test: t, p-values, interval and effect size are NaN,
+    and the row is no member of Holm's family and rejects nothing.
+
+    Raises ValueError when significance is not in (0, 1), or when an arm has two games for one episode.
+    """
+    if not 0 < significance < 1:
+        raise ValueError(f"significance must be between 0 and 1, not {significance}")
+    games = games_by_arm(episodes)
+    rows = [_row(question, metric, games) for question in questions for metric in METRICS]
+    table = pd.DataFrame(rows, columns=list(COMPARISON_COLUMNS))
+    table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
+    table["rejects_h0"] = table["p_value"].astype("float64") < significance
+    table["verdict"] = [verdict_of(row, significance).value for row in table.to_dict("records")]
+    return table.astype(COMPARISON_COLUMNS)
+
+
+def holm(p_values: Floats) -> Floats:
+    """Holm's step-down adjusted p-values [N]; NaN is no test: it stays NaN and does not count.
+
+    Source: S. Holm, "A simple sequentially rejective multiple test procedure", Scand. J. Statist. 6 (1979).
+    The i-th smallest of m p-values is multiplied by m - i + 1, kept from falling, and capped at 1.
+    """
+    adjusted = np.full(p_values.shape, np.nan)
+    tests = np.flatnonzero(~np.isnan(p_values))
+    ascending = tests[np.argsort(p_values[tests], kind="stable")]
+    steps = p_values[ascending] * np.arange(len(ascending), 0, -1)
+    adjusted[ascending] = np.minimum(np.maximum.accumulate(steps), 1.0)
+    return adjusted
+
+
+def mean_interval(values: Floats) -> tuple[float, float]:
+    """Two-sided 95 % t interval of the mean of values [N]; NaN, NaN if there is no spread to judge by."""
+    if len(values) < 2 or _all_equal(values, largest=float(np.abs(values).max())):
+        return np.nan, np.nan
+    mean, error = values.mean(), values.std(ddof=1) / np.sqrt(len(values))
+    half_width = stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1) * error
+    return float(mean - half_width), float(mean + half_width)
+
+
+def _row(question: Question, metric: Metric, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
+    baseline, treatment, left_out = pairs_of(
+        games, question.seed, question.baseline, question.treatment, [metric.column]
+    )
+    low, high = (baseline, treatment) if metric.sign[question.question] > 0 else (treatment, baseline)
+    low, high = low[:, 0], high[:, 0]
+    row: dict[str, object] = {
+        "question": question.question,
+        "persona": question.persona,
+        "seed": question.seed,
+        "metric": metric.name,
+        "pairs": len(low),
+        "pairs_left_out": left_out,
+    }
+    row |= paired_t_test(low, high)
+    if metric.name == "failure" and len(low) >= 2:
+        row["mcnemar_p"] = _mcnemar(low, high)
+    return row
+
+
+def games_by_arm(episodes: pd.DataFrame) -> Mapping[Any, pd.DataFrame]:
+    """The rows of episodes.csv by (arm, seed)."""
+    return dict(iter(episodes.groupby(["arm", "seed"], sort=False)))
+
+
+def pairs_of(
+    games: Mapping[Any, pd.DataFrame], seed: int, baseline: str, treatment: str, columns: Sequence[str]
+) -> tuple[Floats, Floats, int]:
+    """Baseline values [N, C], treatment values [N, C] of the same N episodes, and how many pairs were left out:
+    those of which a game errored, is missing, or lacks one of the columns [C].
+
+    Raises ValueError when an arm has two games for one episode.
+    """
+    sides = [measured_values(games.get((arm, seed)), columns) for arm in (baseline, treatment)]
+    for arm, side in zip((baseline, treatment), sides, strict=True):
+        if not side.index.is_unique:
+            raise ValueError(f"arm {arm!r}, seed {seed}: an episode appears more than once")
+    both = pd.concat(sides, axis=1).to_numpy(dtype=np.float64)
+    measured = np.isfinite(both).all(axis=1)
+    return both[measured, : len(columns)], both[measured, len(columns) :], int((~measured).sum())
+
+
+def measured_values(rows: pd.DataFrame | None, columns: Sequence[str]) -> pd.DataFrame:
+    """The columns of an arm's games by episode; NaN where one is empty or the game could not be played."""
+    if rows is None:
+        return pd.DataFrame(columns=list(columns), dtype="float64")
+    errored = ((rows["ego_outcome"] == "error") | (rows["error"].fillna("") != "")).to_numpy(dtype=bool)
+    values = {
+        name: pd.to_numeric(rows[name]).astype("Float64").to_numpy(dtype=np.float64, na_value=np.nan)
+        for name in columns
+    }
+    return pd.DataFrame(
+        {name: np.where(errored, np.nan, cells) for name, cells in values.items()}, index=rows["episode"].to_numpy()
+    )
+
+
+def paired_t_test(low: Floats, high: Floats) -> dict[str, float]:
+    """H1: the mean of `high - low`, [N] each, is > 0. Only what exists is in the answer, by the table's columns."""
+    differences = high - low
+    if len(differences) == 0:
+        return {}
+    largest = float(np.abs([low, high]).max())
+    mean = float(differences.mean())
+    if len(differences) < 2 or _all_equal(differences, largest):
+        return {"mean_difference": 0.0 if abs(mean) <= ROUNDING * largest else mean}
+    ci_low, ci_high = mean_interval(differences)
+    test = stats.ttest_rel(high, low, alternative="greater")
+    return {
+        "mean_difference": mean,
+        "ci_low": ci_low,
+        "ci_high": ci_high,
+        "t": float(test.statistic),
+        "p_value": float(test.pvalue),
+        "effect_size": mean / float(differences.std(ddof=1)),
+    }
+
+
+def _all_equal(values: Floats, largest: float) -> bool:
+    """Whether values [N] are one number but for the rounding of numbers as large as `largest`."""
+    return bool(np.ptp(values) <= ROUNDING * largest or values.std(ddof=1) == 0)
+
+
+def _mcnemar(low: Floats, high: Floats) -> float:
+    in_favour, against = int((high > low).sum()), int((high < low).sum())
+    if in_favour + against == 0:
+        return 1.0
+    return float(stats.binomtest(in_favour, in_favour + against, 0.5, alternative="greater").pvalue)
+
+
+def verdict_of(row: Mapping[Any, Any], significance: float) -> Verdict:
+    """What a row's pairs, p-values and mean difference come to."""
+    if row["pairs"] < 2:
+        return Verdict.NOT_ENOUGH_PAIRS
+    if np.isnan(row["p_value"]):
+        return Verdict.NO_DIFFERENCE if row["mean_difference"] == 0 else Verdict.ALL_EQUAL
+    if row["p_holm"] < significance:
+        return Verdict.SIGNIFICANT
+    return Verdict.BEFORE_HOLM_ONLY if row["p_value"] < significance else Verdict.NOT_SIGNIFICANT

@@ -1,0 +1,127 @@
+"""The best-response gap: what a player could still gain by changing its strategy alone (SafeDriveRL, equation 2).
+
+For each response, games are paired by seed and episode: the pair's game against the same game with one player
+replaced by its best response. The gap is the mean difference of that player's payoff. It is a lower bound: a better
+response than the one that was found may exist, so a gap that can't be told from 0 proves no equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+from scipy import stats
+
+from harness.evaluation.comparison import CONFIDENCE, games_by_arm, holm, mean_interval, paired_t_test, pairs_of
+from harness.evaluation.game_theory.columns import GAP_COLUMNS
+from harness.evaluation.game_theory.records import Response
+
+Floats = npt.NDArray[np.float64]
+
+PAYOFF = {"ego": "ego_payoff", "non_ego": "non_ego_payoff"}
+
+
+class GapVerdict(str, Enum):
+    """Every value the column `verdict` can have."""
+
+    DISTINGUISHABLE = "distinguishable from 0"
+    """p_holm < significance: this player could gain."""
+    BEFORE_HOLM_ONLY = "distinguishable from 0 before Holm's correction only"
+    NOT_DISTINGUISHABLE = "not distinguishable from 0"
+    """The best response did better, by no more than chance would have it."""
+    NONE_FOUND = "no better response found"
+    """The best response did worse, or just as well on average: what the player does is better than all that was
+    found. No gain, whatever the number's sign."""
+    NO_DIFFERENCE = "no difference"
+    """Every game came to the same payoff."""
+    ALL_EQUAL = "no t statistic: all differences equal"
+    """Better by the same number in every game."""
+    NOT_ENOUGH_PAIRS = "not enough pairs"
+
+
+NOTHING_TO_GAIN = frozenset({GapVerdict.NOT_DISTINGUISHABLE, GapVerdict.NONE_FOUND, GapVerdict.NO_DIFFERENCE})
+"""The verdicts on a player for whom nothing better was found."""
+
+
+def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
+    """A row for each response, in their order, with `GAP_COLUMNS`.
+
+    `episodes` has the columns of episodes.csv. A pair is left out, and counted, when either game errored, is missing,
+    or lacks the payoff or the ego's outcome. What can't be computed is NaN; where all differences are equal there is
+    no test, as in `harness.evaluation.comparison`. Holm's correction is over all gaps of this table.
+
+    Raises ValueError when significance is not in (0, 1), or when an arm has two games for one episode.
+    """
+    if not 0 < significance < 1:
+        raise ValueError(f"significance must be between 0 and 1, not {significance}")
+    games = games_by_arm(episodes)
+    table = pd.DataFrame([_row(response, games) for response in responses], columns=list(GAP_COLUMNS))
+    table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
+    table["verdict"] = [_verdict(row, significance).value for row in table.to_dict("records")]
+    return table.astype(GAP_COLUMNS)
+
+
+def nothing_to_gain(found: pd.DataFrame) -> bool:
+    """Whether both sides were searched for a better response and neither has one that can be told from 0.
+
+    Of a table of `gaps`, e.g. of the last round's: the rule by which rounds stop early. A gap that is distinguishable
+    before Holm's correction only, or can't be judged, is no reason to stop.
+    """
+    searched = set(found["role"]) == {"ego", "non_ego"}
+    return searched and all(GapVerdict(verdict) in NOTHING_TO_GAIN for verdict in found["verdict"])
+
+
+def wilson(failures: float, games: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a rate; NaN, NaN without games."""
+    if games == 0:
+        return np.nan, np.nan
+    interval = stats.binomtest(round(failures), games).proportion_ci(CONFIDENCE, method="wilson")
+    return float(interval.low), float(interval.high)
+
+
+def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
+    columns = [PAYOFF[response.role], "ego_failed"]
+    pair, best, left_out = pairs_of(games, response.seed, response.pair_arm, response.response_arm, columns)
+    row: dict[str, object] = {
+        "seed": response.seed,
+        "persona": response.persona,
+        "round": response.round,
+        "role": response.role,
+        "ego": response.ego,
+        "non_ego": response.non_ego,
+        "pairs": len(pair),
+        "pairs_left_out": left_out,
+    }
+    if not len(pair):
+        return row
+    payoff = float(pair[:, 0].mean())
+    test = paired_t_test(pair[:, 0], best[:, 0])
+    row |= {"payoff": payoff, "payoff_best_response": float(best[:, 0].mean()), "gap": test["mean_difference"]}
+    row |= {name: test[name] for name in ("ci_low", "ci_high", "p_value") if name in test}
+    if payoff != 0:
+        row["gap_share"] = test["mean_difference"] / abs(payoff)
+    for name, failed in (("ego_failure_rate", pair[:, 1]), ("ego_failure_rate_best_response", best[:, 1])):
+        low, high = wilson(failed.sum(), len(failed))
+        row |= {name: float(failed.mean()), f"{name}_low": low, f"{name}_high": high}
+    differences = best[:, 1] - pair[:, 1]
+    low, high = mean_interval(differences)
+    row |= {"failure_difference": float(differences.mean())}
+    return row | {"failure_difference_low": low, "failure_difference_high": high}
+
+
+def _verdict(row: Mapping[Any, Any], significance: float) -> GapVerdict:
+    if row["pairs"] < 2:
+        return GapVerdict.NOT_ENOUGH_PAIRS
+    if np.isnan(row["p_value"]) and row["gap"] == 0:
+        return GapVerdict.NO_DIFFERENCE
+    if row["gap"] <= 0:
+        return GapVerdict.NONE_FOUND
+    if np.isnan(row["p_value"]):
+        return GapVerdict.ALL_EQUAL
+    if row["p_holm"] < significance:
+        return GapVerdict.DISTINGUISHABLE
+    return GapVerdict.BEFORE_HOLM_ONLY if row["p_value"] < significance else GapVerdict.NOT_DISTINGUISHABLE

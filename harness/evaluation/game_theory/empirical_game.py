@@ -1,0 +1,145 @@
+"""The empirical game: what a cross-play table says of equilibria, dominated strategies and the safest mixture.
+
+For each seed and persona the egos and that persona's strategies (its rounds) are a game of two players, with the mean
+payoffs of the cross-play as its matrix (M. P. Wellman, "Methods for Empirical Game-Theoretic Analysis", AAAI 2006). Its
+equilibria are equilibria among these strategies only, and of means over a sample of games. People of different
+personas do not share a payoff, so there is no such game of all of them; of the game "all" there are the egos that
+are dominated against every non-ego, and the safest mixture of egos, which asks for failure rates alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from enum import Enum
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from harness.evaluation.game_theory.columns import EQUILIBRIUM_COLUMNS
+from harness.evaluation.game_theory.crossplay import Matrices, matrices
+from harness.evaluation.game_theory.dominance import dominated, safest_mixture
+from harness.evaluation.game_theory.nash import Equilibrium, regrets, solve
+
+Floats = npt.NDArray[np.float64]
+
+ALL = "all"
+"""The game of every non-ego."""
+
+
+class SolutionKind(str, Enum):
+    """Every value the column `solution` can have."""
+
+    NASH = "nash"
+    SAFEST = "safest"
+    NOT_VERIFIED = "none verified"
+    """No candidate equilibrium held when its regrets were looked at: there is one, and it was not found."""
+    NOT_PLAYED = "left out: not played against all"
+    """A strategy with an empty cell in this game is no part of it."""
+
+
+def equilibria(crossplay: pd.DataFrame) -> pd.DataFrame:
+    """The solutions of every seed's games, with `EQUILIBRIUM_COLUMNS`, from a table of `crossplay`.
+
+    A strategy that was not measured against all the others of a game is left out of the game, and has a row that
+    says so; but a non-ego that no ego was measured against leaves out itself, not the egos.
+    """
+    rows: list[dict[str, object]] = []
+    for seed, found in crossplay.groupby("seed", sort=False):
+        table = matrices(found)
+        for persona in dict.fromkeys(filter(None, table.personas)):
+            of = [place for place, name in enumerate(table.personas) if name == persona]
+            for row in _nash(table.among(range(len(table.egos)), of)):
+                rows.append({"seed": seed, "game": persona, **row})
+        rows.extend({"seed": seed, "game": ALL, **row} for row in _safest(table))
+    return pd.DataFrame(rows, columns=list(EQUILIBRIUM_COLUMNS)).astype(EQUILIBRIUM_COLUMNS).fillna(_NO_TEXT)
+
+
+_NO_TEXT = {name: "" for name, dtype in EQUILIBRIUM_COLUMNS.items() if dtype == "object"}
+
+
+def _complete(table: Matrices, measured: npt.NDArray[np.bool_]) -> tuple[Matrices, list[dict[str, object]]]:
+    """The part of a game whose cells [E, N] are all measured, and rows for the strategies that are no part of it."""
+    met = [bool(column.any()) for column in measured.T]
+    egos = [place for place, row in enumerate(measured) if any(met) and row[met].all()]
+    non_egos = [place for place, anyone in enumerate(met) if egos and anyone]
+    part = table.among(egos, non_egos)
+    out = [("ego", name) for name in table.egos if name not in part.egos]
+    out += [("non_ego", name) for name in table.non_egos if name not in part.non_egos]
+    return part, [{"solution": SolutionKind.NOT_PLAYED.value, "role": role, "player": name} for role, name in out]
+
+
+def _nash(table: Matrices) -> Iterator[dict[str, Any]]:
+    measured = [np.isfinite(each) for each in (table.failure_rates, table.ego_payoffs, table.non_ego_payoffs)]
+    game, left_out = _complete(table, np.logical_and.reduce(measured))
+    if game.egos:
+        found, strategies = solve(game.ego_payoffs, game.non_ego_payoffs).equilibria, _strategies(game)
+        for number, each in enumerate(found, 1):
+            for row in _equilibrium(game, each, strategies):
+                yield {"solution": SolutionKind.NASH.value, "number": number, **row}
+        if not found:
+            for row in strategies:
+                yield {"solution": SolutionKind.NOT_VERIFIED.value, **row}
+    yield from left_out
+
+
+def _strategies(game: Matrices) -> list[dict[str, object]]:
+    """A row for each ego and non-ego of a game of two players, with what holds of it in every solution."""
+    egos = zip(
+        game.egos, dominated(game.ego_payoffs, game.egos), dominated(-game.failure_rates, game.egos), strict=True
+    )
+    non_egos = zip(game.non_egos, dominated(game.non_ego_payoffs.T, game.non_egos), strict=True)
+    rows: list[dict[str, object]] = [
+        {"role": "ego", "player": name, "dominated_in_payoff": payoff, "dominated_in_failures": failures}
+        for name, payoff, failures in egos
+    ]
+    return rows + [{"role": "non_ego", "player": name, "dominated_in_payoff": payoff} for name, payoff in non_egos]
+
+
+def _equilibrium(
+    game: Matrices, at: Equilibrium, strategies: Sequence[dict[str, object]]
+) -> Iterator[dict[str, object]]:
+    x, y = at.ego_shares, at.non_ego_shares
+    ego_regret, non_ego_regret = regrets(game.ego_payoffs, game.non_ego_payoffs, at)
+    against = {
+        "ego": (x, game.ego_payoffs @ y, game.failure_rates @ y, ego_regret),
+        "non_ego": (y, x @ game.non_ego_payoffs, x @ game.failure_rates, non_ego_regret),
+    }
+    failure_rate = float(x @ game.failure_rates @ y)
+    places = {"ego": 0, "non_ego": 0}
+    for row in strategies:
+        role = str(row["role"])
+        shares, payoffs, failures, regret = against[role]
+        place = places[role]
+        places[role] += 1
+        yield row | {
+            "share": shares[place],
+            "payoff": payoffs[place],
+            "solution_payoff": float(shares @ payoffs),
+            "regret": regret,
+            "failure_rate": failures[place],
+            "solution_failure_rate": failure_rate,
+        }
+
+
+def _safest(table: Matrices) -> Iterator[dict[str, object]]:
+    measured = np.isfinite(table.failure_rates) & np.isfinite(table.ego_payoffs)
+    game, left_out = _complete(table, measured)
+    if game.egos:
+        shares = safest_mixture(game.failure_rates)
+        against = shares @ game.failure_rates
+        kind = {"solution": SolutionKind.SAFEST.value, "solution_failure_rate": float(against.max())}
+        in_payoff, in_failures = (dominated(each, game.egos) for each in (game.ego_payoffs, -game.failure_rates))
+        for place, name in enumerate(game.egos):
+            yield kind | {
+                "role": "ego",
+                "player": name,
+                "share": shares[place],
+                "failure_rate": game.failure_rates[place].max(),
+                "dominated_in_payoff": in_payoff[place],
+                "dominated_in_failures": in_failures[place],
+            }
+        for place, name in enumerate(game.non_egos):
+            yield kind | {"role": "non_ego", "player": name, "failure_rate": against[place]}
+    yield from left_out

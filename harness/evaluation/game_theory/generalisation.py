@@ -1,0 +1,70 @@
+"""Generalisation: how an ego that was retrained against some personas stands up to those it was not trained on."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from harness.evaluation.comparison import games_by_arm, holm, paired_t_test, pairs_of, verdict_of
+from harness.evaluation.game_theory.best_response_gap import wilson
+from harness.evaluation.game_theory.columns import GENERALISATION_COLUMNS
+from harness.evaluation.game_theory.records import Pairing
+
+NAIVE = "naive"
+
+
+def generalisation(
+    met: Mapping[str, Collection[str]], pairings: Iterable[Pairing], episodes: pd.DataFrame, significance: float
+) -> pd.DataFrame:
+    """A row for each pairing of an ego in `met` with a non-ego of a persona it did not meet in training, in the order
+    of the pairings, with `GENERALISATION_COLUMNS`. The base line is the naive ego against the same non-ego.
+
+    `met` names for each retrained ego the personas it was trained against; the naive ego, which met none, is not in
+    it. `episodes` has the columns of episodes.csv. Pairs and tests are those of `harness.evaluation.comparison`.
+
+    Raises ValueError when significance is not in (0, 1), or an arm has two games for one episode.
+    """
+    if not 0 < significance < 1:
+        raise ValueError(f"significance must be between 0 and 1, not {significance}")
+    pairings, games = list(pairings), games_by_arm(episodes)
+    naive = {(each.seed, each.non_ego): each.arm for each in pairings if each.ego == NAIVE}
+    rows = [
+        _row(pairing, met[pairing.ego], naive.get((pairing.seed, pairing.non_ego)), games)
+        for pairing in pairings
+        if pairing.ego in met and pairing.persona and pairing.persona not in met[pairing.ego]
+    ]
+    table = pd.DataFrame(rows, columns=list(GENERALISATION_COLUMNS))
+    table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
+    judged = table.rename(columns={"fewer_failures": "mean_difference"}).to_dict("records")
+    table["verdict"] = [verdict_of(row, significance).value for row in judged]
+    return table.astype(GENERALISATION_COLUMNS)
+
+
+def _row(
+    pairing: Pairing, met: Collection[str], naive_arm: str | None, games: Mapping[Any, pd.DataFrame]
+) -> dict[str, object]:
+    naive, ego, left_out = pairs_of(games, pairing.seed, naive_arm or "", pairing.arm, ["ego_failed"])
+    was, now = naive[:, 0], ego[:, 0]
+    row: dict[str, object] = {
+        "seed": pairing.seed,
+        "ego": pairing.ego,
+        "met": " + ".join(met),
+        "persona": pairing.persona,
+        "non_ego": pairing.non_ego,
+        "pairs": len(now),
+        "pairs_left_out": left_out,
+    }
+    if not len(now):
+        return row
+    low, high = wilson(now.sum(), len(now))
+    row |= {"failure_rate": now.mean(), "failure_rate_low": low, "failure_rate_high": high}
+    row |= {"naive_failure_rate": was.mean()}
+    if was.sum():
+        row["share_of_naive"] = now.sum() / was.sum()
+    test = paired_t_test(now, was)
+    names = {"mean_difference": "", "ci_low": "_low", "ci_high": "_high"}
+    row |= {f"fewer_failures{end}": test[name] for name, end in names.items() if name in test}
+    return row | ({"p_value": test["p_value"]} if "p_value" in test else {})

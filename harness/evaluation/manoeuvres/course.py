@@ -1,0 +1,143 @@
+"""One recorded game as the rules look at it: the quantities of every step, and where the players are to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+import pandas as pd
+
+from harness.evaluation.manoeuvres.thresholds import SAME_WITHIN_S
+from harness.evaluation.trace_quantities import drove_in, quantities_of
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.quantities import PATH_M, Quantities, World
+from harness.game.state import EGO, ROLES, Bodies
+
+_HERE = int(np.flatnonzero(PATH_M == 0.0)[0])
+_NEARBY_M = 10.0  # of road, behind and ahead
+_LARGEST_STEP_M = 1.0  # sideways in a step; more is another lane that has become the nearest
+_USUAL_SIZE_M = (5.0, 1.8)  # of SUMO's default vehicle type
+_ROUNDING_S = 1e-9
+
+Stretch = tuple[int, int]  # its first and last step
+
+
+@dataclass(frozen=True)
+class Course:
+    """T steps of one game; arrays are [T], or [T, P] in `quantities`, whose games' axis is the steps'."""
+
+    quantities: Quantities
+    """Of the players among everyone."""
+    between: Quantities
+    """Of the players alone: who is ahead, and when they would touch, is the other player."""
+    drove: BoolArray
+    """[T, P] who was driving; with an ego in the game, no longer than it."""
+
+    @classmethod
+    def of(cls, trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]]) -> Course:
+        """From one game's trace. `sizes_m` are length and width of vehicle types; SUMO's default for one not in it."""
+        kinds = trace.drop_duplicates("player")
+        sizes = {
+            str(name): sizes_m.get(str(kind), _USUAL_SIZE_M)
+            for name, kind in zip(kinds["player"], kinds["vehicle_type"], strict=True)
+        }
+        quantities = quantities_of(trace, world, sizes)
+        players = len(ROLES)
+        bodies = Bodies(*(getattr(quantities.bodies, each.name)[:, :players].copy() for each in fields(Bodies)))
+        between = Quantities(world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m)
+        drove = drove_in(trace)
+        if drove[:, EGO].any():
+            drove[int(np.flatnonzero(drove[:, EGO])[-1]) + 1 :] = False
+        return cls(quantities, between, drove)
+
+    @property
+    def step_s(self) -> float:
+        return self.quantities.world.step_s
+
+    def steps(self, seconds: float) -> int:
+        """How many steps a time takes at least."""
+        return int(np.ceil(seconds / self.step_s - _ROUNDING_S))
+
+    def stretches(self, mask: BoolArray, least_s: float, parted: BoolArray | None = None) -> Iterator[Stretch]:
+        """Where `mask` [T] holds for at least `least_s` in all, short pauses left out of account in which `parted`
+        [T] does not hold."""
+        found: list[list[int]] = []
+        held: list[int] = []
+        for first, last in runs(mask):
+            pause = slice(found[-1][1] + 1 if found else 0, first)
+            one = bool(found) and first - pause.start <= self.steps(SAME_WITHIN_S)
+            if one and not (parted is not None and parted[pause].any()):
+                found[-1][1] = last
+                held[-1] += last - first + 1
+            else:
+                found.append([first, last])
+                held.append(last - first + 1)
+        for (first, last), count in zip(found, held, strict=True):
+            if count >= self.steps(least_s):
+                yield first, last
+
+    # --- across the road ------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _from_lane_m(self) -> FloatArray:
+        """[T, P] to the left of the centre of the nearest lane."""
+        quantities = self.quantities
+        routes = quantities.world.road.routes
+        lanes = routes.lane_offset_m[routes.rows(quantities.state.station_m)]
+        away = quantities.lateral_offset_m[..., None] - lanes
+        nearest = np.where(np.isnan(away), np.inf, np.abs(away)).argmin(-1)
+        return np.take_along_axis(away, nearest[..., None], -1)[..., 0]
+
+    @cached_property
+    def sideways_m(self) -> FloatArray:
+        """[T, P] how far it has come to the left of the way its lane goes, since the start."""
+        moved = np.diff(self._from_lane_m, axis=0, prepend=self._from_lane_m[:1])
+        return np.where(np.abs(moved) < _LARGEST_STEP_M, moved, 0.0).cumsum(0)
+
+    @cached_property
+    def turned_rad(self) -> FloatArray:
+        """[T, P] heading to the left of the road's."""
+        turned = self.quantities.state.heading_rad - self.quantities.path.heading_rad[..., _HERE]
+        return (turned + np.pi) % (2.0 * np.pi) - np.pi
+
+    def swerving_mps2(self, player: int, side: float) -> FloatArray:
+        """[T] lateral acceleration to a side (1 left, -1 right), beyond what the road nearby takes at its tightest.
+
+        Roads are polylines: how they turn is looked at over lengths of 5 m and more.
+        """
+        near = np.flatnonzero(np.abs(PATH_M) <= _NEARBY_M)
+        headings = np.unwrap(self.quantities.path.heading_rad[:, player, near], axis=-1)
+        curve = (side * np.diff(headings, axis=-1) / np.diff(PATH_M[near])).max(-1)
+        own = side * self.quantities.lateral_acceleration_mps2[:, player]
+        return own - np.maximum(curve, 0.0) * self.quantities.speed_mps[:, player] ** 2
+
+    # --- one to the other -----------------------------------------------------------------------------------------
+
+    def ahead_m(self, player: int, of: int) -> FloatArray:
+        """[T] how far the middle of one is ahead of the other's, along the other's route."""
+        return self.between.on_path.ahead_m[:, of, player]
+
+    def gap_m(self, player: int, of: int) -> FloatArray:
+        """[T] from the front of `of` to the rear of who is ahead of it; negative where they are side by side."""
+        on_path = self.between.on_path
+        own = 0.5 * self.quantities.world.length_m[of]
+        return on_path.ahead_m[:, of, player] - on_path.half_length_m[:, of, player] - own
+
+    def in_way(self, player: int, of: int) -> BoolArray:
+        """[T] whether one's body is, across the road, where the other's is: the way it would take."""
+        on_path = self.between.on_path
+        half_width = on_path.half_width_m[:, of, player] + 0.5 * self.quantities.world.width_m[of]
+        return np.abs(on_path.left_m[:, of, player]) < half_width
+
+    def left_m(self, player: int, of: int) -> FloatArray:
+        """[T] how far one is to the left of the line of the other's route."""
+        return self.between.on_path.left_m[:, of, player] + self.quantities.lateral_offset_m[:, of]
+
+
+def runs(mask: BoolArray) -> Iterator[Stretch]:
+    """The stretches over which `mask` [T] holds without a pause."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    for first, end in edges.reshape(-1, 2).tolist():
+        yield first, end - 1

@@ -1,0 +1,72 @@
+"""From one game's trace to the manoeuvres in it, and to and from rows of the table `manoeuvres.csv`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import pandas as pd
+
+from harness.evaluation.manoeuvres.course import Course
+from harness.evaluation.manoeuvres.rules import RULES, Span
+from harness.game.quantities import World
+from harness.game.state import ROLES
+
+NAMES = tuple(RULES)
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """What a player did, from when to when; gap and time to collision are NaN where there is none."""
+
+    player: str
+    manoeuvre: str
+    time_s: float
+    until_s: float
+    gap_m: float
+    ttc_s: float
+    text: str
+
+
+def find_manoeuvres(
+    trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]] | None = None
+) -> list[Manoeuvre]:
+    """The manoeuvres of both players in one game, by the time they begin.
+
+    `trace` are the game's rows (columns as in `traces/`) on the scene that `world` is of; `sizes_m` are length and
+    width of the vehicle types in it, SUMO's default for one that it does not name. In a game with an ego what is
+    named ends with the ego's game.
+    """
+    course = Course.of(trace, world, sizes_m or {})
+    found = []
+    for player, role in enumerate(ROLES):
+        if course.drove[:, player].any():
+            for name, rule in RULES.items():
+                found += [_named(course, role, name, span) for span in rule(course, player, 1 - player)]
+    return sorted(found, key=lambda each: (each.time_s, each.player, each.manoeuvre))
+
+
+def _named(course: Course, role: str, name: str, span: Span) -> Manoeuvre:
+    digits = 6  # of a second: a multiple of the step, as a person would write it
+    return Manoeuvre(
+        role,
+        name,
+        round(span.first * course.step_s, digits),
+        round(span.last * course.step_s, digits),
+        span.gap_m if math.isfinite(span.gap_m) else math.nan,
+        span.ttc_s if math.isfinite(span.ttc_s) else math.nan,
+        span.text,
+    )
+
+
+def rows_of(found: Sequence[Manoeuvre], **game: Any) -> list[dict[str, Any]]:
+    """One game's rows of `manoeuvres.csv`; `game` are its cells in every row: arm, persona, seed, episode."""
+    return [{**game, **asdict(each)} for each in found]
+
+
+def manoeuvres_in(rows: pd.DataFrame) -> list[Manoeuvre]:
+    """The manoeuvres of one game from its rows of `manoeuvres.csv`."""
+    columns = list(Manoeuvre.__dataclass_fields__)
+    return [Manoeuvre(*row) for row in rows[columns].itertuples(index=False, name=None)]

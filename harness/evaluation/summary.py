@@ -1,0 +1,73 @@
+"""The summary of games: a row for each arm, with rates, means and their intervals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+from scipy import stats
+
+from harness.evaluation.comparison import CONFIDENCE, mean_interval
+from harness.evaluation.tables import SUMMARY_COLUMNS, typed
+
+
+def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
+    """A row for each arm (in order of first appearance) and training seed, with `SUMMARY_COLUMNS`.
+
+    `episodes` counts all games of the arm and `errors` those that could not be played; every other column
+    is over the games that were played and in which the quantity was measured, and empty if there were none.
+    Rates have 95 % Clopper-Pearson intervals, the mean speed a 95 % t interval (empty without spread); the
+    other columns are means over games (min_ttc_s: the mean of each game's minimum).
+    """
+    episodes = typed(episodes)
+    rows = [
+        _summary_row(str(arm), persona, seed, games)
+        for arm in episodes["arm"].unique()
+        for (persona, seed), games in episodes[episodes["arm"] == arm].groupby(["persona", "seed"], sort=False)
+    ]
+    return typed(pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS)))
+
+
+def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict[str, object]:
+    played = games[(games["ego_outcome"] != "error") & (games["error"] == "")]
+    with_ego = played[played["ego_failed"].notna()]
+    non_ego_outcomes = played.loc[played["non_ego_outcome"] != "", "non_ego_outcome"]
+    speeds = played["ego_mean_speed_mps"].dropna()
+    speed_low, speed_high = mean_interval(speeds.to_numpy())
+
+    def times(outcome: str) -> int | None:
+        return int((with_ego["ego_outcome"] == outcome).sum()) if len(with_ego) else None
+
+    return {
+        "arm": arm,
+        "persona": persona,
+        "seed": seed,
+        "episodes": len(games),
+        "errors": len(games) - len(played),
+        **_rate("failure_rate", int(with_ego["ego_failed"].sum()), len(with_ego)),
+        "collisions": times("collision"),
+        "rails": times("rail"),
+        "timeouts": times("timeout"),
+        "mean_speed_mps": speeds.mean(),
+        "mean_speed_low_mps": speed_low,
+        "mean_speed_high_mps": speed_high,
+        "trailing_distance_m": played["ego_trailing_distance_m"].mean(),
+        "min_ttc_s": played["ego_min_ttc_s"].mean(),
+        "max_deceleration_mps2": played["ego_max_deceleration_mps2"].mean(),
+        "max_lateral_acceleration_mps2": played["ego_max_lateral_acceleration_mps2"].mean(),
+        "ego_payoff": played["ego_payoff"].mean(),
+        **_rate("non_ego_goal_rate", int((non_ego_outcomes == "goal").sum()), len(non_ego_outcomes)),
+        "non_ego_mean_speed_mps": played["non_ego_mean_speed_mps"].mean(),
+        "non_ego_payoff": played["non_ego_payoff"].mean(),
+    }
+
+
+def _rate(column: str, successes: int, games: int) -> dict[str, float]:
+    """The rate and its Clopper-Pearson interval, as three columns; empty if there were no games."""
+    if games == 0:
+        return {column: np.nan, f"{column}_low": np.nan, f"{column}_high": np.nan}
+    interval = stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
+    return {
+        column: successes / games,
+        f"{column}_low": float(interval.low),
+        f"{column}_high": float(interval.high),
+    }

@@ -1,0 +1,170 @@
+"""The traces of an arm as one Parquet file: the games of a segment are a row group of it.
+
+A segment's file is such a file too, and an arm's is its segments' row groups one after the other: the same bytes
+whether the segments were played in one go or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from harness.errors import UsageError
+from harness.files import check_file, replace_durably, scratch_beside
+from harness.game.arrays import FloatArray
+
+_MOST_BYTES = 10**12
+_LARGEST, _MOST_STEPS = 1e8, 1_000_000
+
+_TEXT = pa.dictionary(pa.int32(), pa.string())
+SCHEMA = pa.schema(
+    [
+        ("episode", pa.int32()),
+        ("step", pa.int32()),
+        ("time_s", pa.float64()),
+        ("player", _TEXT),
+        ("vehicle_type", _TEXT),
+        *(
+            (name, pa.float64())
+            for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad")
+        ),
+        ("lapsed", pa.bool_()),
+        ("outcome", _TEXT),
+    ]
+)
+
+_NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
+
+
+class TraceWriter:
+    """Writes the games of a segment; the file is there when all games are in it, or not at all."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._games: list[pa.Table] = []
+
+    def __enter__(self) -> TraceWriter:
+        return self
+
+    def add(self, columns: Mapping[str, Sequence[Any]]) -> None:
+        """Add one game, as columns of its trace."""
+        arrays = {name: pa.array(columns[name], SCHEMA.field(name).type) for name in SCHEMA.names}
+        self._games.append(pa.table(arrays, SCHEMA))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        if kind is None:
+            games = pa.concat_tables(self._games) if self._games else SCHEMA.empty_table()
+            _write([games.unify_dictionaries().combine_chunks()], self._path)
+
+
+def join_traces(parts: Sequence[Path], path: Path) -> None:
+    """Put the traces of segments into one file, one after the other."""
+    _write((group for part in parts for group in _row_groups(part)), path)
+
+
+def read_trace(path: Path, episode: int) -> pd.DataFrame:
+    """One game's trace; empty if the file has none of that episode. Raises UsageError if it is no file of traces, or
+    holds what no game can be."""
+    try:
+        check_file(path, _MOST_BYTES)
+        table = pq.read_table(path, filters=[("episode", "==", episode)])
+        _check_schema(table.schema)
+        frame = table.to_pandas()
+        _check_game(frame)
+    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+        raise _damaged(path, error) from None
+    return _worded(frame)
+
+
+def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
+    """The games of a file in order, each with its episode, as `read_trace` gives them; read a segment at a time."""
+    rest = SCHEMA.empty_table().to_pandas()
+    for group in _row_groups(path):
+        rows = _frame(group)
+        rows = pd.concat((rest, rows)) if len(rest) else rows
+        games = [(int(episode), game) for episode, game in rows.groupby("episode", sort=False)]
+        for episode, game in games[:-1]:
+            yield episode, game.reset_index(drop=True)
+        rest = games[-1][1] if games else rows  # the next row group may go on with it
+    if len(rest):
+        yield int(rest["episode"].iloc[0]), rest.reset_index(drop=True)
+
+
+def _write(groups: Iterable[pa.Table], path: Path) -> None:
+    scratch = scratch_beside(path)
+    try:
+        with pq.ParquetWriter(scratch, SCHEMA, compression="zstd") as writer:
+            for group in groups:
+                if group.num_rows:
+                    writer.write_table(group)
+        replace_durably(scratch, path)
+    finally:
+        scratch.unlink(missing_ok=True)
+
+
+def _row_groups(path: Path) -> Iterator[pa.Table]:
+    with pq.ParquetFile(path) as file:
+        for number in range(file.num_row_groups):
+            yield file.read_row_group(number)
+
+
+def _frame(table: pa.Table) -> pd.DataFrame:
+    return _worded(table.to_pandas())
+
+
+def _worded(frame: pd.DataFrame) -> pd.DataFrame:
+    for name in ("player", "vehicle_type", "outcome"):
+        frame[name] = frame[name].astype(str)
+    return frame
+
+
+def check_traces(path: Path, episodes: Iterable[int]) -> None:
+    """Raise UsageError unless this is a file of traces, whose numbers can be a game's, with all these episodes."""
+    missing = set(episodes)
+    try:
+        check_file(path, _MOST_BYTES)
+        with pq.ParquetFile(path) as file:
+            _check_schema(file.schema_arrow)
+            for batch in file.iter_batches(columns=["episode", *_NUMBERS]):
+                _check_numbers(np.stack([batch.column(name).to_numpy(False) for name in _NUMBERS]))
+                missing.difference_update(np.unique(batch.column("episode").to_numpy(False)).tolist())
+    except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+        raise _damaged(path, error) from None
+    if missing:
+        raise _damaged(path, ValueError(f"it has no trace of episode {min(missing)}"))
+
+
+def _check_schema(schema: pa.Schema) -> None:
+    if not schema.equals(SCHEMA):
+        wrong = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]
+        raise ValueError(f"its columns are not those of a trace: {', '.join(wrong)[:200]}")
+
+
+def _check_game(frame: pd.DataFrame) -> None:
+    _check_numbers(frame[_NUMBERS].to_numpy(float))
+    steps = frame["step"]
+    if frame.isna().any(axis=None) or (len(frame) and not (0 <= steps.min() <= steps.max() <= _MOST_STEPS)):
+        raise ValueError("it has empty cells, or steps that no game has")
+    if frame.duplicated(["step", "player"]).any():
+        raise ValueError("somebody is in two places at once")
+
+
+def _check_numbers(numbers: FloatArray) -> None:
+    if not (np.abs(numbers) <= _LARGEST).all():  # never true of NaN
+        raise ValueError("it holds numbers that are none, or too large to be of a game")
+
+
+def _damaged(path: Path, error: Exception) -> UsageError:
+    text = (error.strerror or error) if isinstance(error, OSError) else error
+    return UsageError.of(
+        path, "", f"is not a file of traces: {text}", "run the campaign again: it plays its games anew"
+    )

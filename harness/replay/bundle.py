@@ -1,0 +1,145 @@
+"""A recorded game as a folder that opens with `sumo-gui -c scene.sumocfg`: no Python, no harness.
+
+scene.sumocfg      what SUMO opens: names the files below
+scene.net.xml      the scene's net, copied
+scene.add.xml      vehicle types in the colours of the game, rails, the place of contact
+episode.fcd.xml    every pose of every vehicle
+view.xml           zoom, speed, and the halts at contacts and at the end
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import shutil
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pandas as pd
+
+from harness.game.arrays import FloatArray
+from harness.replay.contact import Contact, contacts
+from harness.replay.floating_car_data import shown_at, write_recording, write_xml
+from harness.replay.gui_settings import WINDOW_PX, View, choose_view, view_settings
+from harness.replay.lanes import Lanes
+from harness.replay.vehicles import VehicleType, types_of_vehicles
+
+_RING_RADIUS_M = 4.0
+
+
+def write_replay(
+    trace: pd.DataFrame,
+    net_file: Path,
+    route_file: Path,
+    folder: Path,
+    *,
+    title: str,
+    step_length_s: float,
+    rails: Sequence[FloatArray] = (),
+) -> None:
+    """Write one game's replay, replacing what `folder` held; the folder appears whole or not at all.
+
+    `trace` is the game's rows (columns as in `traces/`), `route_file` defines its vehicle types, `rails` are
+    polylines [n, 2] in net coordinates. The same arguments give the same bytes. Raises ValueError for a trace
+    that holds no row or more than one game.
+    """
+    if trace["episode"].nunique() != 1:
+        raise ValueError(f"a replay is of one game; the trace has {trace['episode'].nunique()}")
+    trace = trace.astype({"player": str, "vehicle_type": str, "outcome": str})
+    types = types_of_vehicles(trace, route_file)
+    lanes = Lanes.read(net_file)
+    found = contacts(trace, types, rails)
+    view = choose_view(trace, found)
+
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    partial = folder.with_name(f".{folder.name}.{os.getpid()}.partial")
+    shutil.rmtree(partial, ignore_errors=True)
+    partial.mkdir()
+    try:
+        shutil.copyfile(net_file, partial / "scene.net.xml")
+        write_xml(_scenery(types, rails, found, view, title), partial / "scene.add.xml")
+        write_recording(trace, types, lanes, step_length_s, partial / "episode.fcd.xml")
+        moments = [*(contact.time_s for contact in found), float(trace["time_s"].max())]
+        halts_s = sorted({shown_at(moment, step_length_s) for moment in moments})
+        write_xml(view_settings(view, halts_s, lanes), partial / "view.xml")
+        # one step beyond the one that shows the last sample: without an end SUMO would never stop
+        write_xml(_configuration(title, halts_s[-1] + step_length_s, step_length_s), partial / "scene.sumocfg")
+        shutil.rmtree(folder, ignore_errors=True)
+        partial.rename(folder)
+    finally:
+        shutil.rmtree(partial, ignore_errors=True)
+
+
+def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTree.Element:
+    root = ElementTree.Element("configuration")
+    about = f" {title}. SUMO's clock shows the game's time plus {step_length_s:g} s. "
+    root.append(ElementTree.Comment(about.replace("--", "- -")))
+    for section, options in {
+        "input": {"net-file": "scene.net.xml", "additional-files": "scene.add.xml"},
+        "time": {"begin": "0", "end": f"{end_s:.3f}", "step-length": f"{step_length_s:g}"},
+        "processing": {
+            # SUMO must put every vehicle where and when it was, however wrong that is by its own rules
+            "collision.action": "none",
+            "insertion-checks": "none",
+            "ignore-route-errors": "true",
+            "time-to-teleport": "-1",
+        },
+        # SUMO warns of what would be wrong if it drove: jumps, hard braking, ends of routes
+        "report": {"no-warnings": "true", "no-step-log": "true"},
+        "device": {"device.fcd-replay.files": "episode.fcd.xml"},
+        "gui_only": {
+            "gui-settings-file": "view.xml",
+            "start": "true",
+            "window-size": ",".join(str(pixels) for pixels in WINDOW_PX),
+        },
+    }.items():
+        parent = ElementTree.SubElement(root, section)
+        for option, value in options.items():
+            ElementTree.SubElement(parent, option, value=value)
+    return root
+
+
+def _scenery(
+    types: Mapping[str, VehicleType],
+    rails: Sequence[FloatArray],
+    found: Sequence[Contact],
+    view: View,
+    title: str,
+) -> ElementTree.Element:
+    root = ElementTree.Element("additional")
+    for _, drawn in sorted({drawn.name: drawn for drawn in types.values()}.items()):
+        ElementTree.SubElement(root, "vType", drawn.attributes())
+    for number, rail in enumerate(rails):
+        _line(root, f"rail_{number}", rail, colour="24,26,32", width_m=0.4, layer=5)
+    for number, contact in enumerate(found):
+        ring = [
+            (contact.x_m + _RING_RADIUS_M * math.cos(a), contact.y_m + _RING_RADIUS_M * math.sin(a))
+            for a in (2 * math.pi * k / 36 for k in range(37))
+        ]
+        _line(root, f"contact_{number}", ring, colour="220,20,20", width_m=0.24, layer=6)
+        side = -1 if number % 2 else 1  # two that are near each other stay legible
+        _text(root, f"contact_{number}_label", contact.label, contact.x_m, contact.y_m + side * 1.5 * _RING_RADIUS_M)
+    _text(root, "title", title, view.x_m, view.y_m + 0.4 * view.height_m)
+    return root
+
+
+def _line(
+    root: ElementTree.Element,
+    name: str,
+    points: Sequence | FloatArray,
+    *,
+    colour: str,
+    width_m: float,
+    layer: int,
+) -> None:
+    """A line; SUMO's `lineWidth` is half of what it draws."""
+    shape = " ".join(f"{x:.3f},{y:.3f}" for x, y in points)
+    look = {"color": colour, "layer": str(layer), "lineWidth": f"{0.5 * width_m:g}"}
+    ElementTree.SubElement(root, "poly", {"id": name, "shape": shape} | look)
+
+
+def _text(root: ElementTree.Element, name: str, text: str, x_m: float, y_m: float) -> None:
+    """SUMO-GUI has no text of its own; it can show the type of an (invisible) point of interest."""
+    place = {"x": f"{x_m:.2f}", "y": f"{y_m:.2f}", "layer": "200"}
+    ElementTree.SubElement(root, "poi", {"id": name, "type": text, "color": "0,0,0,0"} | place)

@@ -1,0 +1,126 @@
+"""A table of the run as cells of the page: what is read, and beside it exactly what the CSV file holds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pandas as pd
+
+from harness.reports.wording import number, p_number, trimmed
+from harness.evaluation.tables import typed
+
+UNITS = (("_mps2", "m/s²"), ("_mps", "m/s"), ("_m", "m"), ("_s", "s"))
+RATES = (
+    *("failure_rate", "non_ego_goal_rate", "ego_failure_rate", "naive_failure_rate", "solution_failure_rate"),
+    *("gap_share", "share"),
+)
+POINTS = ("failure_difference", "fewer_failures")
+"""Differences of rates."""
+P_VALUES = ("p_value", "p_holm", "mcnemar_p")
+IN_THE_METRICS_UNIT = ("mean_difference", "ci_low", "ci_high")
+
+NAMES = {
+    "mean_difference": "mean difference towards H1",
+    "ci_low": "its 95 % low",
+    "ci_high": "its 95 % high",
+    "p_value": "p",
+    "p_holm": "p after Holm",
+    "mcnemar_p": "McNemar p",
+    "effect_size": "effect size d_z",
+    "rejects_h0": "rejects H0 (p alone)",
+    "pairs_left_out": "pairs left out",
+    "episodes": "games",
+}
+"""Headings that the column's own name would not make clear."""
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A column: its name in the CSV file, what the page calls it, and its unit."""
+
+    column: str
+    label: str
+    unit: str
+    text: bool
+    """Whether its cells are words."""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """`exact` is the text of the CSV file's cell, None where `text` is that already (text columns)."""
+
+    text: str
+    exact: str | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """One CSV file as the page shows it."""
+
+    name: str
+    caption: str
+    headings: Sequence[Heading]
+    rows: Sequence[Sequence[Cell]]
+
+
+def table(name: str, caption: str, frame: pd.DataFrame) -> Table:
+    """The frame, one of `harness.evaluation.tables.TABLES`, as cells; `name` is the CSV file's, without ending."""
+    frame = typed(frame)
+    metrics = frame["metric"].tolist() if "metric" in frame.columns else [""] * len(frame)
+    columns = [
+        [_cell(column, value, metric) for value, metric in zip(frame[column].tolist(), metrics, strict=True)]
+        for column in frame.columns
+    ]
+    headings = [heading(str(column), frame[column].dtype == object) for column in frame.columns]
+    return Table(name, caption, headings, list(zip(*columns, strict=True)))
+
+
+def heading(column: str, text: bool) -> Heading:
+    """What the page calls a column, from its name and the unit in it."""
+    if column in NAMES:
+        return Heading(column, NAMES[column], "", text=False)
+    stem, unit = column, "%" if column.startswith(RATES) else "points" if column.startswith(POINTS) else ""
+    for ending, symbol in UNITS:
+        if column.endswith(ending):
+            stem, unit = column.removesuffix(ending), symbol
+            break
+    words = stem.replace("_ttc", "_time_to_collision").replace("non_ego", "non-ego").replace("_", " ")
+    for end in ("low", "high"):
+        words = words.replace(f" {end}", f", 95 % {end}")
+    return Heading(column, words, unit, text)
+
+
+def exact(value: object) -> str:
+    """The text of a value in the CSV file, as `harness.evaluation.tables.write_csv` writes it, unquoted."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return "" if pd.isna(value) else repr(value)
+
+
+def _cell(column: str, value: Any, metric: str) -> Cell:
+    if isinstance(value, str):
+        return Cell(value, None)
+    return Cell(_text(column, value, metric), exact(value))
+
+
+def _text(column: str, value: Any, metric: str) -> str:
+    if pd.isna(value):
+        return "–"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int):
+        return str(value) if column == "seed" else f"{value:,}"
+    if not math.isfinite(value):
+        return str(value)
+    if column in P_VALUES:
+        return p_number(value)
+    if column.startswith(RATES + POINTS):
+        return trimmed(value * 100, 1)
+    if column in IN_THE_METRICS_UNIT and metric:
+        return f"{number(value * 100, 1)} points" if metric == "failure" else f"{number(value, 3)} m/s"
+    return number(value, 2)

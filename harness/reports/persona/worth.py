@@ -1,0 +1,172 @@
+"""What a persona's terms and functions are worth, reckoned by the very code that the game pays by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from harness.config.persona import Persona
+from harness.config.json_schema import unit_of
+from harness.game.arrays import FloatArray
+from harness.game.payoff import FUZZY_QUANTITIES, TERMS, Payoff, Weighted
+from harness.game.state import Outcome
+
+EXAMPLES: Mapping[str, tuple[str, str, float]] = {
+    "collision": ("once", "outcome", float(Outcome.COLLISION)),
+    "rail": ("once", "outcome", float(Outcome.RAIL)),
+    "speed_over_limit": ("at 10 % over", "speed_over_limit", 0.1),
+    "goal": ("once", "outcome", float(Outcome.GOAL)),
+    "timeout": ("once", "outcome", float(Outcome.TIMEOUT)),
+    "progress": ("for 100 m", "advanced_m", 100.0),
+    "speed_under_limit": ("at 10 % under", "speed_over_limit", -0.1),
+    "lane_offset": ("at 1 m", "lane_offset_m", 1.0),
+    "acceleration": ("at 5 m/s²", "acceleration_mps2", 5.0),
+    "lateral_acceleration": ("at 3 m/s²", "lateral_acceleration_mps2", 3.0),
+    "time_pressure": ("always", "advanced_m", 0.0),
+}
+"""A moment for each term without a limit: in words, and the quantity that is then not as in a calm moment."""
+LIMITED: Mapping[str, str] = {
+    "clearance": "clearance_m",
+    "vehicle_clearance": "vehicle_clearance_m",
+    "time_gap": "time_gap_s",
+    "time_to_collision": "time_to_collision_s",
+}
+"""The quantity of each term with a limit: its moment is half of the limit."""
+POINTS = 401
+"""Where a function is looked at, besides the points of its sets."""
+
+
+@dataclass(frozen=True)
+class Counted:
+    """A term of a persona's payoff."""
+
+    group: str
+    name: str
+    alpha: float
+    weight: float
+    meaning: str
+    limit: str
+    """E.g. "within 0.6 m"; empty: it has none."""
+    moment: str
+    """A moment, in words, e.g. "per second at 0.3 m"."""
+    worth: float
+    """What the payoff is in that moment: once, or in a second of it."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A fuzzy term over its quantity."""
+
+    name: str
+    quantity: str
+    meaning: str
+    unit: str
+    inputs: FloatArray
+    """[N] the quantity, rising over the range of the sets' points and some more on both sides."""
+    sets: tuple[tuple[str, float, FloatArray], ...]
+    """Name, value and memberships [N] of each set."""
+    alpha: float
+    weight: float
+    worth: FloatArray
+    """[N] payoff per second, alpha and weight applied."""
+
+    @property
+    def best(self) -> tuple[float, float, float]:
+        """The greatest payoff per second, and the first stretch of the quantity (from, to) over which it is that."""
+        return self._stretch(self.worth.max())
+
+    @property
+    def worst(self) -> tuple[float, float, float]:
+        """The least payoff per second, and the first stretch of the quantity (from, to) over which it is that."""
+        return self._stretch(self.worth.min())
+
+    def _stretch(self, value: float) -> tuple[float, float, float]:
+        there = np.abs(self.worth - value) < 1e-9
+        first = int(there.argmax())
+        last = first + int(np.append(~there[first:], True).argmax()) - 1
+        edge = (-np.inf if first == 0 else self.inputs[first], np.inf if last == len(there) - 1 else self.inputs[last])
+        return float(value), float(edge[0]), float(edge[1])
+
+
+def counted(persona: Persona) -> list[Counted]:
+    """Every named term of a persona's payoff, as the document orders them."""
+    payoff = persona.payoff
+    found = []
+    for each in payoff.terms:
+        term = TERMS[each.name]
+        limit, moment, worth = "", "", np.nan
+        if each.parameter is not None:
+            unit = unit_of(term.parameter)
+            limit, moment = f"within {each.parameter:g} {unit}", f"at {each.parameter / 2:g} {unit}"
+            worth = _in_a_second(payoff, each, {LIMITED[each.name]: each.parameter / 2})
+        elif each.name in EXAMPLES:
+            moment, quantity, value = EXAMPLES[each.name]
+            worth = _in_a_second(payoff, each, {quantity: value})
+        if term.per_second and moment:
+            moment = f"per second {moment}"
+        alpha = payoff.alpha[term.group]
+        found.append(Counted(term.group, each.name, alpha, each.weight, term.meaning, limit, moment, worth))
+    return found
+
+
+def drawn(persona: Persona) -> list[Drawn]:
+    """Every fuzzy term of a persona's payoff."""
+    found = []
+    alpha = persona.payoff.alpha["human"]
+    for name, (weight, function) in persona.payoff.fuzzy.items():
+        points = np.unique(np.concatenate([each.inputs for each in function.sets]))
+        span = float(np.ptp(points)) or abs(float(points[0])) or 1.0
+        low, high = points[0] - 0.15 * span, points[-1] + 0.15 * span
+        if function.quantity not in _BELOW_ZERO:
+            low = max(low, 0.0)
+        inputs = np.unique(np.concatenate([np.linspace(low, high, POINTS), points[points >= low]]))
+        sets = tuple(
+            (each.name, each.value, np.interp(inputs, each.inputs, each.memberships)) for each in function.sets
+        )
+        found.append(
+            Drawn(
+                name,
+                function.quantity,
+                FUZZY_QUANTITIES[function.quantity],
+                unit_of(function.quantity),
+                inputs,
+                sets,
+                alpha,
+                weight,
+                alpha * weight * function(inputs),
+            )
+        )
+    return found
+
+
+_BELOW_ZERO = ("speed_over_limit", "goal_m")  # quantities that can be negative
+
+
+def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]) -> float:
+    """The payoff of one term alone, in one step of one second of a moment that is calm but for these quantities."""
+
+    def array(name: str, calm: float) -> FloatArray:
+        return np.array([[quantities.get(name, calm)]])
+
+    far = {name: array(name, np.inf) for name in LIMITED.values()}
+    state: Any = SimpleNamespace(
+        step=np.array([0]),
+        x_m=np.zeros((1, 1)),
+        speed_mps=np.zeros((1, 1)),
+        outcome=array("outcome", float(Outcome.RUNNING)),
+        acceleration_mps2=array("acceleration_mps2", 0.0),
+    )
+    moment: Any = SimpleNamespace(
+        world=SimpleNamespace(step_s=1.0),
+        state=state,
+        advanced_m=array("advanced_m", 0.0),
+        speed_over_limit=array("speed_over_limit", 0.0),
+        lane_offset_m=array("lane_offset_m", 0.0),
+        lateral_acceleration_mps2=array("lateral_acceleration_mps2", 0.0),
+        **far,
+    )
+    return float(Payoff(payoff.alpha, (term,), {}).evaluate(moment, 0)[term.name][0])

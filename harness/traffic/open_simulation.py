@@ -1,0 +1,26 @@
+"""Opening a SUMO simulation: in this process if its libsumo is free, otherwise in a child process."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from harness.traffic.scene import OpenScene
+from harness.traffic.simulation import Simulation
+
+
+def open_simulation(
+    scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
+) -> Simulation:
+    """Load SUMO with a tile for each game: in this process if its libsumo is free, otherwise in a child process.
+
+    `recorded`: every other is read in every step, near or not, which costs as much as SUMO's own work on it.
+    Both give the same numbers; only the second costs a message each way per verb. Raises SimulationError if SUMO
+    can't load the scene.
+    """
+    from harness.traffic.libsumo_simulation import LocalSimulation
+
+    if not LocalSimulation.in_use():
+        return LocalSimulation(scene, games, taken_over, seed, recorded)
+    from harness.traffic.subprocess_simulation import RemoteSimulation
+
+    return RemoteSimulation(scene, games, taken_over, seed, recorded)

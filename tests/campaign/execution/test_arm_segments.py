@@ -1,0 +1,182 @@
+"""An arm in segments: the same bytes whatever interrupted it, and the memory of one segment."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import harness.campaign.execution.arm_segments
+from harness.campaign.execution.arm_segments import Segment, join_segments, play_segments, segments_of
+from harness.campaign.execution.crash_retries import FIRST, Attempt
+from harness.drivers.sumo import SumoDriver
+from harness.environments.rollout import Arm
+from harness.evaluation.tables import read_csv
+from harness.evaluation.trace_file import read_traces
+from harness.game.arrays import FloatArray, IntArray
+from harness.traffic.scene import OpenScene
+from tests.environments.test_rollout import Steady, arm
+from tests.support.repository import REPOSITORY
+
+EPISODES = 7
+LABELS = {"arm": "naive_vs_sumo", "persona": "", "seed": 1}
+AGAIN = Attempt(first=False)
+
+
+@pytest.fixture(autouse=True)
+def three_games(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(harness.campaign.execution.arm_segments, "SEGMENT_EPISODES", 3)
+
+
+def play(
+    assessed: Arm, folder: Path, attempt: Attempt = FIRST, begin: Callable[[int], None] = lambda episode: None
+) -> tuple[int, list[int]]:
+    """Errors, and the episodes that were played."""
+    played: list[int] = []
+
+    def note(episode: int) -> None:
+        begin(episode)
+        played.append(episode)
+
+    segments = segments_of(folder / "segments", EPISODES)
+    errors = play_segments(assessed, segments, LABELS, attempt, note, lambda done, total: None)
+    join_segments(segments, *(folder / name for name in ("episodes.csv", "manoeuvres.csv", "traces.parquet")))
+    return errors, played
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    return {each.name: each.read_bytes() for each in folder.iterdir() if each.is_file()}
+
+
+@pytest.fixture(scope="module")
+def steady(merge: OpenScene) -> Arm:
+    return arm(merge, Steady(), SumoDriver())
+
+
+@pytest.fixture(scope="module")
+def whole(steady: Arm, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(harness.campaign.execution.arm_segments, "SEGMENT_EPISODES", 3)
+        assert play(steady, folder) == (0, list(range(EPISODES)))
+    return folder
+
+
+class Killed(BaseException):
+    """Ends an arm as the death of its process does: nobody catches it."""
+
+
+@pytest.mark.parametrize("dies_in", [0, 2, 3, 6])
+def test_arm__killed_in_any_game_is_uninterrupted(dies_in: int, steady: Arm, whole: Path, tmp_path: Path) -> None:
+    def die(episode: int) -> None:
+        if episode == dies_in:
+            raise Killed
+
+    with pytest.raises(Killed):
+        play(steady, tmp_path, begin=die)
+    assert play(steady, tmp_path, AGAIN) == (0, list(range(dies_in // 3 * 3, EPISODES)))
+    assert files(tmp_path) == files(whole)
+
+
+def test_arm__has_every_game_once_in_order(whole: Path) -> None:
+    assert read_csv(whole / "episodes.csv")["episode"].tolist() == list(range(EPISODES))
+    assert [episode for episode, _ in read_traces(whole / "traces.parquet")] == list(range(EPISODES))
+
+
+def test_arm__a_game_that_is_given_up_is_an_error_and_the_others_are_played(
+    steady: Arm, whole: Path, tmp_path: Path
+) -> None:
+    errors, played = play(steady, tmp_path, Attempt(first=False, given_up={4: "the worker died of SIGSEGV"}))
+    assert (errors, played) == (1, [0, 1, 2, 3, 5, 6])
+    expected, table = (read_csv(folder / "episodes.csv") for folder in (whole, tmp_path))
+    assert table.loc[4, ["ego_outcome", "non_ego_outcome", "error"]].tolist() == [
+        *("error", "error", "the worker died of SIGSEGV")
+    ]
+    assert table.drop(4).equals(expected.drop(4))
+    assert [episode for episode, _ in read_traces(tmp_path / "traces.parquet")] == [0, 1, 2, 3, 5, 6]
+
+
+class FailsOnce(Steady):
+    """Raises in its fifth game."""
+
+    games = 0
+
+    def begin(self, games: IntArray) -> None:
+        self.games += 1
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        if self.games == 5:
+            raise RuntimeError("out of ideas")
+        return super().decide(games, observation, noise)
+
+
+def test_arm__only_segments_with_errors_are_played_again_by_the_next_run(
+    merge: OpenScene, whole: Path, tmp_path: Path
+) -> None:
+    forgetful = arm(merge, FailsOnce(), SumoDriver())
+    assert play(forgetful, tmp_path) == (1, list(range(EPISODES)))
+    assert play(forgetful, tmp_path, AGAIN) == (1, [])  # within a run, errors stay
+    assert play(forgetful, tmp_path) == (0, [3, 4, 5])
+    assert files(tmp_path) == files(whole)
+
+
+@pytest.mark.parametrize("name", ["json", "episodes.csv", "manoeuvres.csv", "traces.parquet"])
+@pytest.mark.parametrize("gone", [True, False])
+def test_arm__a_torn_segment_is_played_again(name: str, gone: bool, steady: Arm, whole: Path, tmp_path: Path) -> None:
+    shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+    torn = Segment(tmp_path / "segments", range(3, 6)).file(name)
+    torn.unlink() if gone else torn.write_bytes(torn.read_bytes()[:-10])
+    assert play(steady, tmp_path) == (0, [3, 4, 5])
+    assert files(tmp_path) == files(whole)
+
+
+def test_arm__segments_of_other_versions_are_played_again(
+    steady: Arm, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
+    monkeypatch.setattr(harness.campaign.execution.arm_segments, "versions_of_numbers", lambda: {"numpy": "99"})
+    assert play(steady, tmp_path) == (0, list(range(EPISODES)))
+
+
+STREAM = """
+import resource, sys
+from itertools import repeat
+from pathlib import Path
+from harness.campaign.execution import arm_segments as segments
+from harness.environments.rollout import Game
+from harness.campaign.execution.crash_retries import FIRST
+from harness.evaluation.trace_file import SCHEMA
+folder, episodes = Path(sys.argv[1]), int(sys.argv[2])
+texts = {"player": "ego", "vehicle_type": "car", "outcome": ""}
+def game(episode):
+    columns = {name: [texts.get(name, 0.5)] * 2000 for name in SCHEMA.names}
+    columns |= {"episode": [episode] * 2000, "step": list(range(2000)), "lapsed": [False] * 2000}
+    return Game({"episode": episode, "ego_outcome": "goal", "ego_failed": 0, "error": ""}, columns)
+segments.assess = lambda arm, episodes, begin, given_up: (game(each) for each in episodes)
+segments.name_manoeuvres = lambda table, traces, scene: segments.pd.DataFrame(columns=list(MANOEUVRE_COLUMNS))
+from harness.evaluation.tables import MANOEUVRE_COLUMNS
+class Anyone:
+    scene = None
+parts = segments.segments_of(folder / "segments", episodes)
+segments.play_segments(Anyone, parts, {"arm": "a", "persona": "", "seed": 1}, FIRST, None, lambda done, total: None)
+segments.join_segments(parts, folder / "e.csv", folder / "m.csv", folder / "t.parquet")
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+def test_arm__needs_the_memory_of_one_segment(tmp_path: Path) -> None:
+    """Ten times the games of 2,000 rows each, which would be 160 MB more, in a process of their own."""
+    peak_kb = []
+    for episodes in (100, 1000):
+        folder = tmp_path / str(episodes)
+        folder.mkdir()
+        done = subprocess.run(
+            [sys.executable, "-c", STREAM, folder, str(episodes)], cwd=REPOSITORY, capture_output=True, text=True
+        )
+        assert done.returncode == 0, done.stderr
+        peak_kb.append(int(done.stdout))
+    assert peak_kb[1] - peak_kb[0] < 40_000, peak_kb

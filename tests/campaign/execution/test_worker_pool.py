@@ -1,0 +1,259 @@
+"""Stages in processes: in order, side by side, and whatever dies is named and costs only itself."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.campaign.execution.crash_retries import TRIES, Attempt, Begin, Report
+from harness.campaign.execution.run_context import Conditions
+from harness.campaign.execution.worker_pool import Event, run_stages
+from harness.campaign.plan.stages import Drives, Stage, TrainingStage
+from harness.config.campaign import Campaign
+from harness.config.persona import Persona
+from harness.errors import StageFailed
+from tests.support.tiny import (
+    BY_SUMO,
+    begin,
+    end,
+    harness,
+    in_session,
+    sumo_run,
+    tables,
+    wait_for,
+    workers_of,
+    write_campaign,
+)
+
+
+def stage(name: str, *needs: str) -> Stage:
+    """A training that needs others: as its initial policy and as its opponent."""
+    first, second = (*needs, None, None)[:2]
+    opponent = Drives("policy", f"{second}-seed1") if second else None
+    return TrainingStage(name, 1, "", 0, opponent, f"{first}-seed1" if first else None, 0.0, 0.0)
+
+
+def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2, finished: tuple[str, ...] = ()) -> list[Event]:
+    nobody = Persona.model_construct(name="nobody")
+    conditions = Conditions(folder, folder, Campaign.model_construct(), nobody, {}, None, {}, None, {})
+    events: list[Event] = []
+    run_stages(stages, [f"{name}-seed1" for name in finished], conditions, jobs, events.append, work)
+    return events
+
+
+def told(events: list[Event], kind: str) -> list[str]:
+    return [event.stage.removesuffix("-seed1") for event in events if event.kind == kind]
+
+
+# What the workers do here. They are in the processes that run_stages starts, which import this module.
+
+
+def note(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+    with (conditions.folder / "done").open("a") as file:
+        file.write(f"{stage.id}\n")
+    return {"pid": os.getpid(), "deaf": signal.getsignal(signal.SIGINT) == signal.SIG_IGN}
+
+
+def report_much(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+    for done in range(1, 1001):
+        report(done, 1000)
+    return {}
+
+
+def raise_in_b(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+    if stage.id == "b-seed1":
+        raise StageFailed("b-seed1: a payoff is not finite")
+    if stage.id == "bug-seed1":
+        raise KeyError("a bug")
+    return {}
+
+
+def die_in_b(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+    if stage.id == "b-seed1":
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return {}
+
+
+def die_once(stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+    mark = conditions.folder / stage.id
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return {}
+
+
+def die_when_idle(
+    stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt
+) -> dict[str, Any]:
+    """Kill whoever else works for the same parent: it has nothing to do."""
+    if stage.id == "a-seed1":
+        time.sleep(0.5)  # until the other worker waits for its first stage
+        for pid in workers_of(os.getppid()):
+            if pid != os.getpid():
+                os.kill(pid, signal.SIGKILL)
+    return {}
+
+
+# ----------------------------------------------------------------------------------------------------------------------
+
+
+def test_run_stages__each_after_what_it_needs(tmp_path: Path) -> None:
+    stages = [stage("a"), stage("b", "a"), stage("c", "a"), stage("d", "b", "c"), stage("e")]
+    events = run(tmp_path, stages, note)
+    order = [line.removesuffix("-seed1") for line in (tmp_path / "done").read_text().split()]
+    assert sorted(order) == ["a", "b", "c", "d", "e"]
+    assert order.index("a") < min(order.index("b"), order.index("c"))
+    assert order.index("d") > max(order.index("b"), order.index("c"))
+    assert sorted(told(events, "started")) == sorted(told(events, "done")) == ["a", "b", "c", "d", "e"]
+    pids = {event.info["pid"] for event in events if event.kind == "done"}
+    assert os.getpid() not in pids
+    assert len(pids) <= 2
+    assert all(event.info["deaf"] for event in events if event.kind == "done")
+    assert not workers_of(os.getpid())
+
+
+def test_run_stages__what_is_finished_is_not_done_again(tmp_path: Path) -> None:
+    events = run(tmp_path, [stage("a"), stage("b", "a")], note, finished=("a",))
+    assert told(events, "done") == ["b"]
+    assert run(tmp_path, [stage("a")], note, finished=("a",)) == []
+
+
+def test_run_stages__progress_is_told_but_not_all_of_it(tmp_path: Path) -> None:
+    events = [event for event in run(tmp_path, [stage("a")], report_much) if event.kind == "progress"]
+    assert 1 <= len(events) < 20
+    assert (events[-1].done, events[-1].total) == (1000, 1000)
+
+
+def test_run_stages__a_stage_that_fails_is_named_and_the_rest_goes_on(tmp_path: Path) -> None:
+    stages = [stage("a"), stage("b"), stage("c", "b"), stage("d", "c"), stage("e", "a"), stage("bug")]
+    events = run(tmp_path, stages, raise_in_b)
+    assert sorted(told(events, "done")) == ["a", "e"]
+    failed = {event.stage: event.message for event in events if event.kind == "failed"}
+    assert failed["b-seed1"] == "b-seed1: a payoff is not finite"
+    assert "Traceback" in failed["bug-seed1"]  # a bug is told with its traceback
+    assert "KeyError: 'a bug'" in failed["bug-seed1"]
+    skipped = {event.stage: event.message for event in events if event.kind == "skipped"}
+    assert skipped == {"c-seed1": "needs b-seed1, which failed", "d-seed1": "needs c-seed1, which failed"}
+
+
+def test_run_stages__a_stage_that_always_kills_its_worker_fails_by_name(tmp_path: Path) -> None:
+    events = run(tmp_path, [stage("a"), stage("b"), stage("c", "b"), stage("e", "a")], die_in_b, jobs=1)
+    assert sorted(told(events, "done")) == ["a", "e"]
+    assert told(events, "started").count("b") == TRIES
+    assert told(events, "died") == ["b"] * (TRIES - 1)
+    (failed,) = (event for event in events if event.kind == "failed")
+    assert failed.stage == "b-seed1"
+    assert failed.message == f"the worker died of SIGSEGV, {TRIES} times over"
+    assert told(events, "skipped") == ["c"]
+
+
+def test_run_stages__a_stage_whose_worker_was_killed_is_done_again(tmp_path: Path) -> None:
+    events = run(tmp_path, [stage("a"), stage("b", "a")], die_once)
+    assert told(events, "done") == ["a", "b"]
+    assert told(events, "died") == ["a", "b"]
+    assert all("SIGKILL" in event.message for event in events if event.kind == "died")
+
+
+def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path: Path) -> None:
+    events = run(tmp_path, [stage("a"), stage("b", "a"), stage("c", "a")], die_when_idle)
+    assert sorted(told(events, "done")) == ["a", "b", "c"]
+
+
+def need_too_much(
+    stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt
+) -> dict[str, Any]:
+    """Ask the system itself for more memory than it may give, by NumPy and by torch."""
+    import resource
+
+    import numpy as np
+    import torch
+
+    used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (used + 2**28, resource.RLIM_INFINITY))
+    try:
+        ask = torch.ones if stage.id == "b-seed1" else np.ones
+        ask(2**28 if stage.id < "c" else 1)
+        return {}
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+
+
+def test_run_stages__short_of_memory_is_one_message_and_the_rest_goes_on(tmp_path: Path) -> None:
+    events = run(tmp_path, [stage("a"), stage("b"), stage("c")], need_too_much, jobs=1)
+    failed = {event.stage: event.message for event in events if event.kind == "failed"}
+    assert set(failed) == {"a-seed1", "b-seed1"}
+    for message in failed.values():
+        assert message.startswith("the machine is short of memory: ")
+        assert "Traceback" not in message
+    assert told(events, "done") == ["c"]
+
+
+# --- the real command -------------------------------------------------------------------------------------------------
+
+
+def begin_campaign(tmp_path: Path) -> tuple[Any, Path, list[object]]:
+    """The campaign of `sumo_run`, begun anew."""
+    run_folder = tmp_path / "run"
+    command: list[object] = ["campaign", write_campaign(tmp_path, **BY_SUMO), "--out", run_folder, "--jobs", 1]
+    return begin(*command), run_folder, command
+
+
+def wait_for_file(process: subprocess.Popen[str], run_folder: Path, name: str) -> None:
+    """Wait until the training has written a file: its checkpoint stands for the first of its segments."""
+    file = run_folder / ".stages" / "speedy-seed1" / name
+    wait_for(lambda: file.exists() or process.poll() is not None, name)
+    assert file.exists(), end(process)
+
+
+@pytest.mark.slow
+def test_campaign__a_worker_that_is_killed_costs_nothing_but_time(tmp_path: Path) -> None:
+    process, run_folder, _ = begin_campaign(tmp_path)
+    wait_for_file(process, run_folder, "checkpoint.safetensors")
+    (worker,) = workers_of(process.pid)
+    os.kill(worker, signal.SIGSEGV)
+    printed = end(process)
+    assert process.returncode == 0, printed
+    assert "died     speedy-seed1: the worker died of SIGSEGV" in printed
+    assert tables(run_folder) == tables(sumo_run())
+    wait_for(lambda: not in_session(process.pid), "no process of it is left", 5.0)
+
+
+@pytest.mark.slow
+def test_campaign__interrupted_and_killed_and_run_again_is_uninterrupted(tmp_path: Path) -> None:
+    process, run_folder, command = begin_campaign(tmp_path)
+    wait_for_file(process, run_folder, "checkpoint.safetensors")
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+    printed = process.communicate(timeout=30)[0]
+    assert process.returncode == 130
+    assert "run the same command again to go on" in printed
+    assert "Traceback" not in printed
+    wait_for(lambda: not in_session(process.pid), "no process of it is left", 5.0)
+    assert not (run_folder / "episodes.csv").exists()
+
+    process = begin(*command)
+    wait_for_file(process, run_folder, "done.json")
+    os.kill(process.pid, signal.SIGKILL)
+    wait_for(lambda: in_session(process.pid) in ([], [process.pid]), "no worker is left", 5.0)
+    printed = end(process)
+    assert "Traceback" not in printed
+
+    again = harness(*command)
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert tables(run_folder) == tables(sumo_run())
+
+
+def test_campaign__interrupted_while_its_workers_start_leaves_nothing(tmp_path: Path) -> None:
+    process, run_folder, _ = begin_campaign(tmp_path)
+    wait_for(lambda: workers_of(process.pid), "the first worker")
+    os.killpg(process.pid, signal.SIGINT)
+    printed = process.communicate(timeout=30)[0]
+    assert process.returncode == 130
+    assert "Traceback" not in printed
+    wait_for(lambda: not in_session(process.pid), "no process of it is left", 5.0)
+    assert (run_folder / "manifest.json").is_file()

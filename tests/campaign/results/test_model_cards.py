@@ -1,0 +1,232 @@
+"""Model cards: a README.md beside each policy, from the run's own data and nothing else."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from harness.campaign.results.model_cards import model_card, write_model_cards
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.evaluation.tables import SUMMARY_COLUMNS, read_csv, typed
+from tests.support.repository import REPOSITORY
+from tests.support.tiny import harness, learned_run, sumo_run
+
+ARMS = ("naive_alone", "naive_vs_distracted", "distracted_alone", "retrained_vs_distracted")
+
+
+def persona(name: str) -> dict[str, Any]:
+    return read_document(REPOSITORY / "personas" / f"{name}.toml", Persona).model_dump(mode="json")
+
+
+def entry(name: str, kind: str = "training") -> dict[str, Any]:
+    done = {"steps": 1_703_936, "budget_steps": 3_000_000, "stopped": "converged", "rule": "stop when settled"}
+    about = {"kind": kind, "name": name, "persona": "" if name == "naive" else "distracted", "seed": 1}
+    return {**about, "status": "done", "seconds": 166.5, **(done if kind == "training" else {})}
+
+
+MANIFEST: dict[str, Any] = {
+    "name": "merge",
+    "quick": False,
+    "campaign": {"name": "merge", "scene": "../networks/merge", "personas": ["distracted.toml"], "seeds": [1]},
+    "personas": ["distracted"],
+    "ego_persona": persona("careful"),
+    "persona_documents": {"distracted": persona("distracted")},
+    "seeds": [1],
+    "versions": {"python": "3.11.7", "platform": "Linux-6.1", "harness": "0.1.0", "torch": "2.13.0"},
+    "stages": {
+        **{f"{name}-seed1": entry(name) for name in ("naive", "distracted", "retrained_distracted")},
+        **{f"{name}-seed1": entry(name, "assessment") for name in ARMS},
+    },
+}
+POLICY: dict[str, Any] = {
+    "stage": "naive-seed1",
+    "player": "ego",
+    "persona": "careful",
+    "scene": "merge",
+    "against": None,
+    "began_from": None,
+    "training": {"steps": 3_000_000, "early_convergence": True, "learning_rate": 1e-4, "network": [64, 64]},
+}
+PERSON = {**POLICY, "stage": "distracted-seed1", "player": "non_ego", "persona": "distracted", "against": "naive-seed1"}
+SUMMARY = typed(
+    pd.DataFrame(
+        [
+            {"arm": "naive_alone", "seed": 1, "episodes": 100, "errors": 0}
+            | {"failure_rate": 0.0, "failure_rate_low": 0.0, "failure_rate_high": 0.0362}
+            | {"mean_speed_mps": 13.8, "mean_speed_low_mps": 13.79, "mean_speed_high_mps": 13.81},
+            {"arm": "naive_vs_distracted", "seed": 1, "episodes": 100, "errors": 1}
+            | {"failure_rate": 0.18, "failure_rate_low": 0.11, "failure_rate_high": 0.269, "mean_speed_mps": 13.78}
+            | {"non_ego_goal_rate": 0.75, "non_ego_goal_rate_low": 0.653, "non_ego_goal_rate_high": 0.831}
+            | {"non_ego_mean_speed_mps": 11.56},
+            {"arm": "naive_alone", "seed": 2, "episodes": 7, "errors": 0, "failure_rate": 1.0},
+        ],
+        columns=list(SUMMARY_COLUMNS),
+    )
+)
+
+
+def lines(card: str) -> list[str]:
+    return card.replace("\N{NO-BREAK SPACE}", " ").splitlines()
+
+
+def test_card__of_the_naive_ego() -> None:
+    card = lines(model_card("naive-seed1", MANIFEST, SUMMARY, POLICY))
+    assert card[0] == "# naive-seed1"
+    assert card[2] == "The naive ego: it learned alone on the road."
+    for row in (
+        "| player | ego |",
+        "| persona | `careful` |",
+        "| scene | `merge` |",
+        "| against | nobody |",
+        "| began from | nothing |",
+        "| trained for | 1,703,936 of at most 3,000,000 steps: stopped by convergence |",
+        "| convergence | stop when settled |",
+        "| safety | `collision` | 10 | as it happens | touching a vehicle or person, once |",
+        "| safety | `clearance` | 2 | per second | nearness to the nearest surface, rail or vehicle, within 0.6 m |",
+        "| learning_rate | 0.0001 |",
+        "| network | 64, 64 |",
+        "| early_convergence | yes |",
+        'driver = "policies/naive-seed1"    # the path of this folder',
+        "Versions: python 3.11.7, torch 2.13.0.",
+    ):
+        assert row in card, row
+    assert "1 × safety + 1 × operational + 0 × human" in " ".join(card)
+
+
+def test_card__figures_are_those_of_its_own_arms_and_seed() -> None:
+    card = lines(model_card("naive-seed1", MANIFEST, SUMMARY, POLICY))
+    start = card.index("| arm | games | failure rate | mean speed (m/s) |")
+    assert card[start + 1 : start + 5] == [
+        "| --- | ---: | ---: | ---: |",
+        "| `naive_alone` | 100 | 0 % (0–3.6 %) | 13.80 (13.79–13.81) |",
+        "| `naive_vs_distracted` | 99 | 18 % (11–26.9 %) | 13.78 |",
+        "",
+    ]
+
+
+def test_card__of_a_person() -> None:
+    card = lines(model_card("distracted-seed1", MANIFEST, SUMMARY, PERSON))
+    for row in (
+        "| player | non_ego |",
+        "| against | `naive-seed1` |",
+        "| games without the other | 70 % |",
+        "| attention | lapses for 4–6 s after 4 s on average |",
+        "| no lapses in | the first 50 % of the budget |",
+        "| arm | games | reaches its goal | mean speed (m/s) |",
+        "| `naive_vs_distracted` | 99 | 75 % (65.3–83.1 %) | 11.56 |",
+        'policies = "policies"    # the path of the folder that holds this one',
+    ):
+        assert row in card, row
+    assert any(line.startswith("1. ") and "5 seconds" in line for line in card)
+
+
+def test_card__of_a_persona_with_fuzzy_terms_and_mirrors_not_looked_into() -> None:
+    manifest = {**MANIFEST, "persona_documents": {"distracted": persona("speedy")}}
+    card = lines(model_card("distracted-seed1", manifest, SUMMARY, {**PERSON, "persona": "speedy"}))
+    (row,) = [line for line in card if "`speeding`" in line]
+    assert "fuzzy, of `speed_over_limit`: within (0: 1, 0.15: 0) is worth 0; over" in row
+    assert "| decisions | sampled from its distribution |" in card
+    assert any(line.startswith("| overlooks | in 85 % of drives") for line in card)
+
+
+def test_card__of_a_persona_with_a_body() -> None:
+    document = {
+        **persona("careful"),
+        "reaction": {"delay_s": [0.2, 0.4]},
+        "actuators": {"throttle_share": 0.5},
+        "perception": {
+            "misses_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0, "distance_error": 0.1, "error_s": 10.0,
+        },
+    }  # fmt: skip
+    manifest = {**MANIFEST, "persona_documents": {"distracted": document}}
+    card = lines(model_card("distracted-seed1", manifest, SUMMARY, PERSON))
+    for row in (
+        "| misses | in 30 % of drives, others that are more than 8 m away |",
+        "| sees | others up to 60 m away |",
+        "| misjudges | distances by 10 %, closing speeds by 0 of the distance a second, for 10 s |",
+        "| reaction | decisions count 0.2–0.4 s later |",
+        "| uses of the car | 50 % of its acceleration, 100 % of its braking, 100 % of its steering |",
+    ):
+        assert row in card, row
+    assert not any(line.startswith("| overlooks |") for line in card)
+
+
+def test_card__of_the_retrained_ego() -> None:
+    policy = {**POLICY, "against": "distracted-seed1", "began_from": "naive-seed1"}
+    card = lines(model_card("retrained_distracted-seed1", MANIFEST, SUMMARY, policy))
+    for row in (
+        "The ego, retrained against the person `distracted`.",
+        "| began from | `naive-seed1` |",
+        "| games without the other | 25 % |",
+        "None yet: no arm with it has been assessed.",
+    ):
+        assert row in card, row
+
+
+def test_card__says_that_a_quick_run_is_one_and_tells_no_timings() -> None:
+    card = model_card("naive-seed1", {**MANIFEST, "quick": True}, SUMMARY, POLICY)
+    assert "not for conclusions" in card
+    assert "not for conclusions" not in model_card("naive-seed1", MANIFEST, SUMMARY, POLICY)
+    assert "166" not in card
+    slower = json.loads(json.dumps(MANIFEST))
+    slower["stages"]["naive-seed1"]["seconds"] = 999.0
+    assert model_card("naive-seed1", slower, SUMMARY, POLICY) == model_card("naive-seed1", MANIFEST, SUMMARY, POLICY)
+
+
+# --- of real runs -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", [learned_run, sumo_run])
+def test_run__has_a_card_beside_each_policy_with_the_figures_of_its_summary(run: Any) -> None:
+    folder: Path = run()
+    summary = read_csv(folder / "summary.csv")
+    for policy in (folder / "policies").iterdir():
+        card = (policy / "README.md").read_text(encoding="utf-8")
+        assert card.startswith(f"# {policy.name}\n")
+        stage = policy.name.removesuffix("-seed1")
+        arms = {arm for arm in summary["arm"] if f"`{arm}` |" in card}
+        whose = {"naive": "naive_"}.get(stage, stage.removeprefix("retrained_"))
+        if stage.startswith("retrained_"):
+            assert arms == {f"retrained_vs_{whose}", f"retrained_alone_{whose}"}
+        else:
+            assert arms == {arm for arm in summary["arm"] if whose in arm and not arm.startswith("retrained_alone")}
+
+
+@pytest.mark.slow
+def test_run__cards_are_written_anew_by_report_to_the_byte(tmp_path: Path) -> None:
+    run = shutil.copytree(learned_run(), tmp_path / "run")
+    cards = {file: file.read_bytes() for file in run.glob("policies/*/README.md")}
+    assert len(cards) == 3
+    for file in cards:
+        file.unlink()
+    assert harness("report", run).returncode == 0
+    assert {file: file.read_bytes() for file in cards} == cards
+
+
+@pytest.mark.slow
+def test_run__of_before_there_were_cards_gets_none(tmp_path: Path) -> None:
+    folder = RunFolder(shutil.copytree(learned_run(), tmp_path / "run"))
+    manifest = folder.manifest()
+    for name in ("ego_persona", "persona_documents"):
+        manifest.pop(name)
+    for file in folder.path.glob("policies/*/README.md"):
+        file.unlink()
+    write_model_cards(folder, manifest, read_csv(folder.path / "summary.csv"))
+    assert not list(folder.path.glob("policies/*/README.md"))
+
+
+def test_card__a_persons_words_are_one_line_of_text() -> None:
+    words = "In a hurry.\n## Figures\n| failure rate | 0 % |\n<script>alert(1)</script>"
+    documents = {"distracted": {**persona("distracted"), "description": words}}
+    card = lines(model_card("distracted-seed1", {**MANIFEST, "persona_documents": documents}, SUMMARY, PERSON))
+    (told,) = [line for line in card if "In a hurry." in line]
+    assert told.endswith("In a hurry. ## Figures \\| failure rate \\| 0 % \\| &lt;script>alert(1)&lt;/script>")
+    assert [line for line in card if line.startswith("## Figures")] == ["## Figures"]

@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from harness.campaign.results.recorded_games import TAKE_TURNS, recorded_game, scene_drawing, watching_order
+from harness.traffic.drawing import lane_marks
+from harness.traffic.network import read_net
+from harness.traffic.scene import open_scene
+
+
+def episodes(*rows):
+    """A table of games: arm, episode, outcome of the ego."""
+    columns = ("arm", "episode", "ego_outcome")
+    table = pd.DataFrame([dict(zip(columns, row, strict=True)) for row in rows])
+    empty = {"persona": "", "seed": 1, "non_ego_outcome": "", "ego_min_ttc_s": np.nan, "error": ""}
+    return table.assign(**empty)
+
+
+def in_order(table):
+    return [(row.arm, row.episode) for row in watching_order(table).itertuples()]
+
+
+@pytest.mark.parametrize("made", ["retrained", "reconfigured"])
+def test_order__a_failure_is_followed_by_the_game_it_is_compared_with(made):
+    table = episodes(
+        *(("naive_vs_speedy", episode, "collision" if episode == 3 else "goal") for episode in range(5)),
+        *((f"{made}_vs_speedy", episode, "goal") for episode in range(5)),
+    )
+    assert in_order(table)[:2] == [("naive_vs_speedy", 3), (f"{made}_vs_speedy", 3)]
+    assert sorted(in_order(table)) == sorted(zip(table["arm"], table["episode"], strict=True))
+
+
+def test_order__arms_take_turns_so_that_each_is_on_a_page_that_not_all_fit_on():
+    table = episodes(
+        *(("naive_vs_speedy", episode, "collision" if episode < 60 else "goal") for episode in range(70)),
+        *(("naive_vs_texting", episode, "rail" if episode < 60 else "goal") for episode in range(70)),
+    )
+    first = in_order(table)[: 2 * TAKE_TURNS + 4]
+    assert first[:TAKE_TURNS] == [("naive_vs_speedy", episode) for episode in range(TAKE_TURNS)]
+    assert first[TAKE_TURNS : 2 * TAKE_TURNS] == [("naive_vs_texting", episode) for episode in range(TAKE_TURNS)]
+    assert sorted(first[2 * TAKE_TURNS :]) == [
+        (arm, episode) for arm in ("naive_vs_speedy", "naive_vs_texting") for episode in (60, 61)
+    ]
+
+
+def test_order__what_was_not_played_is_not_in_it():
+    table = episodes(("naive_alone", 0, "goal"), ("naive_alone", 1, "error"))
+    table.loc[1, "error"] = "it died"
+    assert in_order(table) == [("naive_alone", 0)]
+
+
+def trace(**players):
+    """A trace of road users that go straight on at 10 m/s, each given as the steps it is there in and its y (m)."""
+    rows = []
+    for name, (steps, y_m, outcomes) in players.items():
+        for step in steps:
+            cells = {"episode": 0, "step": step, "time_s": step * 0.1, "player": name, "vehicle_type": "ego_car"}
+            cells |= {"x_m": 20.0 + step, "y_m": y_m, "heading_rad": 0.0, "speed_mps": 10.0, "acceleration_mps2": 0.0}
+            rows.append(cells | {"steering_rad": 0.0, "lapsed": step == 2, "outcome": outcomes.get(step, "")})
+    return pd.DataFrame(rows)
+
+
+@pytest.fixture
+def row():
+    (row,) = episodes(("naive_vs_speedy", 0, "rail")).itertuples()
+    return row
+
+
+def test_game__is_its_trace(merge, row):
+    rows = trace(ego=(range(5), -0.9, {3: "rail", 4: "rail"}), non_ego=(range(3), -4.8, {2: "goal"}))
+    game = recorded_game(rows, merge, row)
+    ego, non_ego = game.players
+    assert (game.steps, game.step_s, game.outcome) == (4, 0.1, "rail")
+    assert (ego.outcome, ego.ended_step) == ("rail", 3)
+    assert (non_ego.outcome, non_ego.ended_step, len(non_ego.x_m)) == ("goal", 2, 3)
+    assert ego.x_m.tolist() == [20, 21, 22, 23, 24]
+    assert ego.lapsed.tolist() == [False, False, True, False, False]
+    assert (ego.length_m, ego.width_m) == (4.6, 1.8)
+    (touch,) = game.touches
+    assert touch.time_s == pytest.approx(0.3)
+    assert touch.y_m == pytest.approx(0.0, abs=0.01)
+
+
+def test_game__another_road_user_that_comes_and_goes_is_in_pieces(merge, row):
+    game = recorded_game(trace(ego=(range(6), -1.6, {}), van=([1, 2, 4, 5], -4.8, {})), merge, row)
+    assert [(each.name, each.first_step, len(each.x_m)) for each in game.others] == [("van", 1, 2), ("van", 4, 2)]
+
+
+def test_drawing__of_the_merge(merge):
+    drawn = scene_drawing(merge)
+    ((outline,),) = drawn.surfaces
+    assert {tuple(point) for point in np.round(outline, 6).tolist()} >= {(100, -6.4), (130, -3.2), (220, 0)}
+    assert np.round(drawn.lane_marks, 6).tolist() == [[[0, -3.2], [100, -3.2]]]
+    assert [line.tolist() for line in drawn.goal] == [[[175, -3.2], [175, 0]]]
+    assert len(drawn.rails) == 2
+
+
+def test_lane_marks__are_between_the_lanes_whatever_way_the_road_goes(build_net):
+    net = build_net(
+        '<node id="a" x="0" y="0"/><node id="b" x="0" y="100"/>',
+        '<edge id="up" from="a" to="b" numLanes="3" spreadType="center"/>',
+    )
+    assert sorted(float(mark[0, 0]) for mark in lane_marks(read_net(net))) == pytest.approx([-1.6, 1.6])
+
+
+def test_scene__is_opened_from_a_copy_alone(merge, tmp_path):
+    for name in ("scene.toml", "merge.net.xml", "merge.rou.xml"):
+        (tmp_path / name).write_bytes((merge.folder / name).read_bytes())
+    assert scene_drawing(open_scene(tmp_path)).goal[0].tolist() == [[175, -3.2], [175, 0]]

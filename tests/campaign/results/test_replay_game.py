@@ -1,0 +1,127 @@
+"""Finding a game of a real run folder: the list with its manoeuvres, the folder to be shown, the film."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from PIL import Image
+from rich.console import Console
+
+import tests.support.tiny as tiny
+from harness.campaign.results.replay_game import film, found_game, game_table, watch
+from harness.errors import UsageError
+from harness.evaluation.manoeuvres import pairs_in
+from harness.evaluation.tables import MANOEUVRE_COLUMNS, read_csv, typed, write_csv
+from harness.replay import replay_name
+from tests.replay.test_sumo_gui import require_gui
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Path:
+    """A run folder that may be changed."""
+    return shutil.copytree(tiny.learned_run(), tmp_path / "run")
+
+
+def printed(run: Path, arm: str | None = None, width: int = 160) -> str:
+    console = Console(file=io.StringIO(), width=width)
+    console.print(game_table(run, arm))
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue()
+
+
+def test_run__names_the_manoeuvres_of_every_arm(run: Path) -> None:
+    table = read_csv(run / "manoeuvres.csv")
+    assert list(table.columns) == list(MANOEUVRE_COLUMNS)
+    kept = [read_csv(file) for file in sorted((run / ".stages").glob("*/manoeuvres.csv"))]
+    assert len(kept) == len(list((run / ".stages").glob("*/episodes.csv")))
+    assert len(table) == sum(map(len, kept))
+
+
+def test_list__has_the_manoeuvre_pair_of_each_game(run: Path) -> None:
+    row = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1, "episode": 2, "gap_m": None, "ttc_s": 1.0}
+    spans = [("non_ego", "cut_in", 1.0, 1.5), ("ego", "hard_brake", 1.8, 2.4)]
+    rows = [
+        {**row, "player": player, "manoeuvre": name, "time_s": begin, "until_s": end, "text": ""}
+        for player, name, begin, end in spans
+    ]
+    write_csv(typed(pd.DataFrame(rows)), run / "manoeuvres.csv")
+    assert pairs_in(read_csv(run / "manoeuvres.csv"))["naive_vs_speedy", 1, 2].words == "cut in -> hard brake"
+    (line,) = [each for each in printed(run).splitlines() if "cut in -> hard brake" in each]
+    assert line.split()[:3] == ["naive_vs_speedy", "1", "2"]
+
+
+def test_list__of_a_run_without_named_manoeuvres_says_how_to_name_them(run: Path) -> None:
+    (run / "manoeuvres.csv").unlink()
+    assert "name the manoeuvres: harness report" in " ".join(printed(run).split())
+
+
+def test_report__names_what_an_older_run_has_not(run: Path) -> None:
+    before = (run / "manoeuvres.csv").read_bytes()
+    for file in [run / "manoeuvres.csv", *(run / ".stages").glob("*/manoeuvres.csv")]:
+        file.unlink()
+    for seal in (run / ".stages").glob("*/done.json"):  # as they were before they vouched for files
+        seal.write_text(json.dumps({**json.loads(seal.read_text()), "files": {}}))
+    assert tiny.harness("report", run).returncode == 0
+    assert (run / "manoeuvres.csv").read_bytes() == before
+
+
+def test_game__is_made_of_its_trace_and_not_of_what_lies_under_replays(run: Path) -> None:
+    name = replay_name("naive_alone", 1, 3)
+    with found_game(run, "naive_alone", 3, None) as game:
+        before = {file.name: file.read_bytes() for file in game.replay.iterdir()}
+    (run / "replays" / name).mkdir(exist_ok=True)
+    # a configuration can have SUMO write anywhere: whoever sent the folder may have put one there
+    (run / "replays" / name / "scene.sumocfg").write_text("<configuration><log value='/tmp/mine'/></configuration>")
+    with found_game(run, "naive_alone", 3, 1) as game:
+        assert {file.name: file.read_bytes() for file in game.replay.iterdir()} == before
+
+
+def test_game__needs_no_replay_folder(run: Path) -> None:
+    name = replay_name("naive_alone", 1, 3)
+    shutil.rmtree(run / "replays")
+    with found_game(run, "naive_alone", 3, None) as game:
+        assert game.replay.name == name
+        assert (game.replay / "scene.sumocfg").is_file()
+        assert game.title == "naive_alone, seed 1, episode 3"
+        assert not (run / "replays").exists()
+        scratch = game.replay.parent
+    assert not scratch.exists()
+
+
+def test_watch__without_a_screen_names_the_film(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr("harness.replay.sumo_gui.sys.platform", "linux")
+    with found_game(run, "naive_alone", 0, None) as game, pytest.raises(UsageError, match="--film"):
+        watch(game, Console(file=io.StringIO()))
+
+
+def test_film__of_a_game_without_a_replay_folder(run: Path, tmp_path: Path) -> None:
+    require_gui()
+    shutil.rmtree(run / "replays")
+    console = Console(file=io.StringIO(), width=200)
+    with found_game(run, "naive_vs_speedy", 0, None) as game:
+        film(game, tmp_path / "film.gif", console)
+        pictures = int(game.trace["step"].max()) + 1
+    assert isinstance(console.file, io.StringIO)
+    assert console.file.getvalue().strip() == f"Wrote {tmp_path / 'film.gif'}: {pictures} pictures."
+    with Image.open(tmp_path / "film.gif") as made:
+        assert made.n_frames == pictures
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--film", "film.gif"], "harness replay RUN ARM EPISODE"),
+        (["naive_alone", "0", "--film", "film.avi"], "neither .gif nor .mp4"),
+    ],
+)
+def test_command__a_film_that_can_not_be(arguments: list[str], words: str, tmp_path: Path) -> None:
+    said = tiny.harness("replay", tiny.learned_run(), *arguments, cwd=tmp_path)
+    assert said.returncode == 2
+    assert words in said.stderr
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,182 @@
+"""A run folder is one campaign's, and says truly how far it has come."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.campaign.storage.run_folder import RunFolder
+from harness.errors import UsageError
+
+MANIFEST: dict[str, Any] = {
+    "format": 1,
+    "name": "tiny",
+    "campaign": {"name": "tiny"},
+    "personas": ["speedy"],
+    "seeds": [1],
+    "stages": {"naive-seed1": {"kind": "training", "name": "naive", "persona": "", "seed": 1, "status": "done"}},
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> RunFolder:
+    folder = RunFolder(tmp_path / "run")
+    folder.claim("tiny")
+    folder.write_manifest(MANIFEST)
+    return folder
+
+
+def problem_of(action: Callable[[], object]) -> str:
+    with pytest.raises(UsageError) as error:
+        action()
+    (problem,) = error.value.problems
+    assert problem.remedy
+    return str(problem)
+
+
+# --- whose it is ------------------------------------------------------------------------------------------------------
+
+
+def test_claim__a_new_folder_and_again_ones_own(folder: RunFolder) -> None:
+    folder.claim("tiny")
+    assert folder.manifest() == MANIFEST
+
+
+def test_claim__an_empty_folder_is_free(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    RunFolder(tmp_path / "run").claim("tiny")
+
+
+def test_claim__another_campaigns_is_refused_untouched(folder: RunFolder) -> None:
+    problem = problem_of(lambda: folder.claim("merge"))
+    assert "belongs to campaign 'tiny', not 'merge'" in problem
+    assert str(folder.path) in problem
+    assert "--out" in problem
+    assert folder.manifest() == MANIFEST
+
+
+@pytest.mark.parametrize("quick", [False, True])
+def test_claim__a_full_run_and_a_quick_one_do_not_overwrite_each_other(quick: bool, folder: RunFolder) -> None:
+    folder.write_manifest({**MANIFEST, "quick": not quick})
+    assert "would overwrite" in problem_of(lambda: folder.claim("tiny", quick))
+    folder.claim("tiny", not quick)
+
+
+def test_claim__a_folder_of_something_else_is_refused_untouched(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("x")
+    assert "not empty" in problem_of(lambda: RunFolder(tmp_path).claim("tiny"))
+    assert [each.name for each in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_claim__a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "run").write_text("x")
+    assert "is a file" in problem_of(lambda: RunFolder(tmp_path / "run").claim("tiny"))
+    assert "can't be written" in problem_of(lambda: RunFolder(tmp_path / "run" / "inside").claim("tiny"))
+
+
+def test_claim__an_impossible_name_is_refused(tmp_path: Path) -> None:
+    assert "can't be written" in problem_of(lambda: RunFolder(tmp_path / ("x" * 300)).claim("tiny"))
+
+
+# --- the manifest -----------------------------------------------------------------------------------------------------
+
+
+def changed(**changes: Any) -> str:
+    return json.dumps({**MANIFEST, **changes})
+
+
+def stage(id: str = "naive-seed1", **changes: Any) -> str:
+    return changed(stages={id: {**MANIFEST["stages"]["naive-seed1"], **changes}})
+
+
+DAMAGED = {
+    "empty": "",
+    "truncated": changed()[:-20],
+    "a list": "[]",
+    "a number": "7",
+    "nothing": "{}",
+    "deeply nested": "[" * 100_000,
+    "of a later format": changed(format=2),
+    "without a name": changed(name=None),
+    "without a campaign": changed(campaign=None),
+    "without seeds": changed(seeds=[]),
+    "with odd seeds": changed(seeds=["../x"]),
+    "without personas": changed(personas=None),
+    "with a list of stages": changed(stages=[]),
+    "with a stage of another name": stage("speedy-seed1"),
+    "with a stage outside": stage("../../x-seed1", name="../../x"),
+    "with a stage of no kind": stage(kind="dance"),
+    "with a stage of no status": stage(status=None),
+    "with a stage that is a number": changed(stages={"naive-seed1": 1}),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGED)
+def test_manifest__a_damaged_one_is_named(name: str, folder: RunFolder) -> None:
+    folder.manifest_file.write_text(DAMAGED[name])
+    problem = problem_of(folder.manifest)
+    assert problem.startswith(str(folder.manifest_file))
+    assert "damaged" in problem
+    assert problem_of(lambda: folder.claim("tiny")) == problem
+    assert folder.manifest_file.read_text() == DAMAGED[name]
+
+
+def test_manifest__of_no_run_folder(tmp_path: Path) -> None:
+    assert "is not a run folder" in problem_of(RunFolder(tmp_path).manifest)
+    assert "is not a run folder" in problem_of(RunFolder(tmp_path / "nowhere").manifest)
+    (tmp_path / "file").write_text("x")
+    assert "is not a run folder" in problem_of(RunFolder(tmp_path / "file").manifest)
+
+
+# --- stages -----------------------------------------------------------------------------------------------------------
+
+
+def test_finished__only_with_the_key_of_these_inputs(folder: RunFolder) -> None:
+    assert folder.finished("naive-seed1", "key") is None
+    folder.work("naive-seed1").mkdir()
+    assert folder.finished("naive-seed1", "key") is None
+    folder.finish("naive-seed1", "key", {"steps": 7})
+    assert folder.finished("naive-seed1", "key") is None  # the policy it made is not there
+    folder.policy("naive-seed1").mkdir()
+    (folder.policy("naive-seed1") / "policy.safetensors").touch()
+    assert folder.finished("naive-seed1", "key") == {"steps": 7}
+    assert folder.finished("naive-seed1", "another") is None
+    assert folder.finished("speedy-seed1", "key") is None
+
+
+@pytest.mark.parametrize("content", ["", "[]", "7", '{"key": "key"', '{"info": {}}', "\udcff"])
+def test_finished__what_can_not_be_read_is_not_done(content: str, folder: RunFolder) -> None:
+    folder.work("naive-seed1").mkdir()
+    (folder.work("naive-seed1") / "done.json").write_bytes(content.encode(errors="surrogateescape"))
+    assert folder.finished("naive-seed1", "key") is None
+
+
+def test_forget__drops_what_the_stage_wrote_and_nothing_else(folder: RunFolder) -> None:
+    for stage_id in ("naive-seed1", "naive-seed10"):
+        for place in (folder.work(stage_id), folder.policy(stage_id), folder.tensorboard(stage_id)):
+            place.mkdir()
+            (place / "file").write_text("x")
+        folder.traces(stage_id).write_text("x")
+    folder.forget("naive-seed1")
+    left = {path.relative_to(folder.path).as_posix() for path in folder.path.rglob("*") if path.is_file()}
+    assert left == {
+        "manifest.json",
+        ".stages/naive-seed10/file",
+        "policies/naive-seed10/file",
+        "tensorboard/naive-seed10/file",
+        "traces/naive-seed10.parquet",
+    }
+    folder.forget("naive-seed1")  # twice is once
+
+
+def test_keep_scene__copies_and_replaces(folder: RunFolder, tmp_path: Path) -> None:
+    scene = tmp_path / "scene"
+    scene.mkdir()
+    for text in ("old", "new"):
+        (scene / "scene.toml").write_text(text)
+        folder.keep_scene(scene, ("scene.toml",))
+        assert (folder.scene / "scene.toml").read_text() == text

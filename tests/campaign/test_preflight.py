@@ -1,0 +1,158 @@
+"""Everything a campaign names is looked at before anything runs."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.campaign.preflight import QUICK_SEGMENT_STEPS, QUICK_STEPS, open_campaign
+from harness.drivers.policy_file import write_policy
+from harness.errors import Problem, UsageError
+from tests.drivers.test_policy_file import some_policy
+from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign, write_persona
+
+
+def problems_of(campaign: Path) -> list[Problem]:
+    with pytest.raises(UsageError) as error:
+        open_campaign(campaign)
+    return error.value.problems
+
+
+def named(problems: list[Problem]) -> set[tuple[str, str]]:
+    return {(Path(problem.file).name, problem.key) for problem in problems}
+
+
+def scene_copy(folder: Path, **edits: tuple[str, str]) -> Path:
+    """The scene merge in a folder of its own; `edits` replaces text in its files."""
+    shutil.copytree(MERGE, folder / "merge")
+    for name, (old, new) in edits.items():
+        file = folder / "merge" / {"scene": "scene.toml", "routes": "merge.rou.xml", "net": "merge.net.xml"}[name]
+        text = file.read_text()
+        assert old in text
+        file.write_text(text.replace(old, new))
+    return folder / "merge"
+
+
+def files_in(folder: Path) -> dict[Path, bytes]:
+    return {file: file.read_bytes() for file in folder.rglob("*") if file.is_file()}
+
+
+def test_open_campaign__the_papers(repository: Path) -> None:
+    campaign = open_campaign(repository / "campaigns" / "merge.toml")
+    assert [persona.name for persona in campaign.personas] == ["speedy", "distracted"]
+    assert campaign.ego_persona.name == "careful"
+    assert campaign.document.training.steps == 3_000_000
+    assert {Path(name).name for name in campaign.hashes} >= {
+        "merge.toml",
+        "careful.toml",
+        "speedy.toml",
+        "scene.toml",
+        "merge.net.xml",
+    }
+    assert all(len(each) == 64 for each in campaign.hashes.values())
+
+
+def test_open_campaign__quick_is_the_same_with_fewer_steps(repository: Path, tmp_path: Path) -> None:
+    file = repository / "campaigns" / "merge.toml"
+    quick, full = open_campaign(file, quick=True).document, open_campaign(file).document
+    assert (quick.training.steps, quick.training.segment_steps) == (QUICK_STEPS, QUICK_SEGMENT_STEPS)
+    training = quick.training.model_copy(
+        update={"steps": full.training.steps, "segment_steps": full.training.segment_steps}
+    )
+    assert quick.reconfiguration.trials < full.reconfiguration.trials
+    search = quick.reconfiguration.model_copy(update={"trials": full.reconfiguration.trials})
+    assert quick.model_copy(update={"training": training, "reconfiguration": search}) == full
+    tiny = open_campaign(write_campaign(tmp_path), quick=True).document
+    assert tiny.training.steps == 2048  # never more than was asked for
+
+
+def test_open_campaign__names_are_relative_to_the_campaigns_own_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene_copy(tmp_path)
+    write_persona(tmp_path, "anna")
+    file = write_campaign(tmp_path, scene="merge", personas=["anna.toml"])
+    monkeypatch.chdir("/")
+    assert open_campaign(file).scene.folder == tmp_path / "merge"
+
+
+def test_open_campaign__all_mistakes_are_told_at_once_and_nothing_is_written(tmp_path: Path) -> None:
+    scene = scene_copy(
+        tmp_path,
+        scene=('lane = "approach_1"', 'lane = "approach_9"'),
+        routes=('type="person_car" route="through"', 'type="person_car" route="trough"'),
+    )
+    persona = write_persona(tmp_path, "anna")
+    persona.write_text(persona.read_text().replace("progress = 1.0", "progres = 1.0"))
+    file = write_campaign(tmp_path, scene=str(scene), personas=[str(persona)], training={"stepps": 5000})
+    before = files_in(tmp_path)
+    problems = problems_of(file)
+    assert {Path(problem.file).name for problem in problems} >= {"tiny.toml", "anna.toml", "merge.rou.xml"}
+    assert any(problem.key == "training.stepps" and "'steps'" in problem.remedy for problem in problems)
+    assert any("progres" in str(problem) and "'progress'" in str(problem) for problem in problems)
+    assert files_in(tmp_path) == before
+
+
+def test_open_campaign__mistakes_in_campaign_persona_scene_and_policy(tmp_path: Path) -> None:
+    scene = scene_copy(tmp_path, scene=('lane = "approach_1"', 'lane = "approach_9"'))
+    persona = write_persona(tmp_path, "anna", goal=-1.0)
+    ego = {"driver": "lerned", "persona": str(CAREFUL)}
+    file = write_campaign(tmp_path, scene=str(scene), personas=[str(persona)], ego=ego, assessment={"episodes": 1})
+    assert named(problems_of(file)) >= {
+        ("tiny.toml", "assessment.episodes"),
+        ("tiny.toml", "ego.driver"),
+        ("scene.toml", "ego.lane"),
+    }
+    assert "anna.toml" in {Path(problem.file).name for problem in problems_of(file)}
+
+
+def test_open_campaign__what_names_nothing_readable_is_one_problem(tmp_path: Path) -> None:
+    file = write_campaign(tmp_path, scene=None)
+    (problem,) = problems_of(file)
+    assert (problem.key, problem.message) == ("scene", "is missing")
+
+
+@pytest.mark.parametrize("changes", [{"scene": "nowhere"}, {"personas": ["nobody.toml"]}, {"ego": {"persona": "no"}}])
+def test_open_campaign__what_does_not_exist_is_named(changes: dict[str, Any], tmp_path: Path) -> None:
+    problems = problems_of(write_campaign(tmp_path, **changes))
+    assert len(problems) == 1
+    assert "there is no" in str(problems[0])
+
+
+def test_open_campaign__two_personas_of_one_name_are_refused(tmp_path: Path) -> None:
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        write_persona(tmp_path / folder, "anna")
+    problems = problems_of(write_campaign(tmp_path, personas=["a/anna.toml", "b/anna.toml"]))
+    assert len(problems) == 2
+    assert all("'anna' too" in problem.message for problem in problems)
+
+
+@pytest.mark.parametrize(
+    "names", [["naive"], ["sumo"], ["anna", "retrained_anna"], ["anna", "anna_alone"], ["naive_vs_sumo"]]
+)
+def test_open_campaign__a_persona_whose_stages_would_be_taken_for_others_is_refused(
+    names: list[str], tmp_path: Path
+) -> None:
+    personas = [str(write_persona(tmp_path, name)) for name in names]
+    problems = problems_of(write_campaign(tmp_path, personas=personas))
+    assert problems
+    assert all(problem.key == "personas" and repr(names[-1]) in problem.message for problem in problems)
+
+
+def test_open_campaign__the_folder_of_a_policy(tmp_path: Path) -> None:
+    write_policy(some_policy(), tmp_path / "policies" / "mine")
+    ego = {"driver": "policies/mine", "persona": str(CAREFUL)}
+    file = write_campaign(tmp_path, ego=ego)
+    assert open_campaign(file).ego_driver.place == tmp_path / "policies" / "mine"
+    (tmp_path / "policies" / "mine" / "policy.safetensors").write_bytes(b"PK")
+    (problem,) = problems_of(file)
+    assert Path(problem.file).name == "policy.safetensors"
+
+
+def test_open_campaign__sumo_needs_no_policy(tmp_path: Path) -> None:
+    file = write_campaign(tmp_path, ego={"driver": "sumo", "persona": str(CAREFUL)}, personas=[str(SPEEDY)])
+    assert open_campaign(file).ego_driver is None

@@ -1,0 +1,199 @@
+"""Real faults under the real command: one message, what is done is kept, and running again ends as if nothing was."""
+
+from __future__ import annotations
+
+import io
+import os
+import resource
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from harness.campaign.execution import run_campaign as campaign_run
+from harness.campaign.execution.crash_retries import TRIES, Attempt, Begin, Report
+from harness.campaign.execution.run_campaign import run_campaign
+from harness.campaign.execution.run_context import Conditions
+from harness.campaign.execution.run_stage import carry_out
+from harness.campaign.execution.worker_pool import Work, run_stages
+from harness.campaign.plan.stages import Stage
+from harness.campaign.preflight import open_campaign
+from harness.campaign.results.results import Outcome
+from harness.campaign.storage.run_folder import RunFolder
+from harness.evaluation.tables import read_csv
+from tests.support.tiny import (
+    BY_SUMO,
+    HARNESS,
+    begin,
+    end,
+    harness,
+    in_session,
+    sumo_run,
+    tables,
+    wait_for,
+    workers_of,
+    write_campaign,
+)
+
+pytestmark = pytest.mark.slow
+
+
+def command_of(folder: Path) -> tuple[object, ...]:
+    """The campaign of `sumo_run`, in a folder of its own."""
+    return ("campaign", write_campaign(folder, **BY_SUMO), "--out", folder / "run", "--jobs", 1)
+
+
+# --- a dying simulator ------------------------------------------------------------------------------------------------
+
+
+def die_in_game_1(
+    stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt
+) -> dict[str, Any]:
+    """Game 1 of one arm is SUMO's death; one of a training's segments is so once."""
+
+    def begin_or_die(place: int) -> None:
+        begin(place)
+        once = conditions.folder.with_name("died")
+        if stage.id == "naive_vs_sumo-seed1" and place == 1:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if stage.id == "speedy-seed1" and place == 1 and not once.exists():
+            once.touch()
+            os.kill(os.getpid(), signal.SIGSEGV)
+
+    return carry_out(stage, conditions, report, begin_or_die, attempt)
+
+
+def run_by(work: Work, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Outcome, str]:
+    """The campaign of `sumo_run`, its stages carried out by `work`; what came of it, and what was said."""
+    said = io.StringIO()
+    monkeypatch.setattr(campaign_run, "run_stages", partial(run_stages, work=work))
+    campaign = open_campaign(write_campaign(folder, **BY_SUMO))
+    return run_campaign(campaign, RunFolder(folder / "run"), 1, Console(file=said, width=200)), said.getvalue()
+
+
+def test_sigsegv__of_a_game_is_one_error_and_of_a_segment_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    outcome, said = run_by(die_in_game_1, tmp_path, monkeypatch)
+    assert (outcome.error_games, outcome.failed_stages) == (1, ())  # for which the command's exit code is 1
+    assert f"naive_vs_sumo-seed1: the worker died of SIGSEGV, {TRIES} times over in game 1, which is given up" in said
+    games, expected = (read_csv(run / "episodes.csv") for run in (tmp_path / "run", sumo_run()))
+    (bad,) = games.index[games["error"] != ""]
+    assert games.loc[bad, ["arm", "episode", "ego_outcome"]].tolist() == ["naive_vs_sumo", 1, "error"]
+    assert games.loc[bad, "error"] == f"the worker died of SIGSEGV, {TRIES} times over"
+    assert games.drop(bad).equals(expected.drop(bad))
+    assert (tmp_path / "run" / "training.csv").read_bytes() == (sumo_run() / "training.csv").read_bytes()
+
+    outcome, said = run_by(carry_out, tmp_path, monkeypatch)  # mended: the games in error are played again
+    assert outcome.error_games == 0
+    assert [line for line in said.splitlines() if line.startswith("started")] == ["started  naive_vs_sumo-seed1"]
+    assert tables(tmp_path / "run") == tables(sumo_run())
+
+
+# --- two at once, and requests to end ---------------------------------------------------------------------------------
+
+
+def test_two_at_once__the_second_is_refused_and_the_first_goes_on(tmp_path: Path) -> None:
+    command = command_of(tmp_path)
+    process = begin(*command)
+    wait_for(lambda: workers_of(process.pid), "the first worker")
+    for other in (command, ("report", tmp_path / "run")):
+        refused = harness(*other)
+        assert refused.returncode == 2
+        assert refused.stdout == ""
+        assert refused.stderr.splitlines() == [
+            f"{tmp_path / 'run'}: is in use by process {process.pid} "
+            "(wait until it has ended, or choose another folder with --out)"
+        ]
+    os.kill(process.pid, signal.SIGKILL)  # no lock is left of it
+    end(process)
+    again = harness(*command)
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert tables(tmp_path / "run") == tables(sumo_run())
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_request_to_end__is_like_ctrl_c(number: signal.Signals, code: int, tmp_path: Path) -> None:
+    process = begin(*command_of(tmp_path))
+    wait_for(lambda: workers_of(process.pid), "the first worker")
+    process.send_signal(number)
+    printed = process.communicate(timeout=60)[0]
+    assert process.returncode == code
+    assert printed.splitlines()[-1] == "Interrupted. What was done is kept: run the same command again to go on."
+    assert "Traceback" not in printed
+    wait_for(lambda: not in_session(process.pid), "no process of it is left", 10.0)
+
+
+# --- disk, permissions, memory ----------------------------------------------------------------------------------------
+
+
+def limited(kind: int, most: int) -> Callable[[], None]:
+    """Sets a limit in the process that is about to become the command."""
+    return lambda: resource.setrlimit(kind, (most, most))
+
+
+def assert_one_message(done: subprocess.CompletedProcess[str], *words: str) -> None:
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "Traceback" not in done.stdout + done.stderr
+    assert len(done.stderr.strip().splitlines()) <= 1, done.stderr
+    for word in words:
+        assert word in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize("most_bytes", [3_000, 12_000])  # the manifest is larger; a checkpoint is
+def test_disk__that_takes_no_more_is_one_message(most_bytes: int, tmp_path: Path) -> None:
+    command = command_of(tmp_path)
+    full = harness(*command, preexec_fn=limited(resource.RLIMIT_FSIZE, most_bytes))
+    assert_one_message(full, "File too large")
+    assert not list((tmp_path / "run").rglob(".*.part"))
+    again = harness(*command)
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert tables(tmp_path / "run") == tables(sumo_run())
+
+
+def test_disk__that_is_full_is_one_message(tmp_path: Path) -> None:
+    """A disk of 256 kB, where the machine lets us make one."""
+    run = tmp_path / "run"
+    run.mkdir()
+    made = subprocess.run(["mount", "-t", "tmpfs", "-o", "size=256k", "tmpfs", run], capture_output=True, check=False)
+    if made.returncode:
+        pytest.skip("only root can make a small disk")
+    try:
+        command = command_of(tmp_path)
+        assert_one_message(harness(*command), "No space left on device")
+        subprocess.run(["mount", "-o", "remount,size=50m", run], check=True)
+        again = harness(*command)
+        assert again.returncode == 0, again.stdout + again.stderr
+        assert tables(run) == tables(sumo_run())
+    finally:
+        subprocess.run(["umount", run], check=True)
+
+
+def without_privileges(*arguments: object) -> subprocess.CompletedProcess[str]:
+    """The command as somebody for whom permissions count, even where it is root who tests."""
+    drop = ("setpriv", "--bounding-set", "-dac_override,-dac_read_search") if os.geteuid() == 0 else ()
+    command = [*drop, HARNESS, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
+
+
+@pytest.mark.skipif(os.geteuid() == 0 and not shutil.which("setpriv"), reason="root may write everywhere")
+@pytest.mark.parametrize("name", [".", ".stages", "traces"])
+def test_folder__without_permission_is_one_message(name: str, tmp_path: Path) -> None:
+    run = shutil.copytree(sumo_run(), tmp_path / "run")
+    before = tables(run)
+    shutil.rmtree(run / ".stages" / "naive_alone-seed1")  # so that there is something to be done
+    (run / name).chmod(0o555)
+    try:
+        refused = without_privileges("campaign", sumo_run().with_suffix(".toml"), "--out", run, "--jobs", 1)
+    finally:
+        (run / name).chmod(0o755)
+    assert refused.returncode in (1, 2), refused.stdout + refused.stderr
+    assert "Traceback" not in refused.stdout + refused.stderr
+    assert "Permission denied" in refused.stdout + refused.stderr
+    again = harness("campaign", sumo_run().with_suffix(".toml"), "--out", run, "--jobs", 1)
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert tables(run) == before

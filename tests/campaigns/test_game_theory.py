@@ -1,0 +1,127 @@
+"""Campaigns that go on after the paper's rounds, by the real command: answers, best responses, everyone's games."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from harness.campaign.execution.player_factory import equilibrium_of
+from harness.campaign.plan.stages import Drives
+from harness.campaign.storage.run_folder import RunFolder
+from tests.support.repository import REPOSITORY
+from tests.support.tiny import DISTRACTED, SPEEDY, finished, harness
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(700)]
+
+RESPONSE = {"steps": 1024, "starts": 2, "choice_episodes": 3}
+TABLES = ("episodes.csv", "gaps.csv", "crossplay.csv", "equilibria.csv", "generalisation.csv", "populations.csv")
+
+
+@cache
+def arms_race() -> Path:
+    """Four rounds against the equilibrium's mixture, with everything else that there is to ask."""
+    return finished(
+        name="arms_race",
+        personas=[str(SPEEDY), str(DISTRACTED)],
+        rounds={"count": 4, "against": "equilibrium", "stop_early": False},
+        best_response=RESPONSE,
+        crossplay={"egos": ["sumo", str(REPOSITORY / "egos/adas.toml")]},
+        retraining={"against": ["speedy"]},
+        population=[{"name": "town", "shares": {"speedy": 1.0, "distracted": 3.0}}],
+    )
+
+
+@cache
+def settled() -> Path:
+    """Of players who have learned nothing in a game of two episodes no gain can be told from 0."""
+    return finished(
+        name="settled",
+        rounds={"count": 4},
+        best_response=RESPONSE,
+        assessment={"episodes": 2},
+    )
+
+
+def manifest(run: Path) -> dict[str, Any]:
+    return json.loads((run / "manifest.json").read_text(encoding="utf-8"))  # type: ignore[no-any-return]
+
+
+def test_arms_race__everyone_has_met_everyone() -> None:
+    table = pd.read_csv(arms_race() / "crossplay.csv")
+    egos = {"naive", "robust", "retrained_town", "sumo", "adas"}
+    egos |= {f"retrained_{who}{round_}" for who in ("speedy", "distracted") for round_ in ("", "_round4")}
+    non_egos = {f"{who}{round_}" for who in ("speedy", "distracted") for round_ in ("", "_round3")}
+    assert set(zip(table["ego"], table["non_ego"], strict=True)) == {(ego, other) for ego in egos for other in non_egos}
+    assert (table["games"] == 4).all()
+
+
+def test_arms_race__both_players_of_the_last_pairs_were_measured() -> None:
+    table = pd.read_csv(arms_race() / "gaps.csv")
+    assert sorted(zip(table["persona"], table["round"], table["role"], strict=True)) == [
+        (who, 4, role) for who in ("distracted", "speedy") for role in ("ego", "non_ego")
+    ]
+
+
+def test_arms_race__the_best_start_was_chosen_by_games_of_its_own() -> None:
+    entry = manifest(arms_race())["stages"]["retrained_speedy_round4_vs_speedy_round3_ego_response-seed1"]
+    earned = entry["earned"]
+    assert entry["chosen"] == max(earned, key=earned.__getitem__)
+    assert len(earned) == 2
+
+
+def test_arms_race__the_same_bytes_when_some_of_it_is_done_again(tmp_path: Path) -> None:
+    run = shutil.copytree(arms_race(), tmp_path / "run", symlinks=True)
+    before = {name: (run / name).read_bytes() for name in TABLES}
+    names = ("speedy_round3", "retrained_speedy_round4_vs_speedy_round3_non_ego_response")
+    for name in names:
+        shutil.rmtree(run / ".stages" / f"{name}-seed1")
+    campaign = arms_race().with_suffix(".toml")
+    done = harness("campaign", campaign, "--out", run, timeout_s=600.0)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert {name: (run / name).read_bytes() for name in TABLES} == before
+
+
+def test_arms_race__the_report_and_the_terminal_say_who_could_still_gain() -> None:
+    page = (arms_race() / "report.html").read_text(encoding="utf-8")
+    assert 'id="game"' in page
+    done = harness("report", arms_race())
+    assert "speedy, Equilibrium:" in done.stdout
+    assert "town, RQ1:" in done.stdout
+
+
+def test_arms_race__an_equilibriums_mixture_has_shares_that_add_up() -> None:
+    opponent = Drives(
+        "mixture",
+        members=(Drives("policy", "naive-seed1"), Drives("policy", "retrained_speedy-seed1")),
+        weighed_by=(("naive_vs_speedy-seed1",), ("retrained_vs_speedy-seed1",)),
+    )
+    table = pd.read_csv(arms_race() / "crossplay.csv").set_index(["ego", "non_ego"])
+    earned = [table.loc[(ego, "speedy"), "ego_payoff"] for ego in ("naive", "retrained_speedy")]
+    shares = equilibrium_of(opponent, RunFolder(arms_race()))
+    assert sum(shares) == pytest.approx(1.0)
+    if earned[0] != earned[1]:  # against one strategy the equilibrium is the better answer to it
+        assert shares[earned.index(max(earned))] == pytest.approx(1.0)
+
+
+def test_settled__nothing_follows_an_exchange_in_which_nobody_gains() -> None:
+    stages = manifest(settled())["stages"]
+    status = {name: entry["status"] for name, entry in stages.items()}
+    assert status["retrained_vs_speedy_ego_response-seed1"] == "done"
+    after = {name for name in stages if "round" in name}
+    assert after
+    assert {status[name] for name in after} == {"settled"}
+    assert "not needed" in stages["speedy_round3-seed1"]["message"]
+    assert not (settled() / "policies" / "speedy_round3-seed1").exists()
+
+
+def test_settled__is_no_failure_and_nothing_to_do_again() -> None:
+    done = harness("campaign", settled().with_suffix(".toml"), "--out", settled())
+    assert done.returncode == 0
+    assert "settled  " not in done.stdout  # the stages were finished before
+    assert "Not finished" not in done.stdout

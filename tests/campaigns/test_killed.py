@@ -1,0 +1,101 @@
+"""Killed at any moment and run again is uninterrupted: whole campaigns, by the real command."""
+
+from __future__ import annotations
+
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.support.tiny import (
+    CAREFUL,
+    SPEEDY,
+    TRAINING,
+    begin,
+    end,
+    harness,
+    in_session,
+    wait_for,
+    workers_of,
+    write_campaign,
+)
+
+pytestmark = pytest.mark.slow
+
+KILLS = 25
+CAMPAIGN: dict[str, Any] = {
+    "name": "killed",
+    "ego": {"driver": "sumo", "persona": str(CAREFUL)},
+    "personas": [str(SPEEDY)],
+    "training": {**TRAINING, "steps": 3072},
+    "assessment": {"episodes": 52},  # a full segment and a bit
+}
+FILES = ("episodes.csv", "summary.csv", "comparisons.csv", "training.csv", "manoeuvres.csv")
+
+
+def numbers(run: Path) -> dict[str, bytes]:
+    """The bytes of all that a run's numbers are in."""
+    found = {name: (run / name).read_bytes() for name in FILES}
+    for folder in ("policies", "traces"):
+        for file in (run / folder).rglob("*"):
+            if file.is_file():
+                found[file.relative_to(run).as_posix()] = file.read_bytes()
+    return found
+
+
+def kill(process: subprocess.Popen[str], whom: str, chance: random.Random) -> bool:
+    """Kill the command, one of its workers, or both; whether there was somebody."""
+    workers = workers_of(process.pid)
+    victims = [process.pid] if whom in ("command", "both") else []
+    if whom in ("worker", "both") and workers:
+        victims.append(chance.choice(workers))
+    for victim in victims:
+        try:
+            os.kill(victim, signal.SIGKILL)
+        except ProcessLookupError:
+            return False
+    return bool(victims)
+
+
+@pytest.mark.timeout(900)  # 25 starts of a program that takes seconds to start
+def test_campaign__killed_at_25_random_moments_is_uninterrupted(tmp_path: Path) -> None:
+    campaign = write_campaign(tmp_path, **CAMPAIGN)
+    began = time.monotonic()
+    whole = harness("campaign", campaign, "--out", tmp_path / "whole", "--jobs", 2)
+    lasts_s = time.monotonic() - began
+    assert whole.returncode == 0, whole.stdout + whole.stderr
+    expected = numbers(tmp_path / "whole")
+
+    chance, run, kills, finished = random.Random(25), tmp_path / "run", 0, 0
+    command = ("campaign", campaign, "--out", run, "--jobs", 2)
+    while kills < KILLS:
+        process = begin(*command)
+        ended = False
+        while not ended:
+            until = time.monotonic() + chance.uniform(0.0, 0.3 * lasts_s)
+            while time.monotonic() < until and process.poll() is None:
+                time.sleep(0.01)
+            whom = chance.choice(("command", "command", "worker", "both"))
+            ended = process.poll() is not None or kills == KILLS
+            if not ended and kill(process, whom, chance):
+                kills += 1
+                ended = whom != "worker"
+        printed = end(process)
+        assert "Traceback" not in printed, printed
+        assert process.returncode in (0, -signal.SIGKILL), printed
+        wait_for(lambda leader=process.pid: not in_session(leader), "no process of it is left", 10.0)
+        if process.returncode == 0:
+            assert numbers(run) == expected
+            shutil.rmtree(run)
+            finished += 1
+    last = harness(*command)
+    assert last.returncode == 0, last.stdout + last.stderr
+    assert numbers(run) == expected
+    assert not list(run.rglob(".*.part"))
+    assert {each.name for each in (run / ".stages").iterdir() if "-seed" not in each.name} == {"lock", "workers"}

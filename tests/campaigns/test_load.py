@@ -1,0 +1,290 @@
+"""Long work in a process of its own, weighed as it goes: memory, open files and threads stay what they were. And a
+report of ten thousand episodes, which opens all the same.
+
+libsumo itself keeps about a kilobyte each time a simulation is loaded, in one process and however it is closed. It is
+weighed beside the harness, so that what the harness adds is known.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import libsumo
+import numpy as np
+import pandas as pd
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from harness.campaign.results.recorded_games import recorded_games, scene_drawing
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.sumo import SumoDriver
+from harness.environments.arena import Arena, Seat
+from harness.environments.rollout import assess
+from harness.evaluation.summary import summarise
+from harness.evaluation.tables import MANOEUVRE_COLUMNS, typed
+from harness.evaluation.trace_file import SCHEMA, TraceWriter
+from harness.game.arrays import FloatArray, IntArray
+from harness.game.state import Outcome
+from harness.replay.selection import MOST_FAILURES_PER_ARM, choose_games, replay_name
+from harness.reports.manoeuvres import MOST_LISTED
+from harness.reports.page import PAGE_BYTES, render_page
+from harness.traffic.scene import OpenScene, open_scene
+from tests.environments.test_rollout import Steady, arm, play
+from tests.reports.test_page import campaign
+from tests.support.chromium import launched, opener, until
+from tests.support.scenes import build_scene, drawn
+from tests.support.tiny import MERGE, SPEEDY
+
+weighing = pytest.mark.skipif(not Path("/proc/self/statm").is_file(), reason="the system does not say what it weighs")
+
+GAMES = 64  # as many as campaigns train on
+GAME_STEPS = 1_000_000
+SEGMENT_STEPS = 131_072  # a training starts SUMO anew as often
+ASSESSED = 2_000
+GAMES_PER_FILE = 50
+WEIGHED = 20  # times, while it goes on; the first quarter warms up
+
+SOAK_MB = 2.0  # what a million game-steps may add: 0.1 MB was measured
+ASSESSMENT_KB_PER_GAME = 1.0  # beyond what libsumo keeps per load: 0.2 kB were measured
+
+
+@dataclass(frozen=True)
+class Weight:
+    """What a process holds after so many units of work."""
+
+    done: int
+    memory_mb: float
+    files: int
+    threads: int
+
+    @classmethod
+    def now(cls, done: int) -> Weight:
+        gc.collect()
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        files, threads = (len(os.listdir(f"/proc/self/{kind}")) for kind in ("fd", "task"))
+        return cls(done, pages * os.sysconf("SC_PAGE_SIZE") / 1e6, files, threads)
+
+
+# --- the work, in a process of its own --------------------------------------------------------------------------------
+
+
+def soak() -> Iterator[Weight]:
+    """A million game-steps of an arena whose players drive at random, and begin anew wherever a game ends."""
+    scene, persona = open_scene(MERGE), read_document(SPEEDY, Persona)
+    arena = Arena(scene, GAMES, [Seat(None, persona.payoff), Seat(None, persona.payoff)])
+    chance = np.random.default_rng(1)
+    actions = np.clip(chance.normal([0.1, 0.0], [0.4, 0.1], (509, GAMES, 2, 2)), -1.0, 1.0)
+    played, outcomes = 0, set[int]()
+    steps = GAME_STEPS // GAMES
+    for step in range(steps + 1):
+        if step % (steps // WEIGHED) == 0:
+            yield Weight.now(step * GAMES)
+        if step % (SEGMENT_STEPS // GAMES) == 0:
+            arena.reload(step)
+            ended = np.arange(GAMES)
+        else:
+            ended = np.flatnonzero(~arena.state.running.any(1))
+        if len(ended):
+            outcomes |= set(arena.state.outcome[ended].ravel().tolist())
+            arena.start({int(game): drawn(scene, "soak", int(game), step) for game in ended})
+            played += len(ended)
+        arena.step(actions[step % len(actions)])
+    assert played > 10_000
+    assert outcomes >= {Outcome.GOAL, Outcome.COLLISION, Outcome.RAIL}
+    arena.close()
+
+
+def assessment() -> Iterator[Weight]:
+    """Two thousand short games, each with a simulation of its own load, and their traces, fifty games to a file."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        games = assess(arm(build_scene(folder / "road", goal_m=60.0), Steady(), SumoDriver()), ASSESSED)
+        for first in range(0, ASSESSED, GAMES_PER_FILE):
+            if first % (ASSESSED // WEIGHED) == 0:
+                yield Weight.now(first)
+            with TraceWriter(folder / "traces.parquet") as traces:
+                for _ in range(GAMES_PER_FILE):
+                    game = next(games)
+                    assert game.record["ego_outcome"] == "goal"
+                    assert game.trace is not None
+                    traces.add(game.trace)
+        yield Weight.now(ASSESSED)
+        games.close()  # type: ignore[attr-defined]
+
+
+def bare_libsumo() -> Iterator[Weight]:
+    """The simulations of so many games, loaded and stepped, without the harness."""
+    options = ["--net-file", str(MERGE / "merge.net.xml"), "--step-length", "0.1", "--no-step-log", "--no-warnings"]
+    libsumo.start(["sumo", *options])
+    for game in range(ASSESSED + 1):
+        if game % (ASSESSED // WEIGHED) == 0:
+            yield Weight.now(game)
+        libsumo.load([*options, "--seed", str(game)])
+        for _ in range(10):
+            libsumo.simulationStep()
+    libsumo.close()
+
+
+WORK = {work.__name__: work for work in (soak, assessment, bare_libsumo)}
+
+
+@cache
+def weighed(work: str) -> list[Weight]:
+    """What the work weighed once it was warm."""
+    done = subprocess.run(
+        [sys.executable, __file__, work],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"PYTHONPATH": PATH},
+    )
+    assert done.returncode == 0, done.stderr
+    weights = [Weight(**json.loads(line)) for line in done.stdout.splitlines()]
+    assert len(weights) == WEIGHED + 1
+    return weights[WEIGHED // 4 :]
+
+
+PATH = os.pathsep.join(each for each in sys.path if each)
+
+
+def growth_mb(weights: list[Weight]) -> float:
+    """How much heavier the work became, by the medians of either end: what is taken and given back is no growth."""
+    first, last = (float(np.median([each.memory_mb for each in end])) for end in (weights[:5], weights[-5:]))
+    return last - first
+
+
+# --- what must be true ------------------------------------------------------------------------------------------------
+
+
+@weighing
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_soak__a_million_game_steps_leave_memory_as_it_was() -> None:
+    weights = weighed("soak")
+    assert weights[-1].done >= 0.99 * GAME_STEPS
+    assert growth_mb(weights) <= SOAK_MB
+
+
+@weighing
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_assessment__thousands_of_games_add_no_memory_beyond_what_libsumo_keeps() -> None:
+    ours, theirs = weighed("assessment"), weighed("bare_libsumo")
+    assert ours[-1].done == theirs[-1].done == ASSESSED
+    games = 0.75 * ASSESSED
+    assert growth_mb(ours) - growth_mb(theirs) <= games * ASSESSMENT_KB_PER_GAME / 1000.0
+
+
+@weighing
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize("work", ["soak", "assessment"])
+def test_long_work__opens_no_files_and_starts_no_threads(work: str) -> None:
+    weights = weighed(work)
+    assert len({each.files for each in weights}) == 1
+    assert len({each.threads for each in weights}) == 1
+
+
+# --- a report of ten thousand episodes --------------------------------------------------------------------------------
+
+EPISODES = 10_000
+LARGE = ("naive_vs_speedy", "retrained_vs_speedy")
+READY_MS = 3_000  # until the page's player can be used
+
+
+class Restless(Steady):
+    """Straight on, never at the same speed: its games take as much room on a page as a person's."""
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return np.clip(0.5 * noise * [1.0, 0.0], -1.0, 1.0)
+
+
+@pytest.fixture(scope="module")
+def large() -> dict[str, Any]:
+    """The tables of a campaign in which two arms have ten thousand episodes: a hundred, again and again."""
+    found = campaign(personas=["speedy"], games=100)
+    rows = found["episodes"]
+    some = rows[rows["arm"].isin(LARGE)]
+    again = [some.assign(episode=some["episode"] + 100 * k) for k in range(EPISODES // 100)]
+    episodes = typed(pd.concat([rows[~rows["arm"].isin(LARGE)], *again], ignore_index=True))
+    chosen = choose_games(episodes)[["arm", "seed", "episode"]]
+    replays = [replay_name(*game) for game in chosen.itertuples(index=False)]
+    return found | {"episodes": episodes, "summary": summarise(episodes), "replays": replays}
+
+
+@pytest.fixture(scope="module")
+def traces(merge: OpenScene, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The traces of that many episodes, fifty to a row group: some that were really played, again and again."""
+    file = tmp_path_factory.mktemp("traces") / "traces.parquet"
+    games = [pa.table(dict(game.trace or {})) for game in play(arm(merge, Restless(), Restless()), 5)]
+    with pq.ParquetWriter(file, SCHEMA, compression="zstd") as writer:
+        for first in range(0, EPISODES, GAMES_PER_FILE):
+            numbered = []
+            for episode in range(first, first + GAMES_PER_FILE):
+                game = games[episode % len(games)]
+                numbered.append(game.set_column(0, "episode", pa.array([episode] * len(game))))
+            writer.write_table(pa.concat_tables(numbered).select(SCHEMA.names).cast(SCHEMA))
+    return file
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
+    large: dict[str, Any], traces: Path, merge: OpenScene, tmp_path: Path
+) -> None:
+    episodes = large["episodes"]
+    assert int((episodes["ego_failed"] == 1).sum()) > 1_000
+    assert len(large["replays"]) < 3 * MOST_FAILURES_PER_ARM
+
+    games = recorded_games(episodes[episodes["arm"].isin(LARGE)], lambda arm, seed: traces, merge)
+    html = render_page(**large, games=games, scene=scene_drawing(merge))
+    assert PAGE_BYTES / 2 < len(html.encode()) <= PAGE_BYTES  # the room there is, is used
+    assert f"{len(episodes)} games are too many for a page" in html
+    assert "300 of the 10,000 episodes are drawn" in html
+    assert "more failed games have no folder of their own" in html
+
+    file = tmp_path / "report.html"
+    file.write_text(html, encoding="utf-8")
+    with launched() as browser, opener(browser, file) as open_page:
+        page = open_page()
+        page.wait_for_selector(".player[data-ready]")
+        assert int(page.locator(".player").get_attribute("data-ready")) < READY_MS
+        listed = page.locator("[data-is=game] option").all_inner_texts()
+        assert len(listed) >= 100
+        intro = page.locator("#player-intro").inner_text()
+        assert intro.startswith(f"{len(listed)} recorded games")
+        assert f"{len(episodes) - len(listed)} more games are too many for a page" in intro
+        for outcome in ("collision", "goal"):  # the worst, and what went well
+            assert any(outcome in each for each in listed), outcome
+        names = page.locator("[data-is=game] option").evaluate_all("options => options.map(each => each.value)")
+        for name in LARGE:
+            assert any(each.startswith(name) for each in names), name
+        before = page.locator(".player").get_attribute("data-time")
+        page.locator(".player").focus()
+        page.keyboard.press("End")
+        until(page, "before => document.querySelector('.player').dataset.time !== before", before)
+        assert page.seen == []
+
+
+def test_report__a_pair_of_manoeuvres_lists_no_more_games_than_can_be_read(large: dict[str, Any]) -> None:
+    html = render_page(**large, manoeuvres=pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
+    listed = html.split('id="pair-1"')[1].split("</details>")[0]
+    assert listed.count("<li>") == MOST_LISTED
+    assert "more: <a" in listed
+
+
+if __name__ == "__main__":
+    for weight in WORK[sys.argv[1]]():
+        print(json.dumps(asdict(weight)), flush=True)

@@ -1,0 +1,247 @@
+"""Mistakes in a document are named with file, key and remedy, all at once, and a document never changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from harness.config.campaign import Campaign, resolve
+from harness.config.persona import Persona
+from harness.config.scene import Scene
+from harness.config.toml_reading import Document, nearest, read_document
+from harness.errors import Problem, UsageError
+from harness.game.human_limits import Reaction, Sight, Uses
+
+Write = Callable[[str], Path]
+
+CAMPAIGN = 'name = "c"\nscene = "../networks/merge"\npersonas = ["../personas/speedy.toml"]\n'
+SCENE = """
+name = "s"
+net = "s.net.xml"
+routes = "s.rou.xml"
+time_limit_s = 25.0
+[goal]
+edge = "exit"
+position_m = 45.0
+[ego]
+vehicle = "ego"
+lane = "approach_1"
+position_m = [30.0, 45.0]
+speed_mps = [11, 14]
+[non_ego]
+vehicle = "non_ego"
+lane = "approach_0"
+beside_ego_m = [-8.0, 8.0]
+speed_mps = [11.0, 14.0]
+"""
+PERSONA = """
+name = "p"
+description = "a person to test with"
+[[sources]]
+statistic = "so many in a hundred"
+citation = "Somebody, 2020"
+[operational.terms]
+goal = 1
+"""
+FUZZY = """
+[[human.fuzzy]]
+name = "thrill"
+quantity = "speed_over_limit"
+sets = [{ name = "fast", points = [[0.0, 0.0], [0.2, 1.0]], value = 1.0 }]
+"""
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def to_file(text: str) -> Path:
+        path = tmp_path / "a.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return to_file
+
+
+def problems(path: Path, model: type[Document]) -> list[Problem]:
+    with pytest.raises(UsageError) as raised:
+        read_document(path, model)
+    assert all(each.file == str(path) for each in raised.value.problems)
+    assert str(raised.value) == "\n".join(str(each) for each in raised.value.problems)
+    return raised.value.problems
+
+
+def only(path: Path, model: type[Document]) -> tuple[str, str]:
+    """Key of the one problem, and what is said about it."""
+    (problem,) = problems(path, model)
+    return problem.key, f"{problem.message} ({problem.remedy})" if problem.remedy else problem.message
+
+
+def test_documents__of_this_repository_are_in_order(repository: Path) -> None:
+    for folder, model in (("personas", Persona), ("campaigns", Campaign)):
+        for path in sorted((repository / folder).glob("*.toml")):
+            assert read_document(path, model)
+    for path in sorted((repository / "networks").glob("*/scene.toml")):
+        assert read_document(path, Scene)
+
+
+def test_campaign__defaults_are_the_papers_table_1(write: Write) -> None:
+    training = read_document(write(CAMPAIGN), Campaign).training
+    given = (training.steps, training.early_convergence, training.discount, training.clip)
+    assert given == (3_000_000, True, 0.99, 0.1)
+    assert (training.entropy_coefficient, training.learning_rate, training.buffer) == (0.02, 1e-4, 2048)
+
+
+def test_campaign__paths_are_relative_to_its_own_file() -> None:
+    assert resolve(Path("/a/campaigns/c.toml"), "../personas/p.toml") == Path("/a/personas/p.toml")
+
+
+def test_number__a_whole_one_will_do_for_a_fraction(write: Write) -> None:
+    assert read_document(write(SCENE), Scene).ego.speed_mps == (11.0, 14.0)
+    assert read_document(write(PERSONA), Persona).payoff.terms[0].weight == 1.0
+
+
+@pytest.mark.parametrize(
+    ("model", "text", "key", "said"),
+    [
+        # unknown keys, at every depth
+        (Campaign, CAMPAIGN + "sede = [1]", "sede", "unknown key (did you mean 'seeds'?)"),
+        (Campaign, CAMPAIGN + "[trainin]", "trainin", "unknown key (did you mean 'training'?)"),
+        (Campaign, CAMPAIGN + "[training]\nlr = 1", "training.lr", "unknown key (valid: buffer, clip, "),
+        (Scene, SCENE + "[ego.actuators]\nwheelbse_m = 2", "ego.actuators.wheelbse_m", "(did you mean 'wheelbase_m'?)"),
+        (Persona, PERSONA + FUZZY + "wieght = 1", "human.fuzzy[0].wieght", "unknown key (did you mean 'weight'?)"),
+        (
+            Persona,
+            PERSONA + "[safety.terms]\nclearance = { weight = 1, within_m = 1, witin_s = 1 }",
+            "safety.terms.clearance.witin_s",
+            "unknown key (did you mean 'within_s'?)",
+        ),
+        # what is missing
+        (Campaign, CAMPAIGN.replace('name = "c"', ""), "name", "is missing (add it)"),
+        (Scene, SCENE.replace('edge = "exit"', ""), "goal.edge", "is missing (add it)"),
+        (Persona, PERSONA + '[[sources]]\nstatistic = "many of them"', "sources[1].citation", "is missing (add it)"),
+        (Scene, SCENE.replace("[30.0, 45.0]", "[30.0]"), "ego.position_m[1]", "is missing (add it)"),
+        # out of range
+        (Scene, "friction = 3.0" + SCENE, "friction", "3.0 is not possible (input should be less than or equal"),
+        (Scene, "step_length_s = 0" + SCENE, "step_length_s", "0 is not possible (input should be greater than"),
+        (Campaign, CAMPAIGN + "seeds = [-1]", "seeds[0]", "-1 is not possible (input should be greater than"),
+        (Campaign, CAMPAIGN + "seeds = []", "seeds", "this list is not possible (list should have at least 1 item"),
+        (Campaign, CAMPAIGN + "[assessment]\nsignificance = 1.0", "assessment.significance", "1.0 is not possible ("),
+        (Persona, PERSONA + "[attention]\nmean_attentive_s = 0\nlapse_s = [1, 2]", "attention.mean_attentive_s", "0 "),
+        # not a number at all
+        (Scene, "friction = nan" + SCENE, "friction", "nan is not possible (input should be a finite number)"),
+        (Scene, "friction = inf" + SCENE, "friction", "inf is not possible (input should be a finite number)"),
+        (Campaign, CAMPAIGN + "[training]\nlearning_rate = 1e400", "training.learning_rate", "inf is not possible"),
+        (Scene, SCENE.replace("[30.0, 45.0]", "[30.0, nan]"), "ego.position_m[1]", "nan is not possible ("),
+        # of the wrong kind
+        (Scene, 'friction = "dry"' + SCENE, "friction", "'dry' is not possible (input should be a valid number)"),
+        (Scene, "friction = true" + SCENE, "friction", "True is not possible (input should be a valid number)"),
+        (Campaign, CAMPAIGN + "seeds = 1", "seeds", "1 is not possible (input should be a valid array)"),
+        (Campaign, CAMPAIGN + "seeds = [1.5]", "seeds[0]", "1.5 is not possible (input should be a valid integer)"),
+        (Campaign, CAMPAIGN + "training = 3", "training", "3 is not possible (input should be an object)"),
+        (Campaign, CAMPAIGN + "[training]\nsteps = 2024-01-01", "training.steps", "'2024-01-01' is not possible ("),
+        (Campaign, CAMPAIGN + "[[training]]\nsteps = 1", "training", "this list is not possible (input should be"),
+        (Persona, PERSONA + "[safety.terms]\nrail = true", "safety.terms.rail", "True is not possible ("),
+        (Persona, 'decisions = "moody"' + PERSONA, "decisions", "'moody' is not possible (input should be 'mode' or"),
+        # what does not fit together
+        (Scene, SCENE.replace("[-8.0, 8.0]", "[8.0, -8.0]"), "non_ego.beside_ego_m", "is empty: put the lower end"),
+        (Scene, SCENE.replace("[11, 14]", "[-1, 14]"), "ego", "speed_mps must not be negative"),
+        (Scene, SCENE.replace("beside_ego_m = [-8.0, 8.0]", ""), "non_ego", "give either position_m or beside_ego_m"),
+        (Scene, SCENE.replace("beside", "position_m = [0, 9]\nbeside"), "non_ego", "give either position_m or beside"),
+        (Scene, SCENE.replace("position_m = [30.0, 45.0]", "beside_ego_m = [0, 1]"), "", "the ego can't start beside"),
+        (Campaign, CAMPAIGN + "seeds = [1, 2, 1]", "seeds", "a seed stands twice"),
+        (Campaign, CAMPAIGN + "[training]\nbuffer = 1000", "training", "must be a multiple of games (64)"),
+        (Campaign, CAMPAIGN + "[training]\nminibatch = 4096", "training", "must not exceed buffer (2048)"),
+        (Campaign, CAMPAIGN + "[training]\ninitial_deviation = 0.6", "training", "must not exceed max_deviation (0.5)"),
+        (Persona, PERSONA + FUZZY.replace("thrill", "rail"), "human.fuzzy[0].name", "'rail' is a built-in term"),
+        (Persona, PERSONA + FUZZY + FUZZY, "human.fuzzy[1].name", "'thrill' stands twice"),
+        (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "-0.2, 1.0"), "human.fuzzy[0].sets[0].points", "must rise"),
+        (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "0.2, 1.1"), "human.fuzzy[0].sets[0].points[1][1]", "1.1 is not"),
+        (Persona, PERSONA + FUZZY.replace("speed_over_limit", "speed"), "human.fuzzy[0].quantity", "mean 'speed_mps'?"),
+        (Persona, PERSONA + "[attention]\nmean_attentive_s = 5\nlapse_s = [0, 2]", "attention.lapse_s", "longer than"),
+        # names that become files and folders
+        (Campaign, CAMPAIGN.replace('"c"', '"../c"'), "name", "'../c' is not possible (string should match pattern"),
+        (Scene, SCENE.replace('"s.net.xml"', '"../s.net.xml"'), "net", "'../s.net.xml' is not possible (string should"),
+    ],
+)  # fmt: skip
+def test_mistake__is_named_with_its_key_and_remedy(
+    write: Write, model: type[Document], text: str, key: str, said: str
+) -> None:
+    found_key, found = only(write(text), model)
+    assert found_key == key
+    assert said in found
+
+
+def test_mistakes__are_named_all_at_once(write: Write) -> None:
+    text = CAMPAIGN.replace('name = "c"', "") + "seeds = [-1]\nsede = 1\n[training]\nclip = 2.0\n"
+    assert [each.key for each in problems(write(text), Campaign)] == ["name", "sede", "seeds[0]", "training.clip"]
+
+
+@pytest.mark.parametrize("text", ['name = "c', "name = ", "[a\n", "a = 1\na = 2\n", "a = " + "[" * 3000])
+def test_file__that_is_not_toml(write: Write, text: str) -> None:
+    key, said = only(write(text), Campaign)
+    assert key == ""
+    assert said.startswith("is not valid TOML: ")
+    assert said.endswith("(mend it at the line named)")
+
+
+def test_file__that_is_not_utf_8(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    for content in (b"\xff\xfen\x00", 'name = "Zoë"'.encode("latin-1")):
+        path.write_bytes(content)
+        key, said = only(path, Campaign)
+        assert key == ""
+        assert said.startswith("cannot be read: ")
+        assert said.endswith("(a UTF-8 TOML file is needed)")
+
+
+def test_file__that_is_a_folder(tmp_path: Path) -> None:
+    assert only(tmp_path, Campaign)[1].startswith("cannot be read: ")
+
+
+def test_file__that_is_missing_names_the_nearest(write: Write) -> None:
+    path = write(CAMPAIGN).with_name("speedy.toml")
+    path.write_text("", encoding="utf-8")
+    assert only(path.with_name("speddy.toml"), Campaign) == ("", "there is no such file (did you mean 'speedy.toml'?)")
+    missing = path.parent / "nowhere" / "c.toml"
+    assert only(missing, Campaign)[1] == f"there is no such file (there is no folder {missing.parent})"
+
+
+def test_nearest__is_one_word_or_all_of_them() -> None:
+    assert nearest("colour", ["colours", "size"]) == "did you mean 'colours'?"
+    assert nearest("xyz", ["b", "a"]) == "valid: a, b"
+
+
+def test_document__is_frozen(write: Write) -> None:
+    campaign = read_document(write(CAMPAIGN), Campaign)
+    with pytest.raises(ValidationError, match="frozen"):
+        campaign.name = "other"
+    with pytest.raises(ValidationError, match="frozen"):
+        campaign.training.clip = 0.2
+    with pytest.raises(ValidationError, match="frozen"):
+        read_document(write(SCENE), Scene).ego.lane = "b"
+
+
+def test_persona__without_limits_is_written_as_before_there_were_any(write: Write) -> None:
+    """What stages are keyed by, and what a manifest holds."""
+    plain = read_document(write(PERSONA), Persona).model_dump(mode="json")
+    assert {"reaction", "actuators"}.isdisjoint(plain)
+    assert plain["perception"] is None
+    perceives = "[perception]\noverlooks_share = 0.5\n"
+    written = read_document(write(PERSONA + perceives), Persona).model_dump(mode="json")
+    assert written["perception"] == {"overlooks_share": 0.5, "overlooked_up_to_m": 0.0}
+
+
+def test_persona__limits_are_written_and_read_again(write: Write) -> None:
+    limits = (
+        "[perception]\nrange_m = 50.0\ndistance_error = 0.1\nerror_s = 5.0\n"
+        "[reaction]\ndelay_s = [0.2, 0.3]\n[actuators]\nbraking_share = 0.5\n"
+    )
+    person = read_document(write(PERSONA + limits), Persona)
+    written = person.model_dump(mode="json")
+    assert Persona.model_validate(written, strict=False) == person
+    assert person.habits.sight == Sight(50.0, 0.1, 0.0, 5.0)
+    assert person.habits.reaction == Reaction((0.2, 0.3))
+    assert person.habits.uses == Uses(braking=0.5)
+    assert person.habits.missing is read_document(write(PERSONA), Persona).habits.missing

@@ -1,0 +1,93 @@
+"""The script behind docs/game.md: what it prints of a run's tables, and that the page shows what it printed."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+
+import pandas as pd
+import pytest
+
+from tests.support.repository import REPOSITORY
+
+FOLDER = REPOSITORY / "docs" / "game"
+PUBLISHED = REPOSITORY / "reports" / "merge-arms-race"
+
+
+def script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("figures", FOLDER / "figures.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+figures = script()
+
+
+def test_gaps__a_row_says_who_changes_what_it_earns_and_what_becomes_of_the_ego() -> None:
+    row = {
+        "seed": 2,
+        "persona": "speedy",
+        "round": 2,
+        "role": "non_ego",
+        "ego": "retrained_speedy",
+        "non_ego": "speedy",
+        "payoff": 10.0,
+        "payoff_best_response": 10.5,
+        "gap": 0.5,
+        "ci_low": 0.25,
+        "ci_high": 0.75,
+        "gap_share": 0.05,
+        "p_holm": 0.002,
+        "ego_failure_rate": 0.0,
+        "ego_failure_rate_best_response": 0.03,
+    }
+    assert figures.gaps_table(pd.DataFrame([row])).splitlines()[-1] == (
+        "| `retrained_speedy` against `speedy`: speedy | 2 | 10.00 → 10.50 | +0.50 (+0.25 to +0.75) | +5.0% | 0.002 | "
+        "0% → 3% |"
+    )
+
+
+def test_failures__a_cell_is_the_mean_over_seeds_and_empty_where_they_never_met() -> None:
+    met = [("naive", "anna", 0.2), ("naive", "anna", 0.4), ("naive", "bert", 0.0), ("robust", "anna", 0.1)]
+    table = pd.DataFrame(met, columns=["ego", "non_ego", "failure_rate"])
+    assert figures.failures_table(table).splitlines() == [
+        "| ego | `anna` | `bert` |",
+        "| --- | ---: | ---: |",
+        "| `naive` | 30% | 0% |",
+        "| `robust` | 10% | – |",
+    ]
+
+
+def test_strangers__a_row_has_the_naive_ego_beside_it() -> None:
+    row = {
+        "ego": "robust",
+        "met": "anna + bert",
+        "non_ego": "cleo",
+        "failure_rate": 0.05,
+        "failure_rate_low": 0.0215,
+        "failure_rate_high": 0.1118,
+        "naive_failure_rate": 0.2,
+        "share_of_naive": 0.25,
+        "p_holm": float("nan"),
+    }
+    assert figures.strangers_table(pd.DataFrame([row])).splitlines()[-1] == (
+        "| `robust` | anna + bert | `cleo` | 5% (2.1% to 11.2%) | 20% | 0.25 | – |"
+    )
+
+
+@pytest.mark.parametrize(
+    ("table", "source", "name"),
+    [
+        ("gaps_table", FOLDER / "gaps-of-five-seeds.csv", "gaps"),
+        ("gaps_table", PUBLISHED / "gaps.csv", "gaps"),
+        ("failures_table", PUBLISHED / "crossplay.csv", "crossplay"),
+        ("strangers_table", PUBLISHED / "generalisation.csv", "generalisation"),
+    ],
+)
+def test_page__shows_what_the_script_prints(table: str, source: Path, name: str) -> None:
+    page = (REPOSITORY / "docs" / "game.md").read_text(encoding="utf-8")
+    assert getattr(figures, table)(figures.read(source, name)) in page

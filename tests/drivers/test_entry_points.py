@@ -1,0 +1,132 @@
+"""Drivers of installed packages: found by their entry point, told apart by version and code, checked before a run."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.config.campaign import LEARNED
+from harness.drivers.car import Car, car_of
+from harness.drivers.external import GivenDriver, find_driver
+from harness.errors import UsageError
+from harness.game.observation import SIZE
+from harness.game.state import EGO
+from harness.traffic.scene import OpenScene
+from tests.support.repository import REPOSITORY
+from tests.support.tiny import harness, write_campaign
+
+EXAMPLE = REPOSITORY / "egos" / "examples" / "python"
+
+
+def install(
+    folder: Path, name: str = "steady-driver", points: str = "steady = steady:Steady", version: str = "1.0"
+) -> None:
+    """Put the example package where an installer would: its module, and its metadata."""
+    folder.mkdir(exist_ok=True)
+    shutil.copy(EXAMPLE / "steady.py", folder)
+    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    (info / "entry_points.txt").write_text(f"[harness.drivers]\n{points}\n")
+
+
+@pytest.fixture
+def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of installed packages, with the example in it."""
+    install(tmp_path / "site")
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    monkeypatch.delitem(sys.modules, "steady", raising=False)
+    return tmp_path / "site"
+
+
+@pytest.fixture(scope="module")
+def car(merge: OpenScene) -> Car:
+    return car_of(merge.world, EGO)
+
+
+def find(written: str, folder: Path) -> GivenDriver:
+    return find_driver(written, folder / "campaign.toml", "ego.driver", allow_code=False)
+
+
+def test_installed__is_found_by_name_and_needs_no_leave(site: Path, tmp_path: Path, car: Car) -> None:
+    found = find("steady", tmp_path)
+    assert found.in_words == "steady of the package steady-driver 1.0"
+    view = np.zeros((1, SIZE), dtype=np.float32)
+    actions = found.make(car, sampled=False).decide(np.array([0]), view, np.zeros((1, 2)))
+    np.testing.assert_allclose(actions, [[2.0 / 3.0, 0.0]])
+
+
+def test_installed__a_document_gives_it_parameters(site: Path, tmp_path: Path, car: Car) -> None:
+    shutil.copy(EXAMPLE / "slow.toml", tmp_path)
+    found = find("slow.toml", tmp_path)
+    view = np.zeros((1, SIZE), dtype=np.float32)
+    view[0, 0] = 8.5 / 30.0
+    actions = found.make(car, sampled=False).decide(np.array([0]), view, np.zeros((1, 2)))
+    np.testing.assert_allclose(actions, [[-0.5 / 8.0, 0.0]], atol=1e-6)
+
+
+def test_installed__version_parameters_and_code_tell_it_apart(site: Path, tmp_path: Path) -> None:
+    shutil.copy(EXAMPLE / "slow.toml", tmp_path)
+    identities = [find("steady", tmp_path).identity, find("slow.toml", tmp_path).identity]
+    (site / "steady.py").write_text((site / "steady.py").read_text() + "\n# changed\n")
+    identities.append(find("steady", tmp_path).identity)
+    (site / "steady_driver-1.0.dist-info").rename(site / "steady_driver-1.1.dist-info")
+    metadata = site / "steady_driver-1.1.dist-info" / "METADATA"
+    metadata.write_text(metadata.read_text().replace("1.0", "1.1"))
+    identities.append(find("steady", tmp_path).identity)
+    assert all(identities.count(each) == 1 for each in identities)
+
+
+def test_installed__a_name_that_is_none_is_answered_with_the_nearest(site: Path, tmp_path: Path) -> None:
+    for written, remedy in (("staedy", "'steady'"), ("lerned", f"'{LEARNED}'")):
+        with pytest.raises(UsageError) as caught:
+            find(written, tmp_path)
+        assert f"there is no driver {written!r} (did you mean {remedy}?" in str(caught.value)
+
+
+def test_installed__two_packages_of_one_name_are_refused(site: Path, tmp_path: Path) -> None:
+    install(site, "other-driver")
+    with pytest.raises(UsageError, match="several packages offer a driver 'steady': other-driver, steady-driver"):
+        find("steady", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("point", "said"),
+    [
+        ("steady:Stedy", "can't be made: AttributeError"),
+        ("stedy:Steady", "can't be made: ModuleNotFoundError"),
+        ("steady:LAYOUT", "can't be made: TypeError"),
+        ("builtins:id", "made a int without takes_over, begin, decide"),
+    ],
+)
+def test_installed__what_makes_no_driver_is_named(
+    point: str, said: str, tmp_path: Path, car: Car, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path / "site", points=f"mine = {point}")
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    monkeypatch.delitem(sys.modules, "steady", raising=False)
+    with pytest.raises(UsageError) as caught:
+        find("mine", tmp_path).try_out(car, sampled=False)
+    assert said in str(caught.value)
+
+
+def test_installed__the_command_checks_it_and_a_campaign_takes_it(tmp_path: Path) -> None:
+    install(tmp_path / "site")
+    environment = {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), os.environ.get("PYTHONPATH", "")]),
+    }
+    done = harness("check-driver", "steady", "--games", 2, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "steady of the package steady-driver 1.0, on merge" in done.stdout
+    campaign = write_campaign(
+        tmp_path, ego={"driver": "steady"} | {"persona": str(REPOSITORY / "personas/careful.toml")}
+    )
+    checked = harness("check", campaign, env=environment)
+    assert checked.returncode == 0, checked.stdout + checked.stderr
+    assert "There is nothing to train or to tune in it: rounds 0 and 1." in checked.stdout

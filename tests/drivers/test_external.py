@@ -1,0 +1,302 @@
+"""An ego that a campaign is given: found, refused without leave, told apart, and played in rounds 0 and 1."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from harness.campaign.execution.cache_keys import stage_keys
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import TrainingStage
+from harness.campaign.preflight import open_campaign
+from harness.config.driver import KINDS
+from harness.config.toml_reading import tomllib
+from harness.drivers.external import GivenDriver, find_driver
+from harness.drivers.policy_file import write_policy
+from harness.errors import UsageError
+from harness.game.observation import LAYOUT
+from tests.drivers.test_policy_file import some_policy
+from tests.support.repository import REPOSITORY
+from tests.support.tiny import CAREFUL, MERGE, SPEEDY, TRAINING, harness, write_campaign
+
+PERL = REPOSITORY / "egos" / "examples" / "process"
+ADAS, RSS = (REPOSITORY / "egos" / f"{name}.toml" for name in ("adas", "rss"))
+
+
+def find(written: str, folder: Path, allow_code: bool = True) -> GivenDriver:
+    return find_driver(written, folder / "campaign.toml", "ego.driver", allow_code)
+
+
+def refusal(written: str, folder: Path, allow_code: bool = True) -> str:
+    with pytest.raises(UsageError) as caught:
+        find(written, folder, allow_code)
+    return str(caught.value)
+
+
+def document(folder: Path, text: str, name: str = "mine.toml") -> str:
+    (folder / name).write_text(text)
+    return name
+
+
+def ego(driver: object) -> dict[str, Any]:
+    return {"driver": str(driver), "persona": str(CAREFUL)}
+
+
+# --- finding it ---
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('kind = "proces"', "mine.toml: kind: there is no kind of driver 'proces' (did you mean 'process'?)"),
+        ("", "mine.toml: kind: is missing"),
+        ('kind = "process"', "mine.toml: command: is missing"),
+        ('kind = "process"\ncomand = ["perl"]\ncommand = ["perl"]', "comand: unknown key (did you mean 'command'?)"),
+        ('kind = "process"\ncommand = ["no-such-program"]', "command: there is no program 'no-such-program' on PATH"),
+        ('kind = "process"\ncommand = ["./drive"]', "command: there is no program './drive' here that can be run"),
+        ('kind = "process"\ncommand = ["perl"]\nfiles = ["mine.tml"]', "(did you mean 'mine.toml'?)"),
+        ('kind = "process"\ncommand = ["perl"]\ndeadline_s = 0', "deadline_s: 0 is not possible"),
+        ('kind = "fmu"\nfile = "twin.fmu"', "file: 'twin.fmu': there is no such file"),
+        ('kind = "fmu"\nfile = "mine.toml"\n[inputs]\nv = "speed_mp"', "did you mean 'speed_mps'?"),
+        ('kind = "fmu"\nfile = "mine.toml"\n[outputs]\nsteering = "a"', "did you mean 'steering_rad'?"),
+        ('kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "DQN"', "algorithm: 'DQN' is not possible"),
+        ('kind = "python"\nentry_point = "nobody"', "entry_point: no installed package offers a driver 'nobody'"),
+    ],
+)  # fmt: skip
+def test_find__what_is_wrong_with_a_document_is_named(text: str, said: str, tmp_path: Path) -> None:
+    assert said in refusal(document(tmp_path, text), tmp_path)
+
+
+@pytest.mark.parametrize("name", ["twin.fmu", "model.zip"])
+def test_find__a_bare_file_is_answered_with_the_document_to_write(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"PK")
+    kind = {"twin.fmu": "fmu", "model.zip": "stable_baselines3"}[name]
+    assert f'kind = "{kind}", file = "{name}"' in refusal(name, tmp_path)
+
+
+def test_find__a_path_that_leads_nowhere_is_answered_with_the_nearest(tmp_path: Path) -> None:
+    document(tmp_path, "", "idm.toml")
+    assert "'imd.toml': there is no such file or folder (did you mean 'idm.toml'?)" in refusal("imd.toml", tmp_path)
+    assert "no folder" in refusal("nowhere/idm.toml", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'kind = "process"\ncommand = ["perl"]',
+        'kind = "fmu"\nfile = "mine.toml"',
+        'kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "PPO"',
+    ],
+)
+def test_find__code_that_comes_as_a_file_needs_leave_from_the_command_line(text: str, tmp_path: Path) -> None:
+    name = document(tmp_path, text)
+    said = refusal(name, tmp_path, allow_code=False)
+    assert len(said.splitlines()) == 1
+    assert "a document can't give itself leave" in said
+    assert "--allow-code" in said
+    find(name, tmp_path, allow_code=True)
+    assert "unknown key" in refusal(document(tmp_path, f"{text}\nallow_code = true"), tmp_path)
+
+
+def test_find__a_program_is_told_apart_by_all_it_rests_on(tmp_path: Path) -> None:
+    shutil.copytree(PERL, tmp_path / "perl")
+    (tmp_path / "perl" / "map.csv").write_text("1\n")
+    text = (PERL / "perl.toml").read_text()
+    (tmp_path / "perl" / "perl.toml").write_text(text + 'files = ["map.csv"]\n')
+    found = [find("perl/perl.toml", tmp_path)]
+    assert {Path(file).name for file in found[0].files} >= {"drive.pl", "map.csv"}
+    assert found[0].command[1:] == ("drive.pl",)
+    for name in ("drive.pl", "map.csv"):
+        (tmp_path / "perl" / name).write_text((tmp_path / "perl" / name).read_text() + "\n")
+        found.append(find("perl/perl.toml", tmp_path))
+    (tmp_path / "perl" / "perl.toml").write_text(text)
+    found.append(find("perl/perl.toml", tmp_path))
+    identities = [each.identity for each in found]
+    assert all(identities.count(each) == 1 for each in identities)
+
+
+def test_find__a_link_of_a_virtual_environment_stays_one(tmp_path: Path) -> None:
+    (tmp_path / "python").symlink_to(shutil.which("perl") or "")
+    found = find(document(tmp_path, 'kind = "process"\ncommand = ["./python"]'), tmp_path)
+    assert found.command == (str(tmp_path / "python"),)
+
+
+# --- the campaign's check ---
+
+
+def problems(file: Path, allow_code: bool = True) -> list[str]:
+    with pytest.raises(UsageError) as caught:
+        open_campaign(file, allow_code=allow_code)
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_open_campaign__tries_the_driver_before_anything_runs(tmp_path: Path) -> None:
+    text = 'kind = "process"\ncommand = ["perl", "-e", "die qq(no road today)"]'
+    (said,) = problems(write_campaign(tmp_path, ego=ego(document(tmp_path, text))))
+    assert "could not drive when it was tried" in said
+    assert "no road today" in said
+
+
+def test_open_campaign__names_the_egos_problems_beside_all_others(tmp_path: Path) -> None:
+    driver = document(tmp_path, 'kind = "proces"')
+    said = problems(write_campaign(tmp_path, ego=ego(driver), personas=["nobody.toml"], assessment={"episodes": 1}))
+    assert len(said) == 3
+
+
+def test_open_campaign__an_unknown_vehicle_type_is_named(tmp_path: Path) -> None:
+    driver = document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_cra"')
+    (said,) = problems(write_campaign(tmp_path, ego=ego(driver)))
+    assert "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego to be of (did you mean 'ego_car'?)" in said
+
+
+def test_open_campaign__its_files_are_in_the_manifests_hashes(tmp_path: Path) -> None:
+    opened = open_campaign(write_campaign(tmp_path, ego=ego(PERL / "perl.toml")), allow_code=True)
+    assert opened.ego_driver is not None
+    assert opened.hashes[os.path.relpath(PERL / "drive.pl", tmp_path)]
+
+
+def keys(folder: Path, driver: object) -> dict[str, str]:
+    opened = open_campaign(write_campaign(folder, ego=ego(driver)), allow_code=True)
+    stages = plan(opened.document, [each.name for each in opened.personas], opened.tunable)
+    return stage_keys(opened, stages)
+
+
+def test_keys__change_with_the_driver_and_only_with_it(tmp_path: Path) -> None:
+    shutil.copy(ADAS, tmp_path / "adas.toml")
+    first, again = keys(tmp_path, "adas.toml"), keys(tmp_path, "adas.toml")
+    assert first == again
+    (tmp_path / "adas.toml").write_text(ADAS.read_text().replace("time_gap_s = 1.5", "time_gap_s = 1.6"))
+    assert not set(first.values()) & set(keys(tmp_path, "adas.toml").values())
+
+
+def test_keys__of_a_policy_are_what_they_were_before_there_were_other_drivers(tmp_path: Path) -> None:
+    import hashlib
+
+    write_policy(some_policy(), tmp_path / "mine")
+    found = find("mine", tmp_path)
+    assert found.identity == hashlib.sha256((tmp_path / "mine" / "policy.safetensors").read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize(
+    "driver",
+    [RSS, PERL / "perl.toml", "types.toml", "policy"],
+    ids=["rules", "process", "sumo", "policy"],
+)
+def test_plan__an_ego_with_nothing_to_train_or_to_tune_gets_rounds_0_and_1(driver: object, tmp_path: Path) -> None:
+    document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_car"', "types.toml")
+    write_policy(some_policy(), tmp_path / "policy")
+    opened = open_campaign(write_campaign(tmp_path, ego=ego(driver)), allow_code=True)
+    stages = plan(opened.document, ["speedy"], opened.tunable)
+    assert [stage.id for stage in stages if isinstance(stage, TrainingStage)] == ["speedy-seed1"]
+    assert [stage.id for stage in stages if not isinstance(stage, TrainingStage)] == [
+        "naive_alone-seed1",
+        "naive_vs_sumo-seed1",
+        "speedy_alone-seed1",
+        "naive_vs_speedy-seed1",
+    ]
+
+
+# --- whole campaigns ---
+
+
+def played(folder: Path, driver: object, *options: object, **changes: Any) -> tuple[Path, dict[str, Any], pd.DataFrame]:
+    training = {**TRAINING, "steps": 1024}
+    campaign = write_campaign(folder, ego=ego(driver), training=training, assessment={"episodes": 2}, **changes)
+    run = folder / "run"
+    done = harness("campaign", campaign, "--out", run, *options)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return (
+        run,
+        json.loads((run / "manifest.json").read_text()),
+        pd.read_csv(run / "episodes.csv", keep_default_na=False),
+    )
+
+
+def check_rounds(run: Path, manifest: dict[str, Any], episodes: pd.DataFrame, in_words: str) -> None:
+    """The non-ego learned against the ego, everyone is assessed, and the report says who it was and what was not."""
+    assert {name: entry["status"] for name, entry in manifest["stages"].items()} == dict.fromkeys(
+        manifest["stages"], "done"
+    )
+    assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy"}
+    assert set(episodes["error"]) == {""}
+    assert manifest["ego_driver"]["in_words"] == in_words
+    page = html.unescape((run / "report.html").read_text())
+    assert in_words in page
+    assert "0 and 1: there is nothing to train or to tune in this ego" in page
+    assert "Round 2 was not played: there is nothing to train or to tune in this ego." in page
+    assert in_words in (run / "policies" / "speedy-seed1" / "README.md").read_text()
+
+
+@pytest.mark.slow
+def test_campaign__of_rules(tmp_path: Path) -> None:
+    run, manifest, episodes = played(tmp_path, RSS)
+    check_rounds(run, manifest, episodes, f"the rules rss ({RSS})")
+    assert manifest["ego_driver"]["document"]["name"] == "rss"
+
+
+@pytest.mark.slow
+def test_campaign__of_a_program(tmp_path: Path) -> None:
+    shutil.copytree(PERL, tmp_path / "perl")
+    text = 'kind = "process"\ncommand = ["perl", "drive.pl"]\ndeadline_s = 60.0\n'
+    (tmp_path / "perl" / "perl.toml").write_text(text)
+    run, manifest, episodes = played(tmp_path, "perl/perl.toml", "--allow-code")
+    check_rounds(run, manifest, episodes, "the program perl drive.pl (perl/perl.toml)")
+    assert set(manifest["ego_driver"]["files"]) > {"drive.pl"}
+    refused = harness("campaign", tmp_path / "tiny.toml", "--out", run)
+    assert refused.returncode == 2
+    assert "--allow-code" in refused.stderr
+
+
+@pytest.mark.slow
+def test_campaign__of_sumos_models(tmp_path: Path) -> None:
+    shutil.copytree(MERGE, tmp_path / "merge")
+    routes = tmp_path / "merge" / "merge.rou.xml"
+    idm = '<vType id="idm" carFollowModel="IDM" length="4.2" maxSpeed="40" speedFactor="1" speedDev="0"/>'
+    routes.write_text(routes.read_text().replace("<route id", f"{idm}\n<route id", 1))
+    driver = document(tmp_path, 'kind = "sumo"\nvehicle_type = "idm"', "idm.toml")
+    run, manifest, episodes = played(tmp_path, driver, scene="merge")
+    check_rounds(run, manifest, episodes, "SUMO's own models of vehicle type idm (idm.toml)")
+    trace = pd.read_parquet(run / "traces" / "naive_alone-seed1.parquet")
+    assert set(trace["vehicle_type"]) == {"idm"}
+
+
+@pytest.mark.slow
+def test_campaign__a_program_that_dies_costs_games_that_are_counted(tmp_path: Path) -> None:
+    """It dies of 12.5 m/s, in every game: the persona can't learn against it, and the training says why."""
+    dies = (PERL / "drive.pl").read_text().replace("my $steering", "die 'too fast' if $speed > 12.5; my $steering", 1)
+    shutil.copytree(PERL, tmp_path / "perl")
+    (tmp_path / "perl" / "drive.pl").write_text(dies)
+    campaign = write_campaign(tmp_path, ego=ego("perl/perl.toml"), personas=[str(SPEEDY)], assessment={"episodes": 4})
+    done = harness("campaign", campaign, "--out", tmp_path / "run", "--allow-code")
+    assert done.returncode == 1, done.stdout + done.stderr
+    episodes = pd.read_csv(tmp_path / "run" / "episodes.csv", keep_default_na=False)
+    manifest = json.loads((tmp_path / "run" / "manifest.json").read_text())
+    assert "too fast" in manifest["stages"]["speedy-seed1"]["message"]
+    assert manifest["stages"]["speedy-seed1"]["status"] == "failed"
+    assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo"}
+    assert set(episodes["ego_outcome"]) == {"error"}
+    assert episodes["error"].str.contains("DriverError: .*too fast").all()
+
+
+# --- the page about egos ---
+
+
+def test_page__every_document_on_it_is_one() -> None:
+    page = (REPOSITORY / "docs" / "egos.md").read_text()
+    blocks = [block for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "kind =" in block]
+    kinds = {KINDS[table["kind"]].model_validate(table).kind for table in map(tomllib.loads, blocks)}  # type: ignore[attr-defined]
+    assert kinds == set(KINDS) - {"rules"}
+
+
+def test_page__names_every_entry_that_a_driver_sees() -> None:
+    page = (REPOSITORY / "docs" / "egos.md").read_text()
+    for name in LAYOUT:
+        assert re.sub(r"@.*", "", re.sub(r"other\d", "other0", name)) in page, name

@@ -1,0 +1,218 @@
+"""An FMU drives: one that is built here, from C, for FMI 2.0 and 3.0. What it lacks is named before it runs."""
+
+from __future__ import annotations
+
+import importlib.util
+import zipfile
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+
+from harness.config.driver import Fmu
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.car import Car, car_of
+from harness.drivers.fmu import fmu_driver, wiring
+from harness.environments.rollout import Arm, assess
+from harness.errors import DriverError, UsageError
+from harness.game.observation import LAYOUT, SIZE
+from harness.game.state import EGO
+from harness.traffic.scene import OpenScene
+from tests.support.repository import REPOSITORY
+from tests.support.tiny import CAREFUL
+
+GAMES = np.arange(3)
+
+
+def example() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("build_twin", REPOSITORY / "egos/examples/fmu/build.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def twins(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """The example, built for both versions of the standard."""
+    folder = tmp_path_factory.mktemp("twins")
+    return {fmi: example().build(folder / f"twin{fmi}.fmu", fmi) for fmi in (2, 3)}
+
+
+@pytest.fixture(scope="module")
+def car(merge: OpenScene) -> Car:
+    return car_of(merge.world, EGO)
+
+
+def document(**keys: Any) -> Fmu:
+    return Fmu.model_validate({"kind": "fmu", "file": "twin.fmu", **keys})
+
+
+def changed(folder: Path, *replacements: tuple[str, str]) -> Path:
+    """The example with another model description, and a binary that is none: nothing is run."""
+    text = example().description(2)
+    for old, new in replacements:
+        assert old in text
+        text = text.replace(old, new)
+    with zipfile.ZipFile(folder / "changed.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+        archive.writestr(f"binaries/{fmpy.platform}/twin.so", b"")
+    return folder / "changed.fmu"
+
+
+def problems(given: Fmu, file: Path) -> str:
+    with pytest.raises(UsageError) as caught:
+        wiring(given, file)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_fmu__reaches_its_goal_by_a_twin(fmi: int, twins: dict[int, Path], merge: OpenScene, car: Car) -> None:
+    careful = read_document(CAREFUL, Persona)
+    arm = Arm("naive_alone", merge, (fmu_driver(document(), twins[fmi], car), None), (careful, careful), 1)
+    games = [game.record for game in assess(arm, 3)]
+    assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 3
+
+
+def expected(car: Car, seen: np.ndarray, before: np.ndarray, time_gap_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """What twin.c works out, with its memory: the acceleration of the step before."""
+    at = {name: seen[:, k] for k, name in enumerate(LAYOUT)}
+    wanted = np.clip(-8.0 * at["speed_over_limit"], -3.0, 2.0)
+    gap = at["other0_ahead_m"] - 4.6
+    following = 0.3 * (gap - 2.0 - time_gap_s * at["speed_mps"]) + 0.9 * at["other0_ahead_mps"]
+    in_the_way = (at["other0_seen"] > 0.5) & (at["other0_ahead_m"] > 0.0) & (np.abs(at["other0_left_m"]) < 2.2)
+    wanted = np.maximum(np.where(in_the_way, np.minimum(wanted, following), wanted), -8.0)
+    steering = 0.5 * at["path_turned_rad@5m"] + 0.5 * np.arctan2(at["path_left_m"], 4.0 + at["speed_mps"])
+    return before + (wanted - before) / 3.0, steering
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_fmu__sees_units_keeps_a_state_for_each_game_and_forgets_it(fmi: int, twins: dict[int, Path], car: Car) -> None:
+    driver = fmu_driver(document(start={"time_gap_s": 1.8}), twins[fmi], car)
+    random, before = np.random.default_rng(1), np.zeros(3)
+    driver.begin(GAMES)
+    for step in range(6):
+        if step == 4:
+            driver.begin(GAMES[1:2])
+            before[1] = 0.0
+        view = random.uniform(-1.0, 1.0, (3, SIZE)).astype(np.float32)
+        view[:, LAYOUT.index("other0_seen")] = [0.0, 1.0, 1.0]
+        before, steering = expected(car, car.seen(view), before, 1.8)
+        actions = driver.decide(GAMES, view, np.zeros((3, 2)))
+        np.testing.assert_allclose(actions, car.asked(before, steering, view), atol=1e-9)
+
+
+def test_fmu__is_wired_by_names_of_its_own(twins: dict[int, Path], tmp_path: Path, car: Car) -> None:
+    names = ("path_left_m", "y_lane"), ("steering_rad", "delta")
+    file = changed(tmp_path, *((f'name="{old}"', f'name="{new}"') for old, new in names))
+    mine = document(inputs={"y_lane": "path_left_m"}, outputs={"steering_rad": "delta"})
+    found, plain = wiring(mine, file), wiring(document(), twins[2])
+    assert (sorted(found.inputs), found.outputs) == (sorted(plain.inputs), plain.outputs)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "keys", "said"),
+    [
+        ('name="steering_rad"', 'name="delta"', {}, "steering_rad: the FMU has no output of this name"),
+        ('name="steering_rad"', 'name="steer_rad"', {}, "did you mean 'steer_rad'?"),
+        ('name="path_left_m"', 'name="y_lane"', {}, "y_lane: this input of the FMU is called like nothing"),
+        ('name="path_left_m"', 'name="path_lft_m"', {}, "as an entry did you mean 'path_left_m'?"),
+        ("", "", {"inputs": {"y": "path_left_m"}}, "y: the FMU has no input of this name"),
+        ("", "", {"start": {"time_gap": 2.0}}, "time_gap: the FMU has no parameter or input of this name"),
+        ("", "", {"start": {"speed_mps": 2.0}, "inputs": {"speed_mps": "goal_m"}}, "leave out one of them"),
+        ('"continuous"><Real unit="rad"/>', '"discrete"><Integer/>', {}, "steering_rad: is of type Integer"),
+        ('m="1" s="-1"', 'm="1" s="-1" factor="0.2777"', {}, "speed_mps: is in m/s, and speed_mps is not"),
+        ('unit="m" start', 'unit="s" start', {}, "path_left_m: is in s, and path_left_m is not"),
+        ('fmiVersion="2.0"', 'fmiVersion="1.9"', {}, "can't be read as an FMU"),
+    ],
+)
+def test_fmu__what_is_missing_or_does_not_fit_is_named(
+    old: str, new: str, keys: dict[str, Any], said: str, tmp_path: Path
+) -> None:
+    assert said in problems(document(**keys), changed(tmp_path, (old, new)))
+
+
+def test_fmu__all_that_is_missing_is_named_at_once(tmp_path: Path) -> None:
+    file = changed(tmp_path, ('name="steering_rad"', 'name="delta"'), ('name="path_left_m"', 'name="y_lane"'))
+    said = problems(document(start={"gap": 1.0}), file)
+    assert [name for name in ("steering_rad:", "y_lane:", "gap:") if name in said] == [
+        "steering_rad:",
+        "y_lane:",
+        "gap:",
+    ]
+
+
+def test_fmu__for_model_exchange_is_refused(tmp_path: Path) -> None:
+    extra = (' canHandleVariableCommunicationStepSize="true"', "")
+    file = changed(tmp_path, extra, ("<CoSimulation ", "<ModelExchange "))
+    assert "is an FMU of FMI 2.0 for modelExchange" in problems(document(), file)
+
+
+def test_fmu__for_another_platform_is_refused(twins: dict[int, Path], tmp_path: Path) -> None:
+    with zipfile.ZipFile(twins[2]) as whole, zipfile.ZipFile(tmp_path / "win.fmu", "w") as other:
+        other.writestr("modelDescription.xml", whole.read("modelDescription.xml"))
+        other.writestr("binaries/win64/twin.dll", b"")
+    assert "has no binary for" in problems(document(), tmp_path / "win.fmu")
+
+
+def test_fmu__that_is_no_fmu_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "twin.fmu").write_bytes(b"PK\x03\x04")
+    assert "can't be read as an FMU" in problems(document(), tmp_path / "twin.fmu")
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("abort();", "died of SIGABRT"),
+        ("*(volatile int *)0 = 1;", "died of SIGSEGV"),
+        ("for (volatile int on = 1; on;) {}", "did not answer within 0.5 s"),
+        ("twin->value[STEERING] = NAN;", "is not finite"),
+    ],
+)
+def test_fmu__native_code_that_fails_costs_a_game_and_not_the_process(
+    fault: str, said: str, tmp_path: Path, car: Car
+) -> None:
+    build = example()
+    end = "v[STEERING] = 0.5 * v[TURNED] + 0.5 * atan2(v[LEFT], 4.0 + v[SPEED]);"
+    source = build.SOURCE.read_text()
+    assert end in source
+    file = build.build(
+        tmp_path / "faulty.fmu", 3, source.replace(end, f"{end}\n    if (v[SPEED] > 10.0) {{ {fault} }}")
+    )
+    driver = fmu_driver(document(deadline_s=0.5), file, car)
+    view = np.zeros((1, SIZE), dtype=np.float32)
+    driver.begin(GAMES[:1])
+    driver.decide(GAMES[:1], view, np.zeros((1, 2)))
+    view[0, LAYOUT.index("speed_mps")] = 0.5
+    with pytest.raises(DriverError, match=said):
+        driver.decide(GAMES[:1], view, np.zeros((1, 2)))
+    driver.begin(GAMES[:1])
+    assert driver.decide(GAMES[:1], 0.0 * view, np.zeros((1, 2))).shape == (1, 2)
+
+
+def test_fmu__that_plays_one_game_at_a_time_says_so(tmp_path: Path, car: Car, twins: dict[int, Path]) -> None:
+    with zipfile.ZipFile(twins[2]) as whole, zipfile.ZipFile(tmp_path / "single.fmu", "w") as single:
+        for name in whole.namelist():
+            content = whole.read(name)
+            once = b'<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '
+            single.writestr(name, content.replace(b"<CoSimulation ", once) if name.endswith(".xml") else content)
+    driver = fmu_driver(document(), tmp_path / "single.fmu", car)
+    for _ in range(2):  # one after the other is well
+        driver.begin(GAMES[:1])
+        driver.decide(GAMES[:1], np.zeros((1, SIZE), dtype=np.float32), np.zeros((1, 2)))
+    with pytest.raises(DriverError, match=r"one game at a time only: give the campaign training\.games = 1"):
+        driver.begin(GAMES)
+
+
+def test_fmu__an_error_status_is_named(tmp_path: Path, car: Car) -> None:
+    build = example()
+    source = build.SOURCE.read_text().replace("step(twin, step_s);\n    return fmi2OK;", "return fmi2Error;")
+    driver = fmu_driver(document(), build.build(tmp_path / "failing.fmu", 2, source), car)
+    driver.begin(GAMES)
+    with pytest.raises(DriverError, match=r"failing\.fmu reports an error: .*fmi2DoStep"):
+        driver.decide(GAMES, np.zeros((3, SIZE), dtype=np.float32), np.zeros((3, 2)))

@@ -1,0 +1,109 @@
+"""A learned policy drives as the learner that made it would."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO
+
+from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import Policy
+from harness.drivers.protocol import Driver
+from harness.drivers.sumo import SumoDriver
+from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
+from harness.game.observation import SIZE
+from harness.training.checkpoint import policy_of, put_policy
+from tests.drivers.test_policy_file import some_policy
+
+GAMES = np.arange(300)
+
+
+class Nothing(gymnasium.Env[Any, Any]):
+    """Only the spaces: a learner wants an environment to be made."""
+
+    observation_space, action_space = OBSERVATION_SPACE, ACTION_SPACE
+
+
+def learner(network: list[int], seed: int = 3) -> PPO:
+    """A learner with large weights, so that its actions spread over the whole range and beyond."""
+    model = PPO("MlpPolicy", Nothing(), n_steps=8, batch_size=8, policy_kwargs={"net_arch": network}, device="cpu")
+    generator = torch.Generator().manual_seed(seed)
+    with torch.no_grad():
+        for parameter in model.policy.parameters():
+            parameter.copy_(0.5 * torch.randn(parameter.shape, generator=generator))
+    return model
+
+
+def observations(seed: int = 5) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(-1.0, 1.0, (len(GAMES), SIZE)).astype(np.float32)
+
+
+@pytest.mark.parametrize("network", [[64, 64], [7], [16, 8, 4]])
+def test_learned__drives_by_the_learners_most_likely_action(network: list[int]) -> None:
+    model = learner(network)
+    driver = LearnedDriver(policy_of(model, {}), sampled=False)
+    seen = observations()
+    expected, _ = model.predict(seen, deterministic=True)
+    actions = driver.decide(GAMES, seen, np.full((len(GAMES), 2), 9.0))
+    assert 0.05 < np.mean(np.abs(expected) < 1.0) < 0.95  # clipped ones and others
+    np.testing.assert_allclose(actions, expected, atol=1e-5)
+
+
+def test_learned__varies_by_the_noise_it_is_given_and_the_policys_own_deviation() -> None:
+    model = learner([16])
+    seen = observations()
+    noise = np.random.default_rng(7).standard_normal((len(GAMES), 2))
+    with torch.no_grad():
+        likeliest = model.policy.get_distribution(torch.from_numpy(seen)).mode().numpy()
+        deviation = np.exp(model.policy.log_std.numpy())
+    driver = LearnedDriver(policy_of(model, {}), sampled=True)
+    expected = np.clip(likeliest + deviation * noise, -1.0, 1.0)
+    np.testing.assert_allclose(driver.decide(GAMES, seen, noise), expected, atol=1e-5)
+    np.testing.assert_array_equal(driver.decide(GAMES, seen, noise), driver.decide(GAMES, seen, noise))
+
+
+@pytest.mark.parametrize("sampled", [False, True])
+def test_learned__stays_within_its_bounds(sampled: bool) -> None:
+    driver = LearnedDriver(policy_of(learner([16]), {}), sampled)
+    actions = driver.decide(GAMES, observations(), np.full((len(GAMES), 2), 50.0))
+    assert actions.shape == (len(GAMES), 2)
+    assert actions.min() >= -1.0
+    assert actions.max() <= 1.0
+
+
+def test_learned__one_game_is_decided_as_it_would_be_among_many() -> None:
+    driver = LearnedDriver(some_policy(), sampled=True)
+    seen, noise = observations(), np.zeros((len(GAMES), 2))
+    together = driver.decide(GAMES, seen, noise)
+    alone = np.concatenate([driver.decide(GAMES[k : k + 1], seen[k : k + 1], noise[k : k + 1]) for k in GAMES])
+    np.testing.assert_allclose(alone, together, atol=1e-5)
+
+
+def test_policy__goes_into_a_learner_and_comes_out_the_same() -> None:
+    policy = policy_of(learner([8, 6]), {})
+    other = learner([8, 6], seed=4)
+    put_policy(other, policy, deviation=0.5)
+    again = policy_of(other, {})
+    for name, tensor in policy.tensors.items():
+        if name != "log_deviation":
+            np.testing.assert_array_equal(again.tensors[name], tensor)
+    np.testing.assert_allclose(np.exp(again.tensors["log_deviation"]), 0.5, rtol=1e-6)
+
+
+@pytest.mark.parametrize("network", [[8], [8, 7], [9, 6]])
+def test_policy__that_does_not_fit_a_learner_is_refused(network: list[int]) -> None:
+    policy: Policy = policy_of(learner([8, 6]), {})
+    with pytest.raises(ValueError, match="the actor to begin from"):
+        put_policy(learner(network), policy, deviation=0.5)
+
+
+def test_drivers__are_drivers() -> None:
+    assert isinstance(LearnedDriver(some_policy(), sampled=False), Driver)
+    assert isinstance(SumoDriver(), Driver)
+    assert not SumoDriver().takes_over
+    with pytest.raises(RuntimeError):
+        SumoDriver().decide(GAMES, observations(), np.zeros((len(GAMES), 2)))

@@ -1,0 +1,224 @@
+"""A program drives by one JSON line each way; one that dies, is late or talks nonsense costs its game and no more."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.car import Car, car_of
+from harness.drivers.process import ProcessDriver
+from harness.environments.rollout import Arm, assess
+from harness.errors import DriverError
+from harness.game.observation import LAYOUT, SIZE
+from harness.game.state import EGO
+from harness.traffic.scene import OpenScene
+from tests.support.repository import REPOSITORY
+from tests.support.tiny import CAREFUL, wait_for
+
+GAMES = np.array([3, 7])
+SEEN = np.linspace(-1.0, 1.0, 2 * SIZE, dtype=np.float32).reshape(2, SIZE)
+NOISE = np.array([[0.5, -0.5], [1.0, 2.0]])
+OBEDIENT = """
+import json, os, sys, time
+for number, line in enumerate(sys.stdin):
+    message = json.loads(line)
+    games = message.get("games", [])
+    decided = {{"actions": [[1.0, 0.01]] * len(games)}}
+    answer = {{"hello": {{"protocol": 1}}, "begin": {{}}, "decide": decided}}[message["type"]]
+    {change}
+    print(json.dumps(answer), flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def car(merge: OpenScene) -> Car:
+    return car_of(merge.world, EGO)
+
+
+def driver(
+    folder: Path, car: Car, change: str = "pass", units: str = "si", deadline_s: float = 5.0, **options: Any
+) -> ProcessDriver:
+    """A driver by a Python program that answers well, but for the change."""
+    (folder / "program.py").write_text(OBEDIENT.format(change=change))
+    return ProcessDriver([sys.executable, "program.py"], folder, car, units, deadline_s, 20.0, **options)
+
+
+def refusal(driver: ProcessDriver) -> str:
+    def drive() -> None:
+        driver.begin(GAMES)
+        driver.decide(GAMES, SEEN, NOISE)
+
+    with pytest.raises(DriverError) as caught:
+        drive()
+    return str(caught.value)
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def test_process__is_told_all_it_needs_and_asks_in_units(tmp_path: Path, car: Car) -> None:
+    tells = 'open("heard.jsonl", "a").write(line)'
+    mine = driver(tmp_path, car, tells)
+    mine.begin(GAMES)
+    actions = mine.decide(GAMES, SEEN, NOISE)
+    np.testing.assert_array_equal(actions, car.asked(np.array([1.0, 1.0]), np.array([0.01, 0.01]), SEEN))
+
+    hello, begin, decide = map(json.loads, (tmp_path / "heard.jsonl").read_text().splitlines())
+    assert hello["layout"] == list(LAYOUT)
+    assert hello["step_s"] == 0.1
+    assert hello["limits"]["max_braking_mps2"] == 8.0
+    assert hello["limits"]["length_m"] == 4.6
+    assert begin == {"type": "begin", "games": [3, 7]}
+    assert decide["games"] == [3, 7]
+    np.testing.assert_array_equal(decide["observation"], car.seen(SEEN))
+    np.testing.assert_array_equal(decide["noise"], NOISE)
+
+
+def test_process__may_see_and_act_as_policies_do(tmp_path: Path, car: Car) -> None:
+    change = 'if games and message["type"] == "decide": answer["actions"] = [row[:2] for row in message["observation"]]'
+    mine = driver(tmp_path, car, change, units="scaled")
+    mine.begin(GAMES)
+    np.testing.assert_array_equal(mine.decide(GAMES, SEEN, NOISE), SEEN[:, :2])
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ('if number == 2: sys.exit("out of petrol")', "ended with exit code 1 (asked: decide); it said: out of petrol"),
+        ("if number == 2: os.kill(os.getpid(), 11)", "died of SIGSEGV"),
+        ("if number == 0: sys.exit(0)", "ended with exit code 0 (asked: hello)"),
+        ("if number == 2: sys.stdout.close(); os.close(1); time.sleep(60)", "closed its standard output"),
+        ("if number == 2: print('{', flush=True); continue", "not JSON"),
+        ("if number == 2: answer = [1]", "answered decide with [1], not with an object"),
+        ("if number == 2: answer = {}", "2 pairs of numbers are needed, not None"),
+        ("if number == 2: answer['actions'] = [[0, 0]]", "2 pairs of numbers are needed"),
+        ("if number == 2: answer['actions'][1] = [0, 0, 0]", "each must be a pair of numbers, not [0, 0, 0]"),
+        ("if number == 2: answer['actions'][1] = ['0', 0]", "each must be a pair of numbers"),
+        ("if number == 2: answer['actions'][1] = [float('nan'), 0]", "is not finite"),
+        ("if number == 2: answer['actions'][1] = [10**400, 0]", "too large"),
+        ("if number == 2: answer = {'error': 'no such lane'}", "reports an error: 'no such lane'"),
+        ("if number == 0: answer = {'protocol': 2}", "does not speak protocol 1"),
+        ("if number == 1: print('{}', flush=True)", "answered"),
+        ("if number == 2: os.write(1, b'[' * 11_000_000)", "answers with more than 10,000,000 bytes"),
+    ],
+)
+def test_process__what_is_no_answer_is_named(change: str, said: str, tmp_path: Path, car: Car) -> None:
+    assert said in refusal(driver(tmp_path, car, change))
+
+
+@pytest.mark.parametrize("change", ["time.sleep(600)", "os.write(1, b'{'); time.sleep(600)", "any(iter(int, 1))"])
+def test_process__a_late_answer_is_not_waited_for(change: str, tmp_path: Path, car: Car) -> None:
+    mine = driver(tmp_path, car, f"if number == 2: {change}", deadline_s=0.3)
+    mine.begin(GAMES)
+    began = time.monotonic()
+    with pytest.raises(DriverError, match=r"did not answer within 0.3 s \(asked: decide\)"):
+        mine.decide(GAMES, SEEN, NOISE)
+    assert time.monotonic() - began < 5.0
+
+
+def test_process__who_never_reads_is_late_however_much_there_is_to_say(tmp_path: Path, car: Car) -> None:
+    many = np.arange(500)
+    mine = driver(tmp_path, car, "if number == 1: print('{}', flush=True); time.sleep(600)", deadline_s=0.3)
+    mine.begin(many)
+    with pytest.raises(DriverError, match="did not answer within"):
+        mine.decide(many, np.zeros((500, SIZE), dtype=np.float32), np.zeros((500, 2)))
+
+
+def test_process__many_games_fit_through_the_pipes(tmp_path: Path, car: Car) -> None:
+    many, mine = np.arange(1000), driver(tmp_path, car)
+    mine.begin(many)
+    assert mine.decide(many, np.zeros((1000, SIZE), dtype=np.float32), np.zeros((1000, 2))).shape == (1000, 2)
+
+
+def test_process__may_talk_on_its_standard_error_as_much_as_it_likes(tmp_path: Path, car: Car) -> None:
+    mine = driver(tmp_path, car, "sys.stderr.write('blah ' * 100_000 + chr(10)); sys.stderr.flush()")
+    for _ in range(3):
+        mine.begin(GAMES)
+        mine.decide(GAMES, SEEN, NOISE)
+
+
+def test_process__that_cannot_be_started_is_named(tmp_path: Path, car: Car) -> None:
+    mine = ProcessDriver(["./nowhere"], tmp_path, car, "si", 1.0, 5.0)
+    with pytest.raises(DriverError, match=r"\./nowhere ended with exit code 1.*FileNotFoundError"):
+        mine.begin(GAMES)
+
+
+def started(tmp_path: Path, car: Car, change: str = "pass") -> tuple[ProcessDriver, int]:
+    """A driver that has begun, and its program's process id."""
+    mine = driver(tmp_path, car, f'open("pid", "w").write(str(os.getpid())); {change}')
+    mine.begin(GAMES)
+    return mine, int((tmp_path / "pid").read_text())
+
+
+def test_process__ends_with_its_driver(tmp_path: Path, car: Car) -> None:
+    mine, pid = started(tmp_path, car)
+    assert is_running(pid)
+    del mine
+    gc.collect()
+    wait_for(lambda: not is_running(pid), "the end of the program", 5.0)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="what kills it with its parent is Linux's")
+def test_process__ends_with_the_harness_however_that_ends(tmp_path: Path) -> None:
+    """Even a program that never looks whether its input has ended."""
+    script = f"""
+import pathlib, numpy as np, sys, time
+sys.path.insert(0, {str(REPOSITORY)!r})
+from harness.traffic.scene import open_scene
+from harness.drivers.car import car_of
+from tests.drivers.test_process import started
+mine, pid = started(pathlib.Path({str(tmp_path)!r}),
+    car_of(open_scene(pathlib.Path({str(REPOSITORY / "networks" / "merge")!r})).world, 0),
+    "number == 1 and (print(json.dumps(answer), flush=True), time.sleep(600))")
+time.sleep(600)
+"""
+
+    parent = subprocess.Popen([sys.executable, "-c", script])
+    try:
+        wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text(), "the program's start", 30.0)
+        pid = int((tmp_path / "pid").read_text())
+        assert is_running(pid)
+    finally:
+        parent.send_signal(signal.SIGKILL)
+        parent.wait()
+    wait_for(lambda: not is_running(pid), "the end of the program", 5.0)
+
+
+def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car: Car) -> None:
+    """The second game's program dies in its fourth decision; every other game is played, by a new one."""
+    counts = (
+        "path = os.path.join(os.getcwd(), 'games'); n = (len(open(path).read()) if os.path.exists(path) else 0);"
+        "message['type'] == 'begin' and open(path, 'a').write('x');"
+        "globals().__setitem__('steps', 0 if message['type'] == 'begin' else globals().get('steps', 0) + 1);"
+        "n == 2 and message['type'] == 'decide' and steps == 4 and sys.exit('flat tyre')"
+    )
+    mine, careful = driver(tmp_path, car, counts), read_document(CAREFUL, Persona)
+    arm = Arm("naive_alone", merge, (mine, None), (careful, careful), 1)
+    games = [game.record for game in assess(arm, 4)]
+    assert [game["ego_outcome"] == "error" for game in games] == [False, True, False, False]
+    assert "DriverError" in games[1]["error"]
+    assert "flat tyre" in games[1]["error"]
+    assert not os.path.exists(tmp_path / "core")
+
+
+def test_process__the_example_in_perl_reaches_its_goal(merge: OpenScene, car: Car) -> None:
+    folder, careful = REPOSITORY / "egos" / "examples" / "process", read_document(CAREFUL, Persona)
+    mine = ProcessDriver(["perl", "drive.pl"], folder, car, "si", 5.0, 20.0)
+    games = [game.record for game in assess(Arm("naive_alone", merge, (mine, None), (careful, careful), 1), 4)]
+    assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 4

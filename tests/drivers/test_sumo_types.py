@@ -1,0 +1,103 @@
+"""SUMO's own models as an ego: each car-following and lane-changing model, by a vehicle type of the route file."""
+
+from __future__ import annotations
+
+import shutil
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.external import find_driver
+from harness.drivers.policy import LearnedDriver
+from harness.drivers.protocol import Driver
+from harness.drivers.sumo import SumoDriver
+from harness.environments.rollout import Arm, Game, assess
+from harness.errors import UsageError
+from harness.traffic.scene import OpenScene, open_scene
+from tests.drivers.test_policy_file import some_policy
+from tests.support.tiny import CAREFUL, MERGE
+
+FOLLOWING = ("Krauss", "IDM", "EIDM", "ACC", "CACC")
+CHANGING = ("LC2013", "SL2015")
+LIMITS = 'length="4.4" width="1.8" accel="2.6" decel="4.5" maxSpeed="38" speedFactor="1" speedDev="0"'
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The merge, the ego in the lane that ends, with a vehicle type for each pair of models."""
+    folder = tmp_path_factory.mktemp("models") / "merge"
+    shutil.copytree(MERGE, folder)
+    types = "".join(
+        f'<vType id="{following}_{changing}" carFollowModel="{following}" laneChangeModel="{changing}" {LIMITS}/>\n'
+        for following, changing in product(FOLLOWING, CHANGING)
+    )
+    routes, scene = folder / "merge.rou.xml", folder / "scene.toml"
+    routes.write_text(routes.read_text().replace("<route id", types + "<route id", 1))
+    lanes = scene.read_text().replace('"approach_1"', '"x"').replace('"approach_2"', '"approach_1"')
+    scene.write_text(lanes.replace('"x"', '"approach_2"'))
+    return folder
+
+
+def play(scene: OpenScene, non_ego: Driver | None, episodes: int) -> list[Game]:
+    careful = read_document(CAREFUL, Persona)
+    return list(assess(Arm("naive_alone", scene, (SumoDriver(), non_ego), (careful, careful), 1), episodes))
+
+
+def across_m(game: Game) -> float:
+    """How far the ego came across the road."""
+    assert game.trace is not None
+    return float(np.ptp([y for y, who in zip(game.trace["y_m"], game.trace["player"], strict=True) if who == "ego"]))
+
+
+@pytest.mark.parametrize("changing", CHANGING)
+@pytest.mark.parametrize("following", FOLLOWING)
+def test_sumo_types__each_model_leaves_the_lane_that_ends_and_reaches_the_goal(
+    following: str, changing: str, folder: Path
+) -> None:
+    scene = open_scene(folder, f"{following}_{changing}")
+    for game in play(scene, SumoDriver(), 2):
+        assert (game.record["error"], game.record["ego_outcome"]) == ("", "goal")
+        assert across_m(game) == pytest.approx(3.2, abs=0.2)
+        assert game.trace is not None
+        assert f"{following}_{changing}" in game.trace["vehicle_type"]
+
+
+def test_sumo_types__no_two_models_follow_alike(folder: Path) -> None:
+    """CACC is ACC but behind a car."""
+    paths = {}
+    for following in FOLLOWING:
+        games = play(open_scene(folder, f"{following}_LC2013"), SumoDriver(), 4)
+        paths[following] = tuple(game.record["ego_mean_speed_mps"] for game in games)
+    assert len(set(paths.values())) == len(FOLLOWING)
+
+
+def test_sumo_types__the_ego_is_a_car_of_its_type(folder: Path) -> None:
+    scene, plain = open_scene(folder, "IDM_LC2013"), open_scene(folder)
+    assert scene.world.length_m.tolist() == [4.4, 4.6]
+    assert scene.world.actuators.max_speed_mps.tolist() == [38.0, 40.0]
+    assert plain.world.length_m.tolist() == [4.6, 4.6]
+
+
+def test_sumo_types__sublanes_stand_a_player_that_drives_off_the_road(folder: Path) -> None:
+    wild = LearnedDriver(some_policy(), sampled=True)
+    games = play(open_scene(folder, "EIDM_SL2015"), wild, 5)
+    assert [game.record["error"] for game in games] == [""] * 5
+    assert "rail" in [game.record["non_ego_outcome"] for game in games]
+
+
+def test_sumo_types__one_that_is_not_there_is_named(folder: Path) -> None:
+    with pytest.raises(UsageError) as caught:
+        open_scene(folder, "IDM_LC2014")
+    assert "has no vehicle type 'IDM_LC2014'" in str(caught.value)
+    assert "did you mean 'IDM_LC2013'?" in str(caught.value)
+
+
+def test_sumo_types__a_document_names_the_type(tmp_path: Path) -> None:
+    (tmp_path / "idm.toml").write_text('kind = "sumo"\nvehicle_type = "IDM_LC2013"\n')
+    found = find_driver("idm.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=False)
+    assert found.vehicle_type == "IDM_LC2013"
+    assert found.in_words == "SUMO's own models of vehicle type IDM_LC2013 (idm.toml)"

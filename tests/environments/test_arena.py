@@ -1,0 +1,368 @@
+"""The stepping loop on real SUMO: what a step does to players and others, and what everyone sees of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import libsumo
+import numpy as np
+import pytest
+import shapely
+
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.sumo import SumoDriver
+from harness.environments.arena import Arena, Seat, Step
+from harness.game.arrays import FloatArray, IntArray
+from harness.game.initial_state import Start
+from harness.game.observation import LAYOUT, SIZE
+from harness.game.payoff import Payoff
+from harness.game.state import Outcome
+from harness.traffic.route_file import Departure
+from harness.traffic.scene import OpenScene, open_scene
+from tests.support.scenes import (
+    CROSSING_EDGES,
+    CROSSING_NODES,
+    LEFT_Y,
+    RIGHT_Y,
+    ZIPPER,
+    ZIPPER_EDGES,
+    ZIPPER_NODES,
+    build_scene,
+    drawn,
+    placed,
+)
+
+COAST = np.zeros((1, 2, 2))
+FLOW = '<flow id="f" type="van" begin="0" period="2" departLane="random"><route edges="{}"/></flow>'
+Open = Callable[..., Arena]
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
+
+
+@pytest.fixture(scope="module")
+def crossing(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    places = {"ego": ("wc ce", "wc_0"), "non_ego": ("sc ce", "sc_0"), "goal": "ce"}
+    folder = tmp_path_factory.mktemp("scenes") / "crossing"
+    return build_scene(folder, CROSSING_NODES, CROSSING_EDGES, places, goal_m=50.0)
+
+
+@pytest.fixture(scope="module")
+def merge(repository: Any) -> OpenScene:
+    return open_scene(repository / "tests/data/merge")
+
+
+@pytest.fixture(scope="module")
+def payoff(repository: Any) -> Payoff:
+    return read_document(repository / "personas/careful.toml", Persona).payoff
+
+
+@pytest.fixture
+def opened(payoff: Payoff) -> Iterator[Open]:
+    """Opens arenas of two learners, or of the drivers given, and closes them."""
+    arenas = []
+
+    def opened(scene: OpenScene, games: int = 1, *drivers: Any) -> Arena:
+        arenas.append(Arena(scene, games, [Seat(each, payoff) for each in drivers or (None, None)], seed=1))
+        return arenas[-1]
+
+    yield opened
+    for each in arenas:
+        each.close()
+    assert not libsumo.isLoaded()
+
+
+def begun(arena: Arena, start: Start, *others: Departure) -> Arena:
+    arena.start({0: start}, {0: list(others)})
+    return arena
+
+
+def outcomes(arena: Arena) -> list[str]:
+    return [Outcome(int(each)).word for each in arena.state.outcome[0]]
+
+
+def body(x: float, y: float, heading: float, length: float = 4.6, width: float = 1.8) -> shapely.Geometry:
+    box = shapely.box(-length / 2, -width / 2, length / 2, width / 2)
+    return shapely.affinity.translate(shapely.affinity.rotate(box, heading, (0, 0), use_radians=True), x, y)
+
+
+def bodies(step: Step) -> list[shapely.Geometry]:
+    state = step.quantities.state
+    poses = zip(state.x_m[0], state.y_m[0], state.heading_rad[0], strict=True)
+    return [body(*map(float, pose)) for pose in poses]
+
+
+def played_out(arena: Arena, action: FloatArray = COAST, steps: int = 200) -> list[Step]:
+    """Steps until everybody's game has ended."""
+    played = []
+    while arena.state.running.any() and len(played) < steps:
+        played.append(arena.step(action))
+    return played
+
+
+# --- players, SUMO and tiles ------------------------------------------------------------------------------------------
+
+
+def test_step__sumo_has_the_players_where_the_arena_has_them(merge: OpenScene, opened: Open) -> None:
+    arena = begun(opened(merge), drawn(merge, 1))
+    generator = np.random.default_rng(0)
+    for _ in range(40):
+        arena.step(generator.normal(0.1, 0.1, (1, 2, 2)))
+        for k in np.flatnonzero(arena.state.running[0]):
+            x, y = libsumo.vehicle.getPosition(("ego", "non_ego")[k])
+            heading = np.radians(90.0 - libsumo.vehicle.getAngle(("ego", "non_ego")[k]))
+            pose = [float(getattr(arena.state, name)[0, k]) for name in ("x_m", "y_m", "heading_rad")]
+            assert (x - 2.3 * np.cos(heading), y - 2.3 * np.sin(heading), heading) == pytest.approx(pose, abs=1e-3)
+
+
+def test_tiles__a_game_evolves_as_it_does_alone(merge: OpenScene, opened: Open) -> None:
+    actions = np.random.default_rng(0).normal(0.05, 0.1, (100, 2, 2))
+    together = opened(merge, 4)
+    together.start({game: drawn(merge, "tile", game) for game in range(4)})
+    four = [(s.payoff.copy(), together.observation.copy()) for s in (together.step(np.array([a] * 4)) for a in actions)]
+    together.close()
+    alone = opened(merge)
+    for game in range(4):
+        alone.reload(7)
+        alone.start({0: drawn(merge, "tile", game)})
+        for action, (payoffs, observations) in zip(actions, four, strict=True):
+            step = alone.step(action[None])
+            np.testing.assert_allclose(step.payoff[0], payoffs[game], atol=1e-9)
+            np.testing.assert_allclose(alone.observation[0], observations[game], atol=1e-6)
+
+
+def test_start__in_place_restarts_one_game_and_leaves_the_others_alone(merge: OpenScene, opened: Open) -> None:
+    arena, start = opened(merge, 2), drawn(merge, "restart")
+    arena.start({0: start, 1: drawn(merge, "goes on")})
+    first = arena.observation[0].copy()
+    actions = np.random.default_rng(0).normal(0.0, 0.05, (20, 2, 2, 2))
+    seen = [(arena.step(action), arena.observation[0].copy())[1] for action in actions]
+    before = arena.observation[1].copy()
+    arena.start({0: start})
+    np.testing.assert_array_equal(arena.observation[0], first)
+    np.testing.assert_array_equal(arena.observation[1], before)
+    for action, expected in zip(actions, seen, strict=True):
+        arena.step(action)
+        np.testing.assert_array_equal(arena.observation[0], expected)
+
+
+def test_step__quantities_stay_what_they_were(merge: OpenScene, opened: Open) -> None:
+    arena = begun(opened(merge), drawn(merge, 1))
+    steps = [arena.step(COAST) for _ in range(5)]
+    travelled = [float(step.quantities.state.x_m[0, 0]) for step in steps]
+    assert np.diff(travelled) == pytest.approx([0.1 * drawn(merge, 1).speed_mps[0]] * 4)
+    assert [int(step.quantities.state.step[0]) for step in steps] == [1, 2, 3, 4, 5]
+
+
+def test_step__the_first_one_is_paid_the_way_it_went(straight: OpenScene, opened: Open) -> None:
+    arena = begun(opened(straight), placed(straight, (40.2, RIGHT_Y, 0, 10), (60.2, LEFT_Y, 0, 7)))
+    np.testing.assert_allclose(arena.step(COAST).quantities.advanced_m, [[1.0, 0.7]], atol=1e-9)
+
+
+# --- how games end ----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("others", [False, True])
+def test_goal__the_player_leaves_and_the_other_drives_on(others: bool, tmp_path: Any, opened: Open) -> None:
+    road = build_scene(tmp_path, others=FLOW.format("road") if others else "")
+    arena = begun(opened(road), placed(road, (240, RIGHT_Y, 0, 10), (200, LEFT_Y, 0, 10)))
+    for _ in range(10):
+        step = arena.step(COAST)
+    assert outcomes(arena) == ["goal", ""]
+    assert step.quantities.state.present.all()
+    assert arena.state.present[0].tolist() == [False, True]
+    arena.step(COAST)
+    assert ("ego" in libsumo.vehicle.getIDList()) is not others  # where SUMO drives nobody, nobody meets it there
+    assert not arena.observation[0, 0].any()
+    assert arena.observation[0, 1, LAYOUT.index("other0_seen")] == 0.0
+
+
+def test_wreck__stays_as_an_obstacle_without_speed_or_payoff(straight: OpenScene, opened: Open) -> None:
+    arena = begun(opened(straight), placed(straight, (100, RIGHT_Y, 0, 10), (120, RIGHT_Y, 0.6, 10)))
+    while not outcomes(arena)[1]:
+        arena.step(COAST)
+    assert outcomes(arena) == ["", "rail"]
+    where = arena.state.x_m[0, 1], arena.state.y_m[0, 1]
+    steps = played_out(arena)
+    assert outcomes(arena) == ["collision", "rail"]
+    assert (arena.state.x_m[0, 1], arena.state.y_m[0, 1]) == where
+    assert arena.state.speed_mps[0].tolist() == [0.0, 0.0]
+    assert all(step.payoff[0, 1] == 0.0 and not step.drove[0, 1] for step in steps)
+    assert (arena.step(COAST).payoff == 0.0).all()
+
+
+def test_wreck__that_sumo_drove_stands_in_sumo_too(straight: OpenScene, opened: Open) -> None:
+    start = placed(straight, (100, RIGHT_Y, 0, 12), (107, RIGHT_Y, 0, 3))
+    arena = begun(opened(straight, 1, None, SumoDriver()), start)
+    played_out(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
+    assert outcomes(arena) == ["collision", "collision"]
+    for _ in range(10):
+        arena.step(COAST)
+    assert libsumo.vehicle.getPosition("non_ego")[0] - 2.3 == pytest.approx(arena.state.x_m[0, 1])
+
+
+def test_timeout__ends_the_game_at_the_limit(straight: OpenScene, opened: Open) -> None:
+    arena = begun(opened(straight), placed(straight, (100, RIGHT_Y, 0, 0), (100, LEFT_Y, 0, 0)))
+    assert len(played_out(arena, steps=500)) == straight.world.steps == 200
+    assert outcomes(arena) == ["timeout", "timeout"]
+
+
+def test_outcome__contact_counts_before_goal_and_time(straight: OpenScene, opened: Open) -> None:
+    arena = begun(opened(straight), placed(straight, (249.5, RIGHT_Y, 0, 10), (253, RIGHT_Y, 0, 0)))
+    arena.step(COAST)
+    assert outcomes(arena) == ["collision", "collision"]
+
+
+@pytest.mark.parametrize("heading", [0.0, 0.3, -0.7, np.pi / 2, 2.5])
+def test_contact__of_turned_boxes_is_found_in_the_step_it_happens(
+    straight: OpenScene, opened: Open, heading: float
+) -> None:
+    arena = begun(opened(straight), placed(straight, (100, -3.2, 0, 15), (115, -3.0, heading, 0)))
+    *before, last = played_out(arena)
+    assert outcomes(arena) == ["collision", "collision"]
+    assert shapely.intersects(*bodies(last))
+    assert not any(shapely.intersects(*bodies(step)) for step in before)
+
+
+@pytest.mark.parametrize("heading", [0.2, -0.2, 0.9, -1.4])
+def test_rail__is_touched_in_the_step_the_body_leaves_the_road(
+    straight: OpenScene, opened: Open, heading: float
+) -> None:
+    arena = begun(opened(straight), placed(straight, (100, -3.2, heading, 10), None))
+    *before, last = played_out(arena)
+    road = shapely.box(-50, -6.4, 350, 0)
+    assert outcomes(arena) == ["rail", ""]
+    assert not shapely.covers(road, bodies(last)[0])
+    assert all(shapely.covers(road.buffer(0.02), bodies(step)[0]) for step in before)
+
+
+def test_contact__on_a_junction_is_seen(crossing: OpenScene, opened: Open) -> None:
+    arena = begun(opened(crossing), placed(crossing, (-20, -1.6, 0, 10), (1.6, -21, np.pi / 2, 10)))
+    *_, last = played_out(arena)
+    assert outcomes(arena) == ["collision", "collision"]
+    assert shapely.intersects(*bodies(last))
+    assert (np.abs(last.quantities.state.x_m[0]) < 6).all()
+
+
+def test_junction__can_be_driven_over_without_touching_a_rail(crossing: OpenScene, opened: Open) -> None:
+    arena = begun(opened(crossing), placed(crossing, (-20, -1.6, 0, 10), None))
+    played_out(arena)
+    assert outcomes(arena)[0] == "goal"
+
+
+# --- those whom SUMO drives -------------------------------------------------------------------------------------------
+
+
+def test_sumo_driver__is_read_back_merges_and_reaches_the_goal(merge: OpenScene, opened: Open) -> None:
+    arena = opened(merge, 1, SumoDriver(), SumoDriver())
+    for episode in range(3):
+        arena.reload(episode)
+        begun(arena, drawn(merge, "sumo", episode))
+        steps = played_out(arena, steps=300)
+        assert outcomes(arena) == ["goal", "goal"]
+        xs = np.array([step.quantities.state.x_m[0, 1] for step in steps if step.drove[0, 1]])
+        speeds = np.array([step.quantities.state.speed_mps[0, 1] for step in steps if step.drove[0, 1]])
+        np.testing.assert_allclose(np.diff(xs), 0.1 * speeds[1:], atol=0.03)
+        assert steps[0].quantities.state.acceleration_mps2.tolist() == [[0.0, 0.0]]
+        assert max(np.abs(step.quantities.state.acceleration_mps2).max() for step in steps) < 8.0
+
+
+def test_others__are_seen_where_sumo_has_them(straight: OpenScene, opened: Open) -> None:
+    arena = begun(
+        opened(straight),
+        placed(straight, (100, RIGHT_Y, 0, 10), None),
+        Departure("van", "van", ("road",), 0.0, "1", "123", "10"),
+    )
+    seen = {name: arena.observation[0, 0, k] for k, name in enumerate(LAYOUT)}
+    assert seen["other0_seen"] == 0.0  # not in the traffic yet
+    arena.step(COAST)
+    seen = {name: arena.observation[0, 0, k] for k, name in enumerate(LAYOUT)}
+    x = libsumo.vehicle.getPosition("van")[0] - 3.0
+    assert seen["other0_seen"] == 1.0
+    assert seen["other0_ahead_m"] * 50.0 == pytest.approx(x - 101.0, abs=1e-4)
+    assert seen["other0_left_m"] * 8.0 == pytest.approx(3.2, abs=1e-4)
+
+
+def test_others__contact_with_one_is_a_collision(straight: OpenScene, opened: Open) -> None:
+    arena = begun(
+        opened(straight),
+        placed(straight, (100, RIGHT_Y, 0, 12), None),
+        Departure("van", "van", ("road",), 0.0, "0", "120", "1"),
+    )
+    *before, last = played_out(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
+    assert outcomes(arena) == ["collision", ""]
+    for step, touches in ((before[-1], False), (last, True)):
+        others = step.quantities.bodies
+        van = body(*(float(each[0, 2]) for each in (others.x_m, others.y_m, others.heading_rad)), 6.0, 2.0)
+        assert shapely.intersects(bodies(step)[0], van) == touches
+
+
+def test_others__start_again_with_their_game(straight: OpenScene, opened: Open) -> None:
+    arena, start = opened(straight), placed(straight, (150, RIGHT_Y, 0, 0), None)
+    van = Departure("van", "van", ("road",), 0.3, "1", "50", "8")
+    for _ in range(2):
+        begun(arena, start, van)
+        where = []
+        for _ in range(12):
+            arena.step(COAST)
+            assert arena.reading is not None
+            where += [float(x) for x in arena.reading.x_m[0][arena.reading.present[0]]]
+        assert len(where) == 9
+        assert where[0] == pytest.approx(47.0)
+
+
+# --- spaces and sights ------------------------------------------------------------------------------------------------
+
+
+def test_drivers__see_exactly_what_learners_see(merge: OpenScene, opened: Open) -> None:
+    told: list[FloatArray] = []
+
+    class Watching:
+        takes_over = True
+
+        def begin(self, games: IntArray) -> None:
+            told.clear()
+
+        def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+            told.append(observation.copy())
+            return np.zeros((len(games), 2))
+
+    learner = begun(opened(merge), drawn(merge, 5))
+    seen = []
+    for _ in range(30):
+        seen.append(learner.observation[0, 1].copy())
+        learner.step(COAST)
+    learner.close()
+    driven = begun(opened(merge, 1, None, Watching()), drawn(merge, 5))
+    for _ in range(30):
+        driven.step(COAST)
+    np.testing.assert_array_equal(np.concatenate(told), np.array(seen))
+
+
+@pytest.mark.parametrize("net", ["straight", "zipper"])
+def test_soak__random_driving_among_others_keeps_every_promise(tmp_path: Any, opened: Open, net: str) -> None:
+    if net == "zipper":
+        scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, FLOW.format("wide narrow"), goal_m=50.0)
+    else:
+        scene = build_scene(tmp_path, others=FLOW.format("road"))
+    arena, generator, ended = opened(scene, 4), np.random.default_rng(0), []
+    waiting = list(range(4))
+    for k in range(800):
+        arena.start(
+            {game: drawn(scene, k, game) for game in waiting}, {game: scene.departures(generator) for game in waiting}
+        )
+        running = arena.state.running.copy()
+        step = arena.step(generator.normal((0.2, 0.0), (0.5, 0.3), (4, 2, 2)))
+        assert arena.observation.shape == (4, 2, SIZE)
+        assert arena.observation.dtype == np.float32
+        assert np.abs(arena.observation).max() <= 1.0
+        assert np.isfinite(step.payoff).all()
+        assert (step.payoff[~running] == 0.0).all()
+        assert (arena.state.outcome[arena.state.running] == Outcome.RUNNING).all()
+        waiting = np.flatnonzero(~arena.state.running.any(1)).tolist()
+        ended += [Outcome(int(each)).word for each in arena.state.outcome[waiting].ravel()]
+    assert {"rail", "collision"} <= set(ended) <= {"rail", "collision", "goal", "timeout"}

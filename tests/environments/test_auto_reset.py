@@ -1,0 +1,69 @@
+"""Games in store: the same as if each had been drawn when its time had come."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from harness.environments.arena import Arena, Seat
+from harness.environments.auto_reset import NextGames
+from harness.game.attention import Habits
+from harness.game.initial_state import Start, draw_start
+from harness.game.seeding import generator_of
+from harness.traffic.route_file import Departure
+from harness.traffic.scene import OpenScene
+from tests.support.scenes import build_scene
+
+TILES = 4
+FLOW = '<flow id="van" type="van" begin="0" end="20" probability="0.3"><route edges="road"/></flow>'
+
+
+class _Started:
+    """Stands for an arena: notes what was started."""
+
+    games = TILES
+
+    def __init__(self, scene: OpenScene) -> None:
+        self.scene = scene
+        self.games_started: list[tuple[int, Start, list[Departure]]] = []
+
+    def start(self, starts: Mapping[int, Start], departures: Mapping[int, list[Departure]]) -> None:
+        self.games_started += [(tile, start, departures[tile]) for tile, start in starts.items()]
+
+
+@pytest.fixture(scope="module", params=["", FLOW], ids=["alone", "among_others"])
+def scene(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    return build_scene(tmp_path_factory.mktemp("scenes") / "road", others=request.param)
+
+
+@given(order=st.lists(st.sets(st.integers(0, TILES - 1), min_size=1), max_size=12))
+def test_games__are_each_tiles_own_in_their_order_whoever_else_starts(scene: OpenScene, order: list[set[int]]) -> None:
+    chances = scene.chances([Habits(), Habits()], [1.0, 0.5])
+    arena = _Started(scene)
+    games = NextGames(arena, chances, "a", 1)  # type: ignore[arg-type]
+    for tiles in order:
+        games.start(tiles)
+    assert [tile for tile, *_ in arena.games_started] == [tile for tiles in order for tile in tiles]
+    had = [0] * TILES
+    for tile, start, departures in arena.games_started:
+        parts = ("a", 1, tile, had[tile])
+        had[tile] += 1
+        alone = draw_start(chances, *parts)
+        assert start.parts == parts
+        assert np.array_equal(start.position_m, alone.position_m)
+        assert np.array_equal(start.present, alone.present)
+        assert np.array_equal(start.noise, alone.noise)
+        assert departures == (scene.departures(generator_of(*parts, "others")) if scene.has_others else [])
+
+
+def test_games__start_in_the_arena(scene: OpenScene) -> None:
+    arena = Arena(scene, TILES, [Seat(None), Seat(None)])
+    try:
+        NextGames(arena, scene.chances([Habits(), Habits()], [1.0, 1.0]), "a").start([2])
+        assert arena.state.present.tolist() == [[game == 2] * 2 for game in range(TILES)]
+    finally:
+        arena.close()

@@ -1,0 +1,326 @@
+"""The faces of the arena: Gymnasium, PettingZoo and SB3, any number of them in one process."""
+
+from __future__ import annotations
+
+import gc
+import itertools
+import os
+import subprocess
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import libsumo
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+import harness
+from harness import Arena, ArenaVecEnv, DrivingEnv, ParallelDrivingEnv, Seat, UsageError, open_scene, read_document
+from harness.config.persona import Persona
+from harness.drivers.policy_file import Policy, write_policy
+from harness.drivers.sumo import SumoDriver
+from harness.game.attention import Habits
+from harness.game.observation import LAYOUT
+from harness.traffic.libsumo_simulation import LocalSimulation
+from harness.traffic.scene import OpenScene
+from harness.traffic.subprocess_simulation import RemoteSimulation
+from tests.support.repository import REPOSITORY
+from tests.support.scenes import build_scene
+
+STRAIGHT_ON = np.zeros(2, dtype=np.float32)
+SWERVE = np.array([0.0, 1.0], dtype=np.float32)
+Open = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def busy(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    """A straight road with other traffic, whose time is up after 3 s."""
+    flow = '<flow id="f" type="van" begin="0" probability="0.5" departLane="random"><route edges="road"/></flow>'
+    return build_scene(tmp_path_factory.mktemp("scenes") / "busy", others=flow, time_limit_s=3.0)
+
+
+@pytest.fixture
+def opened() -> Iterator[Open]:
+    """Makes environments, and closes them."""
+    environments = []
+
+    def opened(make: Open, *arguments: Any, **named: Any) -> Any:
+        environments.append(make(*arguments, **named))
+        return environments[-1]
+
+    yield opened
+    for each in environments:
+        each.close()
+    assert not libsumo.isLoaded()
+
+
+@pytest.fixture
+def policy(tmp_path: Path) -> Path:
+    """The folder of a policy that brakes as hard as it can."""
+    tensors = {"log_deviation": np.zeros(2, dtype=np.float32)}
+    for part, outputs in (("actor", 2), ("critic", 1)):
+        tensors[f"{part}.0.weight"] = np.zeros((outputs, len(LAYOUT)), dtype=np.float32)
+        tensors[f"{part}.0.bias"] = np.array([-1.0, 0.0][:outputs], dtype=np.float32)
+    write_policy(Policy(tensors), tmp_path / "brakes")
+    return tmp_path / "brakes"
+
+
+def played(environment: Any, action: Any = STRAIGHT_ON, steps: int = 1000) -> list[Any]:
+    """Steps until the game has ended."""
+    taken = []
+    while len(taken) < steps and not (taken and any(taken[-1][2:4])):
+        taken.append(environment.step(action))
+    return taken
+
+
+def run(program: str, *arguments: str, cwd: Path = REPOSITORY) -> str:
+    done = subprocess.run(
+        [sys.executable, *arguments, "-c", program],
+        cwd=cwd,
+        env={**os.environ, "PYTHONPATH": str(REPOSITORY)},
+        capture_output=True,
+        text=True,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+# --- Gymnasium --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["harness/Ego-v0", "harness/NonEgo-v0"])
+@pytest.mark.parametrize("other", [None, "sumo"])
+def test_gymnasium__its_checker_has_nothing_to_say(opened: Open, name: str, other: str | None) -> None:
+    environment = opened(gymnasium.make, name, other=other)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_env(environment.unwrapped)
+
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        "import gymnasium, harness; gymnasium.make('harness/Ego-v0')",
+        "import harness, gymnasium; gymnasium.make('harness/NonEgo-v0').close()",
+        "import gymnasium; gymnasium.make('harness:harness/Ego-v0')",
+        "import harness, importlib.util; importlib.util.find_spec('gymnasium')\n"
+        "import gymnasium; gymnasium.make('harness:harness/Ego-v0')",
+        "import importlib, gymnasium, harness; importlib.reload(harness); gymnasium.make('harness/Ego-v0')",
+    ],
+)
+def test_gymnasium__knows_the_environments_by_name_in_whatever_order_things_are_imported(
+    program: str, tmp_path: Path
+) -> None:
+    run(program, "-W", "error", cwd=tmp_path)
+
+
+def test_import__of_the_package_alone_loads_nothing_heavy() -> None:
+    loaded = run("import harness, sys; print(*sys.modules)").split()
+    assert not {"numpy", "gymnasium", "libsumo", "torch", "pydantic"} & set(loaded)
+
+
+def test_import__everything_exported_is_there() -> None:
+    for name in harness.__all__:
+        assert getattr(harness, name) is not None
+    assert set(harness.__all__) <= set(dir(harness))
+    with pytest.raises(AttributeError, match="DrivingEmv"):
+        harness.DrivingEmv  # noqa: B018
+
+
+def test_docstring__names_every_entry_of_the_observation() -> None:
+    text = DrivingEnv.__doc__ or ""
+    for name in LAYOUT:
+        assert name.split("@")[0].split("_", name.startswith("other"))[-1] in text
+    assert f"({len(LAYOUT)},)" in text
+    first = {name.split("@")[0].split("_")[0]: k for k, name in reversed(list(enumerate(LAYOUT)))}
+    for word in ("other0", "other1"):
+        assert f"| {first[word]}-" in text
+
+
+def test_seed__the_same_seed_gives_the_same_games_in_this_process_and_another(opened: Open, busy: OpenScene) -> None:
+    environments = [opened(DrivingEnv, busy, other="sumo") for _ in range(2)]
+    kinds = [type(each._game.arena.simulation) for each in environments]
+    assert kinds == [LocalSimulation, RemoteSimulation]
+
+    def games(environment: DrivingEnv) -> list[Any]:
+        first = [environment.reset(seed=5)[0], played(environment)]
+        return [*first, environment.reset()[0], played(environment), environment.reset(seed=6)[0]]
+
+    here, there, again = (games(environment) for environment in (*environments, environments[0]))
+    for first, second in itertools.pairwise((here, there, again)):
+        assert repr(first) == repr(second)
+        np.testing.assert_array_equal(first[0], second[0])
+    assert not np.array_equal(here[0], here[2])
+    assert not np.array_equal(here[0], here[4])
+    assert any(step[0][LAYOUT.index("other1_seen")] for step in here[1])
+
+
+def test_step__pays_the_personas_payoff_and_says_what_it_is_made_of(opened: Open) -> None:
+    environment = opened(DrivingEnv)
+    _, info = environment.reset(seed=1)
+    assert info["outcome"] == ""
+    steps = played(environment)
+    assert environment.action_space.shape == (2,)
+    for observation, reward, _, _, info in steps:
+        assert environment.observation_space.contains(observation)
+        assert reward == pytest.approx(sum(info["terms"].values()))
+    careful = read_document(REPOSITORY / "personas/careful.toml", Persona)
+    assert set(steps[0][4]["terms"]) == {each.name for each in careful.payoff.terms}
+    *_, terminated, truncated, info = steps[-1]
+    assert (terminated, truncated, info["outcome"], info["terms"]["goal"]) == (True, False, "goal", 5.0)
+    assert info["goal_m"] <= 0.0
+    assert info["time_s"] == pytest.approx(0.1 * len(steps))
+
+
+def test_step__contact_terminates_and_the_last_observation_is_of_that_moment(opened: Open) -> None:
+    environment = opened(DrivingEnv)
+    environment.reset(seed=1)
+    observation, _, terminated, truncated, info = played(environment, SWERVE)[-1]
+    assert (terminated, truncated, info["outcome"]) == (True, False, "rail")
+    assert info["speed_mps"] > 5.0
+    assert observation[LAYOUT.index("speed_mps")] == pytest.approx(info["speed_mps"] / 30.0)
+
+
+def test_step__the_time_limit_truncates(opened: Open, busy: OpenScene) -> None:
+    environment = opened(DrivingEnv, busy)
+    environment.reset(seed=1)
+    steps = played(environment, np.array([-1.0, 0.0]))
+    *_, terminated, truncated, info = steps[-1]
+    assert (len(steps), terminated, truncated, info["outcome"]) == (30, False, True, "timeout")
+
+
+def test_step__needs_a_running_game_and_finite_actions(opened: Open) -> None:
+    environment = opened(DrivingEnv)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        environment.step(STRAIGHT_ON)
+    environment.reset(seed=1)
+    with pytest.raises(ValueError, match="finite"):
+        environment.step(np.array([np.nan, 0.0]))
+    played(environment, SWERVE)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        environment.step(STRAIGHT_ON)
+
+
+@pytest.mark.parametrize(("player", "learner"), [("ego", 0), ("non_ego", 1)])
+def test_player__is_the_one_that_is_learned(opened: Open, player: str, learner: int) -> None:
+    environment = opened(DrivingEnv, player=player)
+    environment.reset(seed=1)
+    arena = environment._game.arena
+    assert arena.state.present[0].tolist() == [learner == 0, learner == 1]
+    before = arena.state.x_m[0, learner]
+    environment.step(STRAIGHT_ON)
+    assert arena.state.x_m[0, learner] > before
+
+
+def test_other__a_policy_drives_with_its_personas_attention(opened: Open, policy: Path) -> None:
+    environment = opened(DrivingEnv, other=policy, other_persona="personas/distracted.toml")
+    lapsed, speeds = [], []
+    for seed in range(5):
+        environment.reset(seed=seed)
+        for _ in range(40):
+            *_, terminated, truncated, _ = environment.step(STRAIGHT_ON)
+            if terminated or truncated:
+                break
+            speeds.append(environment._game.arena.state.speed_mps[0, 1])
+            lapsed.append(bool(environment._game.arena.state.lapsed[0, 1]))
+    assert 0 < sum(lapsed) < len(lapsed)
+    assert min(speeds) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"player": "nonego"}, "did you mean 'non_ego'"),
+        ({"scene": "networks/merg"}, "networks/merg"),
+        ({"persona": "personas/carefull.toml"}, "carefull.toml"),
+        ({"other": "nowhere"}, "nowhere"),
+        ({"other": "sumo", "other_persona": "personas/careful.toml"}, "only a policy"),
+    ],
+)
+def test_arguments__that_are_wrong_are_the_users_mistake(arguments: dict[str, Any], said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        DrivingEnv(**arguments)
+    assert not libsumo.isLoaded()
+
+
+def test_paths__are_found_from_anywhere(opened: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    opened(DrivingEnv, scene="networks/merge").reset(seed=1)
+
+
+def test_garbage__an_environment_nobody_closed_gives_sumo_back_quietly() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        environment = DrivingEnv()
+        environment.reset(seed=1)
+        del environment
+        gc.collect()
+    assert not libsumo.isLoaded()
+
+
+# --- PettingZoo -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.filterwarnings("error")
+def test_pettingzoo__its_tests_have_nothing_to_say(opened: Open) -> None:
+    parallel_api_test(opened(ParallelDrivingEnv), num_cycles=300)
+    parallel_seed_test(lambda: opened(ParallelDrivingEnv), num_cycles=200)
+
+
+def test_parallel__who_has_ended_leaves_the_agents_and_the_other_goes_on(opened: Open) -> None:
+    environment = opened(ParallelDrivingEnv, non_ego_persona="personas/speedy.toml")
+    environment.reset(seed=2)
+    actions = {"ego": STRAIGHT_ON, "non_ego": np.array([0.0, -1.0])}
+    while len(environment.agents) == 2:
+        _, _, terminations, _, infos = environment.step(actions)
+    assert environment.agents == ["ego"]
+    assert terminations == {"ego": False, "non_ego": True}
+    assert infos["non_ego"]["outcome"] == "rail"
+    while environment.agents:
+        observations, rewards, terminations, truncations, infos = environment.step({"ego": STRAIGHT_ON})
+        assert {*observations, *rewards, *terminations, *truncations, *infos} == {"ego"}
+    assert infos["ego"]["outcome"] == "goal"
+    assert environment.step({}) == ({}, {}, {}, {}, {})
+
+
+def test_parallel__each_agent_is_paid_by_its_own_persona(opened: Open) -> None:
+    environment = opened(ParallelDrivingEnv, non_ego_persona="personas/speedy.toml")
+    environment.reset(seed=2)
+    _, rewards, _, _, infos = environment.step({"ego": STRAIGHT_ON, "non_ego": STRAIGHT_ON})
+    for agent, persona in (("ego", "careful"), ("non_ego", "speedy")):
+        terms = read_document(REPOSITORY / f"personas/{persona}.toml", Persona).payoff
+        assert set(infos[agent]["terms"]) == {*(each.name for each in terms.terms), *terms.fuzzy}
+        assert rewards[agent] == pytest.approx(sum(infos[agent]["terms"].values()))
+
+
+# --- Stable-Baselines3 ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["arena", "gymnasium"])
+def test_sb3__trains_beside_an_eval_callback_in_the_same_process(opened: Open, kind: str) -> None:
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.callbacks import EvalCallback
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import DummyVecEnv
+
+    if kind == "arena":
+        scene = open_scene(REPOSITORY / "networks/merge")
+        careful = read_document(REPOSITORY / "personas/careful.toml", Persona)
+        arena = Arena(scene, 4, [Seat(None, careful.payoff), Seat(SumoDriver())])
+        training = opened(ArenaVecEnv, arena, 0, scene.chances([Habits(), Habits()], [1.0, 1.0]), "test")
+    else:
+        training = opened(DummyVecEnv, [lambda: Monitor(DrivingEnv())])
+    judging = opened(Monitor, DrivingEnv(other="sumo"))
+    assert isinstance(judging.unwrapped._game.arena.simulation, RemoteSimulation)
+    callback = EvalCallback(judging, n_eval_episodes=2, eval_freq=256 // training.num_envs, verbose=0, warn=False)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message="Training and eval env are not of the same type")
+        model = PPO("MlpPolicy", training, n_steps=256 // training.num_envs, batch_size=128, n_epochs=1, device="cpu")
+        model.learn(512, callback=callback)
+    assert model.num_timesteps == 512
+    assert np.isfinite(callback.last_mean_reward)

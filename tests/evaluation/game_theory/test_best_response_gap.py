@@ -1,0 +1,169 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps, nothing_to_gain
+from harness.evaluation.game_theory.columns import GAP_COLUMNS
+from harness.evaluation.game_theory.records import Response
+from tests.support.game_tables import arm, table
+
+EGO = Response(1, "ego", "speedy", 2, "pair", "best_ego", "retrained_speedy", "speedy")
+NON_EGO = Response(1, "non_ego", "speedy", 2, "pair", "best_non_ego", "retrained_speedy", "speedy")
+
+
+def one(response, *arms, significance=0.01):
+    (row,) = gaps([response], table(*arms), significance).to_dict("records")
+    return row
+
+
+def test_gap__agrees_with_the_arithmetic_on_paper():
+    # the ego's payoffs 10, 12, 8, 10 (mean 10) become 11, 15, 10, 12: differences 1, 3, 2, 2, mean 2, variance 2/3
+    pair = arm("pair", ego_failed=[0, 0, 1, 0], ego_payoff=[10, 12, 8, 10])
+    best = arm("best_ego", ego_failed=[0, 0, 0, 0], ego_payoff=[11, 15, 10, 12])
+    row = one(EGO, pair, best)
+    assert (row["pairs"], row["pairs_left_out"]) == (4, 0)
+    assert (row["payoff"], row["payoff_best_response"], row["gap"], row["gap_share"]) == (10, 12, 2, 0.2)
+    # Student's t with 3 degrees of freedom: 97.5 % quantile 3.182446
+    half = 3.182446 * math.sqrt(2 / 3) / 2
+    assert (row["ci_low"], row["ci_high"]) == (pytest.approx(2 - half, abs=1e-5), pytest.approx(2 + half, abs=1e-5))
+    assert row["p_value"] == pytest.approx(float(stats.t.sf(2 / (math.sqrt(2 / 3) / 2), 3)))
+    assert row["p_holm"] == row["p_value"]
+    assert (row["ego_failure_rate"], row["ego_failure_rate_best_response"]) == (0.25, 0)
+    assert row["failure_difference"] == -0.25
+
+
+def test_gap__of_the_non_ego_is_of_its_own_payoff_and_says_what_it_does_to_the_ego():
+    games = 40
+    pair = arm("pair", ego_failed=[1] + [0] * (games - 1), non_ego_payoff=np.linspace(9, 11, games))
+    best = arm("best_non_ego", ego_failed=[1] * 10 + [0] * (games - 10), non_ego_payoff=np.linspace(9, 11, games) * 1.3)
+    row = one(NON_EGO, pair, best)
+    assert row["gap"] == pytest.approx(3)
+    assert row["gap_share"] == pytest.approx(0.3)
+    assert row["verdict"] == GapVerdict.DISTINGUISHABLE.value
+    assert (row["ego_failure_rate"], row["ego_failure_rate_best_response"]) == (0.025, 0.25)
+    # Wilson's interval of 10 in 40 by its formula: (p + z²/2n ± z sqrt(p(1-p)/n + z²/4n²)) / (1 + z²/n)
+    z = 1.959964
+    middle, spread = 0.25 + z**2 / 80, z * math.sqrt(0.25 * 0.75 / 40 + z**2 / 6400)
+    low, high = (row[f"ego_failure_rate_best_response_{end}"] for end in ("low", "high"))
+    assert (low, high) == (
+        pytest.approx((middle - spread) / (1 + z**2 / 40), abs=1e-6),
+        pytest.approx((middle + spread) / (1 + z**2 / 40), abs=1e-6),
+    )
+    assert row["failure_difference"] == pytest.approx(9 / 40)
+    assert row["failure_difference_low"] < 9 / 40 < row["failure_difference_high"]
+
+
+def test_gap__is_a_share_of_the_payoffs_size_also_where_the_payoff_is_negative_or_zero():
+    pair = arm("pair", ego_failed=[0, 0], ego_payoff=[-10, -10])
+    best = arm("best_ego", ego_failed=[0, 0], ego_payoff=[-9, -8])
+    assert one(EGO, pair, best)["gap_share"] == pytest.approx(0.15)
+    nothing = arm("pair", ego_failed=[0, 0], ego_payoff=[-1, 1])
+    assert math.isnan(one(EGO, nothing, best)["gap_share"])
+
+
+@pytest.mark.parametrize(
+    ("better_by", "verdict"),
+    [
+        ([3.0, 2.9, 3.1, 3.0, 3.05, 2.95], GapVerdict.DISTINGUISHABLE),
+        ([3.0, -2.9, 3.1, -3.0, 3.05, -2.95], GapVerdict.NOT_DISTINGUISHABLE),
+        ([-3.0, -2.9, -3.1, -3.0, -3.05, -2.95], GapVerdict.NONE_FOUND),
+        ([1.0, -1.0, 2.0, -2.0, 3.0, -3.0], GapVerdict.NONE_FOUND),
+        ([0.0] * 6, GapVerdict.NO_DIFFERENCE),
+        ([2.0] * 6, GapVerdict.ALL_EQUAL),
+        ([-2.0] * 6, GapVerdict.NONE_FOUND),
+        ([2.0], GapVerdict.NOT_ENOUGH_PAIRS),
+    ],
+)
+def test_verdict__of_what_the_best_response_earned_more(better_by, verdict):
+    count = len(better_by)
+    payoffs = np.arange(1.0, count + 1)
+    pair = arm("pair", ego_failed=[0] * count, ego_payoff=payoffs)
+    best = arm("best_ego", ego_failed=[0] * count, ego_payoff=payoffs + better_by)
+    row = one(EGO, pair, best)
+    assert row["verdict"] == verdict.value
+    if verdict in (GapVerdict.NO_DIFFERENCE, GapVerdict.ALL_EQUAL) or len(set(better_by)) == 1:
+        assert all(math.isnan(row[name]) for name in ("p_value", "p_holm", "ci_low", "ci_high"))
+
+
+def test_verdict__before_holm_only_where_the_table_has_many_gaps():
+    count = 12
+    payoffs = np.linspace(9, 11, count)
+    better = payoffs + 1 + np.tile([-0.975, 0.975], count // 2)  # t = sqrt(11) / 0.975 = 3.4, p = 0.003
+    arms = [arm("pair", ego_failed=[0] * count, ego_payoff=payoffs)]
+    arms += [arm("best_ego", ego_failed=[0] * count, ego_payoff=better)]
+    alone = gaps([EGO], table(*arms), 0.01)
+    assert alone["verdict"].tolist() == [GapVerdict.DISTINGUISHABLE.value]
+    many = gaps([EGO] * 20, table(*arms), 0.01)
+    assert set(many["verdict"]) == {GapVerdict.BEFORE_HOLM_ONLY.value}
+    assert many["p_holm"].tolist() == pytest.approx([20 * alone["p_value"][0]] * 20)
+
+
+def test_pairs__that_errored_are_missing_or_have_no_payoff_are_left_out_and_counted():
+    pair = arm("pair", ego_failed=[0, 0, None, 0, 0], ego_payoff=[1, 2, 3, 4, math.nan])
+    best = arm("best_ego", ego_failed=[1, 0, 0, 0, 0, 0], ego_payoff=[2, 4, 9, 9, 9, 9], first_episode=0)
+    row = one(EGO, pair, best)
+    assert (row["pairs"], row["pairs_left_out"]) == (3, 3)
+    assert row["gap"] == pytest.approx((1 + 2 + 5) / 3)
+    assert row["ego_failure_rate_best_response"] == pytest.approx(1 / 3)
+
+
+def test_pairs__an_arm_that_was_never_played_leaves_every_number_empty():
+    row = one(EGO, arm("pair", ego_failed=[0, 0]))
+    assert (row["pairs"], row["pairs_left_out"]) == (0, 2)
+    assert row["verdict"] == GapVerdict.NOT_ENOUGH_PAIRS.value
+    assert all(
+        math.isnan(row[name]) for name, kind in GAP_COLUMNS.items() if kind == "float64"
+    )  # never 0, and no failure rate
+
+
+def test_pairs__are_of_the_responses_own_seed():
+    pair = [arm("pair", seed=seed, ego_failed=[0, 0], ego_payoff=[1, 2]) for seed in (1, 2)]
+    best = arm("best_ego", seed=2, ego_failed=[0, 0], ego_payoff=[5, 8])
+    assert one(EGO, *pair, best)["pairs"] == 0
+
+
+def test_gaps__refuse_a_significance_that_is_none_and_an_episode_twice():
+    with pytest.raises(ValueError, match="significance"):
+        gaps([], table(arm("pair", ego_failed=[0])), 1.0)
+    twice = [arm("pair", ego_failed=[0]), arm("pair", ego_failed=[0]), arm("best_ego", ego_failed=[0])]
+    with pytest.raises(ValueError, match="more than once"):
+        gaps([EGO], table(*twice), 0.01)
+
+
+def test_gaps__of_no_response_is_an_empty_table_with_its_columns():
+    found = gaps([], table(arm("pair", ego_failed=[0])), 0.01)
+    assert {name: str(kind) for name, kind in found.dtypes.items()} == GAP_COLUMNS
+    assert not len(found)
+
+
+# --- when rounds stop ---
+
+
+def stopping(ego_gain, non_ego_gain, games=30):
+    random = np.random.default_rng(2)
+    noise = random.normal(0, 1, games)
+    pair = arm("pair", ego_failed=[0] * games)
+    best_ego = arm("best_ego", ego_failed=[0] * games, ego_payoff=10 + noise + ego_gain)
+    best_non_ego = arm("best_non_ego", ego_failed=[0] * games, non_ego_payoff=20 + noise + non_ego_gain)
+    return gaps([EGO, NON_EGO], table(pair, best_ego, best_non_ego), 0.01)
+
+
+def test_nothing_to_gain__where_neither_gap_can_be_told_from_0():
+    assert nothing_to_gain(stopping(0, 0))
+    assert nothing_to_gain(stopping(-2, 0))
+
+
+def test_nothing_to_gain__not_where_either_can_be():
+    assert not nothing_to_gain(stopping(2, 0))
+    assert not nothing_to_gain(stopping(0, 2))
+
+
+def test_nothing_to_gain__not_where_a_side_was_not_searched_or_not_measured():
+    both = stopping(0, 0)
+    assert not nothing_to_gain(both[both["role"] == "ego"])
+    assert not nothing_to_gain(both[:0])
+    assert not nothing_to_gain(gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01))

@@ -1,0 +1,83 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from harness.evaluation.game_theory.columns import CROSSPLAY_COLUMNS
+from harness.evaluation.game_theory.crossplay import crossplay, matrices
+from harness.evaluation.game_theory.records import Pairing
+from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
+from tests.support.game_tables import arm, table
+
+NAIVE = Pairing("naive_vs_speedy", 1, "naive", "speedy", "speedy")
+RETRAINED = Pairing("retrained_vs_speedy", 1, "retrained_speedy", "speedy", "speedy")
+SUMO = Pairing("naive_vs_sumo", 1, "naive", "sumo", "")
+
+
+def rows(pairings, *arms):
+    return crossplay(pairings, table(*arms)).to_dict("records")
+
+
+def test_crossplay__a_cell_is_the_rates_and_means_of_its_arm():
+    (row,) = rows([NAIVE], arm("naive_vs_speedy", ego_failed=[1, 0, 0, 0], ego_payoff=[1, 2, 3, 4], speed=12.5))
+    assert (row["games"], row["left_out"], row["failure_rate"]) == (4, 0, 0.25)
+    # Wilson's interval of 1 in 4 (Newcombe 1998's formula): 0.0456 to 0.6994
+    assert (row["failure_rate_low"], row["failure_rate_high"]) == (
+        pytest.approx(0.0456, abs=1e-4),
+        pytest.approx(0.6994, abs=1e-4),
+    )
+    # mean 2.5, standard error sqrt(5/3)/2, 97.5 % quantile of t with 3 degrees of freedom 3.182446
+    half = 3.182446 * math.sqrt(5 / 3) / 2
+    assert row["ego_payoff"] == 2.5
+    assert row["ego_payoff_low"] == pytest.approx(2.5 - half, abs=1e-5)
+    assert (row["non_ego_payoff"], row["ego_mean_speed_mps"]) == (20, 12.5)
+    assert math.isnan(row["non_ego_payoff_low"])  # all payoffs alike: nothing to judge an interval by
+
+
+def test_crossplay__what_is_not_measured_is_empty_and_what_was_not_played_is_counted():
+    other = arm("naive_vs_sumo", ego_failed=[0] * 5, non_ego_payoff=[math.nan] * 5)
+    naive, sumo = rows([NAIVE, SUMO], arm("naive_vs_speedy", ego_failed=[1, None, 0]), other)
+    assert (naive["games"], naive["left_out"], naive["failure_rate"]) == (2, 3, 0.5)
+    assert (sumo["games"], sumo["left_out"]) == (5, 0)
+    assert math.isnan(sumo["non_ego_payoff"])
+    (naive, retrained) = rows([NAIVE, RETRAINED], arm("naive_vs_speedy", ego_failed=[1, 0]))
+    assert (retrained["games"], retrained["left_out"]) == (0, 2)
+    assert all(math.isnan(retrained[name]) for name, kind in CROSSPLAY_COLUMNS.items() if kind == "float64")
+
+
+def test_crossplay__a_pairing_or_an_episode_twice_is_refused():
+    with pytest.raises(ValueError, match="stands twice"):
+        rows([NAIVE, NAIVE], arm("naive_vs_speedy", ego_failed=[0]))
+    with pytest.raises(ValueError, match="more than once"):
+        rows([NAIVE], arm("naive_vs_speedy", ego_failed=[0]), arm("naive_vs_speedy", ego_failed=[0]))
+
+
+def test_crossplay__is_written_and_read_as_a_table_of_the_run(tmp_path):
+    found = crossplay([NAIVE, RETRAINED], table(arm("naive_vs_speedy", ego_failed=[1, 0, 0])))
+    assert list(found.columns) == list(TABLES["crossplay"])
+    write_csv(found, tmp_path / "crossplay.csv")
+    assert read_csv(tmp_path / "crossplay.csv").equals(typed(found))
+
+
+def test_matrices__have_egos_as_rows_and_an_empty_cell_where_nothing_was_played():
+    found = matrices(
+        crossplay(
+            [NAIVE, RETRAINED, SUMO],
+            table(
+                arm("naive_vs_speedy", ego_failed=[1, 0]),
+                arm("retrained_vs_speedy", ego_failed=[0, 0], ego_payoff=[3, 5]),
+                arm("naive_vs_sumo", ego_failed=[0, 0]),
+            ),
+        )
+    )
+    assert (found.egos, found.non_egos, found.personas) == (
+        ["naive", "retrained_speedy"],
+        ["speedy", "sumo"],
+        ["speedy", ""],
+    )
+    np.testing.assert_equal(found.failure_rates, [[0.5, 0], [0, math.nan]])
+    np.testing.assert_equal(found.ego_payoffs, [[10, 10], [4, math.nan]])
+    part = found.among([1], [0])
+    assert (part.egos, part.non_egos, part.ego_payoffs.tolist()) == (["retrained_speedy"], ["speedy"], [[4]])

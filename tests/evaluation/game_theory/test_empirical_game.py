@@ -1,0 +1,136 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from harness.evaluation.game_theory import empirical_game as module
+from harness.evaluation.game_theory.columns import CROSSPLAY_COLUMNS
+from harness.evaluation.game_theory.empirical_game import SolutionKind, equilibria
+from harness.evaluation.game_theory.nash import Solution
+from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
+from tests.support.game_tables import findings
+
+NASH, SAFEST, LEFT_OUT = (kind.value for kind in (SolutionKind.NASH, SolutionKind.SAFEST, SolutionKind.NOT_PLAYED))
+
+
+def played(cells, seed=1):
+    """A cross-play of (ego, non_ego, persona, failure rate, ego payoff, non-ego payoff)."""
+    names = ("ego", "non_ego", "persona", "failure_rate", "ego_payoff", "non_ego_payoff")
+    rows = [dict(zip(names, cell, strict=True)) | {"seed": seed, "arm": f"{cell[0]}_vs_{cell[1]}"} for cell in cells]
+    counts = {"games": 100, "left_out": 0}
+    return pd.DataFrame([row | counts for row in rows], columns=list(CROSSPLAY_COLUMNS)).astype(CROSSPLAY_COLUMNS)
+
+
+PENNIES = [
+    ("naive", "speedy", "speedy", 0.4, 1, -1),
+    ("naive", "speedy_round2", "speedy", 0.0, -1, 1),
+    ("retrained", "speedy", "speedy", 0.0, -1, 1),
+    ("retrained", "speedy_round2", "speedy", 0.2, 1, -1),
+]
+
+
+def rows(found, **wanted):
+    for name, value in wanted.items():
+        found = found[found[name] == value]
+    return found.to_dict("records")
+
+
+def test_nash__of_matching_pennies_is_half_and_half_with_its_payoffs_and_failures():
+    found = equilibria(played(PENNIES))
+    egos, non_egos = rows(found, solution=NASH, role="ego"), rows(found, solution=NASH, role="non_ego")
+    assert [row["player"] for row in (*egos, *non_egos)] == ["naive", "retrained", "speedy", "speedy_round2"]
+    assert [row["share"] for row in (*egos, *non_egos)] == pytest.approx([0.5] * 4)
+    assert [row["payoff"] for row in (*egos, *non_egos)] == pytest.approx([0] * 4)
+    # half of the naive ego's games against each: 0.4/2 and 0; of the retrained: 0 and 0.2/2
+    assert [row["failure_rate"] for row in egos] == pytest.approx([0.2, 0.1])
+    assert [row["failure_rate"] for row in non_egos] == pytest.approx([0.2, 0.1])
+    for row in (*egos, *non_egos):
+        assert (row["game"], row["number"]) == ("speedy", 1)
+        assert row["regret"] == pytest.approx(0, abs=1e-9)
+        assert row["solution_payoff"] == pytest.approx(0, abs=1e-9)
+        assert row["solution_failure_rate"] == pytest.approx(0.15)
+        assert row["dominated_in_payoff"] == ""
+
+
+def test_safest__mixes_egos_against_every_non_ego_of_any_persona_or_none():
+    cells = [("naive", "sumo", "", 0.02, 1, math.nan), ("retrained", "sumo", "", 0.01, 1, math.nan), *PENNIES]
+    found = equilibria(played(cells))
+    egos, non_egos = rows(found, game="all", role="ego"), rows(found, game="all", role="non_ego")
+    assert [row["share"] for row in egos] == pytest.approx([1 / 3, 2 / 3], abs=1e-6)
+    assert [row["failure_rate"] for row in egos] == pytest.approx([0.4, 0.2])  # the worst case of each alone
+    assert [row["player"] for row in non_egos] == ["sumo", "speedy", "speedy_round2"]
+    assert [row["failure_rate"] for row in non_egos] == pytest.approx([0.04 / 3, 0.4 / 3, 0.4 / 3], abs=1e-6)
+    assert all(row["solution_failure_rate"] == pytest.approx(0.4 / 3, abs=1e-6) for row in (*egos, *non_egos))
+    assert {row["solution"] for row in (*egos, *non_egos)} == {SAFEST}
+
+
+def test_dominated__egos_are_named_in_failures_and_payoffs_against_all_and_against_a_persona():
+    cells = [
+        ("naive", "speedy", "speedy", 0.3, 1, 5),
+        ("naive", "distracted", "distracted", 0.2, 5, 5),
+        ("robust", "speedy", "speedy", 0.1, 2, 5),
+        ("robust", "distracted", "distracted", 0.1, 4, 5),
+    ]
+    found = equilibria(played(cells))
+    (naive, robust) = rows(found, game="all", role="ego")
+    assert (naive["dominated_in_failures"], naive["dominated_in_payoff"]) == ("robust", "")
+    assert (robust["dominated_in_failures"], robust["dominated_in_payoff"]) == ("", "")
+    (naive,) = rows(found, game="speedy", player="naive")
+    assert naive["dominated_in_payoff"] == "robust"
+    (naive,) = rows(found, game="distracted", player="naive")
+    assert (naive["dominated_in_payoff"], naive["dominated_in_failures"]) == ("", "robust")
+
+
+def test_left_out__a_strategy_with_an_empty_cell_is_no_part_of_the_game_and_is_said_to_be():
+    cells = [("adas", "speedy", "speedy", 0.9, -5, 9), *PENNIES]
+    found = equilibria(played(cells))
+    assert [row["player"] for row in rows(found, game="speedy", solution=LEFT_OUT)] == ["adas"]
+    assert [row["share"] for row in rows(found, solution=NASH)] == pytest.approx([0.5] * 4)
+    # a non-ego whom nobody met leaves out itself, not the egos
+    nobody = [(ego, "speedy_round3", "speedy", math.nan, math.nan, math.nan) for ego in ("naive", "retrained")]
+    found = equilibria(played([*PENNIES, *nobody]))
+    assert [row["player"] for row in rows(found, game="speedy", solution=LEFT_OUT)] == ["speedy_round3"]
+    assert [row["share"] for row in rows(found, solution=NASH)] == pytest.approx([0.5] * 4)
+
+
+def test_left_out__when_every_ego_lacks_a_cell_there_is_no_game():
+    found = equilibria(played([PENNIES[0], PENNIES[3]]))
+    assert set(found["solution"]) == {LEFT_OUT}
+    assert len(rows(found, game="speedy")) == 4
+    assert found["share"].isna().all()
+
+
+def test_none_verified__is_said_and_no_number_is_given(monkeypatch):
+    monkeypatch.setattr(module, "solve", lambda *game: Solution((), True))
+    found = rows(equilibria(played(PENNIES)), game="speedy")
+    assert [row["solution"] for row in found] == [SolutionKind.NOT_VERIFIED.value] * 4
+    for row in found:
+        assert pd.isna(row["number"])
+        assert all(math.isnan(row[name]) for name in ("share", "payoff", "solution_payoff", "regret", "failure_rate"))
+
+
+def test_seeds__are_games_of_their_own():
+    found = equilibria(pd.concat([played(PENNIES, seed=1), played(PENNIES[:1], seed=2)]))
+    assert [row["share"] for row in rows(found, seed=2, solution=NASH)] == [1, 1]
+    assert len(rows(found, seed=1, solution=NASH)) == 4
+
+
+def test_equilibria__are_written_and_read_as_a_table_of_the_run(tmp_path):
+    found = findings(seeds=(1, 2), games=20).equilibria
+    assert list(found.columns) == list(TABLES["equilibria"])
+    write_csv(found, tmp_path / "equilibria.csv")
+    assert read_csv(tmp_path / "equilibria.csv").equals(typed(found))
+
+
+def test_equilibria__of_no_crossplay_are_an_empty_table():
+    assert not len(equilibria(played([])))
+
+
+def test_equilibria__shares_of_each_solution_and_role_are_a_distribution():
+    found = findings(seeds=(1, 2), games=30).equilibria
+    found = found[found["share"].notna()]
+    sums = found.groupby(["seed", "game", "solution", "number", "role"], dropna=False)["share"].sum()
+    np.testing.assert_allclose(sums.to_numpy(), 1.0)

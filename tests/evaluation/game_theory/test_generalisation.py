@@ -1,0 +1,91 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from harness.evaluation.comparison import Verdict
+from harness.evaluation.game_theory.findings import find
+from harness.evaluation.game_theory.generalisation import generalisation
+from harness.evaluation.game_theory.records import Pairing
+from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
+from tests.support.game_tables import MET, a_campaign, arm, findings, table
+
+NAIVE = Pairing("naive_vs_distracted", 1, "naive", "distracted", "distracted")
+RETRAINED = Pairing("retrained_vs_distracted", 1, "retrained_speedy", "distracted", "distracted")
+ITS_OWN = Pairing("retrained_vs_speedy", 1, "retrained_speedy", "speedy", "speedy")
+
+
+def test_generalisation__agrees_with_the_arithmetic_on_paper():
+    # failures naive 1 1 1 0 0 0 0 0, retrained 0 0 1 0 0 0 0 0: differences 1 1 0 ..., mean 1/4, variance 3/14
+    episodes = table(
+        arm("naive_vs_distracted", ego_failed=[1, 1, 1, 0, 0, 0, 0, 0]),
+        arm("retrained_vs_distracted", ego_failed=[0, 0, 1, 0, 0, 0, 0, 0]),
+    )
+    (row,) = generalisation({"retrained_speedy": ("speedy",)}, [NAIVE, RETRAINED], episodes, 0.01).to_dict("records")
+    assert (row["ego"], row["met"], row["persona"], row["non_ego"]) == (
+        "retrained_speedy",
+        "speedy",
+        "distracted",
+        "distracted",
+    )
+    assert (row["pairs"], row["failure_rate"], row["naive_failure_rate"]) == (8, 0.125, 0.375)
+    assert (row["fewer_failures"], row["share_of_naive"]) == (0.25, pytest.approx(1 / 3))
+    half = 2.364624 * math.sqrt(3 / 14 / 8)  # 97.5 % quantile of t with 7 degrees of freedom
+    assert (row["fewer_failures_low"], row["fewer_failures_high"]) == (
+        pytest.approx(0.25 - half, abs=1e-5),
+        pytest.approx(0.25 + half, abs=1e-5),
+    )
+    assert row["verdict"] == Verdict.NOT_SIGNIFICANT.value
+
+
+def test_generalisation__is_asked_of_personas_an_ego_did_not_meet_and_of_no_others():
+    found = findings(games=20).generalisation
+    assert [tuple(row) for row in found[["ego", "met", "non_ego"]].to_numpy()] == [
+        ("retrained_speedy", "speedy", "distracted"),
+        ("retrained_distracted", "distracted", "speedy"),
+        ("retrained_distracted", "distracted", "speedy_round2"),
+    ]
+
+
+def test_generalisation__without_the_naive_ego_or_its_games_there_is_no_base_line_and_no_number():
+    played = table(arm("retrained_vs_distracted", ego_failed=[0, 1]))
+    for pairings in ([RETRAINED], [NAIVE, RETRAINED]):
+        (row,) = generalisation({"retrained_speedy": ("speedy",)}, pairings, played, 0.01).to_dict("records")
+        assert (row["pairs"], row["pairs_left_out"], row["verdict"]) == (0, 2, Verdict.NOT_ENOUGH_PAIRS.value)
+        assert math.isnan(row["failure_rate"])
+        assert math.isnan(row["fewer_failures"])
+
+
+def test_generalisation__a_naive_ego_that_never_fails_has_no_share():
+    episodes = table(arm("naive_vs_distracted", ego_failed=[0, 0]), arm("retrained_vs_distracted", ego_failed=[1, 0]))
+    (row,) = generalisation({"retrained_speedy": ("speedy",)}, [NAIVE, RETRAINED], episodes, 0.01).to_dict("records")
+    assert math.isnan(row["share_of_naive"])
+    assert row["fewer_failures"] == -0.5
+
+
+def test_generalisation__an_ego_that_met_them_all_has_no_row():
+    found = generalisation({"retrained_speedy": ("speedy",)}, [ITS_OWN], table(arm("x", ego_failed=[0])), 0.01)
+    assert list(found.columns) == list(TABLES["generalisation"])
+    assert not len(found)
+
+
+def test_generalisation__is_written_and_read_as_a_table_of_the_run(tmp_path):
+    found = findings(seeds=(1, 2), games=20).generalisation
+    write_csv(found, tmp_path / "generalisation.csv")
+    assert read_csv(tmp_path / "generalisation.csv").equals(typed(found))
+
+
+# --- all four tables at once ---
+
+
+def test_find__nothing_where_nothing_was_asked():
+    episodes, _, _ = a_campaign(games=4)
+    assert find([], [], {}, episodes, 0.01) is None
+
+
+def test_find__gives_every_table():
+    episodes, pairings, responses = a_campaign(seeds=(1, 2), games=20)
+    found = find(pairings, responses, MET, episodes, 0.01)
+    assert (len(found.gaps), len(found.crossplay), len(found.generalisation)) == (8, 32, 6)
+    assert set(found.equilibria["game"]) == {"speedy", "distracted", "all"}

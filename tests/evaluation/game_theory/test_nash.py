@@ -1,0 +1,190 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from harness.evaluation.game_theory import nash
+from harness.evaluation.game_theory.nash import (
+    TOLERANCE,
+    Equilibrium,
+    NoEquilibrium,
+    equilibrium_shares,
+    regrets,
+    solve,
+)
+
+PENNIES = np.array([[1, -1], [-1, 1]])
+DILEMMA = np.array([[3, 0], [5, 1]])  # cooperate, defect
+SEXES = np.array([[3, 0], [0, 2]]), np.array([[2, 0], [0, 3]])
+ROCK_PAPER_SCISSORS = np.array([[0, -1, 1], [1, 0, -1], [-1, 1, 0]])
+
+
+def found(ego, non_ego):
+    """(ego shares, non-ego shares) of every equilibrium, in the order they are returned."""
+    return [(each.ego_shares.tolist(), each.non_ego_shares.tolist()) for each in solve(ego, non_ego).equilibria]
+
+
+def near(shares):
+    return pytest.approx(shares, abs=1e-9)
+
+
+# --- games solved on paper ---
+
+
+def test_matching_pennies__has_one_equilibrium_half_and_half():
+    ((x, y),) = found(PENNIES, -PENNIES)
+    assert (x, y) == (near([0.5, 0.5]), near([0.5, 0.5]))
+
+
+def test_prisoners_dilemma__both_defect():
+    assert found(DILEMMA, DILEMMA.T) == [([0, 1], [0, 1])]
+
+
+def test_battle_of_the_sexes__has_two_pure_equilibria_and_a_mixed_one():
+    # mixed: the other is indifferent when 2 x = 3 (1 - x), so x = 3/5; 3 y = 2 (1 - y), so y = 2/5
+    first, second, mixed = found(*SEXES)
+    assert first == ([1, 0], [1, 0])  # the ego's payoff is 3, 2 and 6/5: the chosen one comes first
+    assert second == ([0, 1], [0, 1])
+    assert mixed == (near([0.6, 0.4]), near([0.4, 0.6]))
+
+
+def test_rock_paper_scissors__a_third_each():
+    ((x, y),) = found(ROCK_PAPER_SCISSORS, -ROCK_PAPER_SCISSORS)
+    assert (x, y) == (near([1 / 3] * 3), near([1 / 3] * 3))
+
+
+def test_rock_paper_scissors__a_larger_wager_shifts_the_shares():
+    # rock against scissors is worth 2: shares rock 1/4, paper 1/2, scissors 1/4 make every answer worth 0
+    wager = np.array([[0, -1, 2], [1, 0, -1], [-2, 1, 0]])
+    ((x, y),) = found(wager, -wager)
+    assert (x, y) == (near([0.25, 0.5, 0.25]), near([0.25, 0.5, 0.25]))
+
+
+def test_dominated_strategies__are_played_in_no_equilibrium():
+    # Row 1 is better than row 2 everywhere; without row 2 column 1 is better than column 0; then row 0 is best.
+    ego = np.array([[4, 3], [3, 1], [0, 0]])
+    non_ego = np.array([[1, 2], [0, 1], [9, 0]])
+    assert found(ego, non_ego) == [([1, 0, 0], [0, 1])]
+
+
+def test_constant_game__every_profile_is_an_equilibrium_and_the_first_is_chosen():
+    same = np.full((2, 3), 7.0)
+    pure = [(x.tolist(), y.tolist()) for x in np.eye(2) for y in np.eye(3)]
+    assert [each for each in found(same, same) if each in pure] == pure
+    x, y = equilibrium_shares(same, same)
+    assert (x.tolist(), y.tolist()) == ([1, 0], [1, 0, 0])
+
+
+def test_degenerate_game__its_equilibria_of_supports_of_unequal_size_are_found():
+    # the non-ego's columns tie where the ego plays its first row alone, which it may as long as 2 y1 <= 1
+    ego, non_ego = np.array([[1, 1], [0, 2]]), np.array([[3, 3], [1, 0]])
+    for x, y in found(ego, non_ego):
+        assert max(regrets(ego, non_ego, Equilibrium(np.array(x), np.array(y)))) <= 1e-9
+    assert ([1, 0], [1, 0]) in found(ego, non_ego)
+    assert any(x == near([1, 0]) and y == near([0.5, 0.5]) for x, y in found(ego, non_ego))
+
+
+def test_one_strategy_each__is_the_equilibrium():
+    assert found(np.array([[-3.0]]), np.array([[2.0]])) == [([1], [1])]
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("offset", [-1e4, 0.0, 1e4])
+def test_equilibria__do_not_depend_on_the_unit_or_zero_of_payoffs(scale, offset):
+    if scale == 1e-6:
+        offset *= scale  # or the payoffs drown in the rounding of the offset
+    first = found(*SEXES)
+    moved = found(SEXES[0] * scale + offset, SEXES[1] * scale - offset)
+    assert [np.concatenate(each) == pytest.approx(np.concatenate(other), abs=1e-6) for each, other in zip(
+        first, moved, strict=True
+    )] == [True] * 3  # fmt: skip
+
+
+# --- what is returned, whatever the game ---
+
+sizes = st.tuples(st.integers(1, 4), st.integers(1, 4))
+
+
+@st.composite
+def games(draw):
+    """Two matrices of one shape; of few numbers, so that ties are frequent, or of any."""
+    numbers = draw(st.sampled_from([st.integers(-1, 1).map(float), st.floats(-50, 50, width=32)]))
+    shape = draw(sizes)
+    return tuple(draw(arrays(np.float64, shape, elements=numbers)) for _ in range(2))
+
+
+@settings(deadline=None, max_examples=60)
+@given(games())
+def test_solve__finds_an_equilibrium_and_each_has_no_regret(game):
+    solution = solve(*game)
+    assert solution.equilibria
+    for each in solution.equilibria:
+        for shares, length in ((each.ego_shares, game[0].shape[0]), (each.non_ego_shares, game[0].shape[1])):
+            assert shares.shape == (length,)
+            assert (shares >= 0).all()
+            assert shares.sum() == pytest.approx(1)
+        for regret, payoffs in zip(regrets(*game, each), game, strict=True):
+            assert regret <= 1.01 * TOLERANCE * np.ptp(payoffs) + 1e-14 * np.abs(payoffs).max()
+
+
+@settings(deadline=None, max_examples=25)
+@given(games())
+def test_equilibrium_shares__are_those_of_the_highest_ego_payoff_and_always_the_same(game):
+    x, y = equilibrium_shares(*game)
+    best = max(each.ego_shares @ game[0] @ each.non_ego_shares for each in solve(*game).equilibria)
+    assert x @ game[0] @ y == pytest.approx(best, abs=1e-5 * max(np.ptp(game[0]), 1e-9))
+    again = equilibrium_shares(*game)
+    assert (again[0].tolist(), again[1].tolist()) == (x.tolist(), y.tolist())
+
+
+@settings(deadline=None, max_examples=25)
+@given(games())
+def test_the_integer_program__finds_an_equilibrium_by_itself(game):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(nash, "MOST_SUPPORTS", 0)
+        patch.setattr(nash, "_pure", lambda shape: iter(()))
+        solution = solve(*game)
+    assert not solution.went_through_all_supports
+    assert solution.equilibria
+    best = max(each.ego_shares @ game[0] @ each.non_ego_shares for each in solution.equilibria)
+    every = solve(*game).equilibria
+    assert best >= max(each.ego_shares @ game[0] @ each.non_ego_shares for each in every) - 1e-4 * np.ptp(game[0])
+
+
+def test_solve__a_game_of_too_many_supports_is_solved_all_the_same():
+    random = np.random.default_rng(3)
+    game = random.normal(size=(9, 8)), random.normal(size=(9, 8))
+    solution = solve(*game)
+    assert not solution.went_through_all_supports
+    assert solution.equilibria
+
+
+# --- what is no game, and what is not found ---
+
+
+def test_solve__what_does_not_verify_is_not_returned(monkeypatch):
+    everything_is_one = iter([(np.array([1.0, 0.0]), np.array([1.0, 0.0]))])
+    monkeypatch.setattr(nash, "_by_supports", lambda *game: everything_is_one)
+    for name in ("_by_vertices", "_by_integer_program"):
+        monkeypatch.setattr(nash, name, lambda *game: iter([(np.array([np.nan, 0.0]), np.array([0.0, 0.0]))]))
+    assert solve(PENNIES, -PENNIES).equilibria == ()
+    with pytest.raises(NoEquilibrium):
+        equilibrium_shares(PENNIES, -PENNIES)
+
+
+@pytest.mark.parametrize(
+    ("ego", "non_ego"),
+    [
+        (np.array([[1.0, np.nan]]), np.zeros((1, 2))),
+        (np.zeros((1, 2)), np.array([[1.0, np.inf]])),
+        (np.zeros((2, 2)), np.zeros((2, 3))),
+        (np.zeros((0, 2)), np.zeros((0, 2))),
+        (np.zeros(2), np.zeros(2)),
+    ],
+)
+def test_solve__a_missing_payoff_is_no_number(ego, non_ego):
+    with pytest.raises(ValueError, match=r"payoff is missing|no \("):
+        solve(ego, non_ego)

@@ -1,0 +1,324 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from harness.evaluation.comparison import COMPARISON_COLUMNS, METRICS, Verdict, compare, holm
+from harness.evaluation.research_questions import Question
+
+RQ1 = Question("RQ1", "speedy", 1, "naive_alone", "naive_vs_speedy")
+RQ2 = Question("RQ2", "speedy", 1, "naive_vs_speedy", "retrained_vs_speedy")
+
+p_value_lists = st.lists(st.floats(0, 1) | st.just(math.nan), max_size=12)
+
+
+def games(arm, failed, speed=None, seed=1, first_episode=0):
+    """Games of one arm; None is an empty cell."""
+    count = len(failed)
+    return pd.DataFrame(
+        {
+            "arm": arm,
+            "seed": seed,
+            "episode": range(first_episode, first_episode + count),
+            "ego_outcome": ["collision" if cell else "goal" for cell in failed],
+            "ego_failed": pd.array(failed, dtype="Int64"),
+            "ego_mean_speed_mps": np.array([20.0] * count if speed is None else speed, dtype=float),
+            "error": "",
+        }
+    )
+
+
+def both_metrics(question, *arms, significance=0.01):
+    failure, mean_speed = compare([question], pd.concat(arms), significance).to_dict("records")
+    return failure, mean_speed
+
+
+def same(value, expected):
+    return value == pytest.approx(expected, rel=1e-12, nan_ok=True)
+
+
+def test_compare__agrees_with_the_arithmetic_on_paper():
+    # failure differences, treatment - baseline: 1, 1, 0, 1, 0, 1, 0, -1 (n = 8)
+    # mean = (4 - 1) / 8 = 0.375; squares sum to 5; variance = (5 - 8 * 0.375**2) / 7 = 3.875 / 7
+    baseline = games("naive_alone", [0, 0, 0, 0, 1, 0, 0, 1])
+    treatment = games("naive_vs_speedy", [1, 1, 0, 1, 1, 1, 0, 0])
+    row, _ = both_metrics(RQ1, baseline, treatment)
+    deviation = math.sqrt(3.875 / 7)
+    assert (row["pairs"], row["pairs_left_out"]) == (8, 0)
+    assert same(row["mean_difference"], 0.375)
+    assert same(row["effect_size"], 0.375 / deviation)
+    assert same(row["t"], 0.375 / (deviation / math.sqrt(8)))  # 1.42557
+    assert row["t"] == pytest.approx(1.42557, abs=1e-5)
+    # Student's t with 7 degrees of freedom: 97.5 % quantile 2.364624 (printed tables: 2.365)
+    assert row["ci_low"] == pytest.approx(0.375 - 2.364624 * deviation / math.sqrt(8), abs=1e-6)
+    assert row["ci_high"] == pytest.approx(0.375 + 2.364624 * deviation / math.sqrt(8), abs=1e-6)
+    # McNemar: 5 discordant pairs, 4 for H1; P(X >= 4 | 5, 1/2) = (5 + 1) / 32
+    assert same(row["mcnemar_p"], 6 / 32)
+    assert not row["rejects_h0"]
+    assert row["verdict"] == "not significant"
+
+
+def test_compare__p_value_of_two_degrees_of_freedom_has_its_closed_form():
+    # speeds 1, 2, 6 slower: mean 3, variance (4 + 1 + 9)/2 = 7, t = 3 / sqrt(7/3); for 2 degrees of freedom
+    # P(T > t) = 1/2 - t / (2 sqrt(2 + t**2))
+    baseline = games("naive_alone", [0, 0, 0], speed=[20, 20, 20])
+    treatment = games("naive_vs_speedy", [0, 0, 0], speed=[19, 18, 14])
+    _, row = both_metrics(RQ1, baseline, treatment)
+    t = 3 / math.sqrt(7 / 3)
+    assert same(row["t"], t)
+    assert row["p_value"] == pytest.approx(0.5 - t / (2 * math.sqrt(2 + t**2)), rel=1e-9)
+    assert math.isnan(row["mcnemar_p"])
+
+
+@pytest.mark.parametrize("question", [RQ1, RQ2])
+def test_compare__agrees_with_pandas_and_scipy_on_the_same_games(question):
+    random = np.random.default_rng(20)
+    count = 100
+    arms = [
+        games(arm, random.random(count) < rate, random.normal(speed, 3, count))
+        for arm, rate, speed in [
+            (question.baseline, 0.1, 21),
+            (question.treatment, 0.3, 20),
+        ]
+    ]
+    episodes = pd.concat(arms).sample(frac=1, random_state=3)
+    for metric, row in zip(METRICS, both_metrics(question, episodes), strict=True):
+        wide = episodes.pivot(index="episode", columns="arm", values=metric.column).astype(float)
+        more, less = wide[question.treatment], wide[question.baseline]
+        if (question.question, metric.name) in {("RQ1", "mean_speed"), ("RQ2", "failure")}:
+            more, less = less, more
+        test = stats.ttest_rel(more, less, alternative="greater")
+        interval = stats.ttest_rel(more, less).confidence_interval(0.95)
+        difference = more - less
+        assert same(row["mean_difference"], difference.mean())
+        assert (same(row["t"], test.statistic), same(row["p_value"], test.pvalue)) == (True, True)
+        assert (same(row["ci_low"], interval.low), same(row["ci_high"], interval.high)) == (True, True)
+        assert same(row["effect_size"], difference.mean() / difference.std())
+        if metric.name == "failure":
+            counts = pd.crosstab(more, less)
+            in_favour, against = counts.loc[1.0, 0.0], counts.loc[0.0, 1.0]
+            assert same(row["mcnemar_p"], stats.binom.sf(in_favour - 1, in_favour + against, 0.5))
+
+
+def test_compare__worse_is_positive_for_rq1_and_better_is_positive_for_rq2():
+    calm = [0] * 10, np.linspace(20, 22, 10)
+    hurt = [1, 0, 1, 1, 0, 1, 0, 1, 1, 0], np.linspace(15, 19, 10)
+    arms = games("naive_alone", *calm), games("naive_vs_speedy", *hurt), games("retrained_vs_speedy", *calm)
+    table = compare([RQ1, RQ2], pd.concat(arms), 0.05)
+    assert list(zip(table["question"], table["metric"], strict=True)) == [
+        ("RQ1", "failure"),
+        ("RQ1", "mean_speed"),
+        ("RQ2", "failure"),
+        ("RQ2", "mean_speed"),
+    ]
+    assert table["mean_difference"].tolist() == pytest.approx([0.6, 4.0, 0.6, 4.0])
+    assert table["rejects_h0"].all()
+
+
+def test_compare__a_change_against_h1_is_never_significant():
+    arms = (
+        games("naive_alone", [1] * 9 + [0], speed=np.linspace(10, 12, 10)),
+        games("naive_vs_speedy", [0] * 10, speed=np.linspace(20, 25, 10)),
+    )
+    for row in both_metrics(RQ1, *arms, significance=0.05):
+        assert row["mean_difference"] < 0
+        assert row["p_value"] > 0.99
+        assert (row["rejects_h0"], row["verdict"]) == (False, "not significant")
+
+
+def test_compare__pairs_with_an_error_an_empty_value_or_one_side_only_are_left_out_and_counted():
+    baseline = games("naive_alone", [0, 0, 0, 0, 0, 0], speed=[20, 20, np.nan, 20, 20, 20])
+    treatment = games("naive_vs_speedy", [1, 0, 1, None, 1, 1], speed=[18, 17, 16, 15, 14, 13])
+    treatment.loc[0, "ego_outcome"] = "error"  # its values must not count, whatever they are
+    baseline.loc[1, "error"] = "the simulator died"
+    treatment.loc[5, "episode"] = 6  # episodes 5 and 6 are in one arm only
+    failure, mean_speed = both_metrics(RQ1, baseline, treatment)
+    assert (failure["pairs"], failure["pairs_left_out"]) == (2, 5)  # 2 and 4 of 0..6
+    assert (mean_speed["pairs"], mean_speed["pairs_left_out"]) == (2, 5)  # 3 and 4
+    assert failure["mean_difference"] == 1
+    assert mean_speed["mean_difference"] == 5.5
+
+
+def test_compare__pairs_by_episode_whatever_the_order_of_rows():
+    baseline = games("naive_alone", [0, 0, 0, 0], speed=[20, 21, 22, 23])
+    treatment = games("naive_vs_speedy", [0, 0, 0, 0], speed=[19, 19, 19, 19])
+    in_order = compare([RQ1], pd.concat([baseline, treatment]), 0.01)
+    reversed_order = compare([RQ1], pd.concat([baseline, treatment.iloc[::-1]]).reset_index(drop=True), 0.01)
+    pd.testing.assert_frame_equal(in_order, reversed_order)
+
+
+def test_compare__training_seeds_are_not_mixed():
+    other_seed = Question("RQ1", "speedy", 2, "naive_alone", "naive_vs_speedy")
+    episodes = pd.concat(
+        [
+            games("naive_alone", [0, 0, 0]),
+            games("naive_vs_speedy", [1, 0, 0]),
+            games("naive_alone", [0, 0, 0], seed=2),
+            games("naive_vs_speedy", [1, 1, 0], seed=2),
+        ]
+    )
+    table = compare([RQ1, other_seed], episodes, 0.01)
+    failures = table[table["metric"] == "failure"]
+    assert failures["mean_difference"].tolist() == pytest.approx([1 / 3, 2 / 3])
+
+
+def test_compare__an_arm_that_was_never_played_leaves_out_every_pair():
+    failure, mean_speed = both_metrics(RQ1, games("naive_alone", [0, 0, 1]))
+    for row in (failure, mean_speed):
+        assert (row["pairs"], row["pairs_left_out"]) == (0, 3)
+        assert math.isnan(row["mean_difference"])
+        assert (row["rejects_h0"], row["verdict"]) == (False, "not enough pairs")
+
+
+def test_compare__one_pair_is_not_enough():
+    failure, _ = both_metrics(RQ1, games("naive_alone", [0]), games("naive_vs_speedy", [1]))
+    assert (failure["pairs"], failure["mean_difference"]) == (1, 1)
+    assert all(math.isnan(failure[column]) for column in ("t", "p_value", "ci_low", "mcnemar_p"))
+    assert failure["verdict"] == "not enough pairs"
+
+
+def test_compare__equal_arms_are_no_difference():
+    for row in both_metrics(RQ1, games("naive_alone", [0] * 100), games("naive_vs_speedy", [0] * 100)):
+        assert row["mean_difference"] == 0
+        untested = ("t", "p_value", "p_holm", "effect_size", "ci_low", "ci_high")
+        assert all(math.isnan(row[column]) for column in untested)
+        assert (row["rejects_h0"], row["verdict"]) == (False, "no difference")
+
+
+def test_compare__equal_differences_that_are_not_zero_have_no_t_and_are_never_significant():
+    arms = games("naive_alone", [0] * 10, [20.0] * 10), games("naive_vs_speedy", [1] * 10, [19.0] * 10)
+    failure, mean_speed = both_metrics(RQ1, *arms)
+    for row in (failure, mean_speed):
+        assert row["mean_difference"] == 1
+        assert math.isnan(row["t"])
+        assert math.isnan(row["p_value"])
+        assert math.isnan(row["p_holm"])
+        assert (row["rejects_h0"], row["verdict"]) == (False, "no t statistic: all differences equal")
+    assert same(failure["mcnemar_p"], 2.0**-10)  # which does exist
+
+
+def test_compare__rounding_is_no_spread():
+    speed = np.random.default_rng(1).uniform(10, 30, 50)
+    arms = games("naive_alone", [0] * 50, speed), games("naive_vs_speedy", [0] * 50, speed - 0.1)
+    assert np.ptp(speed - (speed - 0.1)) > 0
+    _, row = both_metrics(RQ1, *arms)
+    assert math.isnan(row["t"])
+    assert row["verdict"] == "no t statistic: all differences equal"
+
+
+def test_compare__verdict_says_when_only_the_uncorrected_p_value_is_significant():
+    # the failure row's p-value lies between 0.025 and 0.05, and there are two tests: Holm doubles it
+    random = np.random.default_rng(5).normal(0, 1, 40)
+    arms = (
+        games("naive_alone", [0] * 40, speed=20 + random),
+        games("naive_vs_speedy", [1, 1, 1] + [0] * 37, speed=20 + random[::-1]),
+    )
+    failure, mean_speed = both_metrics(RQ1, *arms, significance=0.05)
+    assert 0.025 < failure["p_value"] < 0.05 < mean_speed["p_value"]
+    assert same(failure["p_holm"], 2 * failure["p_value"])
+    assert (failure["rejects_h0"], failure["verdict"]) == (
+        True,
+        "significant before Holm's correction only",
+    )
+
+
+def test_compare__holm_is_over_all_rows_that_have_a_p_value():
+    questions = [Question("RQ1", str(k), k, "naive_alone", "naive_vs_x") for k in (1, 2, 3)]
+    random = np.random.default_rng(9)
+    episodes = pd.concat(
+        games(arm, [0] * 20, random.normal(speed, 2, 20), seed=k)
+        for k in (1, 2, 3)
+        for arm, speed in (("naive_alone", 21), ("naive_vs_x", 20))
+    )
+    table = compare(questions, episodes, 0.05)
+    tests = table[table["metric"] == "mean_speed"]
+    first, second, third = tests["p_value"].sort_values()
+    by_hand = [3 * first, max(3 * first, 2 * second), max(3 * first, 2 * second, third)]
+    assert sorted(tests["p_holm"]) == pytest.approx([min(p, 1) for p in by_hand])
+    assert table.loc[table["metric"] == "failure", "p_holm"].isna().all()
+
+
+def test_compare__columns_and_dtypes_are_those_of_the_table_even_when_empty():
+    episodes = pd.concat([games("naive_alone", [0, 1]), games("naive_vs_speedy", [1, 1])])
+    for table in (compare([RQ1], episodes, 0.01), compare([], episodes, 0.01)):
+        assert {name: str(dtype) for name, dtype in table.dtypes.items()} == COMPARISON_COLUMNS
+
+
+@pytest.mark.parametrize("significance", [0, 1, -0.01, math.nan])
+def test_compare__refuses_a_significance_that_is_none(significance):
+    with pytest.raises(ValueError, match="significance"):
+        compare([RQ1], games("naive_alone", [0]), significance)
+
+
+def test_compare__refuses_two_games_of_one_episode():
+    with pytest.raises(ValueError, match="more than once"):
+        compare([RQ1], pd.concat([games("naive_alone", [0]), games("naive_alone", [1])]), 0.01)
+
+
+@given(
+    failed=st.lists(st.sampled_from([0, 1, None]), min_size=1, max_size=20),
+    speeds=st.lists(st.floats(0, 60) | st.just(math.nan), min_size=20, max_size=20),
+    significance=st.floats(0.001, 0.999),
+)
+@settings(max_examples=50, deadline=None)
+def test_compare__an_arm_against_itself_rejects_nothing(failed, speeds, significance):
+    itself = [Question(rq, "x", 1, "naive_vs_x", "naive_vs_x") for rq in ("RQ1", "RQ2")]
+    table = compare(itself, games("naive_vs_x", failed, speeds[: len(failed)]), significance)
+    assert not table["rejects_h0"].any()
+    assert set(table["verdict"]) <= {Verdict.NO_DIFFERENCE.value, Verdict.NOT_ENOUGH_PAIRS.value}
+    assert (table["pairs"] + table["pairs_left_out"] == len(failed)).all()
+
+
+def test_compare__random_arms_without_a_difference_are_rejected_as_often_as_significance_says():
+    random = np.random.default_rng(2024)
+    campaigns, count = 600, 60
+    arms, questions = [], []
+    for k in range(campaigns):
+        start = random.normal(20, 2, count)  # the pair's common start, so that pairs correlate
+        for arm in ("one", "other"):
+            arms.append(games(arm, random.random(count) < 0.2, start + random.normal(0, 1, count), seed=k))
+        questions.append(Question("RQ1", "x", k, "one", "other"))
+    table = compare(questions, pd.concat(arms), 0.05)
+    three_deviations = 3 * math.sqrt(0.05 * 0.95 / campaigns)
+    assert table.groupby("metric")["rejects_h0"].mean().max() < 0.05 + three_deviations
+    assert (table["p_holm"] < 0.05).sum() == 0
+    # a campaign of the paper has 8 tests: at least one false one in at most 5 % of campaigns
+    families = table["p_value"].to_numpy().reshape(-1, 8)
+    assert np.mean([holm(family).min() < 0.05 for family in families]) < 0.05 + 3 * math.sqrt(
+        0.05 * 0.95 / len(families)
+    )
+
+
+def test_holm__agrees_with_the_arithmetic_on_paper():
+    # ascending: 0.005 * 4 = 0.02; 0.01 * 3 = 0.03; 0.03 * 2 = 0.06; 0.04 * 1 = 0.04 -> 0.06, it may not fall
+    adjusted = holm(np.array([0.01, 0.04, 0.03, 0.005]))
+    assert adjusted.tolist() == pytest.approx([0.03, 0.06, 0.06, 0.02])
+
+
+def test_holm__leaves_out_what_was_not_tested_and_caps_at_one():
+    # two tests: 0.4 * 2 = 0.8; 0.9 * 1 = 0.9; and three of 0.5: 1.5 -> 1
+    assert holm(np.array([0.9, math.nan, 0.4])).tolist() == pytest.approx([0.9, math.nan, 0.8], nan_ok=True)
+    assert holm(np.array([0.5, 0.5, 0.5])).tolist() == [1, 1, 1]
+
+
+@given(p_value_lists)
+def test_holm__is_at_least_the_p_value_and_at_most_one_and_keeps_the_order(p_values):
+    p = np.array(p_values, dtype=float)
+    adjusted = holm(p)
+    tested = ~np.isnan(p)
+    assert (np.isnan(adjusted) == ~tested).all()
+    assert (adjusted[tested] >= p[tested]).all()
+    assert (adjusted[tested] <= 1).all()
+    assert (np.diff(adjusted[tested][np.argsort(p[tested])]) >= 0).all()
+
+
+@given(p_value_lists.flatmap(lambda p: st.tuples(st.just(p), st.permutations(range(len(p))))))
+def test_holm__does_not_depend_on_the_order_of_the_tests(p_values_and_order):
+    p, order = np.array(p_values_and_order[0], dtype=float), list(p_values_and_order[1])
+    np.testing.assert_array_equal(holm(p[order]), holm(p)[order])

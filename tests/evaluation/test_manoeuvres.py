@@ -1,0 +1,530 @@
+"""Manoeuvres in hand-drawn games: every rule where it just holds, and where it just doesn't."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.environments.rollout import Arm, assess
+from harness.evaluation.manoeuvres import (
+    NAMES,
+    Manoeuvre,
+    find_manoeuvres,
+    manoeuvres_in,
+    pair_of,
+    pairs_in,
+    rows_of,
+    thresholds,
+)
+from harness.evaluation.tables import MANOEUVRE_COLUMNS, typed
+from harness.game.arrays import FloatArray, IntArray
+from harness.traffic.scene import OpenScene
+from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, build_scene
+
+STEP_S = 0.1
+LENGTH_M, WIDTH_M, WHEELBASE_M = 4.6, 1.8, 2.7
+ENDING_Y, THROUGH_Y = -4.8, -1.6  # lanes of the merge, whose right one ends at x 100
+SIZES = {"car": (LENGTH_M, WIDTH_M), "van": (6.0, 2.0)}
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    """Two lanes that go on for 300 m."""
+    return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
+
+
+def car(
+    name: str,
+    x_m: float,
+    y_m: float | FloatArray = THROUGH_Y,
+    speed_mps: float | FloatArray = 12.0,
+    steps: int = 60,
+    *,
+    heading_rad: float | FloatArray | None = None,
+    steering_rad: float | FloatArray = 0.0,
+    lapsed: tuple[int, int] = (0, 0),
+    outcome: str = "",
+    kind: str = "car",
+) -> pd.DataFrame:
+    """A car's rows: it begins at `x_m`, is at `y_m` in every step, its nose where it goes; the last has `outcome`."""
+    time = np.arange(steps)
+    speed = np.broadcast_to(np.asarray(speed_mps, dtype=float), steps)
+    y = np.broadcast_to(np.asarray(y_m, dtype=float), steps)
+    x = x_m + np.concatenate(([0.0], np.cumsum(speed[1:]) * STEP_S))
+    headings = np.arctan2(np.gradient(y), np.maximum(np.gradient(x), 1e-6)) if heading_rad is None else heading_rad
+    return pd.DataFrame(
+        {
+            "episode": 0,
+            "step": time,
+            "time_s": time * STEP_S,
+            "player": name,
+            "vehicle_type": kind,
+            "x_m": x,
+            "y_m": y,
+            "heading_rad": headings,
+            "speed_mps": speed,
+            "acceleration_mps2": np.diff(speed, prepend=speed[:1]) / STEP_S,
+            "steering_rad": steering_rad,
+            "lapsed": (time >= lapsed[0]) & (time < lapsed[1]),
+            "outcome": np.where(time == steps - 1, outcome, ""),
+        }
+    )
+
+
+def across(begin_m: float, end_m: float, first: int, last: int, steps: int = 60) -> FloatArray:
+    """[T] y that goes over from one to the other, evenly between two steps."""
+    return np.interp(np.arange(steps), [first, last], [begin_m, end_m])
+
+
+def named(scene: OpenScene, *cars: pd.DataFrame) -> list[Manoeuvre]:
+    trace = pd.concat(cars).sort_values(["step", "player"], ignore_index=True)
+    return find_manoeuvres(trace, scene.world, SIZES)
+
+
+def only(found: Sequence[Manoeuvre], player: str, name: str) -> list[Manoeuvre]:
+    return [each for each in found if (each.player, each.manoeuvre) == (player, name)]
+
+
+def names(found: Sequence[Manoeuvre], player: str) -> list[str]:
+    return [each.manoeuvre for each in found if each.player == player]
+
+
+# --- cut_in -----------------------------------------------------------------------------------------------------------
+
+
+def cutting_in(gap_m: float, speed_mps: float = 12.0, **changes: Any) -> list[pd.DataFrame]:
+    """The non-ego goes over into the ego's lane so far ahead of it, bumper to bumper where it enters its way (step
+    24); the ego drives at 12 m/s."""
+    ahead = gap_m + LENGTH_M - (speed_mps - 12.0) * 24 * STEP_S
+    return [
+        car("ego", 5.0),
+        car("non_ego", 5.0 + ahead, across(ENDING_Y, THROUGH_Y, 15, 35), speed_mps, heading_rad=0.0, **changes),
+    ]
+
+
+def test_cut_in__says_when_how_near_and_how_soon(merge: OpenScene) -> None:
+    (found,) = only(named(merge, *cutting_in(10.0, 8.0)), "non_ego", "cut_in")
+    assert found.time_s == 2.4  # from then on their middles are less than 1.8 m apart across the road
+    assert found.gap_m == pytest.approx(10.0, abs=0.3)
+    assert found.ttc_s == pytest.approx(10.0 / 4.0)
+    assert found.until_s == 3.2  # within half a metre of the ego's way
+    assert found.text == f"cuts in {found.gap_m:.1f} m ahead, TTC {found.ttc_s:.1f} s"
+
+
+@pytest.mark.parametrize(
+    ("gap_m", "speed_mps", "cuts_in"),
+    [
+        (17.5, 12.0, True),  # 1.5 s at 12 m/s are 18 m
+        (18.5, 12.0, False),
+        (30.0, 4.0, True),  # 8 m/s slower: 3.75 s to the collision
+        (34.0, 4.0, False),  # 4.25 s
+    ],
+)
+def test_cut_in__only_within_the_stated_gap_or_time_to_collision(
+    gap_m: float, speed_mps: float, cuts_in: bool, merge: OpenScene
+) -> None:
+    assert bool(only(named(merge, *cutting_in(gap_m, speed_mps)), "non_ego", "cut_in")) == cuts_in
+
+
+def test_cut_in__of_the_ego_too(merge: OpenScene) -> None:
+    ego, non_ego = (each.assign(player=name) for each, name in zip(cutting_in(8.0), ("non_ego", "ego"), strict=True))
+    found = named(merge, ego, non_ego)
+    assert len(only(found, "ego", "cut_in")) == 1
+    assert not only(found, "non_ego", "cut_in")
+
+
+def test_cut_in__not_by_who_is_ahead_while_the_other_comes_over(merge: OpenScene) -> None:
+    cars = [car("ego", 5.0, across(ENDING_Y, THROUGH_Y, 15, 35)), car("non_ego", 18.0)]
+    found = named(merge, *cars)
+    assert not only(found, "non_ego", "cut_in")
+    assert not only(found, "ego", "cut_in")  # it comes in behind
+
+
+@pytest.mark.parametrize("ahead_m", [0.5, 30.0])
+def test_cut_in__not_by_who_is_there_from_the_start(ahead_m: float, merge: OpenScene) -> None:
+    assert not only(named(merge, car("ego", 5.0), car("non_ego", 5.0 + LENGTH_M + ahead_m)), "non_ego", "cut_in")
+
+
+def test_cut_in__in_a_lapse_it_is_a_drift(merge: OpenScene) -> None:
+    found = named(merge, *cutting_in(8.0, lapsed=(15, 36)))
+    assert "cut_in" not in names(found, "non_ego")
+    assert "drift" in names(found, "non_ego")
+
+
+# --- hard_brake -------------------------------------------------------------------------------------------------------
+
+
+def braking(deceleration_mps2: float, first: int, last: int, steps: int = 60) -> FloatArray:
+    slowed = np.clip(np.arange(steps) - first, 0, last - first) * STEP_S * deceleration_mps2
+    return np.maximum(14.0 - slowed, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("deceleration_mps2", "steps", "expected"),
+    [(4.0, 3, 1), (3.9, 10, 0), (4.5, 2, 0), (8.0, 10, 1)],
+)
+def test_hard_brake__by_deceleration_and_duration(
+    deceleration_mps2: float, steps: int, expected: int, straight: OpenScene
+) -> None:
+    speed = braking(deceleration_mps2, 20, 20 + steps)
+    found = only(named(straight, car("ego", 20.0, RIGHT_Y, speed)), "ego", "hard_brake")
+    assert len(found) == expected
+    if found:
+        assert (found[0].time_s, found[0].until_s) == (pytest.approx(2.1), pytest.approx(2.0 + steps * STEP_S))
+        assert found[0].text == f"brakes at up to {deceleration_mps2:.1f} m/s²"
+        assert np.isnan(found[0].gap_m)
+        assert np.isnan(found[0].ttc_s)
+
+
+def test_hard_brake__a_normal_stop_has_no_name(straight: OpenScene) -> None:
+    assert named(straight, car("ego", 20.0, RIGHT_Y, braking(3.0, 5, 60))) == []
+
+
+def test_hard_brake__a_short_pause_makes_no_second_one(straight: OpenScene) -> None:
+    speed = 14.0 - 0.5 * np.cumsum(np.isin(np.arange(60), [10, 11, 12, 16, 17, 18, 40, 41, 42]))
+    found = only(named(straight, car("ego", 20.0, RIGHT_Y, speed)), "ego", "hard_brake")
+    assert [(each.time_s, each.until_s) for each in found] == [(1.0, 1.8), (4.0, 4.2)]
+
+
+# --- swerve -----------------------------------------------------------------------------------------------------------
+
+
+def swerving(lateral_mps2: float, turned_deg: float, steps: int = 60, side: float = 1.0) -> pd.DataFrame:
+    """Steers for half a second from step 20 on, after which it has turned so far."""
+    steering = np.arctan(WHEELBASE_M * lateral_mps2 / 12.0**2)
+    wheel = np.where((np.arange(steps) >= 20) & (np.arange(steps) < 25), side * steering, 0.0)
+    heading = side * np.radians(turned_deg) * np.clip((np.arange(steps) - 19) / 5, 0, 1)
+    return car("ego", 20.0, RIGHT_Y, heading_rad=heading, steering_rad=wheel)
+
+
+@pytest.mark.parametrize(
+    ("lateral_mps2", "turned_deg", "swerves"),
+    [(2.1, 3.1, True), (1.9, 6.0, False), (2.1, 2.9, False), (5.0, 8.0, True)],
+)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_swerve__by_lateral_acceleration_and_heading(
+    lateral_mps2: float, turned_deg: float, side: float, swerves: bool, straight: OpenScene
+) -> None:
+    found = only(named(straight, swerving(lateral_mps2, turned_deg, side=side)), "ego", "swerve")
+    assert len(found) == swerves
+    if found:
+        assert (found[0].time_s, found[0].until_s) == (2.0, 2.4)
+        assert ("left" if side > 0 else "right") in found[0].text
+
+
+def test_swerve__straightening_up_is_none(straight: OpenScene) -> None:
+    """Turned to the right, it steers to the left until it follows the road."""
+    heading = np.radians(-8.0) * (1.0 - np.clip((np.arange(60) - 19) / 5, 0, 1))
+    wheel = np.where((np.arange(60) >= 20) & (np.arange(60) < 25), 0.08, 0.0)
+    assert not only(named(straight, car("ego", 20.0, heading_rad=heading, steering_rad=wheel)), "ego", "swerve")
+
+
+def test_swerve__following_a_bend_is_none(tmp_path: Path) -> None:
+    """A quarter circle of radius 30 m at 10 m/s takes 3.3 m/s2."""
+    angles = np.linspace(0.0, 0.5 * np.pi, 30)
+    points = [(0.0, 0.0), *zip(150 + 30 * np.sin(angles), 30 - 30 * np.cos(angles), strict=True), (180.0, 180.0)]
+    shape = " ".join(f"{x:.3f},{y:.3f}" for x, y in points)
+    scene = build_scene(
+        tmp_path / "bend",
+        STRAIGHT_NODES.replace('x="300" y="0"', 'x="180" y="180"'),
+        f'<edge id="road" from="a" to="b" numLanes="2" speed="13.89" spreadType="center" shape="{shape}"/>',
+        STRAIGHT,
+    )
+    routes = scene.world.road.routes
+    station = 60.0 + np.arange(150)  # through the bend, 1 m a step, on the line of its route
+    rows = routes.first_row[0] + np.rint((station + 100.0) / 0.5).astype(int)
+    steering = np.where((station > 148.0) & (station < 198.0), np.arctan(WHEELBASE_M / 30.0), 0.0)
+    drawn = car("ego", 0.0, 0.0, 10.0, 150, heading_rad=routes.heading_rad[rows], steering_rad=steering)
+    drawn = drawn.assign(x_m=routes.x_m[rows], y_m=routes.y_m[rows])
+    assert not only(named(scene, drawn), "ego", "swerve")
+    turned = np.where(station > 100.0, np.radians(10.0), 0.0)  # the same wheel, where the road is straight
+    astray = drawn.assign(heading_rad=drawn["heading_rad"] + turned, steering_rad=np.roll(steering, -45))
+    assert only(named(scene, astray), "ego", "swerve")
+
+
+# --- drift ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("moved_m", "drifts"), [(0.52, True), (0.48, False), (0.0, False), (-0.52, True)])
+def test_drift__a_lapse_in_which_the_car_moves_sideways(moved_m: float, drifts: bool, straight: OpenScene) -> None:
+    y = across(RIGHT_Y, RIGHT_Y + moved_m, 9, 40)
+    found = only(named(straight, car("non_ego", 20.0, y, lapsed=(10, 41))), "non_ego", "drift")
+    assert len(found) == drifts
+    if found:
+        side = "left" if moved_m > 0 else "right"
+        assert (found[0].time_s, found[0].until_s) == (1.0, 4.0)
+        assert found[0].text == f"drifts {abs(moved_m):.1f} m to the {side} in a lapse of attention"
+
+
+def test_drift__over_into_the_next_lane_is_one_movement(straight: OpenScene) -> None:
+    y = across(RIGHT_Y + 1.2, RIGHT_Y + 2.4, 9, 40)  # 1.6 m is half way
+    (found,) = only(named(straight, car("non_ego", 20.0, y, lapsed=(10, 41))), "non_ego", "drift")
+    assert "1.2 m to the left" in found.text
+
+
+def test_drift__what_a_driver_steers_is_none(straight: OpenScene) -> None:
+    wheel = 0.01 * np.sin(np.arange(60))
+    y = across(RIGHT_Y, LEFT_Y, 10, 40)
+    assert not only(named(straight, car("non_ego", 20.0, y, steering_rad=wheel)), "non_ego", "drift")
+
+
+@pytest.mark.parametrize(
+    ("still_steps", "begin_m", "moved_m", "drifts"),
+    [
+        (21, 0.2, 0.6, True),  # 0.8 m from the middle of the lane
+        (18, 0.2, 0.6, False),  # for less than 2 s
+        (21, 0.0, 0.6, False),  # still within the lane
+        (21, 0.6, 0.4, False),  # hardly moves
+    ],
+)
+def test_drift__the_wheel_held_still_out_of_the_lane(
+    still_steps: int, begin_m: float, moved_m: float, drifts: bool, straight: OpenScene
+) -> None:
+    wheel = 0.01 * np.sin(np.arange(60))
+    wheel[10 : 10 + still_steps] = wheel[9]
+    y = across(RIGHT_Y + begin_m, RIGHT_Y + begin_m + moved_m, 9, 9 + still_steps)
+    y[10 + still_steps :] = RIGHT_Y
+    found = only(named(straight, car("non_ego", 20.0, y, steering_rad=wheel)), "non_ego", "drift")
+    assert len(found) == drifts
+
+
+def test_drift__a_lane_change_of_sumos_is_none(straight: OpenScene) -> None:
+    """SUMO has no wheel: its drivers' is recorded as 0."""
+    assert named(straight, car("non_ego", 20.0, across(RIGHT_Y, LEFT_Y, 10, 40))) == []
+
+
+# --- overtake ---------------------------------------------------------------------------------------------------------
+
+
+def overtaking(behind_m: float, ahead_m: float, steps: int = 50) -> list[pd.DataFrame]:
+    """From so far behind the ego's middle to so far ahead of it, beside it."""
+    gains = (behind_m + ahead_m) / ((steps - 1) * STEP_S)
+    ego = car("ego", 20.0, THROUGH_Y, 10.0, steps)
+    return [ego, car("non_ego", 20.0 - behind_m, ENDING_Y, 10.0 + gains, steps)]
+
+
+@pytest.mark.parametrize(
+    ("behind_m", "ahead_m", "overtakes"),
+    [
+        (6.0, 6.0, True),
+        (2.1, 4.7, True),
+        (1.9, 6.0, False),  # was beside it all along
+        (6.0, 4.5, False),  # not wholly past
+        (6.0, -0.5, False),
+    ],
+)
+def test_overtake__from_behind_until_wholly_ahead(
+    behind_m: float, ahead_m: float, overtakes: bool, merge: OpenScene
+) -> None:
+    found = only(named(merge, *overtaking(behind_m, ahead_m)), "non_ego", "overtake")
+    assert len(found) == overtakes
+
+
+def test_overtake__says_from_when_to_when(merge: OpenScene) -> None:
+    (found,) = only(named(merge, *overtaking(6.0, 6.0)), "non_ego", "overtake")
+    assert found.time_s == pytest.approx((6.0 - LENGTH_M) / 12.0 * 4.9, abs=0.11)
+    assert found.until_s == pytest.approx((6.0 + LENGTH_M) / 12.0 * 4.9, abs=0.11)
+    assert found.text.startswith("overtakes on the lane that ends, 5")  # draws level 55 m before it
+
+
+def test_overtake__only_on_a_lane_that_ends(straight: OpenScene, merge: OpenScene) -> None:
+    ego, non_ego = overtaking(6.0, 6.0)
+    assert "overtake" not in names(named(straight, ego, non_ego), "non_ego")
+    on_the_lane_that_goes_on = [ego.assign(y_m=ENDING_Y), non_ego.assign(y_m=THROUGH_Y)]
+    assert "overtake" not in names(named(merge, *on_the_lane_that_goes_on), "non_ego")
+
+
+# --- tailgate ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("time_gap_s", "speed_mps", "steps", "tailgates"),
+    [(0.95, 12.0, 21, True), (1.05, 12.0, 60, False), (0.5, 12.0, 19, False), (0.5, 4.9, 60, False)],
+)
+def test_tailgate__by_time_gap_duration_and_speed(
+    time_gap_s: float, speed_mps: float, steps: int, tailgates: bool, straight: OpenScene
+) -> None:
+    gap_m = time_gap_s * speed_mps
+    cars = [
+        car("ego", 20.0 + LENGTH_M + gap_m, RIGHT_Y, speed_mps, steps),
+        car("non_ego", 20.0, RIGHT_Y, speed_mps, steps),
+    ]
+    found = only(named(straight, *cars), "non_ego", "tailgate")
+    assert len(found) == tailgates
+    if found:
+        assert found[0].gap_m == pytest.approx(gap_m, abs=0.3)
+        assert found[0].text == f"follows as close as {time_gap_s:.1f} s" or time_gap_s == 0.95
+
+
+def test_tailgate__of_anyone(straight: OpenScene) -> None:
+    cars = [car("flow.0", 31.0, RIGHT_Y, kind="van"), car("ego", 20.0, RIGHT_Y)]
+    (found,) = only(named(straight, *cars), "ego", "tailgate")
+    assert found.gap_m == pytest.approx(11.0 - 3.0 - 2.3, abs=0.3)
+
+
+# --- forced_stop ------------------------------------------------------------------------------------------------------
+
+
+def stopping(at_x_m: float, to_mps: float = 1.0, steps: int = 60) -> tuple[float, FloatArray]:
+    """Where to begin, and speeds from 12 m/s down by 3 m/s2 to `to_mps` at that place, and stay there."""
+    speed = np.maximum(12.0 - 0.3 * np.arange(steps), to_mps)
+    slow = int(np.flatnonzero(speed <= 2.2)[0])
+    return at_x_m - speed[1 : slow + 1].sum() * STEP_S, np.where(np.arange(steps) <= slow + 3, speed, 0.0)
+
+
+@pytest.mark.parametrize(("before_m", "forced"), [(14.0, True), (17.0, False)])
+def test_forced_stop__at_the_end_of_the_lane(before_m: float, forced: bool, merge: OpenScene) -> None:
+    x, speed = stopping(100.0 - before_m)
+    found = only(named(merge, car("non_ego", x, ENDING_Y, speed)), "non_ego", "forced_stop")
+    assert len(found) == forced
+    if found:
+        assert "before its lane ends" in found[0].text
+
+
+@pytest.mark.parametrize(("gap_m", "forced"), [(9.0, True), (12.0, False)])
+def test_forced_stop__behind_another(gap_m: float, forced: bool, straight: OpenScene) -> None:
+    x, speed = stopping(100.0)
+    cars = [car("ego", x, RIGHT_Y, speed), car("non_ego", 100.0 + LENGTH_M + gap_m, RIGHT_Y, 0.0)]
+    found = only(named(straight, *cars), "ego", "forced_stop")
+    assert len(found) == forced
+    if found:
+        assert found[0].text.endswith("m behind another")
+        assert found[0].gap_m <= 9.1
+
+
+def test_forced_stop__not_on_an_open_road_nor_slowly_nor_for_who_never_drove(straight: OpenScene) -> None:
+    x, speed = stopping(100.0)
+    assert named(straight, car("ego", x, RIGHT_Y, speed)) == []
+    ahead = car("non_ego", 108.0, RIGHT_Y, 0.0)
+    assert not only(named(straight, car("ego", x, RIGHT_Y, np.maximum(speed, 2.3)), ahead), "ego", "forced_stop")
+    assert not only(named(straight, car("ego", 100.0, RIGHT_Y, 2.0, 20), ahead), "ego", "forced_stop")
+
+
+# --- what is looked at ------------------------------------------------------------------------------------------------
+
+
+def test_find__ends_with_the_egos_game(straight: OpenScene) -> None:
+    speed = braking(5.0, 40, 50)
+    brakes = car("non_ego", 20.0, LEFT_Y, speed)
+    assert names(named(straight, brakes), "non_ego") == ["hard_brake"]
+    fails = car("ego", 60.0, RIGHT_Y, steps=30, outcome="rail")
+    assert named(straight, brakes, fails) == []
+
+
+def test_find__a_wreck_does_nothing(straight: OpenScene) -> None:
+    driving, wreck = car("non_ego", 20.0, RIGHT_Y, steps=30, outcome="rail"), car("non_ego", 60.0, RIGHT_Y, 0.0, 60)
+    wreck = wreck.assign(acceleration_mps2=-9.0, outcome="rail").iloc[30:]
+    assert named(straight, driving, wreck) == []
+
+
+def test_find__by_the_time_it_begins(merge: OpenScene) -> None:
+    cars = cutting_in(3.0)
+    cars[0]["acceleration_mps2"] = np.where(np.arange(60) >= 30, -6.0, 0.0)
+    found = named(merge, *cars)
+    assert [each.time_s for each in found] == sorted(each.time_s for each in found)
+    assert {"cut_in", "hard_brake"} <= {each.manoeuvre for each in found}
+
+
+def test_table__holds_the_manoeuvres_whole(merge: OpenScene) -> None:
+    found = named(merge, *cutting_in(10.0, 8.0))
+    rows = rows_of(found, arm="naive_vs_x", persona="x", seed=1, episode=7)
+    table = typed(pd.DataFrame(rows, columns=list(MANOEUVRE_COLUMNS)))
+    assert [repr(each) for each in manoeuvres_in(table)] == [repr(each) for each in found]
+    assert set(pairs_in(table)) == {("naive_vs_x", 1, 7)}
+
+
+# --- pairs ------------------------------------------------------------------------------------------------------------
+
+
+def done(player: str, name: str, time_s: float, until_s: float) -> Manoeuvre:
+    return Manoeuvre(player, name, time_s, until_s, np.nan, np.nan, "")
+
+
+DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4.5)
+
+
+@pytest.mark.parametrize(
+    ("found", "expected"),
+    [
+        ([], "- -> - -> rail"),
+        ([DRIFT], "drift -> - -> rail"),
+        ([SWERVE], "- -> swerve -> rail"),
+        ([DRIFT, SWERVE], "drift -> swerve -> rail"),
+        ([SWERVE, DRIFT], "drift -> swerve -> rail"),
+        # startled by the ego's answer: that is not what it answered
+        ([DRIFT, SWERVE, done("non_ego", "hard_brake", 4.8, 5.2)], "drift -> swerve -> rail"),
+        # the ego had recovered, then came something new
+        ([DRIFT, SWERVE, done("non_ego", "cut_in", 6.6, 7.0)], "cut in -> - -> rail"),
+        # what it still did when the cause came counts
+        (
+            [done("ego", "tailgate", 1.0, 8.0), done("non_ego", "hard_brake", 7.0, 8.0)],
+            "hard brake -> tailgate -> rail",
+        ),
+        ([done("ego", "tailgate", 1.0, 3.0), done("non_ego", "cut_in", 7.0, 8.0)], "cut in -> - -> rail"),
+        ([DRIFT, SWERVE, done("ego", "hard_brake", 5.0, 5.5)], "drift -> hard brake -> rail"),
+        # what was over long before is not answered
+        ([done("non_ego", "overtake", 0.0, 1.0), done("ego", "swerve", 6.5, 7.0)], "- -> swerve -> rail"),
+    ],
+)
+def test_pair__what_the_non_ego_did_and_how_the_ego_answered(found: list[Manoeuvre], expected: str) -> None:
+    assert f"{pair_of(found).words} -> rail" == expected
+
+
+def test_pair__nothing_after_the_end() -> None:
+    assert pair_of([DRIFT, SWERVE], ended_s=3.9).words == "drift -> -"
+
+
+# --- the paper's figure 4, played -------------------------------------------------------------------------------------
+
+
+class Scripted:
+    """Turns the wheel as its script says, step by step, and keeps its speed."""
+
+    takes_over = True
+
+    def __init__(self, wheel: Sequence[float]) -> None:
+        self._wheel, self._step = wheel, 0
+
+    def begin(self, games: IntArray) -> None:
+        self._step = 0
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        wheel = self._wheel[min(self._step, len(self._wheel) - 1)]
+        self._step += 1
+        return np.tile([0.0, wheel], (len(games), 1))
+
+
+def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path, merge: OpenScene) -> None:
+    """Figure 4: the non-ego "enters a distracted state as their vehicle is drifting sideways"; the ego "swerves away
+    and collides with the guard rail"."""
+    careful, distracted = (
+        read_document(repository / "personas" / f"{name}.toml", Persona) for name in ("careful", "distracted")
+    )
+    drivers = (Scripted([0.0] * 30 + [0.9] * 10), Scripted([0.0]))
+    arm = Arm("naive_vs_distracted", merge, drivers, (careful, distracted), 1)
+    stories = {}
+    for game in assess(arm, 12):
+        assert game.trace is not None
+        trace = pd.DataFrame(dict(game.trace))
+        words = pair_of(find_manoeuvres(trace, merge.world)).words
+        stories[game.record["episode"]] = f"{words} -> {game.record['ego_outcome']}"
+    assert "drift -> swerve -> rail" in stories.values(), stories
+
+
+# --- the page about them ----------------------------------------------------------------------------------------------
+
+
+def test_docs__state_every_rule_and_number(repository: Path) -> None:
+    page = (repository / "docs" / "manoeuvres.md").read_text(encoding="utf-8")
+    stated = {name: float(value) for name, value in re.findall(r"^\| `([A-Z_0-9]+)` \| ([0-9.]+) \|", page, re.M)}
+    numbers = {name: value for name, value in vars(thresholds).items() if name.isupper()}
+    assert stated == {name: pytest.approx(value, rel=5e-3) for name, value in numbers.items()}
+    assert re.findall(r"^\| `([a-z_]+)` \|", page, re.M) == list(NAMES)

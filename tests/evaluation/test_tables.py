@@ -1,0 +1,273 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from harness.errors import UsageError
+from harness.evaluation.comparison import compare
+from harness.evaluation.research_questions import Question
+from harness.evaluation.summary import summarise
+from harness.evaluation.tables import SUMMARY_COLUMNS, TABLES, read_csv, typed, write_csv
+
+WHOLE = st.integers(-(2**62), 2**62)
+CELLS = {
+    "object": st.text('a",\r\n', max_size=4)
+    | st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=8),
+    "int64": WHOLE,
+    "Int64": WHOLE | st.none(),
+    "float64": st.floats(),
+    "bool": st.booleans(),
+}
+
+
+def game(arm="naive_alone", episode=0, **cells):
+    """One row of episodes.csv; what is not named can't be measured."""
+    row = {"arm": arm, "persona": "", "seed": 1, "episode": episode, "ego_outcome": "goal", "ego_failed": 0}
+    row |= {"non_ego_outcome": "", "error": ""}
+    return row | cells
+
+
+def episodes_of(*games):
+    return typed(pd.DataFrame(list(games), columns=list(TABLES["episodes"])))
+
+
+@st.composite
+def tables(draw):
+    columns = draw(st.sampled_from(list(TABLES.values())))
+    count = draw(st.integers(0, 4))
+    return typed(
+        pd.DataFrame(
+            {
+                name: pd.Series(draw(st.lists(CELLS[dtype], min_size=count, max_size=count)), dtype=object)
+                for name, dtype in columns.items()
+            }
+        )
+    )
+
+
+def test_summarise__agrees_with_the_arithmetic_on_paper():
+    (row,) = summarise(
+        episodes_of(
+            game(episode=0, ego_mean_speed_mps=20.0, ego_min_ttc_s=3.0, ego_payoff=1.0),
+            game(episode=1, ego_mean_speed_mps=22.0, ego_min_ttc_s=5.0, ego_payoff=2.0),
+            game(episode=2, ego_outcome="collision", ego_failed=1, ego_mean_speed_mps=15.0, ego_payoff=-6.0),
+            game(episode=3, ego_outcome="error", ego_failed=None, error="the simulator died", ego_payoff=99.0),
+        )
+    ).to_dict("records")
+    assert (row["episodes"], row["errors"]) == (4, 1)
+    assert row["failure_rate"] == 1 / 3
+    # Clopper-Pearson for 1 of 3: low solves P(X >= 1) = 1 - (1 - p)**3 = 0.025;
+    # high solves P(X <= 1) = (1 - p)**2 * (1 + 2 p) = 0.025
+    assert row["failure_rate_low"] == pytest.approx(1 - 0.975 ** (1 / 3))
+    high = row["failure_rate_high"]
+    assert (1 - high) ** 2 * (1 + 2 * high) == pytest.approx(0.025)
+    assert (row["collisions"], row["rails"], row["timeouts"]) == (1, 0, 0)
+    # speeds 20, 22, 15: mean 19, variance (1 + 9 + 16) / 2 = 13; t quantile for 2 degrees of freedom 4.302653
+    assert row["mean_speed_mps"] == 19
+    assert row["mean_speed_low_mps"] == pytest.approx(19 - 4.302653 * math.sqrt(13 / 3), abs=1e-5)
+    assert row["mean_speed_high_mps"] == pytest.approx(19 + 4.302653 * math.sqrt(13 / 3), abs=1e-5)
+    assert row["min_ttc_s"] == 4  # of the two games in which there was one
+    assert row["ego_payoff"] == -1  # the errored game's number is not in it
+    assert math.isnan(row["trailing_distance_m"])
+
+
+def test_summarise__agrees_with_pandas_and_scipy_on_the_same_games():
+    random = np.random.default_rng(4)
+    outcomes = random.choice(["goal", "collision", "rail", "timeout", "error"], 200)
+    episodes = episodes_of(
+        *(
+            game(
+                "naive_vs_speedy",
+                episode,
+                persona="speedy",
+                ego_outcome=outcome,
+                ego_failed=None if outcome == "error" else int(outcome != "goal"),
+                ego_mean_speed_mps=random.normal(20, 3),
+                ego_max_deceleration_mps2=random.uniform(0, 8),
+                non_ego_outcome="error" if outcome == "error" else str(random.choice(["goal", "rail"])),
+                non_ego_payoff=random.normal(),
+            )
+            for episode, outcome in enumerate(outcomes)
+        )
+    )
+    row = summarise(episodes).iloc[0]
+    played = episodes[episodes["ego_outcome"] != "error"]
+    assert row["errors"] == (outcomes == "error").sum()
+    for outcome, column in (("collision", "collisions"), ("rail", "rails"), ("timeout", "timeouts")):
+        assert row[column] == (outcomes == outcome).sum()
+    for column, hits in (
+        ("failure_rate", played["ego_failed"] == 1),
+        ("non_ego_goal_rate", played["non_ego_outcome"] == "goal"),
+    ):
+        count, total = int(hits.sum()), len(hits)
+        assert row[column] == pytest.approx(hits.mean())
+        assert row[f"{column}_low"] == pytest.approx(stats.beta.ppf(0.025, count, total - count + 1))
+        assert row[f"{column}_high"] == pytest.approx(stats.beta.ppf(0.975, count + 1, total - count))
+    speed = played["ego_mean_speed_mps"]
+    interval = stats.t.interval(0.95, len(speed) - 1, loc=speed.mean(), scale=stats.sem(speed))
+    assert (row["mean_speed_low_mps"], row["mean_speed_high_mps"]) == pytest.approx(interval)
+    assert row["max_deceleration_mps2"] == pytest.approx(played["ego_max_deceleration_mps2"].mean())
+    assert row["non_ego_payoff"] == pytest.approx(played["non_ego_payoff"].mean())
+
+
+def test_summarise__no_failure_in_100_games_still_has_an_upper_bound():
+    (row,) = summarise(episodes_of(*(game(episode=k) for k in range(100)))).to_dict("records")
+    assert (row["failure_rate"], row["failure_rate_low"]) == (0, 0)
+    assert row["failure_rate_high"] == pytest.approx(1 - 0.025 ** (1 / 100))  # (1 - p)**100 = 0.025
+
+
+def test_summarise__arms_are_in_order_of_first_appearance_with_their_seeds():
+    rows = [
+        game("naive_vs_sumo"),
+        game("naive_alone"),
+        game("naive_vs_sumo", seed=2),
+        game("naive_alone", seed=2),
+    ]
+    table = summarise(episodes_of(*rows))
+    assert list(zip(table["arm"], table["seed"], strict=True)) == [
+        ("naive_vs_sumo", 1),
+        ("naive_vs_sumo", 2),
+        ("naive_alone", 1),
+        ("naive_alone", 2),
+    ]
+
+
+def test_summarise__an_arm_without_ego_has_empty_ego_cells_not_zeros():
+    alone = {"persona": "speedy", "ego_outcome": "", "ego_failed": None, "non_ego_outcome": "goal"}
+    (row,) = summarise(episodes_of(game("speedy_alone", 0, **alone), game("speedy_alone", 1, **alone))).to_dict(
+        "records"
+    )
+    assert (row["episodes"], row["errors"], row["non_ego_goal_rate"]) == (2, 0, 1)
+    for column in ("failure_rate", "failure_rate_high", "collisions", "rails", "timeouts", "mean_speed_mps"):
+        assert pd.isna(row[column])
+
+
+def test_summarise__an_arm_that_only_errored_has_no_rates():
+    error = {"ego_outcome": "error", "ego_failed": None, "error": "lost"}
+    (row,) = summarise(episodes_of(game(**error))).to_dict("records")
+    assert (row["episodes"], row["errors"]) == (1, 1)
+    assert pd.isna(row["failure_rate"])
+    assert pd.isna(row["collisions"])
+
+
+def test_summarise__of_no_games_is_an_empty_summary():
+    table = summarise(episodes_of())
+    assert {name: str(dtype) for name, dtype in table.dtypes.items()} == SUMMARY_COLUMNS
+    assert len(table) == 0
+
+
+def test_write_csv__writes_exactly_these_bytes(tmp_path):
+    path = tmp_path / "episodes.csv"
+    rows = (
+        game(ego_mean_speed_mps=0.1 + 0.2, duration_s=12.0),
+        game(episode=1, ego_outcome="error", ego_failed=None, error='no "lane",\nat all', ego_payoff=-1e-17),
+    )
+    write_csv(episodes_of(*rows), path)
+    assert path.read_bytes().decode() == (
+        ",".join(TABLES["episodes"]) + "\n"
+        "naive_alone,,1,0,goal,0,0.30000000000000004,,,,,,,,,,12.0,\n"
+        'naive_alone,,1,1,error,,,,,,,,-1e-17,,,,,"no ""lane"",\nat all"\n'
+    )
+
+
+def test_write_csv__truth_values_are_true_and_false(tmp_path):
+    path = tmp_path / "comparisons.csv"
+    episodes = episodes_of(game("a"), game("a", 1), game("b"), game("b", 1))
+    write_csv(compare([Question("RQ1", "x", 1, "a", "b")], episodes, 0.01), path)
+    assert path.read_text().splitlines()[1] == "RQ1,x,1,failure,2,0,0.0,,,,,,,1.0,false,no difference"
+
+
+def test_write_csv__puts_columns_in_the_order_of_the_table(tmp_path):
+    table = episodes_of(game())
+    write_csv(table, tmp_path / "one.csv")
+    write_csv(table[table.columns[::-1]], tmp_path / "other.csv")
+    assert (tmp_path / "one.csv").read_bytes() == (tmp_path / "other.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": 1.5}, "seed"),
+        ({"seed": None}, "seed"),
+        ({"arm": 3}, "arm"),
+        ({"ego_payoff": "much"}, "ego_payoff"),
+        ({"ego_pay_off": 1.0}, r"nearest is episodes: missing \[\], unknown \['ego_pay_off'\]"),
+    ],
+)
+def test_write_csv__refuses_what_the_table_can_not_hold_and_keeps_the_old_file(tmp_path, change, message):
+    path = tmp_path / "episodes.csv"
+    write_csv(episodes_of(game()), path)
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match=message):
+        write_csv(episodes_of(game()).assign(**change), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_write_csv__a_failure_to_write_leaves_the_old_file_and_no_other(tmp_path, monkeypatch):
+    path = tmp_path / "episodes.csv"
+    write_csv(episodes_of(game()), path)
+    before = path.read_bytes()
+
+    def full(_descriptor):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr("os.fsync", full)
+    with pytest.raises(OSError, match="no space"):
+        write_csv(episodes_of(game(), game(episode=1)), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_write_csv__a_message_that_is_no_unicode_does_not_lose_the_table(tmp_path):
+    path = tmp_path / "episodes.csv"
+    write_csv(episodes_of(game(error="file \udcff")), path)
+    assert read_csv(path)["error"].tolist() == ["file \\udcff"]
+
+
+@given(table=tables())
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_read_csv__gives_back_what_was_written(tmp_path, table):
+    path = tmp_path / "table.csv"
+    write_csv(table, path)
+    again = read_csv(path)
+    pd.testing.assert_frame_equal(again, table, check_exact=True)
+    first = path.read_bytes()
+    write_csv(again, path)
+    assert path.read_bytes() == first
+
+
+def test_read_csv__empty_text_is_text_and_an_empty_number_is_nan(tmp_path):
+    path = tmp_path / "episodes.csv"
+    write_csv(episodes_of(game(persona="", ego_failed=None)), path)
+    row = read_csv(path).iloc[0]
+    assert (row["persona"], row["error"]) == ("", "")
+    assert row["ego_failed"] is pd.NA
+    assert math.isnan(row["ego_payoff"])
+
+
+def test_read_csv__agrees_with_pandas_reading_the_same_file(tmp_path):
+    path = tmp_path / "episodes.csv"
+    random = np.random.default_rng(8)
+    write_csv(episodes_of(*(game(episode=k, ego_payoff=random.normal()) for k in range(20))), path)
+    by_pandas = pd.read_csv(path, float_precision="round_trip", keep_default_na=False)
+    assert read_csv(path)["ego_payoff"].tolist() == by_pandas["ego_payoff"].tolist()
+
+
+@pytest.mark.parametrize("text", ["", "arm,persona\n", "half\n", ",".join(TABLES["training"]) + "\nnaive,,1,100\n"])
+def test_read_csv__what_is_no_table_is_the_users_mistake_and_names_the_file(tmp_path, text):
+    path = tmp_path / "training.csv"
+    path.write_text(text)
+    with pytest.raises(UsageError, match=r"training\.csv"):
+        read_csv(path)
+
+
+def test_read_csv__a_missing_file_is_the_users_mistake_and_names_the_file(tmp_path):
+    with pytest.raises(UsageError, match=r"episodes\.csv"):
+        read_csv(tmp_path / "episodes.csv")

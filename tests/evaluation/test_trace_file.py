@@ -1,0 +1,89 @@
+"""Traces on disk: written game by game, there whole or not at all, read back as they were."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from harness.evaluation.trace_file import SCHEMA, TraceWriter, read_trace
+
+
+def game(episode: int, steps: int = 3) -> dict[str, list[Any]]:
+    rows = range(steps)
+    return {
+        "episode": [episode] * steps,
+        "step": list(rows),
+        "time_s": [0.1 * k for k in rows],
+        "player": ["ego"] * steps,
+        "vehicle_type": ["car"] * steps,
+        "x_m": [1 / 3 + k for k in rows],
+        "y_m": [-1.6] * steps,
+        "heading_rad": [0.1] * steps,
+        "speed_mps": [10.0] * steps,
+        "acceleration_mps2": [0.0] * steps,
+        "steering_rad": [0.01] * steps,
+        "lapsed": [k == 1 for k in rows],
+        "outcome": [""] * (steps - 1) + ["goal"],
+    }
+
+
+def write(path: Path, *games: dict[str, list[Any]]) -> None:
+    with TraceWriter(path) as traces:
+        for each in games:
+            traces.add(each)
+
+
+def test_trace__comes_back_exactly(tmp_path: Path) -> None:
+    file = tmp_path / "naive_alone-seed1.parquet"
+    write(file, game(0), game(1, steps=5), game(2))
+    trace = read_trace(file, 1)
+    assert list(trace.columns) == SCHEMA.names
+    pd.testing.assert_frame_equal(trace, pd.DataFrame(game(1, steps=5)), check_dtype=False)
+    assert trace["player"].tolist() == ["ego"] * 5
+    assert trace["outcome"].tolist()[-2:] == ["", "goal"]
+    assert trace["lapsed"].dtype == bool
+
+
+def test_trace__an_episode_that_is_not_there_is_empty(tmp_path: Path) -> None:
+    write(tmp_path / "t.parquet", game(0))
+    assert read_trace(tmp_path / "t.parquet", 7).empty
+
+
+def test_trace__no_games_at_all_is_a_file_too(tmp_path: Path) -> None:
+    write(tmp_path / "t.parquet")
+    trace = read_trace(tmp_path / "t.parquet", 0)
+    assert trace.empty
+    assert list(trace.columns) == SCHEMA.names
+
+
+def test_trace__equal_games_are_equal_bytes(tmp_path: Path) -> None:
+    write(tmp_path / "a.parquet", game(0), game(1))
+    write(tmp_path / "b.parquet", game(0), game(1))
+    assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
+
+
+def test_trace_writer__an_arm_that_was_cut_short_leaves_what_was_there_before(tmp_path: Path) -> None:
+    file = tmp_path / "t.parquet"
+    write(file, game(0))
+    before = file.read_bytes()
+
+    def cut_short() -> None:
+        with TraceWriter(file) as traces:
+            traces.add(game(0))
+            raise RuntimeError("cut short")
+
+    with pytest.raises(RuntimeError, match="cut short"):
+        cut_short()
+    assert file.read_bytes() == before
+    assert [each.name for each in tmp_path.iterdir()] == ["t.parquet"]
+
+
+def test_trace_writer__a_column_that_is_missing_is_an_error(tmp_path: Path) -> None:
+    incomplete = game(0)
+    del incomplete["speed_mps"]
+    with pytest.raises(KeyError):
+        write(tmp_path / "t.parquet", incomplete)
+    assert list(tmp_path.iterdir()) == []

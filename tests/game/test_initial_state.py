@@ -1,0 +1,148 @@
+"""How a game starts: everything that is left to chance, and that chance hangs on names alone."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from harness.game.attention import Attention, Habits
+from harness.game.initial_state import Chances, Place, Start, draw_start
+from harness.game.seeding import generator_of, seed_of
+from harness.traffic.scene import OpenScene
+
+TEXTING = Attention(2.0, (1.0, 2.0), 0.02)
+
+
+@pytest.fixture(scope="module")
+def chances(merge: OpenScene) -> Chances:
+    return merge.chances((Habits(), Habits()), (1.0, 1.0))
+
+
+def starts(chances: Chances, games: int = 200) -> list[Start]:
+    return [draw_start(chances, "test", 1, "episode", k) for k in range(games)]
+
+
+def test_start__is_within_the_ranges_of_the_scene(chances: Chances) -> None:
+    drawn = starts(chances)
+    positions = np.array([each.position_m for each in drawn])
+    speeds = np.array([each.speed_mps for each in drawn])
+    beside = positions[:, 1] - positions[:, 0]
+    for values, low, high in ((positions[:, 0], 30.0, 45.0), (beside, -8.0, 8.0), (speeds, 11.0, 14.0)):
+        assert values.min() >= low
+        assert values.max() <= high
+        assert values.max() - values.min() > 0.9 * (high - low)  # and the whole of the range is used
+
+
+def test_start__is_on_the_lane_with_the_bumper_at_the_position(chances: Chances) -> None:
+    for each in starts(chances, 20):
+        assert each.x_m == pytest.approx(each.position_m - 2.3)  # the centre of 4.6 m
+        assert each.y_m == pytest.approx([-1.6, -4.8])  # lanes 1 and 0
+        assert each.heading_rad == pytest.approx([0.0, 0.0])
+
+
+def test_start__the_same_parts_give_the_same_start(chances: Chances) -> None:
+    one, two = draw_start(chances, "a", 1), draw_start(chances, "a", 1)
+    for field in fields(Start):
+        if field.name not in ("lapses", "variation"):
+            assert np.array_equal(getattr(one, field.name), getattr(two, field.name))
+    assert np.array_equal(one.noise, two.noise)
+    assert one.seed == two.seed
+
+
+@pytest.mark.parametrize("parts", [("a", 2), ("b", 1), (1, "a"), ("a", "1"), ("a",), ("a", 1, 1)])
+def test_start__other_parts_give_another(chances: Chances, parts: tuple[str | int, ...]) -> None:
+    one, other = draw_start(chances, "a", 1), draw_start(chances, *parts)
+    assert one.position_m[0] != other.position_m[0]
+    assert one.seed != other.seed
+    assert (one.noise != other.noise).any()
+
+
+def test_start__pairs_whoever_drives_and_attends(chances: Chances) -> None:
+    texting = replace(chances, habits=([Habits()], [Habits(TEXTING)]), present_share=(1.0, 0.0))
+    one, two = draw_start(chances, "a", 1), draw_start(texting, "a", 1)
+    for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "noise", "seed"):
+        assert np.array_equal(getattr(one, name), getattr(two, name))
+    assert not one.lapses[1].lapsed.any()
+    assert two.lapses[1].lapsed.any()
+    assert two.present.tolist() == [True, False]
+
+
+def test_start__one_players_lapses_do_not_hang_on_the_others(chances: Chances) -> None:
+    both = draw_start(replace(chances, habits=([Habits(TEXTING)], [Habits(TEXTING)])), "a", 1)
+    alone = draw_start(replace(chances, habits=([Habits()], [Habits(TEXTING)])), "a", 1)
+    assert (both.lapses[1].lapsed == alone.lapses[1].lapsed).all()
+    assert (both.lapses[0].lapsed != both.lapses[1].lapsed).any()
+
+
+def test_start__a_share_of_games_is_alone(chances: Chances) -> None:
+    drawn = starts(replace(chances, present_share=(1.0, 0.25)), 800)
+    present = np.array([each.present for each in drawn])
+    assert present[:, 0].all()
+    assert present[:, 1].mean() == pytest.approx(0.25, abs=4 * 0.0153)  # sqrt(0.25 * 0.75 / 800)
+
+
+def test_start__has_noise_and_lapses_for_every_step(chances: Chances) -> None:
+    start = draw_start(chances, "a", 1)
+    assert start.noise.shape == (2, 250, 2)  # 25 s in steps of 0.1 s
+    assert replace(start, parts=("b", 1)).noise is start.noise  # drawn once
+    assert [each.lapsed.shape for each in start.lapses] == [(250,), (250,)]
+
+
+def place(line: list[tuple[float, float]], scale: float = 1.0) -> Place:
+    return Place(np.array(line), (0.0, 1.0), False, (0.0, 1.0), scale)
+
+
+@pytest.mark.parametrize(
+    ("position", "x", "y", "heading"),
+    [
+        (6.0, 4.0, 0.0, 0.0),  # bumper at (6, 0), centre 2 m behind
+        (12.0, 10.0, 0.0, np.pi / 2),  # bumper at (10, 2), 2 m round the corner
+        (15.0, 10.0, 3.0, np.pi / 2),
+        (1.0, -1.0, 0.0, 0.0),  # the rear may stand before the lane's start
+        (20.0, 10.0, 8.0, np.pi / 2),  # the very end
+    ],
+)
+def test_pose__along_a_lane_that_bends(position: float, x: float, y: float, heading: float) -> None:
+    pose = place([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)]).pose(position, 4.0)
+    assert pose == pytest.approx((x, y, heading))
+
+
+def test_pose__follows_sumos_own_metres() -> None:
+    # SUMO counts 40 m for a lane that is drawn 20 m long: 30 m of it are drawn at 15 m
+    assert place([(0.0, 0.0), (20.0, 0.0)], scale=0.5).pose(30.0, 4.0) == pytest.approx((13.0, 0.0, 0.0))
+
+
+PART = st.one_of(st.text(max_size=5), st.integers(-5, 5))
+PARTS = st.lists(PART, min_size=1, max_size=4).map(tuple)
+
+
+@settings(max_examples=100)
+@given(PARTS, PARTS)
+def test_seed__differs_whenever_the_parts_do(one: tuple[str | int, ...], two: tuple[str | int, ...]) -> None:
+    assert (seed_of(*one) == seed_of(*two)) == (one == two)
+    assert 0 <= seed_of(*one) < 2**63
+
+
+def test_seed__knows_a_number_from_its_digits_and_where_parts_end() -> None:
+    assert len({seed_of("a", 1), seed_of("a", "1"), seed_of("a1"), seed_of("a", "", "1"), seed_of(1, "a")}) == 5
+
+
+def test_seed__is_the_same_in_every_process_and_release() -> None:
+    # printf 'str:assessment\x1fint:1\x1fstr:episode\x1fint:7' | sha256sum  begins with  a3c78411fec693c7;
+    # another number here means that no old result can be repeated
+    written = bytes.fromhex("a3c78411fec693c7")
+    assert seed_of("assessment", 1, "episode", 7) == int.from_bytes(written, "little") >> 1
+
+
+def test_seed__takes_a_number_from_numpy_for_the_number_it_is() -> None:
+    assert seed_of("episode", np.int64(7)) == seed_of("episode", 7)
+
+
+def test_generator__does_not_hang_on_what_was_drawn_before() -> None:
+    wanted = generator_of("a", 2).random()
+    generator_of("a", 1).random(100)
+    assert generator_of("a", 2).random() == wanted

@@ -1,0 +1,273 @@
+"""What a driver sees: always in [-1, 1], the same wherever on earth, and never more than a windscreen shows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from harness.game.arrays import FloatArray
+from harness.game.observation import AHEAD_M, LAYOUT, OF_OTHERS, OTHERS, SIZE, observe
+from harness.game.quantities import Quantities, World
+from harness.game.road import MARGIN_M, SPACING_M, Rails, Road, Route, Routes
+from harness.game.state import Outcome
+from harness.traffic.scene import OpenScene
+
+Moment = Callable[..., Quantities]
+
+
+@pytest.fixture(scope="module")
+def world(merge: OpenScene) -> World:
+    return merge.world
+
+
+def seen(q: Quantities, player: int = 0) -> Mapping[str, float]:
+    return dict(zip(LAYOUT, observe(q)[0, player].tolist(), strict=True))
+
+
+def car(x: float, y: float = -1.6, **more: Any) -> dict[str, Any]:
+    return {"x_m": x, "y_m": y, **more}
+
+
+def test_layout__names_every_entry_once() -> None:
+    assert len(set(LAYOUT)) == len(LAYOUT) == SIZE
+    assert OF_OTHERS.sum() == OTHERS * 7
+
+
+def test_observation__of_a_car_on_the_merge_road(moment: Moment, world: World) -> None:
+    q = moment(
+        world, [car(60.0, -4.8, speed_mps=12.0, acceleration_mps2=-2.0, steering_rad=0.06), car(84.0, speed_mps=9.0)]
+    )
+    entries = seen(q)
+    expected = {
+        "speed_mps": 12.0 / 30.0,
+        "speed_over_limit": 12.0 / 13.89 - 1.0,
+        "acceleration_mps2": -0.2,
+        "steering_rad": 0.1,  # of 0.6
+        "lane_end_m": 0.4,  # 40 of 100 m
+        "goal_m": 115.0 / 200.0,
+        "path_turned_rad@0m": 0.0,
+        "path_left_m": 0.4,  # the way lies 3.2 of 8 m to the left
+        "free_left_m@0m": 4.8 / 8.0,
+        "free_right_m@0m": -1.6 / 8.0,
+        "free_left_m@20m": (3.2 - 0.9) / 8.0,  # the other car is there
+        "free_right_m@20m": -1.6 / 8.0,
+        "free_right_m@50m": -0.5333 / 8.0,  # at x = 110 the taper is at y = -6.4 + 10 * 3.2 / 30 = -5.3333
+        "other0_seen": 1.0,
+        "other0_ahead_m": 24.0 / 50.0,
+        "other0_left_m": 3.2 / 8.0,
+        "other0_ahead_mps": -0.3,  # 3 of 10 m/s slower
+        "other0_left_mps": 0.0,
+        "other0_turned_sin": 0.0,
+        "other0_turned_cos": 1.0,
+        "other1_seen": 0.0,
+        "other2_turned_cos": 0.0,
+    }
+    for name, value in expected.items():
+        assert entries[name] == pytest.approx(value, abs=2e-3), name
+
+
+COORDINATE = st.floats(-400.0, 400.0)
+CAR = st.fixed_dictionaries(
+    {
+        "x_m": COORDINATE,
+        "y_m": st.one_of(COORDINATE, st.floats(-6.4, 0.0)),
+        "heading_rad": st.floats(-np.pi, np.pi),
+        "speed_mps": st.floats(0.0, 60.0),
+    }
+)
+PLAYER = st.builds(
+    lambda body, more: {**body, **more},
+    CAR,
+    st.fixed_dictionaries(
+        {
+            "acceleration_mps2": st.floats(-15.0, 15.0),
+            "steering_rad": st.floats(-1.2, 1.2),
+            "present": st.booleans(),
+            "outcome": st.sampled_from([int(each) for each in Outcome]),
+        }
+    ),
+)
+
+
+@settings(max_examples=80, deadline=None)
+@given(players=st.lists(PLAYER, min_size=2, max_size=2), others=st.lists(CAR, max_size=5))
+def test_observation__is_finite_and_within_bounds_whatever_happens(
+    moment: Moment, merge: OpenScene, players: list[dict[str, Any]], others: list[dict[str, Any]]
+) -> None:
+    entries = observe(moment(merge.world, players, others))
+    assert entries.shape == (1, 2, SIZE)
+    assert entries.dtype == np.float32
+    assert np.isfinite(entries).all()
+    assert np.abs(entries).max() <= 1.0
+    for p in range(2):
+        if not players[p]["present"]:
+            assert not entries[0, p].any()
+
+
+def test_observation__of_a_player_that_is_not_there_is_zeros(moment: Moment, world: World) -> None:
+    q = moment(world, [car(40.0), car(44.0, -4.8, present=False)])
+    assert not observe(q)[0, 1].any()
+    assert seen(q)["other0_seen"] == 0.0
+    assert seen(q)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
+
+
+@pytest.mark.parametrize(("y", "side", "free"), [(-4.8, "right", -2.3), (-1.6, "left", 2.3)])
+def test_free_width__is_narrowed_by_a_car_alongside_on_its_side(
+    moment: Moment, world: World, y: float, side: str, free: float
+) -> None:
+    # lanes are 3.2 m apart: from the centre of the one to the flank of a car in the other are 3.2 - 0.9 = 2.3 m
+    own = car(50.0, -6.4 - y)
+    alone, beside = (seen(moment(world, [own, car(50.5, y, present=there)])) for there in (False, True))
+    other = {"left": "right", "right": "left"}[side]
+    assert beside[f"free_{side}_m@0m"] == pytest.approx(free / 8.0, abs=1e-3)
+    assert abs(beside[f"free_{side}_m@0m"]) < abs(alone[f"free_{side}_m@0m"])
+    for distance in AHEAD_M:
+        assert beside[f"free_{other}_m@{distance:g}m"] == alone[f"free_{other}_m@{distance:g}m"]
+    assert beside[f"free_{side}_m@30m"] == alone[f"free_{side}_m@30m"]
+
+
+def test_others__come_nearest_first(moment: Moment, world: World) -> None:
+    others = [car(90.0), car(62.0), car(40.0), car(75.0)]
+    entries = seen(moment(world, [car(50.0), car(56.0, -4.8)], others))
+    ahead = [entries[f"other{k}_ahead_m"] * 50.0 for k in range(OTHERS)]
+    assert ahead == pytest.approx([6.0, -10.0, 12.0], abs=1e-3)
+
+
+def test_others__beyond_100_m_are_not_seen(moment: Moment, world: World) -> None:
+    assert seen(moment(world, [car(10.0), car(111.0)]))["other0_seen"] == 0.0
+    assert seen(moment(world, [car(10.0), car(109.0)]))["other0_seen"] == 1.0
+
+
+# --- symmetries ------------------------------------------------------------------------------------------------------
+
+
+def road(world: World, heading: float, x0: float, y0: float, left: float, right: float, lanes: list[float]) -> World:
+    """A straight road 200 m long from anywhere to anywhere."""
+    at = np.arange(-MARGIN_M, 200.0 + MARGIN_M, SPACING_M)
+    n = len(at)
+
+    def line(offset: float) -> FloatArray:
+        x = x0 + at * np.cos(heading) - offset * np.sin(heading)
+        return np.stack((x, y0 + at * np.sin(heading) + offset * np.cos(heading)), axis=1)
+
+    middle = line(0.0)
+    ends = np.where(np.array(lanes) == 0.0, np.inf, 150.0)
+    table = Route(
+        middle[:, 0], middle[:, 1], np.full(n, heading), np.full(n, left), np.full(n, right), np.full(n, 14.0),
+        np.tile(lanes, (n, 1)), np.tile(ends, (n, 1)), 200.0, 180.0,
+    )  # fmt: skip
+    rails = np.concatenate([np.stack((line(side)[:-1:20], line(side)[1::20]), axis=1) for side in (left, right)])
+    return replace(world, road=Road(Rails.of(rails, 20.0), Routes.of([table, table])))
+
+
+def placed(each: dict[str, Any], heading: float, x0: float, y0: float) -> dict[str, Any]:
+    along, left = each["x_m"], each["y_m"]
+    return {
+        **each,
+        "x_m": x0 + along * np.cos(heading) - left * np.sin(heading),
+        "y_m": y0 + along * np.sin(heading) + left * np.cos(heading),
+        "heading_rad": each["heading_rad"] + heading,
+    }
+
+
+def mirrored(each: dict[str, Any]) -> dict[str, Any]:
+    turned = {name: -each[name] for name in ("y_m", "heading_rad", "steering_rad") if name in each}
+    return {**each, **turned}
+
+
+ON_ROAD = st.fixed_dictionaries(
+    {
+        "x_m": st.floats(20.0, 120.0),
+        "y_m": st.floats(-4.0, 4.0),
+        "heading_rad": st.floats(-0.5, 0.5),
+        "speed_mps": st.floats(0.0, 30.0),
+    }
+)
+DRIVEN = st.builds(lambda body, wheel: {**body, "steering_rad": wheel}, ON_ROAD, st.floats(-0.5, 0.5))
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    players=st.lists(DRIVEN, min_size=2, max_size=2),
+    others=st.lists(ON_ROAD, max_size=3),
+    heading=st.floats(-3.0, 3.0),
+    x0=st.floats(-300.0, 300.0),
+    y0=st.floats(-300.0, 300.0),
+)
+def test_observation__is_the_same_wherever_the_road_lies(
+    moment: Moment,
+    merge: OpenScene,
+    players: list[dict[str, Any]],
+    others: list[dict[str, Any]],
+    heading: float,
+    x0: float,
+    y0: float,
+) -> None:
+    sides = sorted(each["y_m"] for each in [*players, *others])
+    assume(min(np.diff(sides)) > 0.01)  # who is exactly ahead is on neither side
+    here = road(merge.world, 0.0, 0.0, 0.0, 1.6, -4.8, [0.0, -3.2])
+    there = road(merge.world, heading, x0, y0, 1.6, -4.8, [0.0, -3.2])
+    one = observe(moment(here, players, others))
+    moved = [[placed(each, heading, x0, y0) for each in some] for some in (players, others)]
+    two = observe(moment(there, *moved))
+    assert close_but_for_ties(one, two)
+
+
+@settings(max_examples=40, deadline=None)
+@given(players=st.lists(DRIVEN, min_size=2, max_size=2), others=st.lists(ON_ROAD, max_size=3))
+def test_observation__of_the_mirror_image_is_the_mirror_image(
+    moment: Moment, merge: OpenScene, players: list[dict[str, Any]], others: list[dict[str, Any]]
+) -> None:
+    sides = sorted(each["y_m"] for each in [*players, *others])
+    assume(min(np.diff(sides)) > 0.01)  # who is exactly ahead is on neither side
+    one = observe(moment(road(merge.world, 0.0, 0.0, 0.0, 1.6, -4.8, [0.0, -3.2]), players, others))
+    image = road(merge.world, 0.0, 0.0, 0.0, 4.8, -1.6, [0.0, 3.2])
+    two = observe(moment(image, [mirrored(each) for each in players], [mirrored(each) for each in others]))
+    names = {name: k for k, name in enumerate(LAYOUT)}
+    back = np.empty_like(two)
+    for name, k in names.items():
+        swapped = name.replace("free_left", "free_?").replace("free_right", "free_left").replace("free_?", "free_right")
+        odd = any(part in name for part in ("left", "right", "turned_rad", "turned_sin", "steering"))
+        back[..., k] = two[..., names[swapped]] * (-1.0 if odd else 1.0)
+    assert close_but_for_ties(one, back)
+
+
+def close_but_for_ties(one: FloatArray, two: FloatArray) -> bool:
+    """Whether observations agree, leaving out the few entries that jump where a car just enters a stretch of road."""
+    return bool((np.abs(one - two) > 1e-3).mean() <= 0.02)
+
+
+# --- no more than a driver could see ---------------------------------------------------------------------------------
+
+
+def test_observation__does_not_show_the_others_hands_or_mind(moment: Moment, world: World) -> None:
+    plain = moment(world, [car(50.0), car(56.0, -4.8)])
+    busy = moment(world, [car(50.0), car(56.0, -4.8, steering_rad=0.3, acceleration_mps2=2.0, lapsed=True)])
+    assert (observe(plain)[0, 0] == observe(busy)[0, 0]).all()
+
+
+def test_observation__shows_a_wreck_as_what_stands_there(moment: Moment, world: World) -> None:
+    wreck = moment(world, [car(50.0), car(70.0, speed_mps=0.0, outcome=Outcome.RAIL)])
+    parked = moment(world, [car(50.0), car(10.0, -4.8)], [car(70.0, speed_mps=0.0)])
+    assert seen(wreck)["other0_ahead_m"] == pytest.approx(0.4)
+    assert seen(wreck)["other0_ahead_mps"] == pytest.approx(-1.0)
+    assert seen(parked)["other0_ahead_m"] == seen(wreck)["other0_ahead_m"]
+
+
+def test_observation__who_overlooks_sees_nobody_beside_or_behind(moment: Moment, world: World) -> None:
+    players = [car(50.0, overlooked_m=1.0), car(50.9, -4.8)]
+    overlooked, looked = moment(world, players), moment(world, [car(50.0), car(50.9, -4.8)])
+    assert seen(overlooked)["other0_seen"] == 0.0
+    assert seen(overlooked)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
+    assert seen(looked)["other0_seen"] == 1.0
+    assert overlooked.touches_vehicle[0, 0] == looked.touches_vehicle[0, 0]  # what is not seen is there all the same
+
+
+def test_observation__who_overlooks_sees_whoever_is_ahead(moment: Moment, world: World) -> None:
+    assert seen(moment(world, [car(50.0, overlooked_m=1.0), car(51.1, -4.8)]))["other0_seen"] == 1.0

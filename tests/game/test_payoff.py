@@ -1,0 +1,359 @@
+"""Equation 1 and each of its terms, by hand, on moments of the merge road (cars are 4.6 m by 1.8 m, steps 0.1 s)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.errors import UsageError
+from harness.game.fuzzy import FuzzyFunction, FuzzySet
+from harness.game.payoff import GROUPS, TERMS, Payoff, Weighted
+from harness.game.quantities import Quantities, World
+from harness.game.state import Outcome
+from harness.traffic.scene import OpenScene
+
+Moment = Callable[..., Quantities]
+
+
+@pytest.fixture(scope="module")
+def world(merge: OpenScene) -> World:
+    return merge.world
+
+
+def car(x: float, y: float = -1.6, **more: Any) -> dict[str, Any]:
+    return {"x_m": x, "y_m": y, **more}
+
+
+FAR = car(190.0)
+
+
+def share(q: Quantities, name: str, limit: float | None = None, weight: float = 1.0) -> float:
+    """What one term is worth to the ego in this step."""
+    payoff = Payoff(dict.fromkeys(GROUPS, 1.0), (Weighted(name, weight, limit),), {})
+    return float(payoff.evaluate(q, 0)[name][0])
+
+
+# --- the terms -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("term", "outcome", "worth"),
+    [
+        ("collision", Outcome.COLLISION, -1.0),
+        ("rail", Outcome.RAIL, -1.0),
+        ("goal", Outcome.GOAL, 1.0),
+        ("timeout", Outcome.TIMEOUT, -1.0),
+    ],
+)
+def test_event__is_worth_its_weight_in_its_own_outcome_alone(
+    moment: Moment, world: World, term: str, outcome: Outcome, worth: float
+) -> None:
+    for each in Outcome:
+        q = moment(world, [car(50.0, outcome=each), FAR])
+        assert share(q, term, weight=7.0) == (7.0 * worth if each is outcome else 0.0)
+
+
+def test_event__of_the_other_player_is_not_the_egos(moment: Moment, world: World) -> None:
+    q = moment(world, [car(50.0), car(90.0, outcome=Outcome.COLLISION)])
+    payoff = Payoff(dict.fromkeys(GROUPS, 1.0), (Weighted("collision", 10.0),), {})
+    assert payoff.total(q, 0).tolist() == [0.0]
+    assert payoff.total(q, 1).tolist() == [-10.0]
+
+
+def test_event__is_not_multiplied_by_the_step_length(moment: Moment, world: World) -> None:
+    for step_s in (0.1, 0.5):
+        q = moment(replace(world, step_s=step_s), [car(50.0, outcome=Outcome.RAIL), FAR])
+        assert share(q, "rail") == -1.0
+
+
+PER_SECOND = [
+    # flanks 0.7 m from the rail at y = 0: 1 - 0.7 / 1.4 = 0.5
+    ("clearance", 1.4, car(50.0), FAR, -0.5),
+    # 1.4 m between the flanks of neighbouring lanes: 1 - 1.4 / 2 = 0.3; the rail, nearer, does not count
+    ("vehicle_clearance", 2.0, car(50.0), car(50.0, -4.8), -0.3),
+    ("vehicle_clearance", 2.0, car(50.0), FAR, 0.0),
+    # 30 m less 4.6 m at 12.7 m/s are 2 s: 1 - 2 / 2.5 = 0.2
+    ("time_gap", 2.5, car(20.0, speed_mps=12.7), car(50.0), -0.2),
+    ("time_gap", 2.0, car(20.0, speed_mps=12.7), car(50.0), 0.0),
+    ("time_gap", 2.5, car(20.0), car(20.0, -4.8), 0.0),  # nobody leads
+    # 25.4 m at 5 m/s nearer are 5.08 s: 1 - 5.08 / 10 = 0.492
+    ("time_to_collision", 10.0, car(20.0, speed_mps=14.0), car(50.0, speed_mps=9.0), -0.492),
+    ("time_to_collision", 10.0, car(20.0, speed_mps=9.0), car(50.0, speed_mps=14.0), 0.0),
+    ("time_to_collision", 10.0, car(50.0), car(52.0), -1.0),  # in contact
+    # 15 % over 13.89 m/s
+    ("speed_over_limit", None, car(50.0, speed_mps=1.15 * 13.89), FAR, -0.15),
+    ("speed_over_limit", None, car(50.0, speed_mps=5.0), FAR, 0.0),
+    # 15 % under it
+    ("speed_under_limit", None, car(50.0, speed_mps=0.85 * 13.89), FAR, -0.15),
+    ("speed_under_limit", None, car(50.0, speed_mps=15.0), FAR, 0.0),
+    ("lane_offset", None, car(50.0, -2.3), FAR, -0.7),
+    # (4 / 10)^2, braking or speeding up
+    ("acceleration", None, car(50.0, acceleration_mps2=-4.0), FAR, -0.16),
+    ("acceleration", None, car(50.0, acceleration_mps2=4.0), FAR, -0.16),
+    # 0.03711437 1/m * 100 = 3.711437 m/s2 (see test_bicycle): 0.3711437^2
+    ("lateral_acceleration", None, car(50.0, steering_rad=-0.1), FAR, -0.13774765),
+    ("time_pressure", None, car(50.0), FAR, -1.0),
+]
+
+
+@pytest.mark.parametrize(("term", "limit", "ego", "other", "rate"), PER_SECOND)
+def test_rate__is_paid_per_second(
+    moment: Moment, world: World, term: str, limit: float | None, ego: Any, other: Any, rate: float
+) -> None:
+    q = moment(world, [ego, other])
+    assert share(q, term, limit) == pytest.approx(rate * 0.1, abs=2e-4)
+    assert share(q, term, limit, weight=3.0) == pytest.approx(3.0 * share(q, term, limit))
+    halved = moment(replace(world, step_s=0.05), [ego, other])
+    assert share(halved, term, limit) == pytest.approx(share(q, term, limit) / 2.0)
+
+
+def test_progress__is_paid_per_100_m_whatever_the_step(moment: Moment, world: World) -> None:
+    for step_s in (0.1, 0.5):
+        q = moment(replace(world, step_s=step_s), [car(50.0), FAR])
+        q.advanced_m = np.array([[1.3, 0.0]])
+        assert share(q, "progress", weight=4.0) == pytest.approx(0.052)
+        q.advanced_m = np.array([[-1.3, 0.0]])
+        assert share(q, "progress", weight=4.0) == pytest.approx(-0.052)
+
+
+def test_terms__all_of_them_are_worked_out_here() -> None:
+    by_hand = {"collision", "rail", "goal", "timeout", "progress", *(each[0] for each in PER_SECOND)}
+    assert by_hand == set(TERMS)
+
+
+def test_terms__only_the_goal_and_progress_are_worth_anything(moment: Moment, world: World) -> None:
+    limits = {"within_m": 5.0, "within_s": 5.0, "": None}
+    for ego in (car(50.0, outcome=Outcome.COLLISION), car(20.0, speed_mps=25.0), car(108.0, -4.8)):
+        for other in (car(52.0), car(30.0), car(54.0, -4.8)):
+            q = moment(world, [ego, other])
+            for name, term in TERMS.items():
+                if name not in ("goal", "progress"):
+                    assert share(q, name, limits[term.parameter]) <= 0.0
+
+
+# --- equation 1 ------------------------------------------------------------------------------------------------------
+
+
+def test_payoff__is_equation_1(moment: Moment, world: World) -> None:
+    thrill = FuzzyFunction("speed_over_limit", (FuzzySet("thrill", (0.0, 0.2), (0.0, 1.0), 6.0),))
+    payoff = Payoff(
+        {"safety": 0.5, "operational": 2.0, "human": 3.0},
+        (
+            Weighted("collision", 10.0),
+            Weighted("clearance", 2.0, 1.4),
+            Weighted("goal", 5.0),
+            Weighted("progress", 4.0),
+            Weighted("time_pressure", 0.25),
+        ),
+        {"thrill": (0.5, thrill)},
+    )
+    q = moment(world, [car(50.0, speed_mps=1.1 * 13.89), FAR])
+    q.advanced_m = np.array([[1.5, 0.0]])
+    shares = {name: float(value[0]) for name, value in payoff.evaluate(q, 0).items()}
+    assert shares == pytest.approx(
+        {
+            "collision": 0.0,
+            "clearance": 0.5 * 2.0 * -0.5 * 0.1,  # a0 * weight * rate * step
+            "goal": 0.0,
+            "progress": 2.0 * 4.0 * 0.015,  # a1 * weight * way / 100 m
+            "time_pressure": 3.0 * 0.25 * -1.0 * 0.1,  # a2 * weight * rate * step
+            "thrill": 3.0 * 0.5 * 6.0 * 0.1,  # a2 * weight * (the average of one set is its value) * step
+        },
+        abs=2e-4,
+    )
+    assert payoff.total(q, 0)[0] == pytest.approx(sum(shares.values()))
+
+
+def test_payoff__a_group_without_weight_counts_for_nothing(moment: Moment, world: World) -> None:
+    q = moment(world, [car(50.0, outcome=Outcome.COLLISION), FAR])
+    payoff = Payoff({"safety": 0.0, "operational": 1.0, "human": 1.0}, (Weighted("collision", 10.0),), {})
+    assert payoff.total(q, 0).tolist() == [0.0]
+
+
+def test_payoff__without_terms_is_nothing(moment: Moment, world: World) -> None:
+    assert Payoff(dict.fromkeys(GROUPS, 1.0), (), {}).total(moment(world, [car(50.0), FAR]), 0).tolist() == [0.0]
+
+
+# --- from a document -------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def read(tmp_path: Path) -> Callable[[str], Persona]:
+    def from_text(text: str) -> Persona:
+        path = tmp_path / "p.toml"
+        about = 'name = "p"\ndescription = "a person to test with"\n'
+        source = '[[sources]]\nstatistic = "so many in a hundred"\ncitation = "Somebody, 2020"\n'
+        path.write_text(about + source + text, encoding="utf-8")
+        return read_document(path, Persona)
+
+    return from_text
+
+
+def problems(read: Callable[[str], Persona], text: str) -> list[str]:
+    with pytest.raises(UsageError) as raised:
+        read(text)
+    assert all(each.file.endswith("p.toml") for each in raised.value.problems)
+    return [str(each).split("p.toml: ", 1)[1] for each in raised.value.problems]
+
+
+def test_document__becomes_equation_1(read: Callable[[str], Persona]) -> None:
+    persona = read(
+        "[safety]\nweight = 0.5\n[safety.terms]\ncollision = 10\nclearance = { weight = 2.0, within_m = 1.4 }\n"
+        "[operational.terms]\ngoal = 5.0\n[human]\nweight = 3.0\n[human.terms]\ntime_pressure = 0.25\n"
+        "[[human.fuzzy]]\nname = 'thrill'\nweight = 0.5\nquantity = 'speed_over_limit'\n"
+        "sets = [{ name = 'fast', points = [[0.0, 0.0], [0.2, 1.0]], value = 6.0 }]\n"
+    )
+    thrill = FuzzyFunction("speed_over_limit", (FuzzySet("fast", (0.0, 0.2), (0.0, 1.0), 6.0),))
+    assert persona.payoff == Payoff(
+        {"safety": 0.5, "operational": 1.0, "human": 3.0},
+        (
+            Weighted("collision", 10.0),
+            Weighted("clearance", 2.0, 1.4),
+            Weighted("goal", 5.0),
+            Weighted("time_pressure", 0.25),
+        ),
+        {"thrill": (0.5, thrill)},
+    )
+
+
+def test_document__of_every_persona_here_can_be_paid(repository: Path, moment: Moment, world: World) -> None:
+    files = sorted((repository / "personas").glob("*.toml"))
+    assert files
+    q = moment(world, [car(50.0), car(60.0, -4.8)])
+    for file in files:
+        assert np.isfinite(read_document(file, Persona).payoff.total(q, 0)).all()
+
+
+GOAL = "[operational.terms]\ngoal = 1.0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (
+            "[safety.terms]\ncollision = -1.0\n",
+            "safety.terms.collision: -1.0 is not possible (input should be greater than or equal to 0)",
+        ),
+        (
+            "[safety]\nweight = -1.0\n",
+            "safety.weight: -1.0 is not possible (input should be greater than or equal to 0)",
+        ),
+        (
+            "[safety.terms]\nclearance = { weight = -2.0, within_m = 1.0 }\n",
+            "safety.terms.clearance.weight: -2.0 is not possible (input should be greater than or equal to 0)",
+        ),
+        (
+            "[safety.terms]\ncolision = 1.0\n",
+            "safety.terms.colision: unknown safety term (did you mean 'collision'?)",
+        ),
+        (
+            "[safety.terms]\ngoal = 1.0\n",
+            "safety.terms.goal: belongs to the operational terms (move it to [operational.terms])",
+        ),
+        ("[human.terms]\nrail = 1.0\n", "human.terms.rail: belongs to the safety terms (move it to [safety.terms])"),
+        (
+            "[safety.terms]\nclearance = 1.0\n",
+            "safety.terms.clearance: its weight is not given as it has to be (give { weight = ..., within_m = ... })",
+        ),
+        (
+            "[safety.terms]\nclearance = { weight = 1.0, within_s = 1.0 }\n",
+            "safety.terms.clearance: its weight is not given as it has to be (give { weight = ..., within_m = ... })",
+        ),
+        (
+            "[safety.terms]\ntime_gap = { weight = 1.0, within_m = 1.0, within_s = 1.0 }\n",
+            "safety.terms.time_gap: its weight is not given as it has to be (give { weight = ..., within_s = ... })",
+        ),
+        (
+            "[safety.terms]\ncollision = { weight = 1.0, within_m = 1.0 }\n",
+            "safety.terms.collision: its weight is not given as it has to be (give a plain weight)",
+        ),
+        (
+            "[safety.terms]\nclearance = { weight = 1.0, within_m = 0.0 }\n",
+            "safety.terms.clearance.within_m: 0.0 is not possible (input should be greater than 0)",
+        ),
+        (
+            "[safety.terms]\ncollision = 'much'\n",
+            "safety.terms.collision: 'much' is not possible (input should be a valid number)",
+        ),
+    ],
+)
+def test_document__a_term_that_is_not_right_is_named(read: Callable[[str], Persona], text: str, said: str) -> None:
+    assert problems(read, text + (GOAL if "operational" not in text else "")) == [said]
+
+
+def test_document__all_terms_that_are_not_right_are_named_at_once(read: Callable[[str], Persona]) -> None:
+    found = problems(read, "[safety.terms]\ncolision = 1.0\ngoal = 1.0\nclearance = 1.0\n[human.terms]\nrail = 1.0\n")
+    assert [each.split(":")[0] for each in found] == [
+        "human.terms.rail",
+        "safety.terms.clearance",
+        "safety.terms.colision",
+        "safety.terms.goal",
+    ]
+
+
+def test_document__without_any_term_teaches_nothing(read: Callable[[str], Persona]) -> None:
+    assert problems(read, "[safety]\nweight = 1.0\n")[0].endswith("nothing could be learned from it")
+
+
+# --- no document can pay for harm ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name", ["ego_collision", "ego_payoff", "other_collision", "harm", "ego_failed", "non_ego_collision"]
+)
+def test_harm__there_is_no_term_for_anothers(read: Callable[[str], Persona], name: str) -> None:
+    for group in GROUPS:
+        assert f"unknown {group} term" in problems(read, f"[{group}.terms]\n{name} = 1.0\n")[0]
+
+
+def fuzzy(quantity: str, sets: str) -> str:
+    return f"[[human.fuzzy]]\nname = 'x'\nquantity = '{quantity}'\nsets = [{sets}]\n"
+
+
+@pytest.mark.parametrize("quantity", ["ego_payoff", "touches_vehicle", "time_to_collision_s", "vehicle_clearance_m"])
+def test_harm__a_fuzzy_term_knows_no_such_quantity(read: Callable[[str], Persona], quantity: str) -> None:
+    text = fuzzy(quantity, "{ name = 'a', points = [[0.0, 1.0]], value = 1.0 }")
+    assert "unknown quantity" in problems(read, text)[0]
+
+
+@pytest.mark.parametrize("quantity", ["clearance_m", "time_gap_s"])
+@pytest.mark.parametrize(
+    "sets",
+    [
+        "{ name = 'near', points = [[0.0, 1.0], [1.0, 0.0]], value = 5.0 }",  # pays for contact
+        "{ name = 'far', points = [[0.0, 0.0], [1.0, 1.0]], value = -5.0 }",  # the same, by fining distance
+        "{ name = 'a', points = [[0.0, 1.0], [0.2, 0.0]], value = -1.0 },"
+        "{ name = 'b', points = [[0.0, 0.0], [0.2, 1.0]], value = -3.0 }",
+    ],
+)
+def test_harm__a_fuzzy_term_may_not_pay_for_contact(read: Callable[[str], Persona], quantity: str, sets: str) -> None:
+    assert "nobody may be paid for a crash" in problems(read, fuzzy(quantity, sets))[0]
+
+
+def test_fuzzy__of_the_lane_that_ends(read: Callable[[str], Persona], moment: Moment, merge: OpenScene) -> None:
+    # lane 0 (y = -4.8) ends at 100 m, lane 1 goes on: half-way from 0 to 80 m, and never
+    sets = (
+        "{ name = 'late', points = [[0.0, 1.0], [80.0, 0.0]], value = 3.0 },"
+        "{ name = 'early', points = [[0.0, 0.0], [80.0, 1.0]], value = -1.0 }"
+    )
+    payoff = read(fuzzy("lane_end_m", sets)).payoff
+    q = moment(merge.world, [{"x_m": 60.0, "y_m": -4.8}, {"x_m": 60.0, "y_m": -1.6}])
+    assert q.lane_end_m[0] == pytest.approx([40.0, np.inf])
+    assert payoff.total(q, 0) == pytest.approx(0.1 * (0.5 * 3.0 - 0.5 * 1.0))
+    assert payoff.total(q, 1) == pytest.approx(0.1 * -1.0)
+
+
+def test_harm__a_tailgater_may_still_like_a_short_gap(read: Callable[[str], Persona]) -> None:
+    sets = (
+        "{ name = 'crash', points = [[0.0, 1.0], [0.2, 0.0]], value = -9.0 },"
+        "{ name = 'close', points = [[0.0, 0.0], [0.2, 1.0], [0.6, 1.0], [1.5, 0.0]], value = 1.0 },"
+        "{ name = 'far', points = [[0.6, 0.0], [1.5, 1.0]], value = -1.0 }"
+    )
+    assert read(fuzzy("time_gap_s", sets)).payoff.fuzzy["x"][1](np.array([0.0, 0.4, 3.0])).tolist() == [-9.0, 1.0, -1.0]

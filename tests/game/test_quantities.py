@@ -1,0 +1,259 @@
+"""What can be said of the players at one moment, on the merge road and on a road that turns, by hand.
+
+On the merge road lane 1 (y = -1.6) goes on, lane 0 (y = -4.8) ends at 100 m; cars are 4.6 m by 1.8 m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.game.quantities import REACH_M, Quantities, World
+from harness.game.road import MARGIN_M, SPACING_M, Rails, Road, Route, Routes
+from harness.game.state import Outcome
+from harness.traffic.scene import OpenScene
+
+Moment = Callable[..., Quantities]
+LANE_0_M, LANE_1_M = -4.8, -1.6
+
+
+@pytest.fixture(scope="module")
+def world(merge: OpenScene) -> World:
+    return merge.world
+
+
+def turning(world: World, radius_m: float, turned_rad: float) -> World:
+    """The same cars on a road that goes 20 m east from the origin, then round a left bend, then straight on."""
+    at = np.arange(-MARGIN_M, 150.0 + MARGIN_M, SPACING_M)
+    turned = np.clip((at - 20.0) / radius_m, 0.0, turned_rad)
+    beyond = np.maximum(at - 20.0 - radius_m * turned_rad, 0.0)
+    n = len(at)
+    route = Route(
+        np.minimum(at, 20.0) + radius_m * np.sin(turned) + beyond * np.cos(turned_rad),
+        radius_m * (1.0 - np.cos(turned)) + beyond * np.sin(turned_rad),
+        turned,
+        np.full(n, 1.6),
+        np.full(n, -1.6),
+        np.full(n, 10.0),
+        np.zeros((n, 1)),
+        np.full((n, 1), np.inf),
+        150.0,
+        100.0,
+    )
+    rails = Rails.of(np.zeros((0, 2, 2)), 20.0)
+    return replace(world, road=Road(rails, Routes.of([route, route])))
+
+
+@pytest.fixture(scope="module")
+def bend(world: World) -> World:
+    """A bend of 15 m radius to the north."""
+    return turning(world, 15.0, np.pi / 2.0)
+
+
+@pytest.fixture(scope="module")
+def hairpin(world: World) -> World:
+    """A hairpin of 4 m radius: the way back lies 8 m north of the way there."""
+    return turning(world, 4.0, np.pi)
+
+
+def car(x: float, y: float = LANE_1_M, **more: Any) -> dict[str, Any]:
+    return {"x_m": x, "y_m": y, **more}
+
+
+GONE = {"present": False, "outcome": Outcome.GOAL}
+WRECKED = {"outcome": Outcome.COLLISION, "speed_mps": 0.0}
+
+
+# --- the leader ------------------------------------------------------------------------------------------------------
+
+
+def test_leader_gap__is_bumper_to_bumper(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0), car(50.0)])
+    assert q.leader_gap_m[0] == pytest.approx([25.4, np.inf])  # 30 m of centres less 2.3 m and 2.3 m
+
+
+def test_leader_gap__is_to_the_nearest_of_several(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0), car(5.0)], [car(60.0), car(40.0), car(45.0)])
+    assert q.leader_gap_m[0] == pytest.approx([15.4, 10.4])  # 20 - 4.6; and the ego leads the other at 15 - 4.6
+
+
+def test_leader_gap__a_car_in_the_next_lane_leads_nobody(moment: Moment, world: World) -> None:
+    assert moment(world, [car(20.0), car(40.0, LANE_0_M)]).leader_gap_m[0].tolist() == [np.inf, np.inf]
+
+
+def test_leader_gap__a_car_half_way_in_the_lane_leads(moment: Moment, world: World) -> None:
+    # lateral distance 1.7 m, less than 0.9 + 0.9 m of half widths
+    assert moment(world, [car(20.0), car(40.0, -3.3)]).leader_gap_m[0, 0] == pytest.approx(15.4)
+    assert moment(world, [car(20.0), car(40.0, -3.5)]).leader_gap_m[0, 0] == np.inf
+
+
+def test_leader_gap__a_car_across_the_lane_takes_less_of_its_length(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0), car(40.0, heading_rad=np.pi / 2)])
+    assert q.leader_gap_m[0, 0] == pytest.approx(20.0 - 2.3 - 0.9)
+
+
+def test_leader_gap__beyond_sight_nobody_leads(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0), car(80.5)])
+    assert q.leader_gap_m[0, 0] == np.inf
+
+
+def test_leader_gap__never_is_negative(moment: Moment, world: World) -> None:
+    assert moment(world, [car(20.0), car(22.0)]).leader_gap_m[0, 0] == 0.0
+
+
+def test_leader_gap__follows_the_bend(moment: Moment, bend: World) -> None:
+    # the leader stands 20 + 15 * pi / 2 + 5 = 48.56 m along the road, 28.56 m ahead, at right angles
+    q = moment(bend, [car(20.0, 0.0), car(35.0, 20.0, heading_rad=np.pi / 2)])
+    assert q.leader_gap_m[0, 0] == pytest.approx(15.0 * np.pi / 2 + 5.0 - 4.6, abs=0.5)
+
+
+def test_leader_gap__a_car_ahead_leads_though_the_road_comes_back_beside_it(moment: Moment, hairpin: World) -> None:
+    # 50 m ahead of the player the road has come back to (10.57, 8): abreast of the leader at (10.6, 0)
+    q = moment(hairpin, [car(-8.0, 0.0), car(10.6, 0.0)])
+    assert q.leader_gap_m[0, 0] == pytest.approx(18.6 - 4.6, abs=0.01)
+
+
+def test_leader_gap__an_oncoming_car_beside_leads_nobody(moment: Moment, hairpin: World) -> None:
+    q = moment(hairpin, [car(-8.0, 0.0), car(10.6, 8.0, heading_rad=np.pi)], [car(5.0, 4.0)])
+    assert q.leader_gap_m[0, 0] == pytest.approx(50.0 - 4.6, abs=0.1)  # only where the way back gets to it
+
+
+def test_time_gap__is_the_gap_over_own_speed(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0, speed_mps=12.7), car(50.0, speed_mps=3.0)])
+    assert q.time_gap_s[0] == pytest.approx([2.0, np.inf])  # 25.4 / 12.7
+
+
+def test_time_gap__of_a_car_that_stands_is_finite(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0, speed_mps=0.0), car(50.0)])
+    assert q.time_gap_s[0, 0] == pytest.approx(254.0)  # as at 0.1 m/s
+
+
+# --- contact ---------------------------------------------------------------------------------------------------------
+
+
+def test_time_to_collision__behind_a_slower_car(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0, speed_mps=14.0), car(50.0, speed_mps=9.0)])
+    assert q.time_to_collision_s[0] == pytest.approx([25.4 / 5.0, 25.4 / 5.0])  # for both: it takes two
+
+
+def test_time_to_collision__never_behind_a_faster_car_or_beside_one(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0, speed_mps=9.0), car(50.0, speed_mps=14.0)], [car(20.0, LANE_0_M, speed_mps=30.0)])
+    assert q.time_to_collision_s[0].tolist() == [np.inf, np.inf]
+
+
+def test_time_to_collision__of_a_car_cutting_in(moment: Moment, world: World) -> None:
+    # 3.2 m between the centres, both as fast ahead. Turned by asin 0.1, at 10 m/s, it comes nearer by 1 m/s;
+    # its front corner reaches out by 2.3 sin + 0.9 cos = 0.23 + 0.8955 = 1.1255 m, the ego's flank by 0.9 m
+    turned = np.arcsin(0.1)
+    q = moment(world, [car(50.0, speed_mps=10.0 * np.cos(turned)), car(50.0, LANE_0_M, heading_rad=turned)])
+    assert q.time_to_collision_s[0, 0] == pytest.approx(3.2 - 0.9 - (0.23 + 0.9 * np.cos(turned)), abs=1e-6)
+
+
+def test_clearance__to_a_vehicle_beside(moment: Moment, world: World) -> None:
+    q = moment(world, [car(50.0), car(51.0, LANE_0_M)])
+    assert q.vehicle_clearance_m[0] == pytest.approx([1.4, 1.4])  # 3.2 - 1.8
+    assert q.rail_clearance_m[0] == pytest.approx([0.7, 0.7], abs=0.02)  # 1.6 - 0.9, each on its side
+    assert q.clearance_m[0] == pytest.approx([0.7, 0.7], abs=0.02)
+
+
+def test_clearance__is_not_known_beyond_its_reach(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0), car(80.0)])
+    assert q.vehicle_clearance_m[0].tolist() == [REACH_M, REACH_M]
+
+
+def test_clearance__at_the_taper(moment: Moment, world: World) -> None:
+    # the taper goes from (100, -6.4) to (130, -3.2); the front right corner of a car at (107.7, -4.8) is (110, -5.7);
+    # at x = 110 the rail is at -6.4 + 10 * 3.2 / 30 = -5.3333, so the car is through it
+    q = moment(world, [car(107.7, LANE_0_M), car(94.7, LANE_0_M)])
+    assert q.touches_rail[0].tolist() == [True, False]
+    # with the corner at (97, -5.7) the nearest of the rail is straight below, 0.7 m
+    assert q.rail_clearance_m[0, 1] == pytest.approx(0.7, abs=0.02)
+
+
+def test_touches_vehicle__when_they_overlap(moment: Moment, world: World) -> None:
+    q = moment(world, [car(50.0), car(54.0)], [car(20.0), car(70.0)])
+    assert q.touches_vehicle[0].tolist() == [True, True]
+    assert q.time_to_collision_s[0].tolist() == [0.0, 0.0]
+
+
+# --- who is there ----------------------------------------------------------------------------------------------------
+
+
+def test_visible__nobody_sees_itself(moment: Moment, world: World) -> None:
+    assert moment(world, [car(20.0), car(50.0)]).visible[0].tolist() == [[False, True], [True, False]]
+
+
+def test_visible__a_player_that_left_neither_sees_nor_is_seen(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0), car(30.0, **GONE)], [car(60.0)])
+    assert q.visible[0].tolist() == [[False, False, True], [False, False, False]]
+    assert q.leader_gap_m[0].tolist() == pytest.approx([35.4, np.inf])
+    assert q.vehicle_clearance_m[0, 0] == REACH_M
+
+
+def test_visible__a_wreck_stays_in_the_way(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0), car(50.0, **WRECKED)])
+    assert q.visible[0, 0, 1]
+    assert q.leader_gap_m[0, 0] == pytest.approx(25.4)
+    assert q.time_to_collision_s[0, 0] == pytest.approx(2.54)
+
+
+def test_visible__another_road_user_that_is_not_there_yet_is_not(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0), car(30.0, LANE_0_M)], [car(40.0, present=False)])
+    assert q.leader_gap_m[0, 0] == np.inf
+
+
+# --- the way ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("y", "offset", "lane_end"),
+    [(-1.6, 0.0, np.inf), (-2.1, 0.5, np.inf), (-4.8, 0.0, 40.0), (-3.7, 1.1, 40.0), (-5.5, 0.7, 40.0)],
+)
+def test_lane__offset_and_end_are_of_the_nearest(
+    moment: Moment, world: World, y: float, offset: float, lane_end: float
+) -> None:
+    q = moment(world, [car(60.0, y), car(10.0)])
+    assert q.lane_offset_m[0, 0] == pytest.approx(offset, abs=1e-6)
+    assert q.lane_end_m[0, 0] == pytest.approx(lane_end, abs=1e-6)
+
+
+def test_lane_end__once_passed_is_no_longer_ahead(moment: Moment, world: World) -> None:
+    assert moment(world, [car(120.0), car(10.0)]).lane_end_m[0, 0] == np.inf
+
+
+def test_goal__is_at_175_m(moment: Moment, world: World) -> None:
+    assert moment(world, [car(100.0), car(180.0)]).goal_m[0] == pytest.approx([75.0, -5.0])
+
+
+def test_speed_over_limit__is_a_share_of_it(moment: Moment, world: World) -> None:
+    q = moment(world, [car(20.0, speed_mps=13.89 * 1.2), car(50.0, speed_mps=0.0)])
+    assert q.speed_over_limit[0] == pytest.approx([0.2, -1.0])
+
+
+def test_path__looks_along_the_bend(moment: Moment, bend: World) -> None:
+    q = moment(bend, [car(0.0, 0.0), car(5.0, 0.0)])
+    # 0, 5, 10, 20 m ahead are straight on; 30 m ahead are 10 m into a bend of 15 m radius; 50 m are beyond it
+    assert q.path.heading_rad[0, 0, 2:] == pytest.approx([0.0, 0.0, 0.0, 0.0, 10.0 / 15.0, np.pi / 2], abs=0.02)
+
+
+def test_games__do_not_see_each_other(moment: Moment, world: World) -> None:
+    one, two = moment(world, [car(20.0), car(30.0)]), moment(world, [car(70.0), car(90.0, LANE_0_M)])
+    state, bodies = one.state.copy(), one.bodies
+    for name, values in vars(state).items():
+        setattr(state, name, np.concatenate((values, getattr(two.state, name))))
+    both = type(bodies)(*(np.concatenate((getattr(bodies, n), getattr(two.bodies, n))) for n in vars(bodies)))
+    offset = np.concatenate((one.lateral_offset_m, two.lateral_offset_m))
+    q = Quantities(world, state, both, np.zeros((2, 2)), offset)
+    for name in ("leader_gap_m", "time_to_collision_s", "clearance_m", "lane_offset_m", "goal_m", "time_gap_s"):
+        expected = np.concatenate((getattr(one, name), getattr(two, name)))
+        assert getattr(q, name) == pytest.approx(expected)
+
+
+def test_leader_gap__does_not_hang_on_where_the_routes_stations_lie(moment: Moment, world: World) -> None:
+    # bumper to bumper: 20 m between centres less a car of 4.6 m, wherever on the road (stations lie 0.5 m apart)
+    for x in (50.0, 50.1, 50.25, 50.3, 50.49):
+        assert moment(world, [car(x), car(x + 20.0)]).leader_gap_m[0, 0] == pytest.approx(15.4, abs=1e-9)

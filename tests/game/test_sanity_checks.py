@@ -1,0 +1,468 @@
+"""Numbers that can't be right: each is injected where it would come from, and found in the step in which it appears."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import libsumo
+import numpy as np
+import pytest
+
+import harness.environments.arena
+from harness.campaign.execution.cache_keys import stage_keys
+from harness.campaign.execution.run_context import conditions_of
+from harness.campaign.execution.run_stage import carry_out
+from harness.campaign.plan.plan import plan
+from harness.campaign.preflight import open_campaign
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.sumo import SumoDriver
+from harness.environments.arena import Arena, Seat
+from harness.environments.gymnasium_env import DrivingEnv
+from harness.errors import StageFailed, UsageError
+from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, Drive
+from harness.game.arrays import FloatArray, IntArray
+from harness.game.fuzzy import FuzzyFunction, FuzzySet
+from harness.game.observation import LAYOUT, observe
+from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS, Payoff, Weighted
+from harness.game.quantities import Quantities
+from harness.game.sanity_checks import ImpossibleNumber, check_observation, check_step, slack_m
+from harness.game.state import EGO, NON_EGO, ROLES, Bodies, Outcome, State
+from harness.traffic.libsumo_simulation import LocalSimulation
+from harness.traffic.scene import OpenScene, open_scene
+from harness.training.ppo import Lesson
+from tests.environments.test_rollout import Steady, arm, play, records, trace
+from tests.support.scenes import build_scene, drawn
+from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign
+from tests.training.test_ppo import alone, in_one_go  # noqa: F401 - a fixture
+
+STEP = 5  # in which something goes wrong
+
+
+class Misbehaving(Steady):
+    """Decides what it should not in the fifth step of every second game it begins."""
+
+    def __init__(self, decision: Callable[[FloatArray], Any]) -> None:
+        self._decision, self._games, self._steps = decision, 0, 0
+
+    def begin(self, games: IntArray) -> None:
+        self._games, self._steps = self._games + 1, 0
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> Any:
+        self._steps += 1
+        steady = np.zeros((len(games), 2))
+        return self._decision(steady) if self._games % 2 == 0 and self._steps == STEP else steady
+
+
+DECISIONS: dict[str, tuple[Callable[[FloatArray], Any], str]] = {
+    "nan": (lambda steady: steady + np.nan, r"decided \[nan, nan\], not from -1 to 1"),
+    "inf": (lambda steady: steady + np.array([0.0, np.inf]), r"decided \[0.0, inf\], not from -1 to 1"),
+    "too much": (lambda steady: steady - np.array([1.5, 0.0]), r"decided \[-1.5, 0.0\], not from -1 to 1"),
+    "hardly too much": (
+        lambda steady: steady + np.array([0.0, 1.0 + 1e-9]),
+        r"decided \[0.0, 1.0+1\], not from -1 to 1",
+    ),
+    "no axis of games": (lambda steady: steady[0], r"decided an array of shape \[2\], not \[1, 2\]"),
+    "one number": (lambda steady: 0.0, r"decided an array of shape \[\], not \[1, 2\]"),
+    "a game too many": (lambda steady: np.zeros((2, 2)), r"decided an array of shape \[2, 2\], not \[1, 2\]"),
+    "an action too many": (lambda steady: np.zeros((1, 3)), r"decided an array of shape \[1, 3\], not \[1, 2\]"),
+    "nothing": (lambda steady: None, r"decided an array of shape \[\]"),
+    "words": (lambda steady: [["full", "left"]], r"decided \[\['full', 'left'\]\], no numbers,"),
+    "ragged": (lambda steady: [[0.0, 0.0], [0.0]], r"decided \[\[0.0, 0.0\], \[0.0\]\], no numbers,"),
+}
+each_decision = pytest.mark.parametrize(("decision", "said"), DECISIONS.values(), ids=DECISIONS)
+
+
+# --- drivers ----------------------------------------------------------------------------------------------------------
+
+
+@each_decision
+def test_driver__that_misbehaves_is_an_error_row_with_driver_and_step(
+    decision: Callable[[FloatArray], Any], said: str, merge: OpenScene
+) -> None:
+    games = play(arm(merge, SumoDriver(), Misbehaving(decision)), 4)
+    unharmed = play(arm(merge, SumoDriver(), Steady()), 4)
+    assert [game.record["episode"] for game in games] == [0, 1, 2, 3]
+    assert records(games[::2]) == records(unharmed[::2])
+    for game in games[1::2]:
+        assert game.record["ego_outcome"] == "error"
+        pattern = rf"ImpossibleNumber: the driver of non_ego, Misbehaving, {said}.* in step {STEP}\b"
+        assert re.match(pattern, game.record["error"]), game.record["error"]
+        assert game.trace is None
+
+
+@pytest.mark.parametrize("name", ["nan", "too much", "no axis of games", "words"])
+def test_opponent__that_misbehaves_ends_a_training_with_driver_and_step(
+    name: str,
+    alone: Lesson,  # noqa: F811
+    tmp_path: Path,
+) -> None:
+    decision, _ = DECISIONS[name]
+
+    class AfterAWhile(Steady):
+        asked = count(1)
+
+        def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> Any:
+            steady = super().decide(games, observation, noise)
+            return decision(steady) if next(self.asked) == STEP else steady
+
+    said = rf"the driver of non_ego, AfterAWhile, decided .* in step {STEP} of game \d, after \d+ steps"
+    with pytest.raises(FloatingPointError, match=said):
+        in_one_go(replace(alone, opponent=AfterAWhile(), alone_share=0.0), tmp_path)
+    assert not (tmp_path / "checkpoint.safetensors").exists()
+
+
+def test_driver__at_the_bounds_is_in_order(merge: OpenScene) -> None:
+    class Flat(Steady):
+        def decide(self, games: IntArray, *_: Any) -> Any:
+            return [[1, -1]] * len(games)  # whole numbers in lists are actions as well
+
+    (game,) = play(arm(merge, Flat(), None), 1)
+    assert not game.record["error"]
+
+
+# --- payoffs ----------------------------------------------------------------------------------------------------------
+
+
+def broken(quantity: Any, value: float) -> property:
+    """A quantity that is wrong from the fifth step on."""
+    return property(lambda q: np.where(q.state.step[:, None] >= STEP, value, quantity.__get__(q, Quantities)))
+
+
+@pytest.mark.parametrize("value", [np.nan, -np.inf])
+def test_payoff__that_is_no_number_is_an_error_row_with_step(
+    value: float, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(Quantities, "lane_offset_m", broken(Quantities.lane_offset_m, value))
+    assessed = arm(merge, Steady(), SumoDriver())
+    assert "lane_offset" in {term.name for term in assessed.personas[EGO].payoff.terms}
+    (game,) = play(assessed, 1)
+    assert re.match(rf"ImpossibleNumber: the payoff of ego is (nan|inf) in step {STEP}$", game.record["error"])
+
+
+def test_payoff__a_fuzzy_term_does_not_make_a_number_of_what_is_none() -> None:
+    sets = (FuzzySet("near", (0.0, 1.0), (1.0, 0.0), -1.0), FuzzySet("far", (0.0, 1.0), (0.0, 1.0), 2.0))
+    values = FuzzyFunction("clearance_m", sets)(np.array([np.nan, 0.5, np.inf, -np.inf]))
+    assert np.array_equal(values, [np.nan, 0.5, 2.0, -1.0], equal_nan=True)
+
+
+def test_payoff__that_is_no_number_fails_a_training_stage_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    campaign = open_campaign(write_campaign(tmp_path))
+    folder = RunFolder(tmp_path / "run")
+    folder.claim("tiny")
+    folder.keep_scene(MERGE, ("scene.toml", "merge.net.xml", "merge.rou.xml"))
+    stages = plan(campaign.document, ["speedy"])
+    keys = stage_keys(campaign, stages)
+    monkeypatch.setattr(Quantities, "lane_offset_m", broken(Quantities.lane_offset_m, np.nan))
+    said = rf"^naive-seed1: the payoff of ego is nan in step {STEP} of game 0, after \d+ steps$"
+    with pytest.raises(StageFailed, match=said):
+        carry_out(stages[0], conditions_of(campaign, folder, keys), lambda done, total: None)
+    assert folder.finished(stages[0].id, keys[stages[0].id]) is None
+    assert not folder.policy(stages[0].id).exists()
+
+
+# --- motion -----------------------------------------------------------------------------------------------------------
+
+
+def carried_on_by_sumo(monkeypatch: pytest.MonkeyPatch, far_m: float) -> None:
+    """In the fifth step of every second game SUMO itself moves its non-ego so much farther along its lane."""
+    steps = {"now": 0, "games": 0}
+    begin, step = LocalSimulation.restart, LocalSimulation.step
+
+    def restarted(simulation: LocalSimulation, *arguments: Any) -> None:
+        steps.update(now=0, games=steps["games"] + 1)
+        begin(simulation, *arguments)
+
+    def stepped(simulation: LocalSimulation, *poses: FloatArray) -> Any:
+        steps["now"] += 1
+        if steps["now"] == STEP and steps["games"] % 2 == 0:
+            vehicle = libsumo.vehicle
+            vehicle.moveTo("non_ego", vehicle.getLaneID("non_ego"), vehicle.getLanePosition("non_ego") + far_m)
+        return step(simulation, *poses)
+
+    monkeypatch.setattr(LocalSimulation, "restart", restarted)
+    monkeypatch.setattr(LocalSimulation, "step", stepped)
+
+
+def test_motion__a_player_that_sumo_carries_off_is_an_error_row_with_step_and_distance(
+    road: OpenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unharmed = play(arm(road, Steady(), SumoDriver()), 4)
+    carried_on_by_sumo(monkeypatch, 50.0)
+    games = play(arm(road, Steady(), SumoDriver()), 4)
+    assert records(games[::2]) == records(unharmed[::2])
+    for game in games[1::2]:
+        found = re.match(
+            rf"ImpossibleNumber: non_ego moved ([\d.]+) m in step {STEP}, in 0.1 s at ([\d.]+) m/s$",
+            game.record["error"],
+        )
+        assert found, game.record["error"]
+        moved_m, speed_mps = map(float, found.groups())
+        assert moved_m == pytest.approx(50.0 + 0.1 * speed_mps, abs=0.02)
+
+
+def test_motion__a_training_fails_where_sumo_carries_a_player_off(
+    road: OpenScene,
+    alone: Lesson,  # noqa: F811
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    carried_on_by_sumo(monkeypatch, 50.0)
+    one = alone.settings.model_copy(update={"games": 1})  # of two: SB3 asks for more than one step at a time
+    lesson = replace(alone, scene=road, opponent=SumoDriver(), alone_share=0.0, settings=one)
+    with pytest.raises(FloatingPointError, match=rf"non_ego moved 5\d\.\d+ m in step {STEP}, .* after \d+ steps"):
+        in_one_go(lesson, tmp_path)
+
+
+@pytest.mark.parametrize(("farther_m", "wrong"), [(50.0, True), (0.01, True), (1e-4, False)])
+def test_motion__a_car_the_harness_moves_goes_as_far_as_its_speed_to_a_millimetre(
+    farther_m: float, wrong: bool, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive = harness.environments.arena.drive
+
+    def drive_too_far(state: State, *rest: Any) -> None:
+        drive(state, *rest)
+        if state.step[0] + 1 == STEP:
+            state.x_m[0, EGO] += farther_m
+
+    monkeypatch.setattr(harness.environments.arena, "drive", drive_too_far)
+    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
+    if wrong:
+        assert re.match(rf"ImpossibleNumber: ego moved [\d.]+ m in step {STEP}, ", game.record["error"])
+    else:
+        assert not game.record["error"]
+
+
+@pytest.mark.parametrize("name", ["x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"])
+def test_motion__that_is_no_number_is_named(name: str, merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    take_back = Arena._take_back
+
+    def lose(arena: Arena, *arguments: Any) -> None:
+        take_back(arena, *arguments)
+        if arena.state.step[0] + 1 == STEP:
+            getattr(arena.state, name)[0, NON_EGO] = np.nan
+
+    monkeypatch.setattr(Arena, "_take_back", lose)
+    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
+    assert f"the motion of non_ego is no number in step {STEP}: " in game.record["error"]
+
+
+def test_motion__of_another_road_user_that_is_no_number_is_an_error_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    van = '<vehicle id="v" type="van" depart="0" departPos="60" departSpeed="9"><route edges="road"/></vehicle>'
+    scene = build_scene(tmp_path, others=van)
+    step = LocalSimulation.step
+
+    def lose(simulation: LocalSimulation, *poses: FloatArray) -> Any:
+        reading = step(simulation, *poses)
+        if libsumo.simulation.getTime() > (STEP - 0.5) * 0.1:
+            reading.speed_mps[:] = np.nan
+        return reading
+
+    assert not play(arm(scene, Steady(), SumoDriver()), 1)[0].record["error"]
+    monkeypatch.setattr(LocalSimulation, "step", lose)
+    (game,) = play(arm(scene, Steady(), SumoDriver()), 1)
+    assert game.record["error"].endswith(f"another road user is nowhere, or has no speed, in step {STEP}")
+
+
+@pytest.mark.parametrize("duration_s", [0.0, 0.1, 2.0])
+def test_motion__changing_lanes_is_no_jump_however_fast_sumo_does_it(duration_s: float, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(MERGE, tmp_path / "merge"))
+    document = (folder / "scene.toml").read_text()
+    assert "lane_change_duration_s = 2.0" in document
+    (folder / "scene.toml").write_text(
+        document.replace("lane_change_duration_s = 2.0", f"lane_change_duration_s = {duration_s}")
+    )
+    games = play(arm(open_scene(folder), SumoDriver(), SumoDriver()), 6)
+    assert not any(game.record["error"] for game in games)
+    frames = [frame[frame["player"] == "non_ego"] for frame in map(trace, games)]
+    furthest = max(float(np.abs(np.diff(frame["y_m"])).max()) for frame in frames)
+    assert (furthest > 3.0) == (duration_s <= 0.1)  # a lane's width in a step, where that is all the time there is
+
+
+# --- observations -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("value", [1.0001, -2.0, np.nan, np.inf])
+def test_observation__out_of_its_bounds_is_an_error_row_with_entry_and_step(
+    value: float, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entry = LAYOUT.index("goal_m")
+
+    def see_wrongly(q: Quantities) -> FloatArray:
+        view = observe(q)
+        view[q.state.step == STEP, NON_EGO, entry] = value
+        return view
+
+    monkeypatch.setattr(harness.environments.arena, "observe", see_wrongly)
+    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
+    assert re.match(
+        rf"ImpossibleNumber: non_ego sees goal_m as {np.float32(value)} in step {STEP}, not from -1 to 1$",
+        game.record["error"],
+    )
+
+
+def test_observation__a_quantity_that_is_no_number_is_not_clipped_into_one(road: OpenScene) -> None:
+    scene = open_scene(road.folder)
+    scene.world.road.routes.goal_m[EGO] = np.nan
+    (game,) = play(arm(scene, Steady(), SumoDriver()), 1)
+    assert game.record["error"] == "ImpossibleNumber: ego sees goal_m as nan in step 0, not from -1 to 1"
+
+
+def test_observation__of_a_start_is_looked_at_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(harness.environments.arena, "observe", lambda q: observe(q) + np.float32(2.0))
+    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
+    assert "in step 0, not from -1 to 1" in game.record["error"]
+
+
+def test_environment__a_gymnasium_learner_is_told_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+    environment = DrivingEnv(merge, persona=CAREFUL)
+    try:
+        environment.reset(seed=1)
+        monkeypatch.setattr(Quantities, "lane_offset_m", broken(Quantities.lane_offset_m, np.nan))
+        for _ in range(STEP - 1):
+            environment.step(np.zeros(2))
+        with pytest.raises(ImpossibleNumber, match=f"payoff of ego is nan in step {STEP}$"):
+            environment.step(np.zeros(2))
+    finally:
+        environment.close()
+
+
+# --- every term can be computed in every scene ------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def road(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    """The least there can be: one straight road, and the two players."""
+    return build_scene(tmp_path_factory.mktemp("road"))
+
+
+@pytest.fixture(scope="module", params=["road", "merge"])
+def everywhere(request: pytest.FixtureRequest) -> Quantities:
+    """Games in which both players are at each station of their routes, standing and at top speed, on the route's line,
+    beside the road and turned round; in the last game of each kind the other is not there."""
+    scene: OpenScene = request.getfixturevalue(request.param)
+    routes = scene.world.road.routes
+    rows = np.arange(min(routes.last_row - routes.first_row) + 1)
+    kinds = [(speed, left, turned) for speed in (0.0, 1.0) for left in (0.0, 20.0) for turned in (0.0, np.pi)]
+    state = State.empty(len(rows) * len(kinds), len(ROLES))
+    for player in (EGO, NON_EGO):
+        at = routes.first_row[player] + rows
+        heading = routes.heading_rad[at]
+        for k, (speed, left, turned) in enumerate(kinds):
+            games = slice(k * len(rows), (k + 1) * len(rows))
+            state.x_m[games, player] = routes.x_m[at] - left * np.sin(heading)
+            state.y_m[games, player] = routes.y_m[at] + left * np.cos(heading)
+            state.heading_rad[games, player] = heading + turned
+            state.speed_mps[games, player] = speed * scene.world.actuators.max_speed_mps[player]
+            state.station_m[games, player] = 0.5 * rows - 100.0
+    state.present[:] = True
+    state.present[-len(rows) :, NON_EGO] = False
+    size = (np.tile(each, (len(state.step), 1)) for each in (scene.world.length_m, scene.world.width_m))
+    poses = (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
+    state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
+    return Quantities(scene.world, state, Bodies(*poses, *size, state.present), np.zeros_like(offset), offset)
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_term__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
+    payoff = Payoff(dict.fromkeys(GROUPS, 1.0), (Weighted(name, 1.0, 2.0 if TERMS[name].parameter else None),), {})
+    for player in (EGO, NON_EGO):
+        (share,) = payoff.evaluate(everywhere, player).values()
+        assert share.shape == everywhere.state.step.shape
+        assert np.isfinite(share).all()
+
+
+@pytest.mark.parametrize("name", FUZZY_QUANTITIES)
+def test_fuzzy_term__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
+    assert not np.isnan(getattr(everywhere, name)).any()  # nobody ahead is an infinite gap, which is worth what is far
+    sets = (FuzzySet("low", (0.0, 1.0), (1.0, 0.0), -1.0), FuzzySet("high", (0.0, 1.0), (0.0, 1.0), 2.0))
+    payoff = Payoff(dict.fromkeys(GROUPS, 1.0), (), {"fuzzy": (1.0, FuzzyFunction(name, sets))})
+    for player in (EGO, NON_EGO):
+        assert np.isfinite(payoff.total(everywhere, player)).all()
+
+
+def test_observation__can_be_made_at_every_place_of_every_route(everywhere: Quantities) -> None:
+    games = np.arange(len(everywhere.state.step))
+    check_observation(observe(everywhere), games, everywhere.state.step)
+
+
+@pytest.mark.parametrize("name", [*OF_EGO, *OF_NON_EGO])
+def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
+    q, metric = everywhere, (OF_EGO | OF_NON_EGO)[name]
+    series = (
+        *(q.state.speed_mps, q.state.acceleration_mps2, q.lateral_acceleration_mps2),
+        *(q.leader_gap_m, q.time_to_collision_s, np.zeros_like(q.state.x_m)),
+    )
+    assert not any(np.isnan(each).any() for each in series)
+    for outcome in (Outcome.GOAL, Outcome.RAIL):
+        for game in (0, len(q.state.step) - 1):
+            value = metric(Drive(outcome, 0.1, *(each[game, :1] for each in series)))
+            assert value is None or np.isfinite(value)
+
+
+def test_persona__every_document_of_the_repository_can_be_computed(everywhere: Quantities, repository: Path) -> None:
+    for file in sorted((repository / "personas").glob("*.toml")):
+        payoff = read_document(file, Persona).payoff
+        for player in (EGO, NON_EGO):
+            assert np.isfinite(payoff.total(everywhere, player)).all(), file.name
+
+
+@pytest.mark.parametrize("limit", ["0.00", "-5", "nan", "inf"])
+def test_scene__without_a_speed_limit_on_a_players_route_is_refused(limit: str, tmp_path: Path) -> None:
+    """What is a share of the limit is the one thing that a scene can lack."""
+    folder = Path(shutil.copytree(MERGE, tmp_path / "merge"))
+    net = folder / "merge.net.xml"
+    text = re.sub(r'(<lane id="exit_[^>]*?) speed="[^"]*"', rf'\1 speed="{limit}"', net.read_text())
+    assert text != net.read_text()
+    net.write_text(text)
+    campaign = write_campaign(tmp_path, scene=str(folder), personas=[str(SPEEDY)])
+    with pytest.raises(UsageError) as raised:
+        open_campaign(campaign)
+    for problem in raised.value.problems:
+        assert Path(problem.file) == net
+        assert problem.key.endswith("speed")
+        assert problem.remedy
+
+
+# --- what it costs ----------------------------------------------------------------------------------------------------
+
+
+def test_checks__cost_less_than_a_hundredth_of_a_step_of_64_games(merge: OpenScene) -> None:
+    persona = read_document(SPEEDY, Persona)
+    arena = Arena(merge, 64, [Seat(None, persona.payoff), Seat(None, persona.payoff)])
+    try:
+        arena.start({game: drawn(merge, "cost", game) for game in range(64)})
+        before, step = arena.state, arena.step(np.zeros((64, 2, 2)))
+        slack, games = slack_m(np.array([True, True])), np.arange(64)
+
+        def checks() -> None:
+            check_step(before, step.quantities, step.drove, step.payoff, slack)
+            check_observation(arena.observation, games, before.step)
+
+        checks()
+        best = {"checks": np.inf, "step": np.inf}
+        for _ in range(20):  # by turns, so that both find the machine in the same moods
+            best["checks"] = min(best["checks"], cpu_s(checks, 200))
+            best["step"] = min(best["step"], cpu_s(lambda: arena.step(np.zeros((64, 2, 2))), 2))
+        assert best["checks"] < 0.01 * best["step"]
+    finally:
+        arena.close()
+
+
+def cpu_s(work: Callable[[], object], times: int) -> float:
+    began = time.process_time()
+    for _ in range(times):
+        work()
+    return (time.process_time() - began) / times

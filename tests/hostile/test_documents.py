@@ -1,0 +1,25 @@
+"""Whatever is wrong with a document, it is said once, with file and key, and nothing else happens."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.hostile.bad_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
+from tests.hostile.bad_roads import NETS, ROUTE_FILES
+from tests.hostile.inputs import CHECK, Bad, Desk
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Desk:
+    return Desk(tmp_path, monkeypatch, capsys)
+
+
+def test_project__is_in_order_before_it_is_spoiled(desk: Desk) -> None:
+    assert desk.run(CHECK).code == 0
+
+
+@pytest.mark.parametrize("bad", [*CAMPAIGNS, *PERSONAS, *SCENES, *NETS, *ROUTE_FILES, *POLICIES], ids=repr)
+def test_document__that_is_wrong(bad: Bad, desk: Desk) -> None:
+    desk.refuses(bad)

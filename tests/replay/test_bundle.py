@@ -1,0 +1,447 @@
+"""Replays on the real SUMO: what it plays is what was recorded, to the millimetre."""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from defusedxml import ElementTree
+
+from harness.errors import UsageError
+from harness.replay import choose_games, open_in_sumo_gui, replay_name, worst_first, write_replay
+from harness.replay import sumo_gui as sumo_gui_module
+from harness.replay.contact import contacts
+from harness.replay.gui_settings import choose_view
+from harness.replay.lanes import Lanes
+from harness.replay.selection import MOST_FAILURES_PER_ARM
+from harness.replay.sumo_gui import find_sumo_gui
+from harness.replay.vehicles import types_of_vehicles
+
+STEP_S = 0.1
+RAILS = (
+    np.array([[0.0, -6.4], [100.0, -6.4], [130.0, -3.2], [220.0, -3.2]]),
+    np.array([[0.0, 0.0], [220.0, 0.0]]),
+)
+SIZES = {"car": (4.6, 1.8), "van": (5.5, 2.0), "city_bus": (12.0, 2.5)}
+ROUTES = """<routes>
+    <vType id="car" length="4.6" width="1.8" guiShape="passenger/sedan"/>
+    <vType id="van" length="5.5" width="2.0" guiShape="delivery" color="120,60,160"/>
+    <vType id="city_bus" vClass="bus"/>
+    <vType id="unused" length="3"/>
+</routes>"""
+
+Pose = tuple[float, float, float, float]  # x_m, y_m, heading_rad, speed_mps
+
+
+@pytest.fixture(scope="session")
+def merge_net(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two lanes (y -6.4 to 0) that taper into one between x 100 and 130, and go on to x 220."""
+    folder = tmp_path_factory.mktemp("net")
+    (folder / "m.nod.xml").write_text(
+        """<nodes>
+        <node id="start" x="0" y="0" type="dead_end"/>
+        <node id="merge" x="100" y="0" type="priority" shape="100,-6.4 100,0 130,0 130,-3.2"/>
+        <node id="end" x="220" y="0" type="dead_end"/></nodes>"""
+    )
+    (folder / "m.edg.xml").write_text(
+        """<edges>
+        <edge id="approach" from="start" to="merge" numLanes="2" speed="13.89" spreadType="right"/>
+        <edge id="exit" from="merge" to="end" numLanes="1" speed="13.89"/></edges>"""
+    )
+    (folder / "m.con.xml").write_text(
+        '<connections><connection from="approach" to="exit" fromLane="1" toLane="0"/></connections>'
+    )
+    sources = ["-n", "m.nod.xml", "-e", "m.edg.xml", "-x", "m.con.xml", "-o", "merge.net.xml"]
+    subprocess.run([sumo_program("netconvert"), *sources], cwd=folder, check=True, capture_output=True)
+    (folder / "merge.rou.xml").write_text(ROUTES)
+    return folder / "merge.net.xml"
+
+
+def sumo_program(name: str) -> Path:
+    gui = find_sumo_gui()
+    assert gui is not None, "SUMO is not installed"
+    return gui.with_name(name)
+
+
+def drive(
+    player: str, poses: Iterable[Pose], *, vehicle_type: str = "car", first_step: int = 0, outcome: str = ""
+) -> pd.DataFrame:
+    """Rows of a trace; `outcome` is reached with the first pose of speed 0, or else with the last."""
+    rows, reached = [], ""
+    listed = list(poses)
+    for k, (x, y, heading, speed) in enumerate(listed):
+        if speed == 0.0 or k == len(listed) - 1:
+            reached = outcome
+        rows.append((first_step + k, x, y, heading, speed, reached))
+    frame = pd.DataFrame(rows, columns=["step", "x_m", "y_m", "heading_rad", "speed_mps", "outcome"])
+    frame = frame.assign(episode=0, time_s=frame["step"] * STEP_S, player=player, vehicle_type=vehicle_type)
+    return frame.assign(acceleration_mps2=0.0, steering_rad=0.0, lapsed=False)
+
+
+def game(*players: pd.DataFrame) -> pd.DataFrame:
+    return pd.concat(players).sort_values(["episode", "step", "player"], ignore_index=True)
+
+
+def straight(x_m: float, y_m: float, speed_mps: float, steps: int) -> list[Pose]:
+    return [(x_m + k * speed_mps * STEP_S, y_m, 0.0, speed_mps) for k in range(steps)]
+
+
+def clean_game() -> pd.DataFrame:
+    """The non-ego merges behind the ego and stays; the ego leaves, with its nose beyond the road's end."""
+    merged = [min(max(k - 40, 0) / 50, 1) for k in range(170)]
+    merging = [
+        (20 + 1.0 * k, -4.8 + 3.2 * share, math.atan2(0.064, 1.0) if 0 < share < 1 else 0.0, 10.0)
+        for k, share in enumerate(merged)
+    ]
+    return game(
+        drive("ego", straight(35.0, -1.6, 12.0, 154), outcome="goal"),
+        drive("non_ego", merging),
+    )
+
+
+def collision_game() -> pd.DataFrame:
+    """The non-ego turns into the ego, which is beside it; both stop where they touch, turned, overlapping."""
+    turning: list[Pose] = [(41 + 1.2 * k, -4.8 + 0.06 * k, 0.05, 12.0) for k in range(32)]
+    wrecks = [(turning[-1][0] + 0.5, turning[-1][1] + 0.2, 0.4, 0.0)] * 12
+    ego_wreck: list[Pose] = [(40 + 1.2 * 32, -1.6, -0.15, 0.0)] * 12
+    return game(
+        drive("ego", straight(40.0, -1.6, 12.0, 32) + ego_wreck, outcome="collision"),
+        drive("non_ego", turning + wrecks, outcome="collision"),
+    )
+
+
+def rail_game() -> pd.DataFrame:
+    """The ego spins through the left rail and lies across it; the other is shoved off the road backwards."""
+    spin: list[Pose] = [(90 + 1.1 * k, -1.6 + 0.09 * k, 0.3 * k, 11.0) for k in range(30)]
+    resting = [(spin[-1][0], spin[-1][1], spin[-1][2], 0.0)] * 5
+    backwards: list[Pose] = [(140 - 0.8 * k, -3.0 - 0.12 * k, math.pi - 0.2, 8.0) for k in range(35)]
+    return game(drive("ego", spin + resting, outcome="rail"), drive("non_ego", backwards))
+
+
+def busy_game() -> pd.DataFrame:
+    """Others appear in the middle of the game: at the start, close behind, and inside the junction."""
+    return game(
+        drive("ego", straight(30.0, -1.6, 10.0, 80), outcome="timeout"),
+        drive("flow.0", straight(2.4, -1.6, 13.0, 60), vehicle_type="van", first_step=15),
+        drive("flow.1", straight(6.0, -4.8, 9.0, 40), vehicle_type="city_bus", first_step=21),
+        drive("bus|2: late", straight(108.0, -1.6, 9.0, 50), vehicle_type="car", first_step=30),
+        drive("leaves.inside", straight(90.0, -1.6, 12.0, 22), first_step=3),
+        drive("brief", straight(60.0, -4.8, 9.0, 1), vehicle_type="DEFAULT_VEHTYPE", first_step=40),
+    )
+
+
+GAMES = {"clean": clean_game, "collision": collision_game, "rail": rail_game, "busy": busy_game}
+
+
+def write(trace: pd.DataFrame, net: Path, folder: Path, **changes: object) -> Path:
+    options = {"title": "test game", "step_length_s": STEP_S, "rails": RAILS} | changes
+    write_replay(trace, net, net.with_name("merge.rou.xml"), folder, **options)  # type: ignore[arg-type]
+    return folder
+
+
+def play(folder: Path) -> tuple[pd.DataFrame, str]:
+    """What SUMO reports of a replay, one row per vehicle and step, and what it printed."""
+    output = folder.parent / "played.xml"
+    command = [
+        sumo_program("sumo"),
+        "-c",
+        folder / "scene.sumocfg",
+        "--fcd-output",
+        output,
+        "--precision",
+        "6",
+    ]
+    command += ["--fcd-output.attributes", "id,x,y,angle,type,speed"]
+    environment = os.environ | {"SUMO_HOME": str(sumo_program("sumo").parent.parent)}  # for its XML schemas
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = [
+        {"label_s": float(step.get("time")), **vehicle.attrib}
+        for step in ElementTree.parse(output).getroot()
+        for vehicle in step
+    ]
+    played = pd.DataFrame(rows)
+    played[["x", "y", "angle", "speed"]] = played[["x", "y", "angle", "speed"]].astype(float)
+    return played.rename(columns={"id": "player"}), done.stderr
+
+
+@pytest.mark.parametrize("name", GAMES)
+def test_replay__every_frame_is_the_trace(name: str, merge_net: Path, tmp_path: Path) -> None:
+    trace = GAMES[name]()
+    assert_plays(write(trace, merge_net, tmp_path / name), trace, {name: size[0] for name, size in SIZES.items()})
+
+
+def assert_plays(folder: Path, trace: pd.DataFrame, lengths_m: Mapping[str, float]) -> None:
+    """SUMO shows every frame of the trace and no other: place to 1e-3 m, heading to 0.1 degrees."""
+    played, printed = play(folder)
+    assert printed == ""
+
+    # the first frame of each vehicle is SUMO putting it into the simulation, a step before it was there
+    played["step"] = np.rint(played["label_s"] / STEP_S).astype(int) - 1
+    entering = played.groupby("player")["step"].idxmin()
+    expected_entries = trace.groupby("player")["step"].min() - 1
+    assert played.loc[entering].set_index("player")["step"].to_dict() == expected_entries.to_dict()
+    played = played.drop(index=entering)
+
+    both = trace.merge(played, on=["player", "step"], how="outer", indicator=True)
+    assert (both["_merge"] == "both").all(), both[both["_merge"] != "both"]
+    length = both["vehicle_type"].map(lengths_m).fillna(5.0)
+    front_x = both["x_m"] + 0.5 * length * np.cos(both["heading_rad"])
+    front_y = both["y_m"] + 0.5 * length * np.sin(both["heading_rad"])
+    assert np.abs(both["x"] - front_x).max() <= 1e-3
+    assert np.abs(both["y"] - front_y).max() <= 1e-3
+    compass = 90.0 - np.degrees(both["heading_rad"])
+    assert np.abs((both["angle"] - compass + 180.0) % 360.0 - 180.0).max() <= 0.1
+    # who leaves early does so with a jump that SUMO needs and nobody sees
+    last_step = both.groupby("player")["step"].transform("max")
+    stays = (both["step"] < last_step) | (last_step == both["step"].max())
+    assert np.abs(both["speed"] - both["speed_mps"])[stays].max() <= 1e-3
+
+
+def test_replay__ends_with_the_game(merge_net: Path, tmp_path: Path) -> None:
+    trace = clean_game()
+    played, _ = play(write(trace, merge_net, tmp_path / "replay"))
+    assert played["label_s"].max() == pytest.approx(trace["time_s"].max() + STEP_S)
+    assert played[played["player"] == "ego"]["label_s"].max() == pytest.approx(153 * STEP_S + STEP_S)
+
+
+def test_replay__plays_where_it_is_moved_to(merge_net: Path, tmp_path: Path) -> None:
+    folder = write(collision_game(), merge_net, tmp_path / "a" / "replay")
+    elsewhere = (tmp_path / "b c").resolve()
+    elsewhere.mkdir()
+    moved = folder.rename(elsewhere / "replay")
+    assert not play(moved)[0].empty
+    for file in moved.glob("scene.[!n]*"):
+        assert str(tmp_path) not in file.read_text()
+
+
+def test_replay__twice_gives_the_same_bytes(merge_net: Path, tmp_path: Path) -> None:
+    shuffled = rail_game().sample(frac=1.0, random_state=3)
+    first = write(rail_game(), merge_net, tmp_path / "first")
+    second = write(shuffled, merge_net, tmp_path / "second")
+    names = sorted(file.name for file in first.iterdir())
+    assert names == ["episode.fcd.xml", "scene.add.xml", "scene.net.xml", "scene.sumocfg", "view.xml"]
+    assert [file.read_bytes() for file in sorted(first.iterdir())] == [
+        file.read_bytes() for file in sorted(second.iterdir())
+    ]
+
+
+def test_replay__that_fails_leaves_what_was_there(merge_net: Path, tmp_path: Path) -> None:
+    folder = write(clean_game(), merge_net, tmp_path / "replays" / "game")
+    before = (folder / "episode.fcd.xml").read_bytes()
+    broken = clean_game().assign(heading_rad="north")
+    with pytest.raises((TypeError, ValueError)):
+        write(broken, merge_net, folder)
+    assert [path.name for path in folder.parent.iterdir()] == ["game"]
+    assert (folder / "episode.fcd.xml").read_bytes() == before
+    write(collision_game(), merge_net, folder)
+    assert (folder / "episode.fcd.xml").read_bytes() != before
+
+
+def test_replay__is_of_one_game(merge_net: Path, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="one game"):
+        write(pd.concat([clean_game(), clean_game().assign(episode=1)]), merge_net, tmp_path / "replay")
+    with pytest.raises(ValueError, match="one game"):
+        write(clean_game().iloc[:0], merge_net, tmp_path / "replay")
+
+
+def test_title__is_text_whatever_it_holds(merge_net: Path, tmp_path: Path) -> None:
+    folder = write(clean_game(), merge_net, tmp_path / "replay", title="<script> & -- 'quoted' --> \"")
+    assert not play(folder)[0].empty
+    poi = ElementTree.parse(folder / "scene.add.xml").getroot().find("poi[@id='title']")
+    assert poi.get("type") == "<script> & -- 'quoted' --> \""
+
+
+def test_scenery__types_that_occur_in_the_colours_of_the_game(merge_net: Path, tmp_path: Path) -> None:
+    folder = write(game(busy_game(), drive("non_ego", straight(20, -4.8, 9, 60))), merge_net, tmp_path / "replay")
+    root = ElementTree.parse(folder / "scene.add.xml").getroot()
+    types = {element.get("id"): element for element in root.iter("vType")}
+    assert sorted(types) == ["DEFAULT_VEHTYPE", "car", "city_bus", "ego", "non_ego", "van"]
+    red, _, blue = (int(part) for part in types["ego"].get("color").split(","))
+    assert blue > 200 > red
+    red, green, blue = (int(part) for part in types["non_ego"].get("color").split(","))
+    assert red > green > blue
+    assert types["van"].get("color") == "120,60,160"
+    assert (types["ego"].get("length"), types["ego"].get("guiShape")) == ("4.6", "passenger/sedan")
+    assert (types["city_bus"].get("length"), types["city_bus"].get("guiShape")) == ("12", "bus")
+    assert len([poly for poly in root.iter("poly") if poly.get("id").startswith("rail")]) == len(RAILS)
+
+
+def test_scenery__another_vehicles_type_called_ego_stays_its_own(merge_net: Path, tmp_path: Path) -> None:
+    routes = tmp_path / "own.rou.xml"
+    routes.write_text('<routes><vType id="ego" length="4.0"/><vType id="car" length="4.6"/></routes>')
+    trace = game(drive("ego", straight(30, -1.6, 9, 5)), drive("flow.0", straight(50, -1.6, 9, 5), vehicle_type="ego"))
+    types = types_of_vehicles(trace, routes)
+    assert (types["ego"].name, types["ego"].length_m) == ("ego", 4.6)
+    assert (types["flow.0"].name, types["flow.0"].length_m) == ("ego_type", 4.0)
+    assert types["flow.0"].colour != types["ego"].colour
+
+
+def test_contacts__are_found_where_and_when_the_bodies_touch(merge_net: Path, tmp_path: Path) -> None:
+    routes = merge_net.with_name("merge.rou.xml")
+    (crash,) = contacts(collision_game(), types_of_vehicles(collision_game(), routes), RAILS)
+    assert crash.time_s == pytest.approx(3.2)
+    assert crash.label == "collision at 3.2 s"
+    assert 78.0 < crash.x_m < 82.0
+    assert -3.0 < crash.y_m < -1.5
+
+    (scrape,) = contacts(rail_game(), types_of_vehicles(rail_game(), routes), RAILS)
+    assert scrape.label == "rail at 3.0 s"
+    assert scrape.y_m == pytest.approx(0.0)
+    assert contacts(clean_game(), types_of_vehicles(clean_game(), routes), RAILS) == []
+    assert contacts(busy_game(), types_of_vehicles(busy_game(), routes), RAILS) == []
+
+
+def test_contacts__one_wreck_after_another(merge_net: Path) -> None:
+    wreck: list[Pose] = [(80.0, -6.0, -0.3, 0.0)] * 31
+    trace = game(
+        drive("non_ego", straight(68.0, -4.8, 12.0, 10) + wreck, outcome="rail"),
+        drive("ego", straight(40.0, -4.8, 12.0, 31) + [(76.5, -4.8, 0.0, 0.0)] * 10, outcome="collision"),
+    )
+    found = contacts(trace, types_of_vehicles(trace, merge_net.with_name("merge.rou.xml")), RAILS)
+    assert [contact.label for contact in found] == ["rail at 1.0 s", "collision at 3.1 s"]
+
+
+@pytest.mark.parametrize(("make", "times"), [(collision_game, ["3.300", "4.400"]), (clean_game, ["17.000"])])
+def test_view__halts_at_the_contact_and_at_the_end(
+    make: Callable[[], pd.DataFrame], times: list[str], merge_net: Path, tmp_path: Path
+) -> None:
+    folder = write(make(), merge_net, tmp_path / "replay")
+    root = ElementTree.parse(folder / "view.xml").getroot()
+    assert [halt.get("time") for halt in root.iter("breakpoint")] == times
+
+
+def test_view__holds_the_players_or_else_the_contact() -> None:
+    routes_away = drive("ego", straight(0.0, 0.0, 50.0, 200))
+    near = drive("non_ego", [(900.0, 5.0, 0.0, 0.0)] * 200)
+    view = choose_view(game(routes_away, near), [])
+    assert abs(view.x_m - 900.0) < 5.0
+    assert view.width_m == pytest.approx(220.0)
+
+    view = choose_view(drive("ego", straight(10.0, -1.6, 10.0, 20)), [])
+    assert view.x_m == pytest.approx(0.5 * (10.0 + 29.0))
+    assert view.width_m < 80.0
+
+
+def test_lanes__nearest_lane_and_place_within_its_length(merge_net: Path) -> None:
+    lanes = Lanes.read(merge_net)
+    points = np.array([[50.0, -4.5], [110.0, -1.6], [110.0, -1.6], [-9.0, 8.0], [300.0, -1.6]])
+    starts = np.array([False, False, True, False, False])
+    lane = lanes.locate(points, starts)
+    assert [lanes.ids[row] for row in lane] == [
+        "approach_0",
+        ":merge_0_0",
+        "approach_1",
+        "approach_1",
+        "exit_0",
+    ]
+    assert lanes.position(lane, points) == pytest.approx([50.0, 10.0, 100.0, 0.0, 90.0])
+    assert [lanes.ids[row] for row in lanes.onward[lane[:2]]] == ["approach_0", "exit_0"]
+
+
+def episodes() -> pd.DataFrame:
+    columns = ["arm", "seed", "episode", "ego_outcome", "ego_failed", "ego_min_ttc_s", "non_ego_outcome"]
+    rows = [
+        ("naive_vs_x", 1, 0, "goal", 0.0, 2.0, "goal"),
+        ("naive_vs_x", 1, 1, "goal", 0.0, np.nan, "goal"),
+        ("naive_vs_x", 1, 2, "goal", 0.0, 0.4, "rail"),
+        ("naive_vs_x", 1, 3, "timeout", 1.0, 0.1, "goal"),
+        ("naive_vs_x", 1, 4, "collision", 1.0, 0.9, "collision"),
+        ("naive_vs_x", 1, 5, "error", np.nan, np.nan, np.nan),
+        ("naive_vs_x", 1, 6, "rail", 1.0, 3.0, "goal"),
+        ("naive_vs_x", 2, 0, "collision", 1.0, 0.2, "collision"),
+        ("naive_vs_x", 2, 1, "goal", 0.0, 1.0, "collision"),
+        ("x_alone", 1, 0, np.nan, np.nan, np.nan, "rail"),
+        ("x_alone", 1, 1, "", np.nan, np.nan, "goal"),
+        ("x_alone", 1, 2, "", np.nan, np.nan, "error"),
+        ("naive_alone", 1, 0, "goal", 0.0, np.nan, ""),
+    ]
+    return pd.DataFrame(rows, columns=columns)
+
+
+def key(frame: pd.DataFrame) -> list[tuple[str, int, int]]:
+    return list(frame[["arm", "seed", "episode"]].itertuples(index=False, name=None))
+
+
+def test_choose_games__every_failure_and_the_first_two_others() -> None:
+    assert key(choose_games(episodes())) == [
+        *[("naive_vs_x", 1, k) for k in (0, 1, 3, 4, 6)],
+        *[("naive_vs_x", 2, k) for k in (0, 1)],
+        ("x_alone", 1, 0),
+        ("x_alone", 1, 1),
+        ("naive_alone", 1, 0),
+    ]
+
+
+def test_choose_games__of_very_many_failures_the_worst_of_each_arm_and_seed() -> None:
+    row = {"arm": "naive_vs_x", "ego_outcome": "rail", "ego_failed": 1.0, "non_ego_outcome": "goal"}
+    rails = [{**row, "seed": seed, "episode": k, "ego_min_ttc_s": k / 100} for seed in (1, 2) for k in range(150)]
+    crashes = [{**row, "seed": 1, "episode": 150 + k, "ego_outcome": "collision"} for k in range(30)]
+    chosen = choose_games(pd.DataFrame([*rails, *crashes]))
+    first = [("naive_vs_x", 1, k) for k in (*range(MOST_FAILURES_PER_ARM - 30), *range(150, 180))]
+    assert sorted(key(chosen)) == [*first, *[("naive_vs_x", 2, k) for k in range(MOST_FAILURES_PER_ARM)]]
+
+
+def test_choose_games__doesnt_depend_on_the_order_of_rows() -> None:
+    shuffled = episodes().sample(frac=1.0, random_state=1)
+    assert sorted(key(choose_games(shuffled))) == sorted(key(choose_games(episodes())))
+    assert choose_games(episodes().iloc[:0]).empty
+
+
+def test_worst_first__by_failure_then_time_to_collision_then_name() -> None:
+    expected = [
+        ("naive_vs_x", 2, 0),  # collisions
+        ("naive_vs_x", 1, 4),
+        ("naive_vs_x", 1, 6),  # rails
+        ("x_alone", 1, 0),
+        ("naive_vs_x", 1, 3),  # timeouts
+        ("naive_vs_x", 1, 2),  # the rest, by time to collision
+        ("naive_vs_x", 2, 1),
+        ("naive_vs_x", 1, 0),
+        ("naive_alone", 1, 0),  # not measured, by name
+        ("naive_vs_x", 1, 1),
+        ("x_alone", 1, 1),
+        ("naive_vs_x", 1, 5),  # can't be shown
+        ("x_alone", 1, 2),
+    ]
+    assert key(worst_first(episodes())) == expected
+    assert key(worst_first(episodes().sample(frac=1.0, random_state=5))) == expected
+    assert list(worst_first(episodes()).columns) == list(episodes().columns)
+
+
+def test_replay_name__sorts_by_episode() -> None:
+    assert replay_name("naive_vs_speedy", 1, 7) == "naive_vs_speedy-seed1-007"
+
+
+def test_open__names_all_that_is_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(sumo_gui_module.sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr(sumo_gui_module, "find_sumo_gui", lambda: None)
+    with pytest.raises(UsageError) as caught:
+        open_in_sumo_gui(tmp_path)
+    message = str(caught.value)
+    assert "no scene.sumocfg" in message
+    assert "is not installed" in message
+    assert "no screen" in message
+
+
+def test_open__starts_sumo_gui_on_the_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    program = tmp_path / "sumo" / "bin" / "sumo-gui"
+    program.parent.mkdir(parents=True)
+    (tmp_path / "sumo" / "data").mkdir()
+    program.write_text('#!/bin/sh\necho "$SUMO_HOME|$1|$2" > "$(dirname "$2")/called"\n')
+    program.chmod(0o755)
+    (tmp_path / "game").mkdir()
+    (tmp_path / "game" / "scene.sumocfg").write_text("<configuration/>")
+    monkeypatch.setenv("DISPLAY", ":1")
+    monkeypatch.setattr(sumo_gui_module, "find_sumo_gui", lambda: program)
+    assert open_in_sumo_gui(tmp_path / "game").wait(timeout=10) == 0
+    home, option, file = (tmp_path / "game" / "called").read_text().strip().split("|")
+    assert (Path(home), option) == ((tmp_path / "sumo").resolve(), "-c")
+    assert Path(file) == tmp_path / "game" / "scene.sumocfg"

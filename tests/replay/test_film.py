@@ -1,0 +1,196 @@
+"""Films: what is in their pictures is where the trace has it, and what is missing to make one is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image
+
+from harness.errors import HarnessError, UsageError
+from harness.replay import write_film
+from harness.replay.encoding import encode, find_ffmpeg
+from harness.replay.film import SIZE_PX, WIDTH_M, film_problems, shown_steps
+from tests.replay.test_bundle import STEP_S, clean_game, collision_game, drive, game, merge_net, straight, write
+from tests.replay.test_sumo_gui import blue, orange, require_gui
+
+__all__ = ["merge_net"]  # a fixture of test_replay
+
+PX_PER_M = SIZE_PX[0] / WIDTH_M
+
+
+def frames(file: Path) -> list[np.ndarray]:
+    """The pictures [height, width, 3] of a GIF."""
+    with Image.open(file) as film:
+        found = []
+        for number in range(film.n_frames):
+            film.seek(number)
+            found.append(np.asarray(film.convert("RGB")).astype(int))
+        return found
+
+
+def place_m(mask: np.ndarray) -> np.ndarray:
+    """Where the middle of the marked pixels is from the middle of the picture: x, y."""
+    rows, columns = np.nonzero(mask)
+    x, y = 0.5 * (columns.min() + columns.max()), 0.5 * (rows.min() + rows.max())
+    return np.array([x - 0.5 * SIZE_PX[0], 0.5 * SIZE_PX[1] - y]) / PX_PER_M
+
+
+def test_film__shows_the_players_where_the_trace_has_them(merge_net: Path, tmp_path: Path) -> None:
+    require_gui()
+    trace = collision_game()
+    folder, told = write(trace, merge_net, tmp_path / "replay"), list[tuple[int, int]]()
+    count = write_film(
+        folder,
+        trace,
+        tmp_path / "film.gif",
+        title="a game",
+        step_length_s=STEP_S,
+        report=lambda done, total: told.append((done, total)),
+    )
+    steps = int(trace["step"].max()) + 1
+    assert count == steps
+    assert told == [(k + 1, steps) for k in range(steps)]
+    assert [path.name for path in sorted(tmp_path.iterdir())] == ["film.gif", "replay"]
+    pictures = frames(tmp_path / "film.gif")
+    assert len(pictures) == steps  # the clock in them makes each another
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.size == SIZE_PX
+        assert film.info["duration"] == 100  # ms: at the speed of life
+
+    for step in (0, 10, 25, 32, steps - 1):
+        there = trace[trace["step"] == step].set_index("player")[["x_m", "y_m"]]
+        assert place_m(blue(pictures[step])) == pytest.approx([0.0, 0.0], abs=0.4)
+        apart = (there.loc["non_ego"] - there.loc["ego"]).to_numpy()
+        if step != 32:  # there they touch, and one hides a part of the other
+            assert place_m(orange(pictures[step])) == pytest.approx(apart, abs=0.5)
+
+
+def test_film__goes_on_with_the_other_when_the_ego_has_left(merge_net: Path, tmp_path: Path) -> None:
+    require_gui()
+    trace = game(
+        drive("ego", straight(60.0, -1.6, 10.0, 8), outcome="goal"), drive("non_ego", straight(30.0, -1.6, 10.0, 12))
+    )
+    folder = write(trace, merge_net, tmp_path / "replay")
+    assert write_film(folder, trace, tmp_path / "film.gif", title="", step_length_s=STEP_S) == 12
+    pictures = frames(tmp_path / "film.gif")
+    assert place_m(blue(pictures[7])) == pytest.approx([0.0, 0.0], abs=0.4)
+    assert not blue(pictures[8]).any()
+    assert place_m(orange(pictures[8])) == pytest.approx([0.0, 0.0], abs=0.4)
+
+
+def test_film__leaves_no_part_of_one_behind(merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    require_gui()
+    folder = write(clean_game(), merge_net, tmp_path / "replay")
+
+    def tired(done: int, total: int) -> None:
+        if done == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_film(folder, clean_game(), tmp_path / "film.gif", title="", step_length_s=STEP_S, report=tired)
+    assert [path.name for path in tmp_path.iterdir()] == ["replay"]
+
+
+@pytest.mark.parametrize(
+    ("steps", "step_length_s", "shown"),
+    [(3, 0.1, [0, 1, 2, 3]), (3, 1.0, [0, 1, 2, 3]), (9, 0.01, [0, 4, 8]), (4, 0.04, [0, 1, 2, 3, 4])],
+)
+def test_film__shows_no_more_than_25_a_second(steps: int, step_length_s: float, shown: list[int]) -> None:
+    assert list(shown_steps(steps, step_length_s)) == shown
+
+
+# --- what is missing ---
+
+
+def test_problems__all_that_is_missing_with_its_remedy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr("harness.replay.film.find_sumo_gui", lambda: None)
+    monkeypatch.setattr("harness.replay.encoding.importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("harness.replay.sumo_gui.sys.platform", "linux")
+    said = "\n".join(map(str, film_problems(tmp_path / "nowhere" / "film.mp4")))
+    for words in (
+        "nowhere: is not a folder",
+        "Xvfb: is not installed",
+        "apt-get install xvfb",
+        "ffmpeg: is not installed",
+        "a .gif needs neither",
+        "sumo-gui: is not installed",
+        "pip install eclipse-sumo",
+    ):
+        assert words in said
+    assert "ffmpeg" not in "\n".join(map(str, film_problems(tmp_path / "film.gif")))
+
+
+def test_problems__a_film_is_a_gif_or_an_mp4(tmp_path: Path) -> None:
+    (problem,) = [each for each in film_problems(tmp_path / "film.avi") if "film.avi" in each.file]
+    assert "neither .gif nor .mp4" in problem.message
+
+
+def test_film__without_a_screen_says_so_and_writes_nothing(
+    merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write(clean_game(), merge_net, tmp_path / "replay")
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    with pytest.raises(UsageError, match="Xvfb"):
+        write_film(folder, clean_game(), tmp_path / "film.gif", title="", step_length_s=STEP_S)
+    assert [path.name for path in tmp_path.iterdir()] == ["replay"]
+
+
+def test_film__a_sumo_gui_that_dies_says_what_it_said(
+    merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    require_gui()
+    folder = write(clean_game(), merge_net, tmp_path / "replay")
+    (folder / "episode.fcd.xml").unlink()
+    with pytest.raises(HarnessError, match=r"(?s)SUMO-GUI|film"):
+        write_film(folder, clean_game(), tmp_path / "film.gif", title="", step_length_s=STEP_S)
+    assert not list(tmp_path.glob("*.gif"))
+
+
+# --- mp4 ---
+
+PICTURES = [Image.new("RGB", (64, 32), (k * 20, 0, 0)) for k in range(5)]
+
+
+def fake_ffmpeg(folder: Path, script: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    program = folder / "bin" / "ffmpeg"
+    program.parent.mkdir()
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{program.parent}:/usr/bin:/bin")
+
+
+def test_mp4__ffmpeg_gets_every_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = f'echo "$@" > {tmp_path}/arguments\nwc -c > {tmp_path}/bytes'
+    fake_ffmpeg(tmp_path, script, monkeypatch)
+    encode(iter(PICTURES), tmp_path / "film.mp4", (64, 32), 0.1)
+    assert int((tmp_path / "bytes").read_text()) == 5 * 64 * 32 * 3
+    arguments = (tmp_path / "arguments").read_text()
+    assert "-f rawvideo -pix_fmt rgb24 -s 64x32 -r 10 -i -" in arguments
+    assert arguments.strip().endswith(str(tmp_path / "film.mp4"))
+
+
+def test_mp4__what_ffmpeg_says_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fake_ffmpeg(tmp_path, "echo 'no such codec' >&2; exit 1", monkeypatch)
+    with pytest.raises(HarnessError, match="no such codec"):
+        encode(iter(PICTURES * 50), tmp_path / "film.mp4", (64, 32), 0.1)
+
+
+def test_mp4__is_one(tmp_path: Path) -> None:
+    if find_ffmpeg() is None:
+        pytest.skip("needs ffmpeg")
+    encode(iter(PICTURES), tmp_path / "film.mp4", (64, 32), 0.1)
+    assert (tmp_path / "film.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+def test_gif__counts_time_though_nothing_moves(tmp_path: Path) -> None:
+    """Pillow makes equal pictures one, shown for longer."""
+    still = pd.Series([PICTURES[0]] * 4).tolist()
+    encode(iter(still), tmp_path / "film.gif", (64, 32), 0.1)
+    with Image.open(tmp_path / "film.gif") as film:
+        assert film.info["duration"] * film.n_frames == 400

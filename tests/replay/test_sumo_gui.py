@@ -1,0 +1,198 @@
+"""A replay in SUMO-GUI under a virtual screen: what a person sees is where the trace has it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from PIL import Image, ImageGrab
+
+from harness.replay import follow_in_sumo_gui, open_in_sumo_gui, sumo_gui
+from harness.replay.contact import contacts
+from harness.replay.gui_settings import choose_view
+from harness.replay.sumo_gui import find_sumo_gui
+from harness.replay.vehicles import types_of_vehicles
+from harness.replay.virtual_screen import find_xvfb, virtual_screen
+from harness.traffic import gui
+from tests.replay.test_bundle import GAMES, RAILS, STEP_S, collision_game, merge_net, write
+
+__all__ = ["merge_net"]  # a fixture of test_replay
+
+
+def require_gui() -> None:
+    """Skips where SUMO-GUI can't run on a virtual screen; under HARNESS_REQUIRE_GUI=1, fails."""
+    needed = {"Xvfb": find_xvfb(), "sumo-gui": find_sumo_gui()}
+    missing = [name for name, found in needed.items() if not found]
+    if missing:
+        reason = f"needs {' and '.join(missing)}"
+        if os.environ.get("HARNESS_REQUIRE_GUI") == "1":
+            pytest.fail(reason)
+        pytest.skip(reason)
+
+
+@pytest.fixture(scope="module")
+def screen() -> Iterator[str]:
+    """The name of a virtual screen."""
+    require_gui()
+    xvfb = find_xvfb()
+    assert xvfb is not None
+    with virtual_screen(xvfb, (1400, 900)) as name:
+        yield name
+
+
+def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
+    """RGB pictures [height, width, 3] that SUMO-GUI takes of the given steps of the game."""
+    settings = (folder / "view.xml").read_text()
+    settings = re.sub(r"<(breakpoint|delay) [^>]*>", "", settings)
+    files = [folder / f"step{step}.png" for step in steps]
+    taken = "".join(
+        f'<snapshot file="{file.name}" time="{(step + 1) * STEP_S:.1f}"/>'
+        for file, step in zip(files, steps, strict=True)
+    )
+    (folder / "view.xml").write_text(settings.replace("</viewsettings>", taken + "</viewsettings>"))
+    command = [str(find_sumo_gui()), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
+    done = subprocess.run(
+        command, env=os.environ | {"DISPLAY": screen}, capture_output=True, text=True, timeout=90, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files]
+
+
+def blue(picture: np.ndarray) -> np.ndarray:
+    red, green, blue = np.moveaxis(picture, -1, 0)
+    return (blue > 180) & (blue > red + 90) & (blue > green + 50)
+
+
+def orange(picture: np.ndarray) -> np.ndarray:
+    red, green, blue = np.moveaxis(picture, -1, 0)
+    return (red > 200) & (green > 80) & (green < 215) & (blue < 110)
+
+
+def place(mask: np.ndarray, trace: pd.DataFrame, net: Path) -> tuple[float, float]:
+    """The middle of the marked pixels in net coordinates."""
+    found = contacts(trace, types_of_vehicles(trace, net.with_name("merge.rou.xml")), RAILS)
+    view = choose_view(trace, found)
+    height, width = mask.shape
+    metres = max(view.width_m / width, view.height_m / height)  # per pixel
+    rows, columns = np.nonzero(mask)
+    low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()])
+    x, y = 0.5 * (low + high) - 0.5 * np.array([width, height])
+    return view.x_m + x * metres, view.y_m - y * metres
+
+
+@pytest.mark.parametrize(("name", "step"), [("clean", 70), ("clean", 153), ("collision", 15), ("rail", 22)])
+def test_gui__shows_both_cars_where_the_trace_has_them(
+    name: str, step: int, screen: str, merge_net: Path, tmp_path: Path
+) -> None:
+    trace = GAMES[name]()
+    (picture,) = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [step])
+    expected = trace[trace["step"] == step].set_index("player")
+    for player, mask in (("ego", blue(picture)), ("non_ego", orange(picture))):
+        assert mask.any(), f"{player} can't be seen"
+        x_m, y_m = place(mask, trace, merge_net)
+        assert abs(x_m - expected.loc[player, "x_m"]) < 1.5
+        assert abs(y_m - expected.loc[player, "y_m"]) < 1.0
+
+
+def test_gui__who_left_is_gone_and_who_is_there_at_the_end_stays(screen: str, merge_net: Path, tmp_path: Path) -> None:
+    trace = GAMES["clean"]()
+    leaving, gone, last = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [153, 154, 169])
+    assert blue(leaving).any()
+    assert not blue(gone).any()
+    assert orange(gone).any()
+    assert orange(last).any()
+
+
+def test_gui__halts_at_the_contact(
+    screen: str, merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write(collision_game(), merge_net, tmp_path / "replay")
+    settings = (folder / "view.xml").read_text()
+    snapshots = '<snapshot file="halt.png" time="3.3"/><snapshot file="beyond.png" time="3.5"/></viewsettings>'
+    settings = re.sub(r"<delay [^>]*>", '<delay value="20"/>', settings).replace("</viewsettings>", snapshots)
+    (folder / "view.xml").write_text(settings)
+    monkeypatch.setenv("DISPLAY", screen)
+    gui = open_in_sumo_gui(folder)
+    try:
+        deadline = time.monotonic() + 60.0
+        while not (folder / "halt.png").exists() and time.monotonic() < deadline:
+            time.sleep(0.1)
+        assert (folder / "halt.png").exists()
+        time.sleep(2.0)  # a hundred times what the two further steps would take
+        assert gui.poll() is None
+        assert not (folder / "beyond.png").exists()
+    finally:
+        gui.kill()
+        gui.wait(timeout=10)
+
+
+def test_gui__follows_the_ego_and_halts_at_the_contact(
+    screen: str, merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = collision_game()
+    folder = write(trace, merge_net, tmp_path / "replay")
+    settings = folder / "view.xml"
+    settings.write_text(re.sub(r"<delay [^>]*>", '<delay value="20"/>', settings.read_text()))
+    monkeypatch.setenv("DISPLAY", screen)
+    started: list[subprocess.Popen[bytes]] = []
+
+    class Noted(subprocess.Popen):  # type: ignore[type-arg]
+        def __init__(self, *arguments: object, **options: object) -> None:
+            super().__init__(*arguments, **options)  # type: ignore[call-overload]
+            started.append(self)
+
+    monkeypatch.setattr(gui.subprocess, "Popen", Noted)
+    opened = threading.Event()
+    watching = threading.Thread(target=follow_in_sumo_gui, args=(folder, opened.set), daemon=True)
+    watching.start()
+    try:
+        assert opened.wait(60.0)
+        pictures = settled(screen)
+        assert watching.is_alive()  # at a halt, or the game would be over long since
+    finally:
+        started[0].kill()  # as when its user closes it
+    watching.join(20.0)
+    assert not watching.is_alive()
+
+    contact = trace[trace["outcome"] == "collision"]["step"].min()
+    expected = trace[trace["step"] == contact].set_index("player")
+    places = {name: middle(mask(pictures)) for name, mask in (("ego", blue), ("non_ego", orange))}
+    canvas = np.argwhere(blue(pictures) | orange(pictures) | ground(pictures))
+    centre = 0.5 * (canvas.min(0) + canvas.max(0))
+    assert abs(places["ego"][1] - centre[1]) < 30  # pixels; SUMO-GUI follows the front bumper
+    metre = (canvas.max(0) - canvas.min(0))[1] / sumo_gui.FOLLOWED_M[0]
+    apart = (places["non_ego"][1] - places["ego"][1]) / metre
+    assert apart == pytest.approx(expected.loc["non_ego", "x_m"] - expected.loc["ego", "x_m"], abs=0.8)
+
+
+def settled(screen: str) -> np.ndarray:
+    """What is on the screen [height, width, 3] once nothing moves any more."""
+    before, since = np.zeros(0), time.monotonic()
+    deadline = since + 60.0
+    while time.monotonic() < deadline:
+        now = np.asarray(ImageGrab.grab(xdisplay=screen).convert("RGB")).astype(int)
+        if not np.array_equal(now, before) or not blue(now).any():
+            before, since = now, time.monotonic()
+        elif time.monotonic() - since > 2.0:
+            return now
+        time.sleep(0.2)
+    pytest.fail("SUMO-GUI never comes to rest")
+
+
+def middle(mask: np.ndarray) -> np.ndarray:
+    """Row and column of the middle of the marked pixels that belong together: toolbars have blue ones too."""
+    rows = np.argwhere(mask)
+    rows = rows[np.abs(rows - np.median(rows, axis=0)).max(1) < 60]
+    return 0.5 * (rows.min(0) + rows.max(0))
+
+
+def ground(picture: np.ndarray) -> np.ndarray:
+    return (picture == (214, 224, 206)).all(-1)

@@ -1,0 +1,123 @@
+"""The report in a real browser: what is on the page before anything is played."""
+
+from __future__ import annotations
+
+import pytest
+from tests.support.chromium import launched, opener
+from tests.reports.test_page import campaign, recordings, with_errors
+
+from harness.reports.page import render_page
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with launched() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    arguments = campaign(quick=True, seeds=(1,))
+    rows = arguments["episodes"]
+    arguments = with_errors(arguments, (rows["arm"] == "naive_vs_distracted") & (rows["episode"] == 40))
+    return write(tmp_path_factory.mktemp("report"), arguments)
+
+
+def write(folder, arguments):
+    path = folder / "report.html"
+    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def opened(browser, report):
+    with opener(browser, report) as open_page:
+        yield open_page
+
+
+def test_report__opens_from_a_file_without_a_complaint_or_a_request(opened):
+    page = opened()
+    assert page.title() == "merge: report"
+    for details in page.locator("details").all():
+        details.locator("summary").click()
+    page.wait_for_timeout(200)
+    assert page.seen == []
+
+
+def test_report__the_verdicts_are_on_the_first_screen(opened):
+    page = opened()
+    for text in ("RQ1: yes", "RQ2: yes"):
+        box = page.get_by_text(text).first.bounding_box()
+        assert box["y"] + box["height"] < 900
+    assert page.get_by_text("Quick run").is_visible()
+    assert page.get_by_text("The speedy driver makes the naive ego fail in 18 of 60 games").is_visible()
+    for part in (".clip canvas", ".rates .retrained strong"):
+        box = page.locator(part).first.bounding_box()
+        assert box["y"] + box["height"] < 900
+
+
+@pytest.mark.parametrize("width", [400, 320, 1280])
+def test_report__the_page_itself_never_scrolls_sideways(opened, width):
+    page = opened(width=width)
+    for details in page.locator("details").all():
+        details.locator("summary").click()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_report__long_names_and_messages_do_not_widen_it(opened, tmp_path):
+    arguments = campaign(personas=["a_persona_with_a_name_of_forty_letters_x"])
+    arguments["manifest"]["stages"]["naive-seed1"] |= {"status": "failed", "message": "x" * 300}
+    page = opened(write(tmp_path, arguments), width=400)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_report__text_stands_out_from_its_ground_in_light_and_dark(opened, scheme):
+    page = opened(color_scheme=scheme)
+    for selector in ("h1", ".sentence", ".answer strong", ".count", ".banner", "figcaption", "td", "figure svg text"):
+        ratio = page.locator(selector).first.evaluate(CONTRAST)
+        assert ratio >= 4.5, f"{selector}: {ratio:.1f}"
+
+
+def test_report__figures_are_drawn_in_the_pages_colours(opened):
+    colours = {}
+    for scheme in ("light", "dark"):
+        text = opened(color_scheme=scheme).locator("figure svg text").first
+        colours[scheme] = text.evaluate("element => getComputedStyle(element).fill")
+    assert colours["light"] != colours["dark"]
+
+
+def test_report__hostile_names_are_inert(opened, tmp_path):
+    hostile = ["<script>alert(1)</script>", "\"><img src=x onerror='alert(2)'>"]
+    page = opened(write(tmp_path, campaign(personas=hostile)))
+    page.wait_for_timeout(200)
+    assert page.seen == []
+    assert page.get_by_role("heading", name=hostile[0]).first.is_visible()
+
+
+def test_report__prints_with_its_verdicts_and_figures(opened):
+    page = opened()
+    page.emulate_media(media="print")
+    assert page.get_by_text("RQ1: yes").first.is_visible()
+    assert page.locator("figure svg").first.is_visible()
+    assert page.locator("#player canvas").first.is_visible()
+    for gone in ("nav", ".clock", ".filters"):
+        assert not page.locator(gone).first.is_visible()
+    assert page.pdf().startswith(b"%PDF")
+
+
+CONTRAST = """element => {
+  const parse = colour => colour.match(/[\\d.]+/g).map(Number);
+  const luminance = colour => {
+    const [r, g, b] = parse(colour).map(part => part / 255)
+      .map(part => part <= 0.03928 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const style = getComputedStyle(element);
+  const ink = luminance(element instanceof SVGElement ? style.fill : style.color);
+  let ground = element;
+  while (ground && (parse(getComputedStyle(ground).backgroundColor)[3] ?? 1) === 0) ground = ground.parentElement;
+  const paper = luminance(getComputedStyle(ground).backgroundColor);
+  return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
+}"""
+"""WCAG's contrast ratio of an element's text with the first ground behind it that is not transparent."""

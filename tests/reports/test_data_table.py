@@ -1,0 +1,108 @@
+"""The tables of the report in a real browser: sorted, filtered, and downloaded as the CSV files that they are."""
+
+from __future__ import annotations
+
+import pytest
+from tests.support.chromium import launched, opener, until
+from tests.reports.test_page import campaign, recordings, with_errors
+
+from harness.reports.page import render_page
+from harness.evaluation.tables import write_csv
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with launched() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def arguments():
+    found = campaign(personas=["speedy"])
+    rows = found["episodes"]
+    found = with_errors(found, (rows["arm"] == "naive_vs_speedy") & (rows["episode"] == 40))
+    found["episodes"].loc[found["episodes"]["error"] != "", "error"] = 'it said "no", twice,\nand died'
+    return found
+
+
+@pytest.fixture(scope="module")
+def report(arguments, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def page(browser, report):
+    with opener(browser, report) as open_page:
+        page = open_page()
+        page.wait_for_selector(".player[data-ready]")
+        for details in page.locator("#tables details").all():
+            details.locator("summary").click()
+        yield page
+
+
+@pytest.mark.parametrize("name", ["episodes", "summary", "comparisons", "training"])
+def test_table__downloads_as_its_csv_file(page, arguments, tmp_path, name):
+    page.locator(f"#{name} thead .sort").nth(2).click()  # sorting and filtering do not change what is downloaded
+    if name == "episodes":
+        page.locator("[data-filter=text]").fill("rail")
+    with page.expect_download() as download:
+        page.locator(f".filters:has(+ .scroll #{name}) button").click()
+    assert download.value.suggested_filename == f"{name}.csv"
+    write_csv(arguments[name], tmp_path / "table.csv")
+    assert download.value.path().read_bytes() == (tmp_path / "table.csv").read_bytes()
+    assert page.seen == []
+
+
+def test_table__of_pairs_downloads_too(page):
+    with page.expect_download() as download:
+        page.locator(".filters:has(+ .scroll #pairs) button").click()
+    first, *rows = download.value.path().read_text().splitlines()
+    assert first.startswith("non-ego,ego,failures,naive_vs_sumo,naive_vs_speedy")
+    assert any(row.startswith("cut-in,swerve,") for row in rows)
+
+
+def column(page, place):
+    return page.locator("#episodes tbody").evaluate(
+        "(body, place) => [...body.rows].filter(row => !row.hidden)"
+        ".map(row => row.cells[place].dataset.value ?? row.cells[place].textContent)",
+        place,
+    )
+
+
+def test_table__sorts_numbers_by_size_with_what_is_empty_last(page, arguments):
+    place = list(arguments["episodes"].columns).index("ego_min_ttc_s")
+    heading = page.locator("#episodes thead th").nth(place)
+    heading.locator("button").click()
+    rising = [float(value) for value in column(page, place) if value]
+    assert rising == sorted(rising)
+    assert heading.get_attribute("aria-sort") == "ascending"
+    assert column(page, place)[-1] == ""
+    heading.locator("button").click()
+    falling = [float(value) for value in column(page, place) if value]
+    assert falling == sorted(falling, reverse=True)
+    assert column(page, place)[-1] == ""
+
+
+def test_table__filters_by_arm_outcome_and_text(page, arguments):
+    episodes = arguments["episodes"]
+    page.locator("[data-filter=arm]").select_option(label="naive_vs_speedy")
+    page.locator("[data-filter=ego_outcome]").select_option(label="collision")
+    expected = episodes[(episodes["arm"] == "naive_vs_speedy") & (episodes["ego_outcome"] == "collision")]
+    assert column(page, 3) == [str(episode) for episode in expected["episode"]]
+    assert page.locator(".filters output").inner_text() == f"{len(expected)} of {len(episodes)} games"
+    page.locator("[data-filter=ego_outcome]").select_option(label="all")
+    page.locator("[data-filter=text]").fill("twice died")
+    assert column(page, 3) == ["40"]
+
+
+def test_table__a_row_opens_its_game(page):
+    page.locator("[data-filter=arm]").select_option(label="naive_vs_speedy")
+    page.locator("#episodes tbody tr:not([hidden]) a").nth(3).click()
+    until(page, "() => document.querySelector('[data-is=game]').value === 'naive_vs_speedy,1,3'")
+
+
+def test_table__a_game_that_was_not_played_opens_nothing(page):
+    page.locator("[data-filter=text]").fill("twice died")
+    assert page.locator("#episodes tbody tr:not([hidden]) a").count() == 0

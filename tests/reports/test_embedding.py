@@ -1,0 +1,81 @@
+from __future__ import annotations
+
+import base64
+import json
+import zlib
+
+import numpy as np
+import pytest
+from tests.support.recorded import SCENE, recorded
+from tests.reports.test_page import campaign
+
+from harness.reports.embedding import NOTHING, SCALES, Embedded, columns_of, pack
+from harness.reports.player_data import key
+
+
+@pytest.fixture(scope="module")
+def games():
+    return list(recorded(campaign(personas=["speedy"])["episodes"]))
+
+
+def unpacked(text):
+    """What recorded.js makes of a packed game, before it is cut into columns."""
+    planes = np.frombuffer(zlib.decompress(base64.b64decode(text)), dtype=np.uint8).reshape(4, -1)
+    return np.ascontiguousarray(planes.T).view("<i4").ravel()
+
+
+def read(embedded):
+    return json.loads(embedded.document())
+
+
+def test_packing__gives_back_what_was_packed():
+    columns = [np.array([5.0, -3.0, 100_000.0]), np.zeros(0), np.array([-2_000_000.0, -1.0])]
+    numbers = unpacked(pack(columns))
+    assert np.cumsum(numbers[:3]).tolist() == columns[0].tolist()
+    assert np.cumsum(numbers[3:]).tolist() == columns[2].tolist()
+
+
+def test_columns__are_the_trace_to_half_a_unit(games):
+    game = games[0]
+    columns = columns_of(game)
+    ego = game.players[0]
+    for column, (name, scale) in zip(columns, SCALES.items(), strict=False):
+        values = np.asarray(getattr(ego, name), dtype=float)
+        measured = np.isfinite(values)
+        assert np.abs(column[measured] * scale - values[measured]).max() <= 0.5 * scale + 1e-9
+        assert (column[~measured] == NOTHING).all()
+    assert len(columns) == len(SCALES) * len(game.players) + 4 * len(game.others)
+
+
+def test_embedded__as_many_as_fit_and_the_first_ones(games):
+    whole = Embedded(SCENE, games, {}, 10_000_000)
+    assert whole.keys == {key(game.arm, game.seed, game.episode) for game in games}
+    part = Embedded(SCENE, games, {}, 40_000)
+    assert 0 < len(part.games) < len(games)
+    assert part.games == games[: len(part.games)]
+    road = len(Embedded(SCENE, [], {}, 0).document())
+    assert len(part.document()) - road < 40_000 + 2 * len(part.games)
+
+
+def test_embedded__games_are_read_only_until_the_page_is_full(games):
+    asked = []
+
+    def one_by_one():
+        for game in games:
+            asked.append(game)
+            yield game
+
+    part = Embedded(SCENE, one_by_one(), {}, 40_000)
+    assert len(asked) == len(part.games) + 1
+
+
+def test_embedded__without_a_road_there_are_no_games(games):
+    assert read(Embedded(None, games, {}, 10_000_000))["games"] == []
+
+
+def test_document__nothing_in_it_can_end_the_script(games):
+    hostile = "</script><!--<script>&\u2028"
+    marks = {key(games[0].arm, games[0].seed, games[0].episode): [{"text": hostile}]}
+    embedded = Embedded(SCENE, games[:1], marks, 10_000_000)
+    assert not set(embedded.document()) & set("<>&\u2028")
+    assert read(embedded)["games"][0]["marks"] == [{"text": hostile}]

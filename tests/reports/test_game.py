@@ -1,0 +1,416 @@
+"""The report's section on the game: its numbers are the CSV files', its words say no more than was found."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+
+import pandas as pd
+import pytest
+from tests.support.chromium import launched, opener
+from tests.support.game_tables import arm, findings, table
+from tests.reports.test_page import Page, campaign
+from tests.reports.test_browser import CONTRAST
+
+from harness.reports.game import CAPTIONS, game_section
+from harness.reports.game_wording import equilibrium_sentences, gap_verdicts
+from harness.reports.heatmaps import views
+from harness.reports.page import render_page
+from harness.evaluation.tables import write_csv
+from harness.evaluation.game_theory.empirical_game import equilibria
+from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps
+from harness.evaluation.game_theory.records import GameFindings, Response
+
+PERSONAS = ("speedy", "distracted")
+
+
+@pytest.fixture(scope="module")
+def found():
+    return findings(seeds=(1, 2))
+
+
+def page_of(game, seeds=(1,)):
+    """A report that says little but of the game."""
+    arguments = campaign(personas=(), seeds=seeds)
+    return render_page(**arguments | {"training": arguments["training"][:0]}, game=game)
+
+
+@pytest.fixture(scope="module")
+def html(found):
+    return page_of(found, seeds=(1, 2))
+
+
+@pytest.fixture(scope="module")
+def page(html):
+    return Page(html)
+
+
+def plain(text):
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+# --- numbers ---
+
+
+@pytest.mark.parametrize("name", CAPTIONS)
+def test_section__the_numbers_are_those_of_the_csv_file(name, found, page, tmp_path):
+    write_csv(getattr(found, name), tmp_path / "table.csv")
+    with (tmp_path / "table.csv").open(newline="", encoding="utf-8") as file:
+        assert page.cells(name) == list(csv.reader(file))
+    assert f"{name}.csv" in {attributes.get("href") for tag, attributes in page.tags if tag == "a"}
+
+
+def test_section__every_number_that_is_read_is_the_exact_one_rounded(page):
+    checked = 0
+    for name in CAPTIONS:
+        headings = [cell["exact"] for cell in page.tables[name][0]]
+        for row in page.tables[name][1:]:
+            for column, cell in zip(headings, row, strict=True):
+                if cell["exact"] in (None, "") or column in ("p_value", "p_holm"):
+                    continue
+                scaled = any(word in column for word in ("rate", "share", "fewer", "failure_difference"))
+                read = float(cell["text"].replace("\N{MINUS SIGN}", "-").replace(",", ""))
+                exact = float(cell["exact"]) * (100 if scaled else 1)
+                assert read == pytest.approx(exact, abs=0.0501 if scaled else 0.00501), column
+                checked += 1
+    assert checked > 500
+
+
+def test_heat_map__has_the_tables_number_in_every_cell(found):
+    first = found.crossplay[found.crossplay["seed"] == 2]
+    (mean, _, second) = game_section(found).views
+    assert (mean.label, second.label) == ("mean over 2 seeds", "seed 2")
+    failures, ego, non_ego = (each.figure for each in second.maps)
+    for row in first.to_dict("records"):
+        between = f"{row['ego']} against {row['non_ego']} "
+        assert f"{between}{row['failure_rate'] * 100:g} %" in failures
+        assert f"{between}{row['ego_payoff']:.1f}" in ego
+        payoff = "–" if math.isnan(row["non_ego_payoff"]) else f"{row['non_ego_payoff']:.1f}"
+        assert f"{between}{payoff}" in non_ego
+        assert f">{row['failure_rate'] * 100:g} %<" in failures  # and not only for those who can't see it
+    naive = found.crossplay[(found.crossplay["ego"] == "naive") & (found.crossplay["non_ego"] == "speedy")]
+    assert f"naive against speedy {naive['ego_payoff'].mean():.1f}" in mean.maps[1].figure
+
+
+def test_heat_map__of_one_seed_there_is_nothing_to_choose():
+    assert [view.label for view in game_section(findings(games=20)).views] == ["seed 1"]
+
+
+def test_heat_map__has_a_personas_strategies_side_by_side(found):
+    rows = found.crossplay[found.crossplay["seed"] == 1]
+    rows = pd.concat([rows[rows["non_ego"] != "speedy_round2"], rows[rows["non_ego"] == "speedy_round2"]])
+    figure = views(rows)[0].maps[0].figure
+    names = re.findall(r">(speedy|speedy_round2|distracted|sumo)</text>", figure)
+    assert names == ["speedy", "speedy_round2", "distracted", "sumo"]
+
+
+def test_section__takes_its_share_of_the_page(found, html):
+    without = page_of(None, seeds=(1, 2))
+    assert len(html) - len(without) == pytest.approx(game_section(found).bytes, rel=0.35)
+
+
+# --- where there is nothing ---
+
+
+def test_section__is_there_only_where_a_run_has_such_tables(html):
+    without = page_of(None)
+    assert 'id="game"' in html
+    assert 'href="#game"' in html
+    assert 'id="game"' not in without
+    assert 'href="#game"' not in without
+
+
+def test_section__gaps_alone_or_a_crossplay_alone_are_a_section_too(found):
+    empty = findings(games=4)
+    empty = {name: getattr(empty, name)[:0] for name in CAPTIONS}
+    gaps_alone = Page(page_of(GameFindings(**empty | {"gaps": found.gaps})))
+    assert "Everyone against everyone" not in gaps_alone.text
+    assert "gaps" in gaps_alone.tables
+    others = {name: getattr(found, name) for name in CAPTIONS if name != "gaps"}
+    crossplay_alone = Page(page_of(GameFindings(**empty | others)))
+    assert "gaps" not in crossplay_alone.tables
+    assert "crossplay" in crossplay_alone.tables
+
+
+# --- words ---
+
+EGO = Response(1, "ego", "speedy", 3, "pair", "best_ego", "retrained_speedy", "speedy")
+NON_EGO = Response(1, "non_ego", "speedy", 3, "pair", "best_non_ego", "retrained_speedy", "speedy")
+
+
+def said(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, games=100):
+    """The verdict on a pair of which the ego earns 10, the speedy driver 20; gains alternate a little around a mean."""
+    wave = [0.01 * (-1) ** place for place in range(games)]
+
+    def arm_of(name, ego=0.0, non_ego=0.0, failed=0):
+        sides = (
+            [10 + (each + ego if ego else 0) for each in wave],
+            [20 + (each + non_ego if non_ego else 0) for each in wave],
+        )
+        return arm(name, 1, [1] * failed + [0] * (games - failed), *sides)
+
+    episodes = table(
+        arm_of("pair", failed=3), arm_of("best_ego", ego_gain), arm_of("best_non_ego", 0, non_ego_gain, failing)
+    )
+    ((persona, verdict),) = gap_verdicts(gaps(responses, episodes, 0.01))
+    assert persona == "speedy"
+    return verdict.label, plain(verdict.sentence), plain(verdict.speed), verdict.tone
+
+
+def test_words__both_could_gain():
+    label, sentence, induced, tone = said(0.2, 6.2, failing=12)
+    assert label == "no"
+    assert sentence == "The ego could still gain 2 % of its payoff; the speedy driver 31 %: not an equilibrium."
+    assert induced == (
+        "A speedy driver trained anew against this ego makes it fail in 12 of 100 games (12 %; 95 %: 7–19.8 %) "
+        "instead of 3."
+    )
+    assert tone == "harm"
+
+
+def test_words__one_could_gain():
+    label, sentence, _, tone = said(-0.2, 6.2)
+    assert label == "no"
+    assert sentence == (
+        "For the ego nothing better was found; the speedy driver could still gain 31 % of its payoff: "
+        "not an equilibrium."
+    )
+    assert tone == "open"
+
+
+def test_words__nothing_better_is_no_equilibrium_but_as_near_as_was_looked():
+    label, sentence, induced, tone = said(-0.2, -0.4, failing=12)
+    assert label == "not refuted"
+    assert sentence == (
+        "For the ego nothing better was found; for the speedy driver nothing better was found: as near to an "
+        "equilibrium as this search can tell."
+    )
+    assert induced.endswith("instead of 3, though that driver earns no more by it.")
+    assert tone == "harm"  # the ego fails more, whatever for
+    assert said(0, -0.4)[1].startswith("The best response of the ego earns the same in every game; for the speedy")
+
+
+def test_words__a_negative_gap_is_never_a_gain(found):
+    negative = [gap for gap in game_section(found).gaps if gap.verdict == GapVerdict.NONE_FOUND.value]
+    assert negative
+    assert {gap.share for gap in negative} == {"none found"}
+
+
+def test_words__a_gain_that_cant_be_told_from_0_has_its_interval_beside_it():
+    row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
+    row = row.assign(verdict=GapVerdict.NOT_DISTINGUISHABLE.value, payoff=-20.0, gap=6.0, gap_share=0.3)
+    ((_, answer),) = gap_verdicts(row.assign(ci_low=-1.0, ci_high=13.0))
+    assert answer.tone == "open"  # nothing is shown, neither way
+    assert plain(answer.sentence).startswith(
+        "For the ego a gain of 30 % was measured, which can't be told from 0 (95 %: −5 to 65 %); for the speedy driver"
+    )
+
+
+def test_words__of_one_side_alone_nothing_is_decided():
+    label, sentence, induced, _ = said(-0.2, 0, responses=(EGO,))
+    assert label == "not decided"
+    assert sentence == (
+        "For the ego nothing better was found; no best response of the speedy driver was trained: whether this is an "
+        "equilibrium is not decided."
+    )
+    assert induced == ""
+
+
+@pytest.mark.parametrize("verdict", list(GapVerdict))
+def test_words__say_gain_without_reserve_only_where_it_can_be_told_from_0(verdict):
+    row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
+    row = row.assign(verdict=verdict.value, gap_share=0.1, gap=1.0, p_holm=0.2)
+    ((_, answer),) = gap_verdicts(row)
+    assert ("could still gain" in answer.sentence) == (verdict is GapVerdict.DISTINGUISHABLE)
+    assert (answer.label == "no") == (verdict is GapVerdict.DISTINGUISHABLE)
+    assert answer.sentence.endswith(".") or "left out" in answer.sentence
+
+
+def test_words__games_that_could_not_be_compared_are_counted_not_rated():
+    episodes = table(arm("pair", ego_failed=[0, 0]), arm("best_ego", ego_failed=[None, 0]))
+    ((_, verdict),) = gap_verdicts(gaps([EGO, NON_EGO], episodes, 0.01))
+    assert verdict.label == "not decided"
+    assert "1 of 2 pairs is left out: not played or not measured." in verdict.sentence
+    assert verdict.speed == "What a speedy driver trained anew makes of this ego was not measured."
+    assert "%" not in verdict.sentence
+
+
+def test_words__several_seeds_are_counted_and_each_is_said(found):
+    (speedy, distracted) = (dict(gap_verdicts(found.gaps))[persona] for persona in PERSONAS)
+    assert speedy.label == "no in 2 of 2 seeds"
+    assert plain(speedy.speed).startswith(
+        "A speedy driver trained anew against this ego makes it fail in 26 % of games"
+    )
+    assert distracted.label == "not refuted in 2 of 2 seeds"
+    assert distracted.sentence == "In 2 of 2 seeds no gain that can be told from 0 was found for either."
+    assert [answer.seed for answer in speedy.per_seed] == [1, 2]
+
+
+def test_words__only_the_last_round_is_the_headline(found):
+    earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value)
+    verdicts = dict(gap_verdicts(pd.concat([earlier, found.gaps], ignore_index=True)))
+    assert verdicts["speedy"].label == "no in 2 of 2 seeds"
+
+
+def test_words__pairs_of_earlier_rounds_are_said_beneath(found):
+    earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value, ego="naive")
+    both = pd.concat([earlier, found.gaps], ignore_index=True)
+    section = game_section(GameFindings(both, found.crossplay, found.equilibria, found.generalisation))
+    assert len(section.gaps) == 8
+    assert [(persona, pair, answer.seed) for persona, pair, answer in section.others] == [
+        ("speedy", "naive against speedy_round2", 1),
+        ("speedy", "naive against speedy_round2", 2),
+        ("distracted", "naive against distracted", 1),
+        ("distracted", "naive against distracted", 2),
+    ]
+    text = Page(page_of(GameFindings(both, found.crossplay, found.equilibria, found.generalisation), (1, 2))).text
+    assert "naive against distracted, seed 2: For the ego nothing better was found" in text
+
+
+def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
+    cells = pd.DataFrame(
+        {
+            "seed": 1,
+            "ego": ["naive", "naive", "retrained", "retrained"],
+            "non_ego": ["speedy", "speedy_round2"] * 2,
+            "persona": "speedy",
+            "failure_rate": [0.4, 0.0, 0.0, 0.2],
+            "ego_payoff": [1.0, -1.0, -1.0, 1.0],
+            "non_ego_payoff": [-1.0, 1.0, 1.0, -1.0],
+        }
+    )
+    (_, against, (nash,)), (_, everyone, (safest,)) = equilibrium_sentences(equilibria(cells))
+    assert (against, everyone) == ("speedy", "all")
+    assert plain(nash) == (
+        "In equilibrium the ego plays 50 % naive + 50 % retrained, the speedy driver 50 % speedy + 50 % "
+        "speedy_round2: the ego fails in 15 % of games and earns 0.00."
+    )
+    assert plain(safest) == (
+        "Whoever comes, the safest choice of egos is 33.3 % naive + 66.7 % retrained: it fails in 13.3 % of games at "
+        "worst (against speedy, speedy_round2). The safest single ego is retrained, with 20 % at worst."
+    )
+
+
+def test_words__a_game_with_holes_says_who_is_left_out_and_gives_no_number():
+    cells = pd.DataFrame(
+        {
+            "seed": 1,
+            "ego": ["naive", "retrained"],
+            "non_ego": ["speedy", "speedy_round2"],
+            "persona": "speedy",
+            "failure_rate": 0.1,
+            "ego_payoff": 1.0,
+            "non_ego_payoff": 1.0,
+        }
+    )
+    for _, _, sentences in equilibrium_sentences(equilibria(cells)):
+        assert sentences == [
+            "No ego was measured against all of these: there is no game to solve.",
+            "Left out, because not played against all: naive, retrained, speedy, speedy_round2.",
+        ]
+
+
+# --- in a browser ---
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with launched() as browser:
+        yield browser
+
+
+@pytest.fixture
+def opened(browser, html, tmp_path):
+    (tmp_path / "report.html").write_text(html, encoding="utf-8")
+    with opener(browser, tmp_path / "report.html") as open_page:
+        yield open_page
+
+
+@pytest.mark.parametrize("width", [320, 400, 1280])
+def test_browser__the_page_does_not_scroll_sideways_and_nothing_lies_on_another(opened, width):
+    page = opened(width=width)
+    for details in page.locator("#game details").all():
+        details.locator("summary").click()
+    assert page.seen == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+    overlaps = page.evaluate(
+        """() => {
+          const boxes = [...document.querySelectorAll("#game > *, #game .maps figure")]
+            .filter(each => each.checkVisibility() && !each.classList.contains("views"))
+            .map(each => each.getBoundingClientRect());
+          return boxes.flatMap((a, n) => boxes.slice(n + 1).filter(b =>
+            a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom - 1 && b.top < a.bottom - 1)).length;
+        }"""
+    )
+    assert overlaps == 0
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_browser__numbers_stand_out_from_the_darkest_cell(opened, scheme):
+    page = opened(color_scheme=scheme)
+    for selector in ("#game .sentence", "#game .induced", "#game figcaption", "#game .heat svg text", "#game dd"):
+        assert page.locator(selector).first.evaluate(CONTRAST) >= 4.5, selector
+    worst = page.evaluate(
+        """() => {
+          const numbers = colour => colour.match(/[\\d.]+/g).map(Number);
+          const luminance = colour => {
+            const [r, g, b] = colour.map(part => part / 255)
+              .map(part => part <= 0.03928 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
+            return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+          };
+          const ground = numbers(getComputedStyle(document.querySelector("#game .heat")).backgroundColor);
+          const ink = luminance(numbers(getComputedStyle(document.querySelector("#game .heat svg text")).fill));
+          return Math.min(...[...document.querySelectorAll("#game .heat svg path")].map(cell => {
+            const style = getComputedStyle(cell), opacity = Number(style.opacity) * Number(style.fillOpacity);
+            if (style.fill === "none" || opacity === 1) return Infinity;
+            const mixed = numbers(style.fill).slice(0, 3).map((part, n) => part * opacity + ground[n] * (1 - opacity));
+            const [a, b] = [ink, luminance(mixed)];
+            return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
+          }));
+        }"""
+    )
+    assert 4.5 <= worst < 21
+
+
+def test_browser__a_seed_is_chosen_by_keyboard_or_mouse(opened):
+    page = opened()
+    shown = page.locator("#game .maps:visible .figure-title").first
+    assert shown.inner_text() == "Failure rate of the ego (%), mean over 2 seeds"
+    page.get_by_label("seed 2", exact=True).check()
+    assert shown.inner_text() == "Failure rate of the ego (%), seed 2"
+    page.keyboard.press("ArrowLeft")
+    assert shown.inner_text() == "Failure rate of the ego (%), seed 1"
+
+
+@pytest.mark.parametrize("name", CAPTIONS)
+def test_browser__a_table_downloads_as_its_csv_file(opened, found, tmp_path, name):
+    page = opened()
+    for details in page.locator("#game details").all():
+        details.locator("summary").click()
+    with page.expect_download() as download:
+        page.locator(f".filters:has(+ .scroll #{name}) button").click()
+    assert download.value.suggested_filename == f"{name}.csv"
+    write_csv(getattr(found, name), tmp_path / "table.csv")
+    assert download.value.path().read_bytes() == (tmp_path / "table.csv").read_bytes()
+
+
+def test_browser__prints_the_verdicts_and_the_maps_chosen(opened):
+    page = opened()
+    page.emulate_media(media="print")
+    assert page.locator("#game .sentence").first.is_visible()
+    assert page.locator("#game .maps:visible").count() == 1
+    assert not page.get_by_label("seed 2", exact=True).is_visible()
+
+
+def test_browser__hostile_names_are_inert(opened, found, tmp_path):
+    hostile = "<img src=x onerror='alert(2)'>"
+    response = Response(1, "ego", hostile, 1, "pair", "best_ego", hostile, hostile)
+    episodes = table(arm("pair", ego_failed=[0, 0]), arm("best_ego", ego_failed=[0, 0], ego_payoff=[11, 12]))
+    crossplay = found.crossplay.assign(ego=hostile)[:1]
+    game = GameFindings(gaps([response], episodes, 0.01), crossplay, found.equilibria, found.generalisation)
+    (tmp_path / "hostile.html").write_text(page_of(game), encoding="utf-8")
+    page = opened(tmp_path / "hostile.html")
+    page.wait_for_timeout(100)
+    assert page.seen == []
+    assert page.get_by_role("heading", name=hostile).first.is_visible()

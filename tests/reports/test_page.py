@@ -1,0 +1,639 @@
+from __future__ import annotations
+
+import csv
+import math
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+import pytest
+from tests.support.recorded import SCENE, manoeuvres, recorded
+
+from harness.evaluation.comparison import Verdict, compare
+from harness.evaluation.research_questions import Question
+from harness.replay.selection import choose_games, replay_name, worst_first
+from harness.reports import page as page_module
+from harness.reports.page import duration, render_page
+from harness.reports.wording import effect, number, p_number, p_text, percent, verdicts
+from harness.evaluation.summary import summarise
+from harness.evaluation.tables import TABLES, typed, write_csv
+
+GAMES = 60
+FAILING = {"alone": 0.0, "sumo": 0.03, "naive": 0.3, "retrained": 0.03}
+
+
+def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=GAMES, quick=False, retrained=True):
+    """The arguments of render_page for a made-up campaign, its tables computed as those of a real one.
+
+    `failing` overrides FAILING: the share of games the ego fails, by kind of arm.
+    """
+    rates = FAILING | (failing or {})
+    arms = [("naive_alone", "", "alone"), ("naive_vs_sumo", "", "sumo")]
+    stages = ["naive"]
+    for persona in personas:
+        arms += [(f"{persona}_alone", persona, None), (f"naive_vs_{persona}", persona, "naive")]
+        stages.append(persona)
+        if retrained:
+            arms += [
+                (f"retrained_vs_{persona}", persona, "retrained"),
+                (f"retrained_alone_{persona}", persona, "alone"),
+            ]
+            stages.append(f"retrained_{persona}")
+    random = np.random.default_rng(7)
+    rows = [
+        _game(arm, persona, seed, episode, rates.get(kind), random)
+        for arm, persona, kind in arms
+        for seed in seeds
+        for episode in range(games)
+    ]
+    episodes = typed(pd.DataFrame(rows, columns=list(TABLES["episodes"])))
+    questions = [
+        Question(question, persona, seed, before, after)
+        for persona in personas
+        for seed in seeds
+        for question, before, after in (
+            ("RQ1", "naive_alone", f"naive_vs_{persona}"),
+            ("RQ2", f"naive_vs_{persona}", f"retrained_vs_{persona}"),
+        )
+        if question == "RQ1" or retrained
+    ]
+    training = pd.DataFrame([row for stage in stages for seed in seeds for row in _windows(stage, seed, random)])
+    manifest = {
+        "format": 1,
+        "name": "merge",
+        "quick": quick,
+        "seeds": list(seeds),
+        "personas": list(personas),
+        "versions": {"harness": "0.1.0", "sumo": "1.28.0"},
+        "campaign": {
+            "name": "merge",
+            "scene": "../networks/merge",
+            "ego": {"driver": "learned"},
+            "training": {"steps": 3_000_000},
+            "assessment": {"episodes": games, "significance": 0.01},
+        },
+        "stages": {f"{stage}-seed{seed}": _training_stage(seed) for stage in stages for seed in seeds}
+        | {f"{arm}-seed{seed}": _done(seed) for arm, _, _ in arms for seed in seeds},
+    }
+    replays = [
+        replay_name(game["arm"], game["seed"], game["episode"]) for game in choose_games(episodes).to_dict("records")
+    ]
+    return {
+        "manifest": manifest,
+        "episodes": episodes,
+        "summary": summarise(episodes),
+        "comparisons": compare(questions, episodes, 0.01),
+        "training": typed(training),
+        "replays": replays,
+    }
+
+
+def _game(arm, persona, seed, episode, failing, random):
+    row = {"arm": arm, "persona": persona, "seed": seed, "episode": episode, "duration_s": random.uniform(9, 14)}
+    row |= {"ego_outcome": "", "non_ego_outcome": "", "error": ""}
+    if failing is not None:
+        failed = episode < failing * GAMES
+        cause = ("collision", "rail", "timeout")[episode % 3]
+        row |= {"ego_outcome": cause if failed else "goal", "ego_failed": int(failed)}
+        row |= {
+            "ego_mean_speed_mps": random.normal(13.2, 0.8) - 3 * failed,
+            "ego_max_deceleration_mps2": random.uniform(1, 8),
+            "ego_max_lateral_acceleration_mps2": random.uniform(0, 2),
+            "ego_time_to_goal_s": math.nan if failed else random.uniform(9, 14),
+            "ego_payoff": random.normal(8, 1) - 12 * failed,
+        }
+    if "_vs_" in arm:
+        row |= {"ego_trailing_distance_m": random.uniform(2, 30)}
+        row |= {"ego_min_ttc_s": random.uniform(0.2, 8) if episode % 4 else math.nan}
+    if "_vs_" in arm or failing is None:
+        row |= {"non_ego_outcome": "goal" if random.uniform() < 0.97 else "rail"}
+        row |= {"non_ego_mean_speed_mps": random.normal(15, 1), "non_ego_payoff": random.normal(10, 2)}
+    return row
+
+
+def _windows(stage, seed, random):
+    persona = stage.removeprefix("retrained_") if stage != "naive" else ""
+    for window in range(1, 10):
+        yield {
+            "stage": stage,
+            "persona": persona,
+            "seed": seed,
+            "steps": window * 131_072,
+            "mean_payoff": 10 - 25 * math.exp(-window / 2) + random.normal(0, 0.4),
+            "failure_rate": min(1, math.exp(-window / 2) + abs(random.normal(0, 0.01))),
+            "games": 900,
+            "mean_duration_s": 11.5,
+        }
+
+
+def recordings(arguments, others=2):
+    """What render_page takes beside a campaign, of games drawn to fit it."""
+    games = recorded(arguments["episodes"], others)
+    return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
+
+
+def _done(seed):
+    return {"kind": "assessment", "seed": seed, "status": "done", "seconds": 12.34, "message": ""}
+
+
+def _training_stage(seed):
+    trained = {"steps": 1_179_648, "budget_steps": 3_000_000, "stopped": "converged", "rule": "the curve is flat"}
+    return {"kind": "training", "seed": seed, "status": "done", "seconds": 3725.0, "message": ""} | trained
+
+
+class Page(HTMLParser):
+    """What a test asks of a page: its text, its tables by id, every tag with its attributes."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.tags, self.pieces, self.tables = [], [], {}
+        self._table = self._cell = None
+        self._silent = 0
+        self.feed(html)
+        self.text = " ".join("".join(self.pieces).split())
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        self.tags.append((tag, attributes))
+        self._silent += tag in ("style", "script")
+        if tag == "table":
+            self._table = self.tables.setdefault(attributes.get("id", f"table {len(self.tables)}"), [])
+        elif tag == "tr":
+            self._table.append([])
+        elif tag in ("td", "th"):
+            self._cell = {"exact": attributes.get("data-value", attributes.get("data-column")), "text": ""}
+            self._table[-1].append(self._cell)
+
+    def handle_endtag(self, tag):
+        self._silent -= tag in ("style", "script")
+        if tag in ("td", "th"):
+            self._cell = None
+
+    def handle_data(self, data):
+        if not self._silent:
+            self.pieces.append(data)
+        if self._cell is not None:
+            self._cell["text"] += data
+
+    def cells(self, name):
+        """A table of the page as the CSV file should have it, its header first."""
+        return [[cell["text"] if cell["exact"] is None else cell["exact"] for cell in row] for row in self.tables[name]]
+
+
+@pytest.fixture(scope="module")
+def small():
+    return campaign()
+
+
+@pytest.fixture(scope="module")
+def html(small):
+    return render_page(**small)
+
+
+@pytest.fixture(scope="module")
+def page(html):
+    return Page(html)
+
+
+# --- numbers ---
+
+
+@pytest.mark.parametrize("name", ["comparisons", "summary", "training", "episodes"])
+def test_page__the_numbers_are_those_of_the_csv_file(name, small, page, tmp_path):
+    write_csv(small[name], tmp_path / "table.csv")
+    with (tmp_path / "table.csv").open(newline="", encoding="utf-8") as file:
+        assert page.cells(name) == list(csv.reader(file))
+
+
+def test_page__every_number_that_is_read_is_the_exact_one_rounded(page):
+    checked = 0
+    for name in ("summary", "episodes", "training"):
+        headings = [cell["exact"] for cell in page.tables[name][0]]
+        for row in page.tables[name][1:]:
+            for column, cell in zip(headings, row, strict=True):
+                if cell["exact"] in (None, ""):
+                    assert cell["exact"] is None or cell["text"] == "–"
+                    continue
+                scale = 100 if "rate" in column else 1
+                read = float(cell["text"].replace("\N{MINUS SIGN}", "-").replace(",", ""))
+                assert read == pytest.approx(float(cell["exact"]) * scale, abs=0.0501 if scale > 1 else 0.00501)
+                checked += 1
+    assert checked > 1000
+
+
+def test_page__each_table_links_its_file(page):
+    links = {attributes["href"] for tag, attributes in page.tags if tag == "a"}
+    assert links >= {"episodes.csv", "summary.csv", "comparisons.csv", "training.csv"}
+
+
+def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatch):
+    monkeypatch.setattr(page_module, "MOST_ROWS", 10)
+    page = Page(render_page(**small))
+    assert "episodes" not in page.tables
+    assert f"{len(small['episodes'])} games are too many for a page" in page.text
+
+
+# --- words ---
+
+
+def text_of(arguments):
+    """The page's text, sooner: without the learning curves."""
+    return Page(without_curves(arguments)).text
+
+
+def without_curves(arguments):
+    return render_page(**arguments | {"training": arguments["training"][:0]})
+
+
+def verdict_texts(arguments):
+    """(label, sentence) of every answer on the page, in order."""
+    html = without_curves(arguments)
+    found = re.findall(r'class="answer"><strong>(.*?)</strong>.*?class="sentence">(.*?)</p>', html, flags=re.DOTALL)
+    plain = [[re.sub(r"\s+", " ", part.replace("&#39;", "'").replace("&lt;", "<")) for part in pair] for pair in found]
+    return [(label, sentence.replace("\N{NO-BREAK SPACE}", " ")) for label, sentence in plain]
+
+
+def test_words__significant_is_a_yes_with_counts_and_p_values():
+    rq1, rq2 = verdict_texts(campaign(personas=["speedy"]))
+    assert rq1[0] == "RQ1: yes"
+    assert rq1[1].startswith(
+        "The speedy driver makes the naive ego fail in 18 of 60 games instead of 0 of 60 (p < 0.0001"
+    )
+    assert rq1[1].endswith("also after Holm's correction).")
+    assert rq2[0] == "RQ2: yes"
+    assert rq2[1].startswith(
+        "Retraining brings the ego's failures against the speedy driver down to 2 of 60 games from 18 of 60 (p"
+    )
+
+
+def test_words__not_significant_is_never_a_no():
+    rq1, rq2 = verdict_texts(campaign(personas=["speedy"], failing={"naive": 0.05, "retrained": 0.2}))
+    assert rq1[0] == "RQ1: not shown"
+    assert "fails in 3 of 60 games against the speedy driver and in 0 of 60 alone: not significantly more" in rq1[1]
+    assert rq2[0] == "RQ2: not shown"
+    assert "the retrained ego fails in 12 of 60 games, the naive ego in 3 of 60: not significantly less" in rq2[1]
+    assert "(p = 0.999; p = 1 after Holm's correction)" in rq2[1]
+
+
+def test_words__significant_before_holm_only_is_not_a_yes():
+    arguments = campaign(personas=["speedy"], failing={"naive": 0.1})
+    failure = arguments["comparisons"].index[0]
+    arguments["comparisons"].loc[failure, "p_holm"] = 0.025
+    arguments["comparisons"].loc[failure, "verdict"] = Verdict.BEFORE_HOLM_ONLY.value
+    rq1, _ = verdict_texts(arguments)
+    assert rq1[0] == "RQ1: only before Holm's correction"
+    assert "significantly more often by itself, but not after Holm's correction (p = 0.0" in rq1[1]
+    assert "p = 0.025 after Holm's correction" in rq1[1]
+
+
+def test_words__no_difference():
+    rq1, rq2 = verdict_texts(campaign(personas=["speedy"], failing={"naive": 0, "retrained": 0}))
+    for label, sentence in (rq1, rq2):
+        assert label.endswith("no difference")
+        assert "In each of the 60 pairs both games ended alike, so there is nothing to test." in sentence
+
+
+def test_words__all_differences_equal_names_mcnemars_p_and_never_says_significant():
+    rq1, _ = verdict_texts(campaign(personas=["speedy"], failing={"naive": 1}))
+    assert rq1[0] == "RQ1: no t statistic"
+    assert "All 60 pairs differ alike, so the t-test does not exist" in rq1[1]
+    assert "McNemar's exact test, which does, gives p < 0.0001. That is below the campaign's significance" in rq1[1]
+    assert "significantly" not in rq1[1]
+
+
+def test_words__not_enough_pairs():
+    arguments = campaign(personas=["speedy"])
+    lost = (arguments["episodes"]["arm"] == "naive_vs_speedy") & (arguments["episodes"]["episode"] > 0)
+    rq1, _ = verdict_texts(with_errors(arguments, lost))
+    assert rq1[0] == "RQ1: not answered"
+    assert "but only one pair of games could be compared: too few for a test." in rq1[1]
+    assert "59 of 60 pairs are left out: not played or not measured." in rq1[1]
+
+
+def test_words__an_arm_that_was_not_played_is_named():
+    arguments = campaign(personas=["speedy"])
+    rq1, rq2 = verdict_texts(with_errors(arguments, arguments["episodes"]["arm"] == "retrained_vs_speedy"))
+    assert rq1[0] == "RQ1: yes"
+    assert rq2 == ("RQ2: not answered", "The arm retrained_vs_speedy was not played.")
+
+
+def test_words__a_stage_that_is_not_done_leaves_its_question_open_not_unasked():
+    arguments = without_arm(campaign(personas=["speedy"]), "retrained_vs_speedy", seeds=[1])
+    assert verdict_texts(arguments)[1] == ("RQ2: not answered", "The arm retrained_vs_speedy was not played.")
+    arguments = without_arm(campaign(personas=["speedy"], seeds=(1, 2)), "retrained_vs_speedy", seeds=[2])
+    assert verdict_texts(arguments)[1][0] == "RQ2: yes in 1 of 2 seeds"
+    assert "Seed 2: not answered. The arm retrained_vs_speedy was not played." in text_of(arguments)
+
+
+def without_arm(arguments, arm, seeds):
+    """The campaign of which an arm has failed, as the run folder has it: neither games nor comparisons."""
+    rows, compared = arguments["episodes"], arguments["comparisons"]
+    lost = (compared["question"] == "RQ2") & compared["seed"].isin(seeds)
+    arguments["episodes"] = rows[~((rows["arm"] == arm) & rows["seed"].isin(seeds))]
+    arguments["comparisons"] = compared[~lost]
+    arguments["summary"] = summarise(arguments["episodes"])
+    for seed in seeds:
+        arguments["manifest"]["stages"][f"{arm}-seed{seed}"] |= {"status": "failed", "message": "it died"}
+    return arguments
+
+
+def test_words__without_retraining_round_2_was_not_played():
+    arguments = campaign(personas=["speedy"], retrained=False)
+    rq1, rq2 = verdict_texts(arguments)
+    assert rq1[0] == "RQ1: yes"
+    assert rq2[1] == "Round 2 was not played: there is nothing to train or to tune in this ego."
+    assert "retrained vs" not in without_curves(arguments)
+
+
+def test_words__several_seeds_are_counted_and_shown_each():
+    arguments = campaign(personas=["speedy"], seeds=(1, 2, 3))
+    episodes = arguments["episodes"]
+    tame = (episodes["arm"] == "naive_vs_speedy") & (episodes["seed"] == 2)
+    episodes.loc[tame, ["ego_failed"]] = 0
+    episodes.loc[tame, ["ego_outcome"]] = "goal"
+    rq1, rq2 = verdict_texts(recomputed(arguments))
+    assert rq1[0] == "RQ1: yes in 2 of 3 seeds"
+    assert rq1[1].startswith("In 2 of 3 training seeds the speedy driver makes the naive ego fail significantly more")
+    assert rq2[0] == "RQ2: yes in 2 of 3 seeds"
+    text = text_of(arguments)
+    assert "Seed 1: yes." in text
+    assert "Seed 2: no difference." in text
+
+
+def test_words__an_ordinary_driver_that_does_as_much_harm_is_pointed_out(page):
+    assert "an ordinary driver does it too" not in page.text
+    worse = text_of(campaign(personas=["speedy"], failing={"sumo": 0.4}))
+    assert "That is no less often than against speedy: an ordinary driver does it too." in worse
+
+
+def test_words__an_ego_that_fails_alone_is_pointed_out(page):
+    assert "Caution" not in page.text
+    assert "The naive ego fails alone as well" in text_of(campaign(personas=["speedy"], failing={"alone": 0.1}))
+
+
+@pytest.mark.parametrize("question", ["RQ1", "RQ2"])
+@pytest.mark.parametrize("verdict", list(Verdict))
+def test_words__only_significant_is_a_yes(verdict, question, small):
+    row = {"question": question, "seed": 1, "verdict": verdict.value, "pairs": 60, "pairs_left_out": 0}
+    row |= {"p_value": 0.004, "p_holm": 0.02, "mcnemar_p": 0.004}
+    rows = [row | {"metric": metric} for metric in ("failure", "mean_speed")]
+    arms = {(arm["arm"], arm["seed"]): arm for arm in small["summary"].to_dict("records")}
+    answer = verdicts(question, "speedy", [1], rows, arms, 0.01)
+    yes = verdict is Verdict.SIGNIFICANT
+    assert (answer.label == "yes") == yes
+    assert (answer.tone != "open") == yes
+    assert answer.sentence.endswith(".")
+    assert answer.speed.endswith(".")
+    for text in (answer.sentence, answer.speed):
+        if verdict in (Verdict.NO_DIFFERENCE, Verdict.ALL_EQUAL, Verdict.NOT_ENOUGH_PAIRS):
+            assert "significantly" not in text
+        if verdict is Verdict.BEFORE_HOLM_ONLY:
+            assert "by itself, but not after Holm's correction" in text
+        if verdict is Verdict.NOT_SIGNIFICANT:
+            assert "not significantly" in text
+
+
+def test_words__one_seed_of_several_is_harm_enough_but_not_mended():
+    arguments = campaign(personas=["speedy"], seeds=(1, 2))
+    arms = {(arm["arm"], arm["seed"]): arm for arm in arguments["summary"].to_dict("records")}
+    for question, tone in (("RQ1", "harm"), ("RQ2", "open")):
+        rows = [row for row in arguments["comparisons"].to_dict("records") if row["question"] == question]
+        rows = [row | {"verdict": Verdict.NOT_SIGNIFICANT.value} if row["seed"] == 2 else row for row in rows]
+        assert verdicts(question, "speedy", [1, 2], rows, arms, 0.01).label == "yes in 1 of 2 seeds"
+        assert verdicts(question, "speedy", [1, 2], rows, arms, 0.01).tone == tone
+
+
+def test_p_values__are_never_rounded_to_nothing_or_certainty():
+    assert [p_number(p) for p in (0.00031, 0.0123, 0.5, 1.0)] == ["0.0003", "0.0123", "0.5", "1"]
+    assert p_text(1e-30) == "p\N{NO-BREAK SPACE}<\N{NO-BREAK SPACE}0.0001"
+    assert p_number(0.99999) == ">\N{NO-BREAK SPACE}0.999"
+    assert (p_number(math.nan), p_text(math.nan)) == ("–", "no p-value")
+
+
+def test_numbers__read_as_a_person_writes_them():
+    assert (number(-1.5, 1), number(-0.001, 2), number(math.nan, 1)) == ("\N{MINUS SIGN}1.5", "0.00", "–")
+    assert [percent(share) for share in (0.25, 0.0362, 1)] == [
+        f"{text}\N{NO-BREAK SPACE}%" for text in ("25", "3.6", "100")
+    ]
+    assert [duration(s) for s in (12.34, 59.99, 185, 3725, None)] == [
+        "12.3 s", "1 min 00 s", "3 min 05 s", "1 h 02 min", "–",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("question", "metric", "mean", "words"),
+    [
+        ("RQ1", "failure", 0.25, "25 points more failures (95 %: 15 to 35)"),
+        ("RQ1", "failure", -0.25, "25 points fewer failures (95 %: 15 to 35)"),
+        ("RQ2", "failure", 0.25, "25 points fewer failures (95 %: 15 to 35)"),
+        ("RQ1", "mean_speed", 0.25, "0.25 m/s slower (95 %: 0.15 to 0.35)"),
+        ("RQ2", "mean_speed", 0.25, "0.25 m/s faster (95 %: 0.15 to 0.35)"),
+        ("RQ2", "mean_speed", -0.25, "0.25 m/s slower (95 %: 0.15 to 0.35)"),
+    ],
+)
+def test_effect__names_the_direction_it_has(question, metric, mean, words):
+    row = {"question": question, "metric": metric, "mean_difference": mean}
+    row |= {"ci_low": mean - 0.1, "ci_high": mean + 0.1}
+    assert effect(row).replace("\N{NO-BREAK SPACE}", " ") == words
+
+
+# --- banners ---
+
+
+def test_banner__a_quick_run_says_so(page):
+    warning = "Quick run: fewer training steps than table 1; not for conclusions."
+    assert warning in text_of(campaign(personas=["speedy"], quick=True))
+    assert warning not in page.text
+
+
+def test_banner__stages_that_are_not_done_are_named_with_their_message(page):
+    arguments = campaign()
+    stages = arguments["manifest"]["stages"]
+    stages["retrained_speedy-seed1"] |= {"status": "failed", "message": "the worker <died>"}
+    stages["retrained_vs_speedy-seed1"] |= {"status": "pending", "seconds": None}
+    text = text_of(arguments)
+    assert f"2 of {len(stages)} stages are not done." in text
+    assert "retrained_speedy-seed1: failed: the worker <died>" in text
+    assert "retrained_vs_speedy-seed1: pending" in text
+    assert "not done" not in page.text
+
+
+def test_banner__games_that_could_not_be_played_are_counted_by_arm(page):
+    arguments = campaign()
+    rows = arguments["episodes"]
+    text = text_of(with_errors(arguments, (rows["arm"] == "naive_vs_speedy") & (rows["episode"] < 3)))
+    assert f"3 of {len(rows)} games could not be played." in text
+    assert "naive_vs_speedy, seed 1: 3" in text
+    assert "could not be played." not in page.text.split("Figures")[0]
+
+
+def with_errors(arguments, games):
+    """The campaign with `games`, a mask over its episodes, that could not be played."""
+    frame = arguments["episodes"]
+    frame.loc[games, "ego_outcome"] = "error"
+    frame.loc[games, "error"] = "the simulator died"
+    measured = [name for name, dtype in TABLES["episodes"].items() if dtype in ("float64", "Int64")]
+    frame.loc[games, measured] = None
+    return recomputed(arguments)
+
+
+def recomputed(arguments):
+    """The campaign with tables that fit its changed episodes."""
+    old = arguments["comparisons"]
+    questions = [
+        Question(
+            row["question"],
+            row["persona"],
+            row["seed"],
+            "naive_alone" if row["question"] == "RQ1" else f"naive_vs_{row['persona']}",
+            f"{'naive' if row['question'] == 'RQ1' else 'retrained'}_vs_{row['persona']}",
+        )
+        for row in old[old["metric"] == "failure"].to_dict("records")
+    ]
+    arguments["summary"] = summarise(arguments["episodes"])
+    arguments["comparisons"] = compare(questions, arguments["episodes"], 0.01)
+    return arguments
+
+
+# --- replays ---
+
+
+def test_replays__are_worst_first_as_the_command_lists_them(small, page):
+    expected = [
+        replay_name(game["arm"], game["seed"], game["episode"])
+        for game in worst_first(choose_games(small["episodes"])).to_dict("records")
+    ]
+    commands = re.findall(r"sumo-gui -c replays/(\S+)/scene.sumocfg", page.text)
+    assert commands == expected
+
+
+def test_replays__each_has_the_command_that_opens_it(page):
+    assert "harness replay . naive_vs_speedy 6" in page.text
+    assert "--seed" not in page.text
+    assert "harness replay . naive_vs_speedy 6 --seed 2" in text_of(campaign(personas=["speedy"], seeds=(1, 2)))
+
+
+def test_replays__those_that_the_page_can_play_are_links(small):
+    html = without_curves(small | recordings(small))
+    assert '<a href="#game=naive_vs_speedy,1,6">naive_vs_speedy, game 6</a>' in html
+    assert 'href="#game=' not in without_curves(small)
+
+
+def test_replays__none_is_said_plainly(small):
+    assert "No game was recorded for replay." in text_of(small | {"replays": []})
+
+
+# --- the file itself ---
+
+
+def test_page__is_the_same_bytes_for_the_same_input(small):
+    once, again = (without_curves(small | recordings(small)) for _ in range(2))
+    assert once == again
+
+
+def test_page__names_from_documents_stay_text():
+    hostile = "<script>alert(1)</script>"
+    arguments = campaign(personas=[hostile, "\"><img src=x onerror='alert(2)'>", "$\\frac{"])
+    arguments["manifest"]["name"] = hostile
+    arguments["manifest"]["versions"] |= {hostile: hostile}
+    with_errors(arguments, arguments["episodes"]["episode"] == 0)
+    html = render_page(**arguments, **recordings(arguments))
+    page = Page(html)
+    assert hostile in page.text
+    assert {tag for tag, _ in page.tags}.isdisjoint({"img", "iframe", "object", "link", "base"})
+    assert [tag for tag, _ in page.tags].count("script") == 2  # what is recorded, and what plays it
+    assert not [name for _, attributes in page.tags for name in attributes if name.startswith("on")]
+
+
+def test_page__loads_nothing(html, page):
+    assert "http://" not in html
+    assert "https://" not in html
+    assert not [attributes for _, attributes in page.tags if "src" in attributes]
+    assert "@import" not in html
+    assert all(target.startswith("#") for target in re.findall(r"url\(([^)]*)\)", html))
+    (policy,) = [a["content"] for tag, a in page.tags if tag == "meta" and "http-equiv" in a]
+    assert policy.startswith("default-src 'none'")
+
+
+def test_page__every_id_is_there_once_and_every_reference_has_one(html, page):
+    ids = [attributes["id"] for _, attributes in page.tags if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    targets = {a["href"][1:] for _, a in page.tags if a.get("href", "").startswith("#")}
+    assert targets | set(re.findall(r"url\(#([^)]*)\)", html)) <= set(ids)
+
+
+def test_page__every_figure_says_what_it_shows(page):
+    figures = [attributes for tag, attributes in page.tags if tag == "svg"]
+    assert len(figures) == 2 * 4 + 5  # four per persona, one per training stage
+    assert all(attributes["role"] == "img" and len(attributes["aria-label"]) > 40 for attributes in figures)
+    assert "naive vs speedy: 30\N{NO-BREAK SPACE}%" in figures[0]["aria-label"] + figures[1]["aria-label"]
+    assert [tag for tag, _ in page.tags].count("figcaption") == len(figures)
+
+
+def test_page__figures_take_their_colours_from_the_page(html):
+    figures = "".join(re.findall(r"<svg.*?</svg>", html, flags=re.DOTALL))
+    assert "currentColor" in figures
+    assert "var(--persona)" in figures
+    assert not re.findall(r"#[0-9a-f]{6}\b", figures)
+    assert "<text" in figures
+
+
+def test_page__every_table_has_a_caption_and_scoped_headings(html, page):
+    assert html.count("<table") == html.count("<caption>")
+    assert all("scope" in attributes for tag, attributes in page.tags if tag == "th")
+
+
+def test_page__an_empty_run_is_a_page_too():
+    tables = ("episodes", "summary", "comparisons", "training", "manoeuvres")
+    empty = {name: typed(pd.DataFrame(columns=list(TABLES[name]))) for name in tables}
+    page = Page(render_page({"name": "merge", "stages": {}}, **empty, replays=[]))
+    assert "No persona has been assessed yet." in page.text
+
+
+def test_page__draws_without_touching_matplotlibs_global_state(small):
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    render_page(**small)
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_page__takes_nothing_from_the_users_matplotlib_settings(small, html):
+    import matplotlib
+
+    with matplotlib.rc_context({"font.size": 30, "text.usetex": True, "axes.facecolor": "red"}):
+        assert render_page(**small) == html
+
+
+# --- manoeuvres ---
+
+
+def test_manoeuvres__failures_are_counted_by_pair_and_arm(small):
+    page = Page(without_curves(small | recordings(small)))
+    heading, *rows = [[cell["text"] for cell in row] for row in page.tables["pairs"]]
+    episodes = small["episodes"]
+    failed = episodes[episodes["ego_failed"].fillna(0) == 1]
+    assert heading[:3] == ["non-ego", "ego", "failures"]
+    assert sum(int(row[2]) for row in rows) == len(failed)
+    assert sum(int(row[heading.index("naive_vs_speedy")]) for row in rows) == (failed["arm"] == "naive_vs_speedy").sum()
+    assert [row[:2] for row in rows] == [["cut-in", "swerve"], ["drift", "hard brake"], ["tailgate", "overtake"]]
+    assert all(sum(map(int, row[3:])) == int(row[2]) for row in rows)
+
+
+def test_manoeuvres__each_pair_opens_its_games_shortly_before_the_manoeuvre(small):
+    html = without_curves(small | recordings(small))
+    assert '<a href="#game=naive_vs_speedy,1,6&amp;t=2.5">naive_vs_speedy, game 6</a>: collision (gap 3.1 m' in html
+
+
+def test_manoeuvres__a_failure_without_any_is_counted_last(small):
+    found = recordings(small)["manoeuvres"]
+    page = Page(without_curves(small | recordings(small) | {"manoeuvres": found[found["episode"] > 2]}))
+    last = [cell["text"] for cell in page.tables["pairs"][-1]]
+    assert last[:2] == ["–", "–"]
+    assert int(last[2]) > 0
+
+
+def test_manoeuvres__without_a_table_nothing_is_said_of_them(page):
+    assert "pairs" not in page.tables
+    assert "Manoeuvres" not in page.text

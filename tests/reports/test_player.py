@@ -1,0 +1,397 @@
+"""The player of the report in a real browser: it plays, steps, scrubs, keeps two games in step, and opens its links."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from tests.support.chromium import launched, opener, until
+from tests.support.recorded import STEP_S, recorded
+from tests.reports.test_page import campaign, recordings
+
+from harness.reports.player_data import key
+from harness.reports.page import GAMES_BYTES, PAGE_BYTES, render_page
+
+GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and what retraining made of it
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with launched() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="module")
+def arguments():
+    found = campaign(personas=["speedy"])
+    return found | {"training": found["training"][:0]}
+
+
+@pytest.fixture(scope="module")
+def games(arguments):
+    """The recorded games by their key."""
+    return {key(game.arm, game.seed, game.episode): game for game in recorded(arguments["episodes"])}
+
+
+@pytest.fixture(scope="module")
+def report(arguments, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def opened(browser, report):
+    with opener(browser, report) as open_page:
+
+        def open_player(fragment=f"#game={GAME}&t=2", **settings):
+            page = open_page(fragment=fragment, **settings)
+            page.wait_for_selector(".player[data-ready]")
+            return page
+
+        yield open_player
+
+
+def time_of(page):
+    return float(page.locator(".player").get_attribute("data-time"))
+
+
+def press(page, *keys):
+    page.locator(".player").focus()
+    for each in keys:
+        page.keyboard.press(each)
+
+
+def scrub(page, time_s):
+    page.locator("[data-is=time]").evaluate(
+        "(slider, value) => { slider.value = value; slider.dispatchEvent(new Event('input', {bubbles: true})); }",
+        time_s,
+    )
+
+
+# --- the clock ---
+
+
+def test_player__plays_and_pauses_without_a_complaint_or_a_request(opened):
+    page = opened()
+    page.get_by_role("button", name="Play", exact=True).last.click()
+    until(page, "() => Number(document.querySelector('.player').dataset.time) > 2.3")
+    page.locator(".player [data-do=play]").click()
+    stopped = time_of(page)
+    page.wait_for_timeout(150)
+    assert time_of(page) == stopped
+    assert page.seen == []
+
+
+def test_player__stops_at_the_end_and_begins_anew(opened, games):
+    page = opened(f"#game={GAME}&t={games[GAME].steps * STEP_S - 0.2}")
+    press(page, "Space")
+    until(page, "() => document.querySelector('[data-do=play]').textContent === 'Play'")
+    assert time_of(page) == pytest.approx(games[GAME].steps * STEP_S)
+    press(page, "Space")
+    until(page, "() => (t => t > 0 && t < 2)(Number(document.querySelector('.player').dataset.time))")
+
+
+def test_player__speed_is_the_speed_of_the_clock(opened):
+    advanced = {}
+    for speed in ("0.25", "4"):
+        page = opened("#game=retrained_vs_speedy,1,6&t=0")
+        page.locator("[data-is=speed]").select_option(speed)
+        advanced[speed] = page.evaluate(
+            """async () => {
+              const player = document.querySelector('.player');
+              document.querySelector('[data-do=play]').click();
+              await new Promise(done => setTimeout(done, 150));
+              const [from, begun] = [Number(player.dataset.time), performance.now()];
+              await new Promise(done => setTimeout(done, 900));
+              return (Number(player.dataset.time) - from) / (performance.now() - begun) * 1000;
+            }"""
+        )
+    assert advanced["0.25"] == pytest.approx(0.25, rel=0.35)
+    assert advanced["4"] == pytest.approx(4, rel=0.35)
+
+
+def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(opened, games):
+    page = opened()
+    for pressed, expected in (
+        ("Period", 2.1),
+        ("Period", 2.2),
+        ("Comma", 2.1),
+        ("ArrowRight", 3.1),
+        ("ArrowLeft", 2.1),
+        ("End", games[GAME].steps * STEP_S),
+        ("Home", 0),
+        ("c", games[GAME].touches[0].time_s),
+    ):
+        press(page, pressed)
+        assert time_of(page) == pytest.approx(expected, abs=1e-6), pressed
+
+
+def test_player__every_key_it_knows_is_explained(opened):
+    page = opened()
+    page.locator(".keys summary").click()
+    explained = page.locator(".keys").inner_text().lower()
+    for name in ("space", ", .", "home end", "n p", "one second", "copy a link", "zoom"):
+        assert name in explained
+
+
+def test_player__scrubbing_shows_the_values_of_that_moment(opened, games):
+    page = opened()
+    ego = games[GAME].players[0]
+    for step in (5, 33, 61):
+        scrub(page, step * STEP_S)
+        assert page.locator(".values .of-ego").inner_text().startswith(f"ego {ego.speed_mps[step]:.1f} m/s")
+
+
+def test_player__dragging_over_the_curves_is_scrubbing(opened, games):
+    page = opened()
+    page.locator(".curves").scroll_into_view_if_needed()
+    box = page.locator(".curves").bounding_box()
+    page.mouse.click(box["x"] + 34 + (box["width"] - 44) / 2, box["y"] + 60)
+    assert time_of(page) == pytest.approx(games[GAME].steps * STEP_S / 2, abs=0.06)
+
+
+# --- the road ---
+
+
+def pixel(page, screen, x_m, y_m):
+    """Colour of the canvas at a place on the road."""
+    return (
+        page.locator(".view")
+        .nth(screen)
+        .evaluate(
+            """(canvas, [x, y]) => {
+          const [left, top, scale] = canvas.dataset.camera.split(' ').map(Number);
+          const ratio = canvas.width / canvas.getBoundingClientRect().width;
+          const place = [(left + x * scale) * ratio, (top - y * scale) * ratio].map(Math.round);
+          return [...canvas.getContext('2d').getImageData(...place, 1, 1).data].slice(0, 3);
+        }""",
+            [x_m, y_m],
+        )
+    )
+
+
+def colour(page, name):
+    """A colour of the page, as its canvas has it."""
+    return page.evaluate(
+        """name => {
+          const context = document.createElement('canvas').getContext('2d');
+          context.fillStyle = getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+          context.fillRect(0, 0, 1, 1);
+          return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
+        }""",
+        name,
+    )
+
+
+@pytest.mark.parametrize("settings", [{}, {"color_scheme": "dark"}, {"width": 400, "device_scale_factor": 2}])
+def test_road__cars_are_where_the_trace_has_them(opened, games, settings):
+    page = opened(**settings)
+    names = {"ego": "--ego", "non_ego": "--non-ego"}
+    for step in (3, 27, 48, 60):
+        scrub(page, step * STEP_S)
+        for player in games[GAME].players:
+            assert pixel(page, 0, player.x_m[step], player.y_m[step]) == colour(page, names[player.name]), (
+                step,
+                player.name,
+            )
+        asphalt = pixel(page, 0, games[GAME].players[0].x_m[step] + 5, -1.6)
+        assert asphalt == colour(page, "--asphalt")
+
+
+def test_road__between_two_steps_a_car_is_between_its_places(opened, games):
+    page = opened()
+    ego = games[GAME].players[0]
+    scrub(page, 2.0)
+    page.locator("[data-is=time]").evaluate("slider => { slider.step = 'any'; }")
+    scrub(page, 2.05)
+    ahead = (ego.x_m[20] + ego.x_m[21]) / 2 + 2.2
+    assert pixel(page, 0, ahead + 0.25, ego.y_m[20]) == colour(page, "--asphalt")
+    assert pixel(page, 0, ahead, ego.y_m[20]) != colour(page, "--asphalt")
+
+
+def test_road__others_are_drawn_too(opened, games):
+    page = opened("#game=naive_vs_speedy,1,6&t=4")
+    press(page, "f")
+    other = games[GAME].others[0]
+    assert pixel(page, 0, other.x_m[40] - 0.4, other.y_m[40]) == colour(page, "--other")
+
+
+def test_road__follows_the_players_or_shows_the_whole_road_and_zooms(opened):
+    page = opened()
+
+    def scale():
+        return float(page.locator(".view").get_attribute("data-camera").split()[2])
+
+    following = scale()
+    press(page, "+")
+    assert scale() == pytest.approx(following * 1.25, rel=1e-3)
+    press(page, "f")
+    assert scale() * 220 <= page.locator(".view").bounding_box()["width"]
+    assert page.locator("[data-do=view]").get_attribute("aria-pressed") == "false"
+    press(page, "f")
+    assert scale() == pytest.approx(following, rel=1e-3)
+
+
+# --- two games ---
+
+
+def test_side_by_side__stays_in_step(opened, games):
+    page = opened()
+    press(page, "b")
+    page.wait_for_selector(".screens.two")
+    assert [page.locator(".screen h3").nth(n).inner_text().split(",")[0] for n in (0, 1)] == [
+        "naive_vs_speedy",
+        "retrained_vs_speedy",
+    ]
+    for step in (12, 40):
+        scrub(page, step * STEP_S)
+        for screen, name in enumerate((GAME, OTHER)):
+            ego = games[name].players[0]
+            assert pixel(page, screen, ego.x_m[step], ego.y_m[step]) == colour(page, "--ego")
+    press(page, "Space")
+    until(page, "() => Number(document.querySelector('.player').dataset.time) > 4.5")
+    press(page, "Space", "Period", "Comma")
+    step = round(time_of(page) / STEP_S)
+    for screen, name in enumerate((GAME, OTHER)):
+        said = page.locator(".values").nth(screen).locator(".of-ego").inner_text()
+        assert said.startswith(f"ego {games[name].players[0].speed_mps[step]:.1f} m/s")
+    press(page, "b")
+    page.wait_for_selector(".screens:not(.two)")
+
+
+def test_side_by_side__the_one_that_ended_waits_for_the_other(opened, games):
+    assert games[GAME].steps < games[OTHER].steps
+    page = opened(f"#game={GAME}&t=2&with={OTHER}")
+    press(page, "End")
+    assert time_of(page) == pytest.approx(games[OTHER].steps * STEP_S)
+    ego = games[GAME].players[0]
+    assert f"{ego.speed_mps[-1]:.1f} m/s" in page.locator(".values").first.inner_text()
+
+
+# --- addresses ---
+
+
+def test_link__reopens_the_games_at_the_moment(opened):
+    page = opened()
+    press(page, "b")
+    page.wait_for_selector(".screens.two")
+    scrub(page, 3.2)
+    page.locator("[data-do=link]").click()
+    until(page, "() => document.querySelector('[data-is=said]').textContent.includes('link to this moment')")
+    fragment = page.evaluate("location.hash")
+    assert fragment == f"#game={GAME}&t=3.2&with={OTHER}"
+    again = opened(fragment)
+    assert time_of(again) == pytest.approx(3.2)
+    assert again.locator(".screen").count() == 2
+    assert again.locator("[data-is=game]").input_value() == GAME
+    assert again.locator("[data-is=with]").input_value() == OTHER
+    box = again.locator(".player").bounding_box()
+    assert -5 < box["y"] < 200
+
+
+def test_link__of_a_game_that_is_not_there_says_so(opened):
+    page = opened("#game=naive_vs_nobody,1,3&t=2")
+    until(page, "() => document.querySelector('[data-is=said]').textContent.includes('not in this page')")
+    assert page.locator(".screen").count() == 1
+    assert page.seen == []
+
+
+@pytest.mark.parametrize("fragment", ["#game=", "#game=%E0%A4%A,1,1", "#figures", "#game=a,b,c&t=x&with=%"])
+def test_link__nonsense_is_harmless(opened, fragment):
+    page = opened(fragment)
+    assert page.locator(".screen").count() == 1
+    assert page.seen == []
+
+
+def test_link__the_rows_of_the_tables_open_their_games(opened):
+    page = opened("")
+    page.locator("#pairs tbody a").first.click()
+    page.locator(".pair[open] a").first.click()
+    until(page, "() => location.hash.startsWith('#game=')")
+    wanted = re.match(r"#game=([^&]*)&t=([\d.]+)", page.evaluate("location.hash"))
+    until(page, "key => document.querySelector('[data-is=game]').value === key", wanted[1])
+    assert time_of(page) == pytest.approx(float(wanted[2]))
+
+
+def test_marks__a_manoeuvre_goes_to_its_moment(opened):
+    page = opened()
+    page.get_by_role("button", name="4.0 s speedy: cut-in").click()
+    assert time_of(page) == pytest.approx(4.0)
+
+
+# --- the cards' animations ---
+
+
+def test_clip__plays_by_itself_and_opens_in_the_player(opened):
+    page = opened("")
+    clip = page.locator(".clip").first
+    until(page, "() => Number(document.querySelector('.clip').dataset.time) > 0.3")
+    clip.get_by_role("link").click()
+    key_of_clip = clip.get_attribute("data-game")
+    until(page, "key => document.querySelector('[data-is=game]').value === key", key_of_clip)
+    until(page, "() => Number(document.querySelector('.player').dataset.time) > 0.2")
+
+
+def test_clip__stands_still_for_who_asked_for_less_motion(opened):
+    page = opened("", reduced_motion="reduce")
+    page.wait_for_selector(".clip[data-time]")
+    before = page.locator(".clip").first.get_attribute("data-time")
+    page.wait_for_timeout(250)
+    assert page.locator(".clip").first.get_attribute("data-time") == before
+    page.locator(".clip-play").first.click()
+    until(page, "before => document.querySelector('.clip').dataset.time !== before", before)
+
+
+# --- the page it is in ---
+
+
+@pytest.mark.parametrize("fragment", [f"#game={GAME}&t=5", f"#game={GAME}&t=5&with={OTHER}"])
+def test_player__fits_a_narrow_window(opened, fragment):
+    page = opened(fragment, width=400)
+    page.locator(".keys summary").click()
+    assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
+def test_player__hostile_names_are_inert(browser, tmp_path):
+    hostile = "</script><img src=x onerror='alert(1)'>"
+    arguments = campaign(personas=[hostile], games=4)
+    arguments["training"] = arguments["training"][:0]
+    found = recordings(arguments)
+    found["manoeuvres"]["text"] = hostile
+    path = tmp_path / "report.html"
+    path.write_text(render_page(**arguments, **found), encoding="utf-8")
+    with opener(browser, path) as open_page:
+        page = open_page()
+        page.wait_for_selector(".player[data-ready]")
+        assert page.locator(".screen h3").inner_text().startswith(f"naive_vs_{hostile}, game")
+        assert hostile in page.locator(".marks").inner_text()
+        link = page.locator(".clip a").first.get_attribute("href")
+        page.evaluate("link => { location.hash = link; }", link)
+        page.wait_for_timeout(300)
+        assert page.locator("[data-is=game]").input_value()
+        assert page.seen == []
+
+
+def test_page__of_a_default_campaign_is_small_and_soon_interactive(browser, tmp_path):
+    arguments = campaign(games=100)
+    html = render_page(**arguments, **recordings(arguments, others=6))
+    assert len(html.encode()) <= PAGE_BYTES
+    assert "more games are too many" not in html
+    path = tmp_path / "report.html"
+    path.write_text(html, encoding="utf-8")
+    with opener(browser, path) as open_page:
+        page = open_page()
+        page.wait_for_selector(".player[data-ready]")
+        assert int(page.locator(".player").get_attribute("data-ready")) < 2000
+        assert page.locator("[data-is=game] option").count() == len(arguments["episodes"])
+
+
+def test_page__what_is_too_much_is_left_to_the_run_folder(arguments, monkeypatch):
+    monkeypatch.setattr("harness.reports.page.GAMES_BYTES", 50_000)
+    assert GAMES_BYTES > 50_000
+    html = render_page(**arguments, **recordings(arguments))
+    shown = len(re.findall(r'"packed"', html))
+    assert 0 < shown < len(arguments["episodes"])
+    assert f"{shown} recorded games" in html
+    assert f"{len(arguments['episodes']) - shown} more games are too many for a page" in html

@@ -1,0 +1,78 @@
+"""A run whose stages were made by different versions says so, and which."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from tests.support.tiny import harness, sumo_run
+
+from harness.reports.provenance import mixed_versions
+
+NEW, OLD = {"python": "3.11.7", "numpy": "2.2.6"}, {"python": "3.11.7", "numpy": "2.1.0"}
+
+
+def stages(**made_by: Any) -> dict[str, dict[str, Any]]:
+    return {name: {"status": "done", "versions": versions} for name, versions in made_by.items()}
+
+
+def test_mixed_versions__of_one_there_is_nothing_to_say() -> None:
+    assert mixed_versions({}) == []
+    assert mixed_versions(stages(a=[NEW], b=[NEW])) == []
+
+
+def test_mixed_versions__names_what_differs_and_nothing_else() -> None:
+    assert mixed_versions(stages(a=[NEW], b=[OLD], c=[NEW])) == [
+        "This run mixes versions: its numbers are not promised to be those of one version.",
+        "  by numpy 2.2.6: a, c",
+        "  by numpy 2.1.0: b",
+    ]
+
+
+def test_mixed_versions__within_a_training_that_went_on() -> None:
+    assert mixed_versions(stages(a=[OLD, NEW]))[1:] == ["  by numpy 2.1.0, then 2.2.6: a"]
+
+
+def test_mixed_versions__a_program_that_one_did_not_have() -> None:
+    assert mixed_versions(stages(a=[NEW], b=[{"python": "3.11.7"}]))[1:] == [
+        "  by numpy 2.2.6: a",
+        "  by numpy of no known version: b",
+    ]
+
+
+def test_mixed_versions__stages_that_are_not_done_or_of_no_known_versions_do_not_count() -> None:
+    others = {
+        "b": {"status": "pending", "versions": [OLD]},
+        "c": {"status": "done"},
+        "d": {"status": "done", "versions": 7},
+    }
+    assert mixed_versions(stages(a=[NEW]) | others) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["report", "campaign"])
+def test_run__that_mixes_versions_says_so_on_the_terminal_and_on_the_page(command: str, tmp_path: Path) -> None:
+    run = shutil.copytree(sumo_run(), tmp_path / "run")
+    for file, keys in ((run / "manifest.json", ("stages", "speedy-seed1")), (done_of(run), ("info",))):
+        document = json.loads(file.read_text())
+        entry = document
+        for key in keys:
+            entry = entry[key]
+        entry["versions"][0]["numpy"] = "1.0"
+        file.write_text(json.dumps(document))
+    more = ("report", run) if command == "report" else ("campaign", sumo_run().with_suffix(".toml"), "--out", run)
+    done = harness(*more)
+    assert done.returncode == 0, done.stderr
+    assert "This run mixes versions" in done.stdout
+    assert "by numpy 1.0: speedy-seed1" in done.stdout
+    page = (run / "report.html").read_text()
+    assert 'id="mixed"' in page
+    assert "by numpy 1.0: speedy-seed1" in page
+    assert 'id="mixed"' not in (sumo_run() / "report.html").read_text()
+
+
+def done_of(run: Path) -> Path:
+    return run / ".stages" / "speedy-seed1" / "done.json"

@@ -1,0 +1,125 @@
+"""What the page says of searches: naive against reconfigured, the best over the trials, and the parameters found."""
+
+from __future__ import annotations
+
+import html
+import json
+import math
+import re
+from typing import Any
+
+import pandas as pd
+from tests.reports.test_page import campaign
+
+from harness.reports.page import render_page
+from harness.reports.provenance import mixed_versions
+from harness.reports.search import searches
+from harness.evaluation.tables import RECONFIGURATION_COLUMNS
+from harness.evaluation.tables import typed
+
+PAYOFFS = (2.0, 1.5, math.nan, 4.25, 4.25)
+
+
+def trials(seed: int = 1, payoffs: tuple[float, ...] = PAYOFFS, error: str = "ValueError: no") -> pd.DataFrame:
+    """The table of a search of two parameters."""
+    chosen = payoffs.index(max(each for each in payoffs if not math.isnan(each)))
+    rows = [
+        {
+            **{
+                "stage": "reconfigured_speedy",
+                "persona": "speedy",
+                "seed": seed,
+                "trial": trial,
+                "chosen": trial == chosen,
+            },
+            **{"parameter": name, "value": 1.5 + 0.25 * trial, "low": -1.0, "high": 3.0},
+            **{"mean_payoff": payoff, "failure_rate": 0.125, "best_payoff": max(payoffs[: trial + 1], key=_or_least)},
+            "error": error if math.isnan(payoff) else "",
+        }
+        for trial, payoff in enumerate(payoffs)
+        for name in ("gap_s", "<b>odd</b>")
+    ]
+    return typed(pd.DataFrame(rows).reindex(columns=list(RECONFIGURATION_COLUMNS)))
+
+
+def _or_least(payoff: float) -> float:
+    return -math.inf if math.isnan(payoff) else payoff
+
+
+def reconfigured(**options: Any) -> dict[str, Any]:
+    """The arguments of render_page for a campaign whose ego was reconfigured, not retrained."""
+    given = campaign(personas=["speedy"], **options)
+    given["manifest"] = json.loads(json.dumps(given["manifest"]).replace("retrained", "reconfigured"))
+    given["manifest"]["stages"]["reconfigured_speedy-seed1"] |= {"kind": "reconfiguration"}
+    given["manifest"]["campaign"]["ego"]["driver"] = "adas.toml"
+    for name in ("episodes", "summary"):
+        given[name]["arm"] = given[name]["arm"].str.replace("retrained", "reconfigured")
+    given["training"] = given["training"][:0]
+    return given | {"replays": [], "reconfiguration": trials()}
+
+
+def words_of(page: str) -> str:
+    text = re.sub(r"<(script|style)>.*?</\1>", "", page, flags=re.DOTALL)
+    return html.unescape(re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", text)))
+
+
+def test_page__shows_naive_against_reconfigured_as_it_does_naive_against_retrained() -> None:
+    page = words_of(render_page(**reconfigured()))
+    assert "RQ2: yes Does reconfiguration mend it?" in page
+    assert (
+        "Reconfiguration brings the ego's failures against the speedy driver down to 2 of 60 games from 18 of 60"
+        in page
+    )
+    assert "reconfigured ego, against speedy" in page
+    assert "The reconfigured ego alone: is what worked unbroken?" in page
+    assert "played by the naive and by the reconfigured ego" in page
+    assert "drives faster after reconfiguration" in page
+    assert "the ego tuned against speedy, against the same speedy" in page
+    assert not re.search("retrain", page.replace("the retrained or reconfigured one", ""), re.IGNORECASE)
+
+
+def test_page__of_several_seeds_counts_them() -> None:
+    page = words_of(render_page(**reconfigured(seeds=(1, 2))))
+    assert "In 2 of 2 training seeds reconfiguration makes the ego fail significantly less often" in page
+
+
+def test_page__says_what_was_found_and_escapes_names() -> None:
+    page = render_page(**reconfigured())
+    assert '<tr><th scope="row">gap_s</th><td>1.5</td><td>2.25</td><td>\N{MINUS SIGN}1</td><td>3</td></tr>' in page
+    assert "<b>odd</b>" not in page
+    assert "&lt;b&gt;odd&lt;/b&gt;" in page
+    assert "0, 1 and 2: this ego is not trained, but its parameters are tuned" in words_of(page)
+
+
+def test_page__of_a_campaign_without_a_search_says_nothing_of_any() -> None:
+    page = words_of(render_page(**campaign(personas=["speedy"])))
+    assert "econfiguration" not in page
+    assert "trial" not in page
+
+
+def test_searches__in_words() -> None:
+    (found,) = searches(trials())
+    assert found.summary == (
+        "5 trials; best in trial 3: mean payoff 4.25, failures in 12.5 %. "
+        "As given: mean payoff 2.00, failures in 12.5 %. 1 could not be played: ValueError: no"
+    )
+    assert found.document == "policies/reconfigured_speedy-seed1/driver.toml"
+    (found,) = searches(trials(payoffs=(3.0, 1.0, 3.0)))
+    assert found.summary == "3 trials, none better than the ego as given: mean payoff 3.00, failures in 12.5 %."
+
+
+def test_searches__each_seed_has_its_own() -> None:
+    both = pd.concat([trials(1), trials(2, (1.0, 2.0))])
+    assert [each.stage for each in searches(both)] == ["reconfigured_speedy, seed 1", "reconfigured_speedy, seed 2"]
+    assert "2 trials; best in trial 1" in str(searches(both)[1].figure)
+    assert searches(trials()[:0]) == []
+
+
+def test_mixed_versions__what_only_searches_are_made_by_is_compared_among_searches() -> None:
+    def stage(kind: str, **versions: str) -> dict[str, Any]:
+        return {"status": "done", "kind": kind, "versions": [versions]}
+
+    arm, search = stage("assessment", python="3.11"), stage("reconfiguration", python="3.11", optuna="5.0.0")
+    assert mixed_versions({"a": arm, "b": search}) == []
+    other = stage("reconfiguration", python="3.11", optuna="5.1.0")
+    assert mixed_versions({"a": arm, "b": search, "c": other})[1:] == ["  by optuna 5.0.0: b", "  by optuna 5.1.0: c"]

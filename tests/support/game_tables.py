@@ -1,0 +1,114 @@
+"""Made-up games of a campaign that goes on: arms of egos against non-egos, and best responses to pairs of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+
+from harness.evaluation.game_theory.findings import find
+from harness.evaluation.game_theory.records import Pairing, Response
+from harness.evaluation.tables import EPISODE_COLUMNS, typed
+
+
+def arm(name, seed=1, ego_failed=(), ego_payoff=None, non_ego_payoff=None, persona="", speed=13.0, first_episode=0):
+    """Games of one arm, an episode each; None in `ego_failed` is a game that errored."""
+    count = len(ego_failed)
+    ego = [10.0] * count if ego_payoff is None else ego_payoff
+    non_ego = [20.0] * count if non_ego_payoff is None else non_ego_payoff
+    rows = [
+        {
+            "arm": name,
+            "persona": persona,
+            "seed": seed,
+            "episode": first_episode + place,
+            "ego_outcome": {None: "error", 0: "goal", 1: "collision"}[failed],
+            "ego_failed": failed,
+            "ego_mean_speed_mps": math.nan if failed is None else speed,
+            "ego_payoff": math.nan if failed is None else ego[place],
+            "non_ego_outcome": "" if failed is None else "goal",
+            "non_ego_payoff": math.nan if failed is None else non_ego[place],
+            "duration_s": 10.0,
+            "error": "it died" if failed is None else "",
+        }
+        for place, failed in enumerate(ego_failed)
+    ]
+    return pd.DataFrame(rows, columns=list(EPISODE_COLUMNS))
+
+
+def table(*arms):
+    """Arms under one another, as episodes.csv holds them."""
+    return typed(pd.concat(arms, ignore_index=True))
+
+
+FAILING = {
+    ("naive", "speedy"): 0.24,
+    ("naive", "speedy_round2"): 0.3,
+    ("naive", "distracted"): 0.16,
+    ("naive", "sumo"): 0.02,
+    ("retrained_speedy", "speedy"): 0.04,
+    ("retrained_speedy", "speedy_round2"): 0.12,
+    ("retrained_speedy", "distracted"): 0.1,
+    ("retrained_speedy", "sumo"): 0.0,
+    ("retrained_distracted", "speedy"): 0.2,
+    ("retrained_distracted", "speedy_round2"): 0.22,
+    ("retrained_distracted", "distracted"): 0.04,
+    ("retrained_distracted", "sumo"): 0.0,
+    ("robust", "speedy"): 0.04,
+    ("robust", "speedy_round2"): 0.06,
+    ("robust", "distracted"): 0.04,
+    ("robust", "sumo"): 0.02,
+}
+"""Share of games the ego fails."""
+MET = {
+    "retrained_speedy": ("speedy",),
+    "retrained_distracted": ("distracted",),
+    "robust": ("speedy", "distracted"),
+}
+GAINS = {
+    ("ego", "speedy"): 0.1,
+    ("non_ego", "speedy"): 6.0,
+    ("ego", "distracted"): -0.3,
+    ("non_ego", "distracted"): 0.1,
+}
+"""What the best response earns more, by role and persona."""
+
+
+def a_campaign(seeds=(1,), games=50, gains=None):
+    """Episodes, pairings and responses of a whole made-up campaign: every cell of FAILING, a best response of both
+    sides of each persona's last pair."""
+    gains, random = GAINS | (gains or {}), np.random.default_rng(5)
+    arms, pairings, responses = [], [], []
+    for seed in seeds:
+        for (ego, non_ego), rate in FAILING.items():
+            persona = "" if non_ego == "sumo" else non_ego.partition("_")[0]
+            name = f"{ego}_vs_{non_ego}"
+            failed = [int(place < rate * games) for place in range(games)]
+            arms.append(_noisy(name, seed, failed, persona, random))
+            pairings.append(Pairing(name, seed, ego, non_ego, persona))
+        for (role, persona), gain in gains.items():
+            non_ego = {"speedy": "speedy_round2"}.get(persona, persona)
+            ego = f"retrained_{persona}"
+            pair = next(each for each in arms if each["arm"][0] == f"{ego}_vs_{non_ego}" and each["seed"][0] == seed)
+            best = pair.copy()
+            best["arm"] = f"best_{role}_{persona}"
+            earned = f"{role}_payoff"
+            best[earned] = best[earned].astype(float) + random.normal(gain, 0.3, size=games)
+            if role == "non_ego" and gain > 1:
+                best.loc[: games // 4, ["ego_failed", "ego_outcome"]] = [1, "collision"]
+            arms.append(best)
+            responses.append(Response(seed, role, persona, 2, pair["arm"][0], best["arm"][0], ego, non_ego))
+    return table(*arms), pairings, responses
+
+
+def _noisy(name, seed, failed, persona, random):
+    ego = [float(random.normal(8, 1) - 12 * each) for each in failed]
+    non_ego = [float(random.normal(15, 2) + 3 * each) if persona else math.nan for each in failed]
+    return arm(name, seed, failed, ego, non_ego, persona, speed=float(random.normal(13, 0.5)))
+
+
+def findings(seeds=(1,), games=50, gains=None, significance=0.01):
+    """What is found in such a campaign."""
+    episodes, pairings, responses = a_campaign(seeds, games, gains)
+    return find(pairings, responses, MET, episodes, significance)

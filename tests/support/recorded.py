@@ -1,0 +1,95 @@
+"""Recorded games drawn by hand, for tests of the page: on the road of networks/merge, without SUMO."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from harness.replay.selection import choose_games, worst_first
+from harness.reports.player_data import PlayerTrack, RecordedGame, SceneDrawing, Touch, Track
+
+STEP_S, STEPS = 0.1, 80
+OUTLINE = np.array([[0, 0], [220, 0], [220, -3.2], [130, -3.2], [100, -6.4], [0, -6.4], [0, 0.0]])
+SCENE = SceneDrawing(
+    surfaces=[[OUTLINE]],
+    lane_marks=[np.array([[0, -3.2], [100, -3.2]])],
+    rails=[np.array([[0.3, 0], [219.7, 0]]), np.array([[219.7, -3.2], [130, -3.2], [100, -6.4], [0.3, -6.4]])],
+    goal=[np.array([[175, -3.2], [175, 0]])],
+)
+
+
+def recorded(episodes, others=2):
+    """A game for each row of `episodes` that was played, the ones to watch first on top."""
+    played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
+    chosen = worst_first(choose_games(played))
+    rest = worst_first(played.drop(chosen.index))
+    for rows in (chosen, rest):
+        for row in rows.itertuples():
+            yield recorded_game(row, others)
+
+
+def recorded_game(row, others=2):
+    """One game that ends as its row says."""
+    outcome = row.ego_outcome or row.non_ego_outcome
+    random = np.random.default_rng([row.seed, row.episode])
+    ends = STEPS - 18 + int(random.integers(10)) if outcome in ("collision", "rail") else STEPS
+    time = np.arange(ends + 1) * STEP_S
+    players = []
+    if row.ego_outcome:
+        players.append(_player("ego", time, 30.0, -1.6, 12.5, random, row.ego_outcome))
+    if row.non_ego_outcome:
+        players.append(_player("non_ego", time, 32.0, -4.8, 13.4, random, row.non_ego_outcome))
+    if outcome == "collision" and len(players) == 2:
+        shift = players[0].y_m[-1] - players[1].y_m[-1] - 1.75
+        players[1].y_m[:] += shift * np.clip((time - time[-1] + 2.5) / 2.5, 0, 1) ** 2
+        players[1].x_m[:] += (players[0].x_m[-1] - players[1].x_m[-1] + 1.2) * (time / time[-1])
+    touches = []
+    if outcome in ("collision", "rail"):
+        place = (players[0].x_m[-1], players[0].y_m[-1] - 0.9 if outcome == "collision" else 0.0)
+        touches.append(Touch(float(time[-1]), *map(float, place), f"{outcome} at {time[-1]:.1f} s"))
+    along = [
+        Track(f"car {n}", 5.0, 1.8, 0, 80 + 30 * n + 9.0 * time, np.full(len(time), -1.6), 0 * time, 0 * time + 9.0)
+        for n in range(others)
+    ]
+    return RecordedGame(row.arm, row.persona, row.seed, row.episode, STEP_S, ends, outcome, players, along, touches)
+
+
+def _player(name, time, x_m, y_m, speed_mps, random, outcome):
+    ego = name == "ego"
+    wave = random.uniform(0.6, 1.4)
+    acceleration = (-0.6 if ego else 0.5) * np.sin(wave * time) + random.normal(0, 0.08, len(time))
+    if ego:
+        acceleration = np.where(time > time[-1] - 1.2, -4.0, acceleration)
+    speed = np.maximum(speed_mps + np.cumsum(acceleration) * STEP_S, 0.0)
+    x = x_m + np.concatenate(([0.0], np.cumsum(speed)[:-1] * STEP_S))
+    y = np.full(len(time), y_m)
+    if not ego:
+        y = y_m + 3.2 * np.clip((x - 85) / 40, 0, 1) ** 2
+    elif outcome == "rail":
+        y = y_m + 0.75 * np.clip((time - time[-1] + 2.0) / 2.0, 0, 1) ** 2
+    heading = np.arctan2(np.gradient(y), np.gradient(x))
+    gap = np.where(np.abs(time - 3.5) < 2.5, 18 - 2.2 * time, np.inf)
+    soonest = np.where(time > 2.5, np.maximum(time[-1] - time, 0.0) * 1.3, np.inf)
+    return PlayerTrack(
+        name, 4.6, 1.8, 0, x, y, heading, speed, acceleration, np.gradient(heading) * 2.0,
+        (time > 2.0) & (time < 3.4) & (not ego), gap, soonest, outcome if outcome != "timeout" else "timeout",
+        len(time) - 1,
+    )  # fmt: skip
+
+
+def manoeuvres(episodes):
+    """A frame of manoeuvres as `harness.evaluation.manoeuvres` writes it: two in each game against a persona."""
+    names = (("cut_in", "swerve"), ("drift", "hard_brake"), ("tailgate", "overtake"))
+    rows = []
+    for row in episodes[episodes["arm"].str.contains("_vs_")].itertuples():
+        non_ego, ego = names[row.episode % 3]
+        cells = {"arm": row.arm, "persona": row.persona, "seed": row.seed, "episode": row.episode}
+        rows.append(
+            {**cells, "player": "non_ego", "manoeuvre": non_ego, "time_s": 4.0, "until_s": 5.4}
+            | {"gap_m": 3.1, "ttc_s": 0.9, "text": "gap 3.1 m, TTC 0.9 s"}
+        )
+        rows.append(
+            {**cells, "player": "ego", "manoeuvre": ego, "time_s": 5.0, "until_s": 5.3}
+            | {"gap_m": np.nan, "ttc_s": np.nan, "text": ""}
+        )
+    return pd.DataFrame(rows)

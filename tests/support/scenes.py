@@ -1,0 +1,103 @@
+"""Small scenes that tests build on the spot, and starts at given poses in them."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import sumo
+
+from harness.game.attention import Habits
+from harness.game.initial_state import Start, draw_start
+from harness.traffic.scene import OpenScene, open_scene
+
+STRAIGHT_NODES = '<node id="a" x="0" y="0"/><node id="b" x="300" y="0"/>'
+STRAIGHT_EDGES = '<edge id="road" from="a" to="b" numLanes="2" speed="13.89" spreadType="right"/>'
+STRAIGHT = {"ego": ("road", "road_0"), "non_ego": ("road", "road_1"), "goal": "road"}
+RIGHT_Y, LEFT_Y = -4.8, -1.6  # centre lines of its lanes
+
+CROSSING_NODES = "".join(
+    f'<node id="{name}" x="{x}" y="{y}" type="priority"/>'
+    for name, x, y in (("w", -100, 0), ("c", 0, 0), ("e", 100, 0), ("s", 0, -100), ("n", 0, 100))
+)
+CROSSING_EDGES = "".join(
+    f'<edge id="{a}{b}" from="{a}" to="{b}" numLanes="1" speed="13.89" spreadType="right" priority="{priority}"/>'
+    for a, b, priority in (("w", "c", 2), ("c", "e", 2), ("s", "c", 1), ("c", "n", 1))
+)
+
+ZIPPER_NODES = '<node id="a" x="0" y="0"/><node id="z" x="150" y="0" type="zipper"/><node id="b" x="300" y="0"/>'
+ZIPPER_EDGES = (
+    '<edge id="wide" from="a" to="z" numLanes="3" speed="13.89" spreadType="right"/>'
+    '<edge id="narrow" from="z" to="b" numLanes="2" speed="13.89" spreadType="right"/>'
+)
+ZIPPER = {"ego": ("wide narrow", "wide_2"), "non_ego": ("wide narrow", "wide_1"), "goal": "narrow"}
+
+CARS = """
+    <vType id="ego_car" length="4.6" width="1.8" maxSpeed="40" speedFactor="1.0" speedDev="0.0"/>
+    <vType id="person_car" length="4.6" width="1.8" maxSpeed="40" speedFactor="1.0" speedDev="0.0" sigma="0"/>
+    <vType id="van" length="6.0" width="2.0" maxSpeed="30"/>
+"""
+
+
+def build_scene(
+    folder: Path,
+    nodes: str = STRAIGHT_NODES,
+    edges: str = STRAIGHT_EDGES,
+    places: dict[str, object] = STRAIGHT,
+    others: str = "",
+    cars: str = CARS,
+    goal_m: float = 250.0,
+    time_limit_s: float = 20.0,
+) -> OpenScene:
+    """Write a scene's folder, its net built by netconvert, and open it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "n.nod.xml").write_text(f"<nodes>{nodes}</nodes>")
+    (folder / "n.edg.xml").write_text(f"<edges>{edges}</edges>")
+    program = shutil.which("netconvert", path=os.path.join(sumo.SUMO_HOME, "bin"))
+    assert program is not None
+    subprocess.run(
+        [program, "-n", "n.nod.xml", "-e", "n.edg.xml", "-o", "n.net.xml"], cwd=folder, check=True, capture_output=True
+    )
+    ego, non_ego = places["ego"], places["non_ego"]
+    (folder / "n.rou.xml").write_text(
+        f"""<routes>{cars}
+    <vehicle id="ego" type="ego_car" depart="0"><route edges="{ego[0]}"/></vehicle>
+    <vehicle id="non_ego" type="person_car" depart="0"><route edges="{non_ego[0]}"/></vehicle>
+    {others}</routes>"""
+    )
+    (folder / "scene.toml").write_text(
+        f"""name = "small"
+net = "n.net.xml"
+routes = "n.rou.xml"
+time_limit_s = {time_limit_s}
+goal = {{ edge = "{places["goal"]}", position_m = {goal_m} }}
+ego = {{ vehicle = "ego", lane = "{ego[1]}", position_m = [30.0, 40.0], speed_mps = [8.0, 12.0] }}
+non_ego = {{ vehicle = "non_ego", lane = "{non_ego[1]}", position_m = [30.0, 40.0], speed_mps = [8.0, 12.0] }}
+"""
+    )
+    return open_scene(folder)
+
+
+def drawn(scene: OpenScene, *parts: str | int, present: Sequence[float] = (1.0, 1.0)) -> Start:
+    """A start drawn from named parts."""
+    return draw_start(scene.chances([Habits(), Habits()], present), *parts)
+
+
+def placed(scene: OpenScene, *poses: tuple[float, float, float, float] | None) -> Start:
+    """A start with the players' centres at x_m, y_m, heading_rad, speed_mps; None: the player takes no part."""
+    start = drawn(scene, "placed")
+    given = np.array([pose or (40.0, LEFT_Y, 0.0, 0.0) for pose in poses])
+    return replace(
+        start,
+        x_m=given[:, 0],
+        y_m=given[:, 1],
+        heading_rad=given[:, 2],
+        speed_mps=given[:, 3],
+        position_m=given[:, 0] + 0.5 * scene.world.length_m,
+        present=np.array([pose is not None for pose in poses]),
+    )

@@ -1,0 +1,201 @@
+"""Tiny campaigns for tests: written to a folder, and run by the real command in a process of its own."""
+
+from __future__ import annotations
+
+import atexit
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.config.campaign import Training
+from tests.support.repository import REPOSITORY
+
+MERGE = REPOSITORY / "networks" / "merge"
+CAREFUL, SPEEDY, DISTRACTED = (REPOSITORY / "personas" / f"{name}.toml" for name in ("careful", "speedy", "distracted"))
+HARNESS = Path(sys.executable).with_name("harness")
+TABLES = ("episodes.csv", "summary.csv", "comparisons.csv")
+
+TRAINING: dict[str, Any] = {
+    "steps": 2048,
+    "segment_steps": 1024,
+    "games": 8,
+    "buffer": 512,
+    "minibatch": 128,
+    "epochs": 2,
+    "network": [8],
+}
+PERSONA = """\
+name = "{name}"
+description = "Somebody who wants to get there."
+[[sources]]
+statistic = "Nobody has counted them."
+citation = "nobody, nowhere"
+[operational.terms]
+goal = {goal}
+progress = 1.0
+[safety.terms]
+collision = 1.0
+"""
+
+
+def settings(**changes: Any) -> Training:
+    """The tiny training's settings."""
+    return Training.model_validate({**TRAINING, **changes})
+
+
+def write_persona(folder: Path, name: str, goal: float = 2.0) -> Path:
+    """A persona of a few lines of TOML."""
+    file = folder / f"{name}.toml"
+    file.write_text(PERSONA.format(name=name, goal=goal), encoding="utf-8")
+    return file
+
+
+def write_campaign(folder: Path, **changes: Any) -> Path:
+    """A campaign that ends within seconds; `changes` replaces its tables and keys, None leaves one out."""
+    document: dict[str, Any] = {
+        "name": "tiny",
+        "scene": str(MERGE),
+        "personas": [str(SPEEDY)],
+        "ego": {"persona": str(CAREFUL)},
+        "training": TRAINING,
+        "assessment": {"episodes": 4},
+    }
+    document |= changes
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"{document['name']}.toml"
+    file.write_text(toml({key: value for key, value in document.items() if value is not None}), encoding="utf-8")
+    return file
+
+
+def toml(document: dict[str, Any]) -> str:
+    """Plain values first, then a section for each table."""
+    plain = [f"{key} = {_inline(value)}" for key, value in document.items() if not isinstance(value, dict)]
+    sections = [f"[{key}]\n{toml(value)}" for key, value in document.items() if isinstance(value, dict)]
+    return "\n".join([*plain, *sections]) + "\n"
+
+
+def _inline(value: Any) -> str:
+    """JSON's plain values are TOML's."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_inline(each)}" for key, each in value.items()) + " }"
+    return f"[{', '.join(map(_inline, value))}]" if isinstance(value, list | tuple) else json.dumps(value)
+
+
+def harness(*arguments: object, timeout_s: float = 200.0, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run the command to its end."""
+    command = [HARNESS, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False, **options)
+
+
+def begin(*arguments: object) -> subprocess.Popen[str]:
+    """Start the command as the leader of a process group, as a shell does, whatever is ignored where the tests run."""
+    command = [HARNESS, *map(str, arguments)]
+    return subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+        preexec_fn=_heed_all,
+    )
+
+
+def _heed_all() -> None:
+    for each in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        signal.signal(each, signal.SIG_DFL)
+
+
+def end(process: subprocess.Popen[str]) -> str:
+    """Wait for the command; what it printed. Whatever is left of it is killed, so that a failed test leaves nothing."""
+    try:
+        return process.communicate(timeout=120)[0]
+    finally:
+        if left := in_session(process.pid):
+            for each in left:
+                os.kill(each, signal.SIGKILL)
+            process.wait()
+
+
+def in_session(leader: int) -> list[int]:
+    """The processes of a session that are alive."""
+    return [pid for pid, fields in _processes() if int(fields[3]) == leader and fields[0] != "Z"]
+
+
+def workers_of(parent: int) -> list[int]:
+    """The workers that a command has started."""
+    children = [pid for pid, fields in _processes() if int(fields[1]) == parent and fields[0] != "Z"]
+    return [pid for pid in children if b"spawn_main" in _read(f"/proc/{pid}/cmdline")]
+
+
+def _processes() -> Iterable[tuple[int, list[str]]]:
+    """Each process with the fields of its stat after its name: state, parent, group, session."""
+    for folder in Path("/proc").iterdir():
+        if folder.name.isdigit() and (stat := _read(f"{folder}/stat")):
+            yield int(folder.name), stat.decode().rpartition(")")[2].split()
+
+
+def _read(path: str) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError:
+        return b""
+
+
+def wait_for(condition: Callable[[], object], what: str, seconds: float = 60.0) -> None:
+    """Wait until the condition holds; fails, naming it, if it does not in time."""
+    until = time.monotonic() + seconds
+    while not condition():
+        if time.monotonic() > until:
+            pytest.fail(f"waited {seconds:g} s in vain for: {what}")
+        time.sleep(0.02)
+
+
+def tables(run: Path) -> dict[str, bytes]:
+    """The bytes of a run's tables."""
+    return {name: (run / name).read_bytes() for name in TABLES}
+
+
+@cache
+def _scratch() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="harness-tests-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def finished(*options: object, **changes: Any) -> Path:
+    """Run a campaign to its end: its run folder, beside its document."""
+    campaign = write_campaign(_scratch(), **changes)
+    run = campaign.with_suffix("")
+    done = harness("campaign", campaign, "--out", run, *options, timeout_s=600.0)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return run
+
+
+@cache
+def learned_run() -> Path:
+    """The run folder of a finished campaign with a learned ego. Many tests read it; none may change it."""
+    return finished(name="learned")
+
+
+@cache
+def sumo_run() -> Path:
+    """The run folder of a finished campaign whose ego SUMO drives. Many tests read it; none may change it."""
+    return finished("--jobs", 1, **BY_SUMO)
+
+
+BY_SUMO: dict[str, Any] = {
+    "name": "left_to_sumo",
+    "ego": {"driver": "sumo", "persona": str(CAREFUL)},
+    "assessment": {"episodes": 2},
+}

@@ -1,0 +1,226 @@
+"""A second simulation in the same process: the same numbers from a child process, and no child left behind."""
+
+from __future__ import annotations
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import libsumo
+import numpy as np
+import pytest
+
+from harness.drivers.sumo import SumoDriver
+from harness.environments.arena import Arena, Seat
+from harness.errors import SimulationError
+from harness.traffic import subprocess_simulation
+from harness.traffic.libsumo_simulation import LocalSimulation
+from harness.traffic.open_simulation import open_simulation
+from harness.traffic.route_file import Departure
+from harness.traffic.scene import OpenScene
+from harness.traffic.subprocess_simulation import RemoteSimulation
+from tests.support.repository import REPOSITORY
+from tests.support.scenes import LEFT_Y, ZIPPER, ZIPPER_EDGES, ZIPPER_NODES, build_scene, drawn, placed
+
+FLOW = '<flow id="f" type="van" begin="0" period="3" departLane="random"><route edges="road"/></flow>'
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    return build_scene(tmp_path_factory.mktemp("scenes") / "straight", others=FLOW)
+
+
+@pytest.fixture
+def far(scene: OpenScene) -> Iterator[RemoteSimulation]:
+    simulation = RemoteSimulation(scene, 1, (True, True), 1)
+    yield simulation
+    simulation.close()
+
+
+def lives(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    status = Path(f"/proc/{process}/stat")
+    return not (status.exists() and status.read_text().rsplit(")", 1)[1].split()[0] == "Z")
+
+
+def ends(process: int, within_s: float = 10.0) -> bool:
+    until = time.monotonic() + within_s
+    while time.monotonic() < until:
+        if not lives(process):
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_open__the_first_is_local_further_ones_are_not_and_after_it_the_next_is_local_again(scene: OpenScene) -> None:
+    first = open_simulation(scene, 1, (True, True), 1)
+    second = open_simulation(scene, 1, (True, True), 1)
+    first.close()
+    third = open_simulation(scene, 1, (True, True), 1)
+    kinds = [type(each) for each in (first, second, third)]
+    for each in (second, third):
+        each.close()
+    assert kinds == [LocalSimulation, RemoteSimulation, LocalSimulation]
+    assert not libsumo.isLoaded()
+
+
+def test_both__give_the_same_numbers(scene: OpenScene) -> None:
+    arenas = [Arena(scene, 2, [Seat(None), Seat(SumoDriver())], seed=3) for _ in range(2)]
+    assert isinstance(arenas[1].simulation, RemoteSimulation)
+    actions = np.random.default_rng(0).normal(0.0, 0.1, (120, 2, 2, 2))
+
+    def played(arena: Arena) -> bytes:
+        seen = []
+        for seed in (1, 2):
+            arena.reload(seed)
+            starts = {game: drawn(scene, "both", game) for game in range(2)}
+            arena.start(starts, {game: scene.departures(np.random.default_rng(game)) for game in range(2)})
+            for action in actions:
+                arena.step(action)
+                seen += [arena.observation.tobytes(), arena.state.x_m.tobytes(), arena.state.outcome.tobytes()]
+                assert arena.reading is not None
+                seen += [arena.reading.x_m.tobytes(), repr(arena.reading.names.tolist()).encode()]
+        return b"".join(seen)
+
+    here, there = (played(arena) for arena in arenas)
+    for arena in arenas:
+        arena.close()
+    assert here == there
+
+
+def test_refusal__in_the_child_is_an_error_here_and_the_child_goes_on(scene: OpenScene, far: RemoteSimulation) -> None:
+    start = placed(scene, (40, LEFT_Y, 0, 0), None)
+    wrong = Departure("wrong", "van", ("road",), 0.0, "7", "base", "0")
+    with pytest.raises(SimulationError, match=r"start game 0.*departLane.*wrong"):
+        far.restart(0, start, [wrong])
+    far.reload(1)
+    far.restart(0, start, [])
+    assert far.step(start.x_m[None], start.y_m[None], start.heading_rad[None]).names.tolist() == [[]]
+
+
+def test_refusal__to_load_leaves_no_child(scene: OpenScene, tmp_path: Path) -> None:
+    broken = build_scene(tmp_path)
+    broken.net_file.write_text("<net")
+    with pytest.raises(SimulationError, match=r"n\.net\.xml"):
+        RemoteSimulation(broken, 1, (True, True), 1)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_death__of_the_child_is_an_error_that_names_the_signal(far: RemoteSimulation) -> None:
+    os.kill(far._child.pid, signal.SIGSEGV)
+    for _ in range(2):
+        with pytest.raises(SimulationError, match="SIGSEGV"):
+            far.reload(1)
+
+
+def test_interrupt__ends_the_child_rather_than_leave_an_answer_to_come(
+    far: RemoteSimulation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patched:
+
+        def interrupted(stream: Any) -> Any:
+            raise KeyboardInterrupt
+
+        patched.setattr(subprocess_simulation, "_receive", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            far.reload(1)
+    with pytest.raises(SimulationError, match="SIGKILL"):
+        far.reload(2)
+
+
+def test_close__ends_the_child_and_twice_is_once(far: RemoteSimulation) -> None:
+    far.close()
+    assert far._child.poll() == 0
+    far.close()
+    with pytest.raises(SimulationError, match="closed"):
+        far.reload(1)
+
+
+def test_garbage__ends_the_child(scene: OpenScene) -> None:
+    child = RemoteSimulation(scene, 1, (True, True), 1)._child
+    gc.collect()
+    assert child.poll() == 0
+
+
+def test_prints__of_sumo_do_not_reach_the_channel() -> None:
+    program = """
+from harness.traffic import libsumo_simulation
+from harness.traffic import subprocess_simulation
+import os
+class Printing:
+    def __init__(self, *arguments): os.write(1, b"SUMO says"); print("this", flush=True)
+    def reload(self, seed): os.write(1, b"and that"); return seed
+    def close(self): print("bye", flush=True)
+libsumo_simulation.LocalSimulation = Printing
+subprocess_simulation.serve()
+"""
+    child = subprocess.Popen(
+        [sys.executable, "-c", program],
+        cwd=REPOSITORY,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert child.stdin is not None
+    assert child.stdout is not None
+    for message, answer in (((None,), None), (("reload", 5), 5)):
+        subprocess_simulation._send(child.stdin, message)
+        assert subprocess_simulation._receive(child.stdout) == (answer, None)
+    rest, said = child.communicate(timeout=20)
+    assert (rest, said.split()) == (b"", [b"SUMO", b"saysthis", b"and", b"thatbye"])
+
+
+SCRIPT = """
+import os, pathlib, signal, sys
+sys.path.insert(0, {repository!r})
+from harness import open_scene
+from harness.traffic.open_simulation import open_simulation
+scene = open_scene(pathlib.Path("straight"))
+both = [open_simulation(scene, 1, (True, True), 1) for _ in range(2)]
+os.chdir("/")
+both[1].reload(2)
+print(both[1]._child.pid, flush=True)
+{end}
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.parametrize("end", ["", "raise RuntimeError", "os.kill(os.getpid(), signal.SIGKILL)", "os._exit(3)"])
+def test_parent__a_script_without_a_main_guard_leaves_no_orphan_however_it_ends(
+    scene: OpenScene, tmp_path: Path, end: str
+) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT.format(repository=str(REPOSITORY), end=end))
+    done = subprocess.run(
+        [sys.executable, str(script)], cwd=scene.folder.parent, capture_output=True, text=True, timeout=60
+    )
+    assert done.stdout.strip().isdigit(), done.stderr
+    assert ends(int(done.stdout))
+    assert done.returncode == 0 or end
+
+
+def test_soak__players_off_the_road_around_a_zipper_junction_do_not_kill_sumo(tmp_path: Path) -> None:
+    """SUMO 1.28 dies of this (SIGSEGV in a thousand steps) if lane changes take time, and with its sublane model."""
+    scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, goal_m=100.0)
+    simulation, generator = RemoteSimulation(scene, 4, (True, True), 1), np.random.default_rng(0)
+    try:
+        for episode in range(14):
+            x, y = generator.uniform(90, 150, (4, 2)), generator.uniform(-9, 0, (4, 2))
+            heading, turning = np.zeros((4, 2)), generator.normal(0.0, 0.03, (4, 2))
+            for game in range(4):
+                simulation.restart(game, drawn(scene, episode, game), [])
+            for _ in range(250):
+                heading = heading + turning + generator.normal(0.0, 0.05, (4, 2))
+                x, y = x + 0.6 * np.cos(heading), y + 0.6 * np.sin(heading)
+                simulation.step(x, y, heading)
+    finally:
+        simulation.close()

@@ -1,0 +1,65 @@
+"""When a learning curve has settled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from harness.training.early_stopping import LATEST, LEAST, RULE, TOLERANCE, has_converged
+
+
+def test_has_converged__a_flat_curve_has() -> None:
+    assert has_converged([3.0] * LEAST)
+
+
+def test_has_converged__a_rising_curve_has_not() -> None:
+    assert not has_converged(list(range(LEAST)))
+    assert not has_converged(list(range(100)))
+
+
+def test_has_converged__a_falling_curve_has() -> None:
+    assert has_converged(list(range(LEAST, 0, -1)))
+
+
+@pytest.mark.parametrize("segments", range(LEAST))
+def test_has_converged__never_before_the_least_number_of_segments(segments: int) -> None:
+    assert not has_converged([1.0] * segments)
+
+
+def test_has_converged__a_curve_that_rose_and_settled_has() -> None:
+    assert has_converged([-10.0, -6.0, -2.0, *[5.0] * (2 * LATEST)])
+
+
+def test_has_converged__not_before_the_rise_is_out_of_both_windows() -> None:
+    assert not has_converged([-10.0, *[5.0] * (2 * LATEST - 1)])
+    assert has_converged([-10.0, *[5.0] * (2 * LATEST)])
+
+
+def test_has_converged__by_no_more_than_the_tolerance_of_the_span() -> None:
+    # span 100; the mean of the latest is above that of the ones before by just less, and just more, than 1 of it
+    assert pytest.approx(0.01) == TOLERANCE
+    before = [-100.0, *[0.0] * LATEST]
+    assert has_converged([*before, *[0.99] * LATEST])
+    assert not has_converged([*before, *[1.02] * LATEST])
+
+
+def test_has_converged__noise_on_a_plateau_is_no_rise_but_noise_on_a_slope_is() -> None:
+    noise = np.random.default_rng(1).normal(0.0, 0.3, 60)
+    rise = np.concatenate((np.linspace(-20.0, 0.0, 20), np.zeros(40)))
+    curve = (rise + noise).tolist()
+    stopped = next(n for n in range(len(curve)) if has_converged(curve[:n]))
+    assert 20 < stopped < 45
+
+
+def test_has_converged__segments_without_a_finished_game_do_not_count() -> None:
+    assert not has_converged([-math.inf] * 40)
+    assert not has_converged([-math.inf] * LATEST + [1.0] * LATEST)
+    assert has_converged([-math.inf, *[1.0] * LEAST])
+    assert not has_converged([*[-math.inf] * 3, *map(float, range(20))])
+
+
+def test_rule__says_what_is_done() -> None:
+    assert f"latest {LATEST} segments" in RULE
+    assert "1%" in RULE

@@ -1,0 +1,330 @@
+"""The search for a better ego: the same games for all, and the same search however often it is interrupted."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import harness.training.parameter_search
+from harness.config.campaign import Reconfiguration
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.config.tunable import Tunable
+from harness.drivers.car import car_of
+from harness.drivers.mixture import Member, Mixture
+from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import read_policy
+from harness.drivers.protocol import Driver
+from harness.errors import StageFailed
+from harness.game.arrays import FloatArray, IntArray
+from harness.game.state import EGO
+from harness.traffic.scene import OpenScene, open_scene
+from harness.training.paired_rollouts import PairedGames
+from harness.training.parameter_search import Search, Trial, best, propose, read_trials, run_search, write_trials
+from tests.drivers.test_entry_points import install
+from tests.drivers.test_external import document, find
+from tests.drivers.test_fmu import example
+from tests.support.repository import REPOSITORY
+from tests.support.tiny import CAREFUL, SPEEDY
+
+SLOW = 'kind = "rules"\nname = "slow"\ndescription = "Drives at half the limit."\n[cruise]\nspeed_share = 0.5\n'
+SPEED = '[tunable]\n"cruise.speed_share" = [0.4, 1.1]\n'
+
+
+@pytest.fixture(scope="module")
+def scene() -> OpenScene:
+    return open_scene(REPOSITORY / "networks" / "merge")
+
+
+def opponent() -> Driver:
+    return LearnedDriver(read_policy(REPOSITORY / "policies" / "merge" / "speedy-seed1"), sampled=False)
+
+
+def personas() -> tuple[Persona, Persona]:
+    return read_document(CAREFUL, Persona), read_document(SPEEDY, Persona)
+
+
+def search_of(scene: OpenScene, folder: Path, text: str, **settings: Any) -> Search:
+    given = find(document(folder, text), folder)
+    few = {"trials": 5, "games": 6, "games_at_once": 6, **settings}
+    return Search(scene, given, personas(), opponent(), Reconfiguration(**few), ("reconfiguration", 1, "test"))
+
+
+# --- the games ---
+
+
+class Watched:
+    """Remembers what was seen first in each game."""
+
+    takes_over = True
+
+    def __init__(self, scene: OpenScene) -> None:
+        rules = find(str(REPOSITORY / "egos" / "adas.toml"), REPOSITORY)
+        self._driver = rules.make(car_of(scene.world, EGO), sampled=False)
+        self.first: list[FloatArray] = []
+        self._new: set[int] = set()
+
+    def begin(self, games: IntArray) -> None:
+        self._new |= {*games.tolist()}
+        self._driver.begin(games)
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        self.first += [seen.copy() for game, seen in zip(games, observation, strict=True) if int(game) in self._new]
+        self._new -= {*games.tolist()}
+        return self._driver.decide(games, observation, noise)
+
+
+def play(scene: OpenScene, driver: Driver, other: Driver | Mixture | None = None, **changes: Any) -> Any:
+    given = {"games": 7, "at_once": 3, "alone_share": 0.3, "parts": ("test", 1)} | changes
+    games = PairedGames(scene, personas(), other or opponent(), **given)
+    try:
+        return games.play(driver), games.play(driver)
+    finally:
+        games.close()
+
+
+def test_games__are_so_many_as_asked_for_and_the_same_again(scene: OpenScene) -> None:
+    watched = Watched(scene)
+    once, again = play(scene, watched)
+    assert once.payoff.shape == once.failed.shape == (7,)
+    np.testing.assert_array_equal(once.payoff, again.payoff)
+    np.testing.assert_array_equal(once.failed, again.failed)
+    np.testing.assert_array_equal(watched.first[:9], watched.first[9:])  # three loads of three; two are over
+    assert len(np.unique(np.array(watched.first[:7]), axis=0)) == 7  # and each is another
+
+
+def test_games__do_not_depend_on_how_many_are_played_at_once(scene: OpenScene) -> None:
+    alone, together = (play(scene, Watched(scene), at_once=at_once)[0] for at_once in (1, 7))
+    np.testing.assert_allclose(alone.payoff, together.payoff, atol=1e-4)
+    np.testing.assert_array_equal(alone.failed, together.failed)
+
+
+@pytest.mark.parametrize(("share", "met"), [(0.0, range(20, 21)), (1.0, range(1)), (0.5, range(4, 17))])
+def test_games__are_alone_in_their_share(share: float, met: range, scene: OpenScene) -> None:
+    other = _Counting()
+    play(scene, Watched(scene), other, games=20, at_once=20, alone_share=share)
+    assert len(other.games) in met
+
+
+class _Counting:
+    takes_over = True
+
+    def __init__(self) -> None:
+        self.games: set[int] = set()
+
+    def begin(self, games: IntArray) -> None:
+        """Nothing to forget."""
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        self.games |= {*games.tolist()}
+        return np.zeros((len(games), 2))
+
+
+def test_games__may_be_against_several_who_take_turns(scene: OpenScene) -> None:
+    _, speedy = personas()
+    both = _Counting(), _Counting()
+    play(scene, Watched(scene), Mixture(tuple(Member(each, speedy) for each in both)), games=20, at_once=20)
+    assert both[0].games
+    assert both[1].games
+    assert not both[0].games & both[1].games
+
+
+# --- what is proposed ---
+
+TUNABLE = (Tunable("a", 0.0, 1.0), Tunable("b", -10.0, -5.0))
+
+
+def test_propose__is_told_by_the_trials_so_far_and_nothing_else() -> None:
+    trials: list[Trial] = []
+    for number in range(15):
+        values = propose(TUNABLE, trials, "test", 1)
+        assert values == propose(TUNABLE, trials, "test", 1)
+        assert values != propose(TUNABLE, trials, "test", 2)
+        assert all(low <= values[key] <= high for key, low, high in TUNABLE)
+        assert list(values) == ["a", "b"]
+        trials.append(Trial(values, None if number == 3 else -abs(values["a"] - 0.25), 0.0))
+    assert len({trial.values["a"] for trial in trials}) == 15
+
+
+def test_propose__goes_where_it_was_good() -> None:
+    trials: list[Trial] = []
+    for _ in range(40):
+        values = propose(TUNABLE, trials, "test", 1)
+        trials.append(Trial(values, -abs(values["a"] - 0.25) - 0.1 * abs(values["b"] + 9.0), 0.0))
+    first, last = (np.mean([each.mean_payoff for each in some]) for some in (trials[:10], trials[30:]))
+    assert last > first
+    assert abs(trials[best(trials)].values["a"] - 0.25) < 0.1
+
+
+def test_best__is_the_first_of_equals_and_never_one_that_was_not_played() -> None:
+    trials = [Trial({}, payoff, 0.0) for payoff in (1.0, None, 3.0, 3.0, 2.0)]
+    assert best(trials) == 2
+    assert best(trials[:2]) == 0
+
+
+# --- the search ---
+
+
+def test_search__finds_the_speed_that_pays(scene: OpenScene, tmp_path: Path) -> None:
+    """Half the limit costs the careful ego payoff all the way, above the limit it is fined: the best is near it."""
+    search = search_of(scene, tmp_path, SLOW + SPEED, trials=16, games=8, games_at_once=8, alone_share=1.0)
+    trials = run_search(search, tmp_path / "trials.json")
+    assert dict(trials[0].values) == {"cruise.speed_share": 0.5}
+    found = trials[best(trials)]
+    assert 0.9 < found.values["cruise.speed_share"] < 1.05
+    assert found.mean_payoff is not None
+    assert trials[0].mean_payoff is not None
+    assert found.mean_payoff > trials[0].mean_payoff + 1.0
+    of_share = {each.values["cruise.speed_share"]: each.mean_payoff for each in trials}
+    assert max(of_share.items(), key=lambda each: each[1])[0] == found.values["cruise.speed_share"]
+
+
+@pytest.mark.parametrize("stops_at", [[1], [3, 3, 4]])
+def test_search__interrupted_is_the_same_search(stops_at: list[int], scene: OpenScene, tmp_path: Path) -> None:
+    search = search_of(scene, tmp_path, SLOW + SPEED)
+    whole = run_search(search, tmp_path / "whole.json")
+    for stop in stops_at:
+
+        def begin(trial: int, stop: int = stop) -> None:
+            if trial == stop:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run_search(search, tmp_path / "kept.json", begin=begin)
+        assert len(read_trials(tmp_path / "kept.json")) == stop
+    told: list[tuple[int, int]] = []
+    assert run_search(search, tmp_path / "kept.json", lambda *of: told.append(of)) == whole
+    assert told == [(done, 5) for done in range(stops_at[-1], 6)]
+    assert (tmp_path / "kept.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
+
+
+def test_search__that_is_finished_plays_nothing(
+    scene: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    search = search_of(scene, tmp_path, SLOW + SPEED, trials=2)
+    whole = run_search(search, tmp_path / "kept.json")
+    monkeypatch.setattr(harness.training.parameter_search, "PairedGames", None)
+    assert run_search(search, tmp_path / "kept.json") == whole
+
+
+def test_kept__is_read_back_bit_for_bit_or_not_at_all(tmp_path: Path) -> None:
+    trials = [Trial({"a": 0.1 + 0.2}, 1 / 3, 0.0), Trial({"a": 1e-300}, None, None, "ValueError: “no”")]
+    kept = tmp_path / "kept.json"
+    assert read_trials(kept) == []
+    write_trials(trials, kept)
+    assert read_trials(kept) == trials
+    whole = kept.read_bytes()
+    for damaged in (whole[:-20], b"", b"[]", b"null", whole.replace(b"0.3333", b"0.4333"), b"\xff" + whole):
+        kept.write_bytes(damaged)
+        assert read_trials(kept) == []
+
+
+class _Fails:
+    """An ego that can't be driven with some values."""
+
+    def __init__(self, search: Search, fails: Any) -> None:
+        self._given, self._fails = search.driver, fails
+
+    @property
+    def searched(self) -> Any:
+        return self._given.searched
+
+    @property
+    def numbers(self) -> Any:
+        return self._given.numbers
+
+    def tuned(self, values: Any) -> Any:
+        if self._fails(values):
+            raise ValueError("no such driver")
+        return self._given.tuned(values)
+
+    def make(self, *of: Any) -> Driver:
+        if self._fails(self.numbers):
+            raise ValueError("no such driver")
+        return self._given.make(*of)
+
+
+def test_search__a_driver_that_can_not_be_made_is_a_trial_without_a_payoff(scene: OpenScene, tmp_path: Path) -> None:
+    search = search_of(scene, tmp_path, SLOW + SPEED, trials=8)
+    fails: Any = _Fails(search, lambda values: values["cruise.speed_share"] > 0.8)
+    trials = run_search(replace(search, driver=fails), tmp_path / "kept.json")
+    too_fast = [each for each in trials if each.values["cruise.speed_share"] > 0.8]
+    assert 0 < len(too_fast) < 7
+    assert {(each.mean_payoff, each.error) for each in too_fast} == {(None, "ValueError: no such driver")}
+    assert all((each.mean_payoff is None) == (each in too_fast) for each in trials)
+    assert trials[best(trials)] not in too_fast
+
+
+def test_search__fails_where_the_ego_can_not_drive_as_it_was_given(scene: OpenScene, tmp_path: Path) -> None:
+    search = search_of(scene, tmp_path, SLOW + SPEED)
+    fails: Any = _Fails(search, lambda values: True)
+    with pytest.raises(StageFailed, match="could not play as it was given: ValueError: no such driver"):
+        run_search(replace(search, driver=fails), tmp_path / "kept.json")
+    assert read_trials(tmp_path / "kept.json") == []
+
+
+# --- of every kind ---
+
+PROGRAM = """
+import json, sys
+for line in sys.stdin:
+    message = json.loads(line)
+    if message["type"] == "hello":
+        speed, entries = message["parameters"]["speed_mps"], message["layout"]
+        answer = {"protocol": 1}
+    elif message["type"] == "begin":
+        answer = {}
+    else:
+        now = [dict(zip(entries, seen)) for seen in message["observation"]]
+        steering = [0.5 * each["path_turned_rad@5m"] + 0.1 * each["path_left_m"] for each in now]
+        pedals = [max(-3.0, min(2.0, speed - each["speed_mps"])) for each in now]
+        answer = {"actions": list(zip(pedals, steering))}
+    print(json.dumps(answer), flush=True)
+"""
+
+
+def check_speed_is_found(scene: OpenScene, folder: Path, text: str) -> None:
+    text += "[parameters]\nspeed_mps = 5.0\n[tunable]\nspeed_mps = [3.0, 13.0]\n"
+    search = search_of(scene, folder, text, trials=6, games=3, games_at_once=3, alone_share=1.0)
+    trials = run_search(search, folder / "kept.json")
+    assert [each.error for each in trials] == [""] * 6
+    speeds = [each.values["speed_mps"] for each in trials]
+    payoffs = [each.mean_payoff or 0.0 for each in trials]
+    assert speeds[0] == 5.0
+    assert len(set(payoffs)) == 6
+    assert np.corrcoef(speeds, payoffs)[0, 1] > 0.8  # what the search was told is what the driver drove by
+
+
+def test_search__of_an_installed_package(scene: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install(tmp_path / "site")
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    monkeypatch.delitem(sys.modules, "steady", raising=False)
+    check_speed_is_found(scene, tmp_path, 'kind = "python"\nentry_point = "steady"\n')
+
+
+def test_search__of_a_program(scene: OpenScene, tmp_path: Path) -> None:
+    (tmp_path / "drive.py").write_text(PROGRAM)
+    check_speed_is_found(scene, tmp_path, f'kind = "process"\ncommand = ["{sys.executable}", "drive.py"]\n')
+    assert not [pid for pid in os.listdir("/proc") if pid.isdigit() and b"drive.py" in _command(pid)]
+
+
+def _command(pid: str) -> bytes:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+def test_search__of_a_digital_twin(scene: OpenScene, tmp_path: Path) -> None:
+    example().build(tmp_path / "twin.fmu")
+    text = 'kind = "fmu"\nfile = "twin.fmu"\n[start]\ntime_gap_s = 1.8\n[tunable]\ntime_gap_s = [0.8, 4.0]\n'
+    search = search_of(scene, tmp_path, text, trials=3, games=4, games_at_once=4, alone_share=0.0)
+    trials = run_search(search, tmp_path / "kept.json")
+    assert [each.error for each in trials] == [""] * 3
+    assert len({each.mean_payoff for each in trials}) == 3
