@@ -22,7 +22,7 @@ from benchmarks.games import MERGE, REPOSITORY, coasting_policy, persona_file
 from benchmarks.sides import Pace, Side, Tell, opened
 from harness.campaign.execution import run_campaign as campaign_run
 from harness.campaign.execution.cache_keys import stage_keys
-from harness.campaign.execution.run_context import conditions_of
+from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.worker_pool import Event
 from harness.campaign.plan.plan import plan
@@ -156,7 +156,7 @@ def assessment_side(pace: Pace) -> None:
         scene = campaign.scene.document
         folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
         stages = plan(campaign.document, [each.name for each in campaign.personas])
-        conditions = conditions_of(campaign, folder, stage_keys(campaign, stages))
+        conditions = run_context_of(campaign, folder, stage_keys(campaign, stages))
         arm = next(stage for stage in stages if stage.id == _ARM)
         for needed in arm.needs:
             write_policy(coasting_policy(), folder.policy(needed))

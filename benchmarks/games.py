@@ -11,7 +11,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.policy_file import ACTIONS, Policy
 from harness.environments.arena import Arena, Seat
-from harness.environments.auto_reset import NextGames
+from harness.environments.auto_reset import AutoReset
 from harness.game.arrays import FloatArray
 from harness.game.observation import SIZE
 from harness.game.seeding import generator_of
@@ -59,19 +59,19 @@ class Played:
     def __init__(self, scene: OpenScene, games: int, seed: int = 1) -> None:
         people = [persona("careful"), persona("distracted")]
         self.arena = Arena(scene, games, [Seat(None, each.payoff) for each in people], seed)
-        self._chances = scene.chances([each.habits for each in people], [1.0, 1.0])
-        self._games = NextGames(self.arena, self._chances, "benchmarks")
+        self._start_distribution = scene.start_distribution([each.human_factors for each in people], [1.0, 1.0])
+        self._games = AutoReset(self.arena, self._start_distribution, "benchmarks")
         noise = generator_of("benchmarks", "actions").standard_normal((_ACTIONS_KEPT, games, len(people), ACTIONS))
         self._actions = _STRAIGHT_ON + _VARIED * noise
         self._steps = 0
 
     def start(self, games: list[int]) -> None:
         """Start games, each as it has not been played before."""
-        self._games.start(games)
+        self._games.reset(games)
 
     def begin_again(self, seed: int = 1) -> None:
         """Everything anew, just as it was the first time."""
-        self._games = NextGames(self.arena, self._chances, "benchmarks")
+        self._games = AutoReset(self.arena, self._start_distribution, "benchmarks")
         self._steps = 0
         self.arena.reload(seed)
         self.start(list(range(self.arena.games)))

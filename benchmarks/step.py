@@ -16,19 +16,19 @@ from benchmarks.bare import Placement, place_and_step, record
 from benchmarks.games import GAMES, Played, merge
 from benchmarks.traffic import write_scene
 from harness.environments.gymnasium_env import arena as stepping
-from harness.traffic.background_traffic import Others
+from harness.traffic.background_traffic import BackgroundTraffic
 from harness.traffic.scene import open_scene
 
 _ALONE_STEPS, _AMONG_OTHERS_STEPS = 300, 100
 _PARTS = (
     ("drivers, attention, requests", "decide", stepping.Arena, "_decide"),
     ("the players' cars move", "drive", stepping, "drive"),
-    ("others near the players read", "read", Others, "read"),
+    ("others near the players read", "read", BackgroundTraffic, "read"),
     ("where each is along its route", "locate", stepping.Arena, "_locate"),
-    ("contact, goal, time", "judge", stepping.Arena, "_judge"),
-    ("payoffs", "pay", stepping.Arena, "_pay"),
+    ("contact, goal, time", "terminations", stepping.Arena, "_terminations"),
+    ("payoffs", "pay", stepping.Arena, "_payoffs"),
     ("everyone looks", "observe", stepping, "observe"),
-    ("who ended leaves or stands", "settle", stepping.Arena, "_settle"),
+    ("who ended leaves or stands", "settle", stepping.Arena, "_finish"),
     ("ended games start anew", "start", Played, "start"),
 )
 

@@ -28,19 +28,21 @@ from harness.environments.gymnasium_env import DrivingEnv
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.game.arrays import FloatArray
 from harness.game.state import EGO
-from harness.training.ppo import Lesson, train
+from harness.training.ppo import TrainingSpec, train
 
 _ENDLESS = 1_000_000_000
 _WARM_UP_UPDATES = 3
 _OPPONENT = "speedy"
 
 
-def lesson(settings: Training) -> Lesson:
+def lesson(settings: Training) -> TrainingSpec:
     """The ego's retraining against a person with a learned policy."""
     people = (persona("careful"), persona(_OPPONENT))
     opponent = LearnedDriver(coasting_policy(), people[1].decisions == "sampled")
     alone_share = Retraining().alone_share
-    return Lesson(merge(), EGO, people, opponent, alone_share, 0.0, coasting_policy(), settings, ("benchmarks", 1))
+    return TrainingSpec(
+        merge(), EGO, people, opponent, alone_share, 0.0, coasting_policy(), settings, ("benchmarks", 1)
+    )
 
 
 def endless(**changes: Any) -> Training:
@@ -100,7 +102,7 @@ class _FreeGames(VecEnv):
 
     render_mode = None
 
-    def __init__(self, arena: _NoArena, learner: int, chances: Any, *parts: str | int, **how: Any) -> None:
+    def __init__(self, arena: _NoArena, learner: int, start_distribution: Any, *parts: str | int, **how: Any) -> None:
         super().__init__(arena.games, OBSERVATION_SPACE, ACTION_SPACE)
         self.arena = arena
         generator = np.random.default_rng(1)
@@ -111,7 +113,7 @@ class _FreeGames(VecEnv):
         self._infos: list[dict[str, Any]] = [{} for _ in range(arena.games)]
         self._steps = 0
 
-    def begin(self, chances: Any, *parts: str | int) -> None:
+    def sample_from(self, start_distribution: Any, *parts: str | int) -> None:
         """Nothing is drawn."""
 
     def take_finished(self) -> list[Any]:
@@ -152,14 +154,14 @@ class _SubprocessGames(SubprocVecEnv):
         one: Callable[[], gymnasium.Env[Any, Any]],
         arena: _NoArena,
         learner: int,
-        chances: Any,
+        start_distribution: Any,
         *parts: str | int,
         **how: Any,
     ) -> None:
         super().__init__([one] * arena.games)
         self.arena = arena
 
-    def begin(self, chances: Any, *parts: str | int) -> None:
+    def sample_from(self, start_distribution: Any, *parts: str | int) -> None:
         """Each environment draws its own games."""
 
     def take_finished(self) -> list[Any]:

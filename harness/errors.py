@@ -82,7 +82,7 @@ def is_of_memory(error: BaseException) -> bool:
     return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
 
 
-def attempt(problems: list[Problem], action: Callable[[], T]) -> T | None:
+def collect(problems: list[Problem], action: Callable[[], T]) -> T | None:
     """The action's result, or None: the user's mistakes in it join `problems`, so that the rest is looked at too."""
     try:
         return action()

@@ -17,11 +17,11 @@ from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego, 
 from harness.config.persona import Persona
 from harness.config.toml_reading import Document, nearest, read_document
 from harness.drivers.car import car_of
-from harness.drivers.external import GivenDriver, find_driver
+from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy_file import check_no_archive, policy_files, read_policy
-from harness.errors import Problem, UsageError, attempt
+from harness.errors import Problem, UsageError, collect
 from harness.game.state import EGO
-from harness.traffic.load_check import try_scene
+from harness.traffic.load_check import check_loads
 from harness.traffic.scene import OpenScene, open_scene
 
 QUICK_STEPS = 262_144
@@ -40,11 +40,11 @@ class OpenCampaign:
     scene: OpenScene
     ego_persona: Persona
     personas: tuple[Persona, ...]
-    ego_driver: GivenDriver | None
+    ego_driver: ExternalDriver | None
     """The ego's driver, where it is neither learned nor plainly SUMO's own."""
     policies: Path | None
     """The folder of the policies trained before, where the campaign names one."""
-    other_egos: Mapping[str, GivenDriver]
+    other_egos: Mapping[str, ExternalDriver]
     """Who meets every non-ego in cross-play beside the campaign's own egos, by name; SUMO's plain own is not here."""
     hashes: dict[str, str]
     """SHA-256 of every file the campaign rests on, by its path from the campaign's folder."""
@@ -67,21 +67,21 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
     """
     problems: list[Problem] = []
 
-    document = attempt(problems, lambda: read_document(file, Campaign))
+    document = collect(problems, lambda: read_document(file, Campaign))
     named = document or _named(file)
     if named is None:
         raise UsageError(problems)
     scene_folder = resolve(file, named.scene)
-    ego_driver = attempt(problems, lambda: _ego_driver(file, named.ego.driver, allow_code))
-    scene = attempt(problems, lambda: open_scene(scene_folder, ego_driver.vehicle_type if ego_driver else None))
+    ego_driver = collect(problems, lambda: _ego_driver(file, named.ego.driver, allow_code))
+    scene = collect(problems, lambda: open_scene(scene_folder, ego_driver.vehicle_type if ego_driver else None))
     persona_files = [resolve(file, named.ego.persona), *(resolve(file, each) for each in named.personas)]
-    personas = [attempt(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
+    personas = [collect(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
     if ego_driver is not None and scene is not None:
         sampled = personas[0] is not None and personas[0].decisions == "sampled"
-        attempt(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, _at_once(document, ego_driver)))
-    attempt(problems, lambda: _check_round_2(file, document, ego_driver))
+        collect(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, _at_once(document, ego_driver)))
+    collect(problems, lambda: _check_round_2(file, document, ego_driver))
     other_egos = _other_egos(problems, file, document, scene, allow_code)
-    policies = attempt(problems, lambda: _policies_folder(file, named.policies))
+    policies = collect(problems, lambda: _policies_folder(file, named.policies))
     for given, persona in zip(named.personas, personas[1:], strict=True):
         names = [each.name for each in personas[1:] if each is not None]
         if persona is not None and names.count(persona.name) > 1:
@@ -94,7 +94,7 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
                 )
             )
     if not problems and scene is not None:
-        attempt(problems, lambda: try_scene(scene))
+        collect(problems, lambda: check_loads(scene))
     if problems or document is None or scene is None:
         raise UsageError(problems)
     names = [persona.name for persona in personas[1:] if persona is not None]
@@ -145,7 +145,7 @@ def _named(file: Path) -> _Named | None:
         return None
 
 
-def _at_once(document: Campaign | None, ego_driver: GivenDriver) -> int:
+def _at_once(document: Campaign | None, ego_driver: ExternalDriver) -> int:
     """How many games at once the ego will have to play."""
     if document is None:
         return 1
@@ -156,7 +156,7 @@ def _at_once(document: Campaign | None, ego_driver: GivenDriver) -> int:
     )
 
 
-def _check_round_2(file: Path, document: Campaign | None, ego_driver: GivenDriver | None) -> None:
+def _check_round_2(file: Path, document: Campaign | None, ego_driver: ExternalDriver | None) -> None:
     """Raises UsageError for a table that says how round 2 goes of another kind of ego than this."""
     if document is None or (ego_driver is None and document.ego.driver not in (LEARNED, SUMO)):
         return  # nobody knows which ego it has
@@ -188,24 +188,24 @@ def _check_stage_names(file: Path, document: Campaign, personas: Sequence[str], 
         )
 
 
-def _ego_driver(file: Path, driver: str, allow_code: bool) -> GivenDriver | None:
+def _ego_driver(file: Path, driver: str, allow_code: bool) -> ExternalDriver | None:
     return None if driver in (LEARNED, SUMO) else find_driver(driver, file, "ego.driver", allow_code)
 
 
 def _other_egos(
     problems: list[Problem], file: Path, document: Campaign | None, scene: OpenScene | None, allow_code: bool
-) -> dict[str, GivenDriver]:
+) -> dict[str, ExternalDriver]:
     """The drivers of [crossplay], each found and tried; what is wrong with them goes to `problems`."""
-    found: dict[str, GivenDriver] = {}
+    found: dict[str, ExternalDriver] = {}
     crossplay = document.crossplay if document is not None else None
     for written in crossplay.egos if crossplay is not None else ():
         if written in (SUMO, LEARNED):
             continue
-        driver = attempt(problems, lambda written=written: find_driver(written, file, "crossplay.egos", allow_code))  # type: ignore[misc]
+        driver = collect(problems, lambda written=written: find_driver(written, file, "crossplay.egos", allow_code))  # type: ignore[misc]
         if driver is not None:
             found[name_of(written)] = driver
             if scene is not None:
-                attempt(problems, lambda driver=driver: driver.try_out(car_of(scene.world, EGO), False))  # type: ignore[misc]
+                collect(problems, lambda driver=driver: driver.try_out(car_of(scene.world, EGO), False))  # type: ignore[misc]
     return found
 
 
@@ -242,7 +242,7 @@ def _trained_before(file: Path, document: Campaign, personas: Sequence[str], fol
             message = f"{document.policies!r} holds no policy {name!r}"
             problems.append(Problem(str(file), "policies", message, _instead(name, there)))
             continue
-        policy = attempt(problems, lambda name=name: read_policy(folder / name))  # type: ignore[misc]
+        policy = collect(problems, lambda name=name: read_policy(folder / name))  # type: ignore[misc]
         if policy is not None and (learned := policy.card.get("stage")) != name:
             message = f"was learned as {learned!r}, but is called {name!r}"
             problems.append(Problem(str(folder / name), "stage", message, "give the folder its policy's name"))

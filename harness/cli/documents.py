@@ -54,14 +54,14 @@ def show_persona(
 
     from harness.config.persona import Persona
     from harness.config.toml_reading import read_document
-    from harness.reports.persona.profile import portrait_of
+    from harness.reports.persona.profile import persona_profile
     from harness.reports.persona.terminal import show
 
-    portrait = portrait_of(read_document(file, Persona))
+    portrait = persona_profile(read_document(file, Persona))
     if html is not None:
-        from harness.reports.persona.page import write_portrait
+        from harness.reports.persona.page import write_profile
 
-        write_portrait(portrait, html)
+        write_profile(portrait, html)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # of a terminal that does not know every character
     console = Console()

@@ -9,15 +9,15 @@ from pydantic import Field, SerializerFunctionWrapHandler, field_validator, mode
 
 from harness.config.scene import Interval
 from harness.config.toml_reading import Document
-from harness.game.attention import Attention, Overlooking
-from harness.game.human_limits import NOBODY, PERSISTENCE_S, Missing, Reaction, Sight, Uses
+from harness.game.attention import Attention, NoBlindSpotCheck
+from harness.game.human_limits import NOBODY, PERSISTENCE_S, LookedButFailedToSee, Reaction, Sight, Uses
 
 LONGEST_DELAY_S = 5.0
 LATER = ("misses_share", "noticed_within_m", "range_m", "distance_error", "closing_error_per_s", "error_s")
 """Keys of perception that earlier versions did not know."""
 
 
-class Lapsing(Document):
+class AttentionLapses(Document):
     """When attention lapses, for how long, and what the car does meanwhile."""
 
     mean_attentive_s: float = Field(gt=0.1, le=3600.0)
@@ -42,7 +42,7 @@ class Lapsing(Document):
         return Attention(self.mean_attentive_s, self.lapse_s, self.crown_rad, self.bumps_rad)
 
 
-class Reacting(Document):
+class ReactionTime(Document):
     """How late decisions reach pedals and wheel: while the person itself is trained, too."""
 
     delay_s: Interval
@@ -63,7 +63,7 @@ class Reacting(Document):
 
 
 class Perception(Document):
-    """What a person fails to see. Overlooking and missing others are habits of driving, not of learning: while the
+    """What a person fails to see. NoBlindSpotCheck and missing others are habits of driving, not of learning: while the
     person itself is trained, its eyes are open, for nobody has learned from what was overlooked and went well. How
     far and how exactly it sees is the body's doing, and there from the first lesson on."""
 
@@ -102,14 +102,16 @@ class Perception(Document):
         return {key: each for key, each in dump(self).items() if key not in LATER or each != usual[key]}
 
     @property
-    def overlooking(self) -> Overlooking:
+    def no_blind_spot_check(self) -> NoBlindSpotCheck:
         """Whom the person overlooks."""
-        return Overlooking(self.overlooks_share, self.overlooked_up_to_m)
+        return NoBlindSpotCheck(self.overlooks_share, self.overlooked_up_to_m)
 
     @property
-    def missing(self) -> Missing:
+    def looked_but_failed_to_see(self) -> LookedButFailedToSee:
         """Whom the person looks at and fails to see."""
-        return NOBODY if self.noticed_within_m is None else Missing(self.misses_share, self.noticed_within_m)
+        return (
+            NOBODY if self.noticed_within_m is None else LookedButFailedToSee(self.misses_share, self.noticed_within_m)
+        )
 
     @property
     def sight(self) -> Sight:

@@ -124,7 +124,7 @@ def _name_terms(schema: dict[str, Any]) -> None:
         }
         schema["properties"][group] = field | {"$ref": f"#/$defs/{title}"}
         tables[title] = given
-    quantity = tables["Fuzzy"]["properties"]["quantity"]
+    quantity = tables["FuzzyTerm"]["properties"]["quantity"]
     quantity["enum"] = list(FUZZY_QUANTITIES)
     known = "; ".join(f"{name}: {meaning}" for name, meaning in FUZZY_QUANTITIES.items())
     quantity["description"] += f" {known}."

@@ -15,10 +15,10 @@ from pydantic import (
     model_validator,
 )
 
-from harness.config.human_limits import CarUse, Lapsing, Perception, Reacting
+from harness.config.human_limits import AttentionLapses, CarUse, Perception, ReactionTime
 from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest
-from harness.game.attention import Habits
+from harness.game.attention import HumanFactors
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.human_limits import ALL, AT_ONCE, EXACT, NOBODY
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
@@ -90,7 +90,7 @@ class MembershipFunction(Document):
         return FuzzySet(self.name, inputs, memberships, self.value)
 
 
-class Fuzzy(Document):
+class FuzzyTerm(Document):
     """A human term declared by membership functions over one quantity of the game."""
 
     name: Name
@@ -117,7 +117,7 @@ class Fuzzy(Document):
         return name
 
     @model_validator(mode="after")
-    def _contact_is_worst(self) -> Fuzzy:
+    def _contact_is_worst(self) -> FuzzyTerm:
         if self.quantity in NEARNESS:
             inputs = {0.0, *(max(point[0], 0.0) for each in self.sets for point in each.points)}
             some = np.array(sorted(inputs | {each + 1e-6 for each in inputs} | {max(inputs) + 1.0}))
@@ -138,7 +138,7 @@ class Fuzzy(Document):
 class Human(Group):
     """The human group: besides named terms, any number of fuzzy ones."""
 
-    fuzzy: list[Fuzzy] = Field(default_factory=list, max_length=50)
+    fuzzy: list[FuzzyTerm] = Field(default_factory=list, max_length=50)
     """Terms declared by membership functions."""
 
 
@@ -161,9 +161,9 @@ class Persona(Document):
     safety: Group = Group()
     operational: Group = Group()
     human: Human = Human()
-    attention: Lapsing | None = None
+    attention: AttentionLapses | None = None
     perception: Perception | None = None
-    reaction: Reacting | None = None
+    reaction: ReactionTime | None = None
     actuators: CarUse | None = None
     decisions: Literal["mode", "sampled"] = "mode"
     """Whether it always takes its policy's most likely action, or varies as the policy does."""
@@ -222,13 +222,13 @@ class Persona(Document):
         return Payoff(alpha, tuple(terms), fuzzy)
 
     @property
-    def habits(self) -> Habits:
+    def human_factors(self) -> HumanFactors:
         """How this person attends to the road."""
         perception = self.perception
-        return Habits(
+        return HumanFactors(
             self.attention.attention if self.attention else None,
-            perception.overlooking if perception else Habits.overlooking,
-            perception.missing if perception else NOBODY,
+            perception.no_blind_spot_check if perception else HumanFactors.no_blind_spot_check,
+            perception.looked_but_failed_to_see if perception else NOBODY,
             self.reaction.reaction if self.reaction else AT_ONCE,
             perception.sight if perception else EXACT,
             self.actuators.uses if self.actuators else ALL,

@@ -67,7 +67,7 @@ class EmergencyBraking(Document):
     """How fast the braking grows."""
 
 
-class Reacting(Document):
+class ReferenceReaction(Document):
     """What the reference drivers have in common: how a person comes to brake (UN R157, Annex 4, Appendix 3)."""
 
     reaction_s: float = Field(0.75, ge=0.0, le=3.0)
@@ -78,7 +78,7 @@ class Reacting(Document):
     """Full braking (table 1)."""
 
 
-class CarefulAndCompetent(Reacting):
+class CarefulAndCompetent(ReferenceReaction):
     """The careful and competent human driver of UN R157 (Annex 4, Appendix 3: performance model 1)."""
 
     wander_m: float = Field(0.375, ge=0.0, le=2.0)
@@ -98,7 +98,7 @@ class CarefulAndCompetent(Reacting):
     """A driver sees where others are, not in which lane: beside one's own lane are taken to be lanes of this width."""
 
 
-class Rss(Reacting):
+class Rss(ReferenceReaction):
     """Responsibility-sensitive safety (Shalev-Shwartz et al. 2017), parameters as in Mattas et al. 2022."""
 
     acceleration_mps2: float = Field(3.0, ge=0.0, le=6.0)
@@ -113,7 +113,7 @@ class Rss(Reacting):
     """mu: a distance to the side that is always kept."""
 
 
-class Fuzzy(Reacting):
+class FuzzySafety(ReferenceReaction):
     """The fuzzy safety model (Mattas et al. 2020; performance model 2 of UN R157)."""
 
     comfortable_mps2: float = Field(4.0, ge=1.0, le=12.0)
@@ -128,7 +128,7 @@ class Fuzzy(Reacting):
     """By so much the other's time to reach one's way must exceed one's own time to be past."""
 
     @model_validator(mode="after")
-    def _graded(self) -> Fuzzy:
+    def _graded(self) -> FuzzySafety:
         if self.hardest_mps2 <= self.comfortable_mps2:
             raise ValueError("hardest_mps2 must exceed comfortable_mps2: between them lies what is fuzzy")
         return self
@@ -169,7 +169,7 @@ class Rules(Adjustable):
     emergency_braking: EmergencyBraking | None = None
     careful_and_competent: CarefulAndCompetent | None = None
     rss: Rss | None = None
-    fuzzy: Fuzzy | None = None
+    fuzzy: FuzzySafety | None = None
 
     @model_validator(mode="after")
     def _one_reaction(self) -> Rules:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from harness.config.rule_driver import Cruise
-from harness.drivers.perception import Encounters, View
+from harness.drivers.perception import Encounters, OwnMotion
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.observation import AHEAD_M
 
@@ -36,7 +36,7 @@ def speed_aimed_at_mps(limit_mps: FloatArray, path_turned_rad: FloatArray, law: 
 
 
 def cruise_mps2(
-    view: View, encounters: Encounters, limit_mps: FloatArray, before_mps2: FloatArray, law: Cruise, step_s: float
+    view: OwnMotion, encounters: Encounters, limit_mps: FloatArray, before_mps2: FloatArray, law: Cruise, step_s: float
 ) -> FloatArray:
     """Acceleration that the cruise control asks for, after what it asked for a step before."""
     aimed = speed_aimed_at_mps(limit_mps, view.path_turned_rad, law)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from harness.config.rule_driver import CarefulAndCompetent, EmergencyBraking, Fuzzy, Rss
+from harness.config.rule_driver import CarefulAndCompetent, EmergencyBraking, FuzzySafety, Rss
 from harness.drivers.perception import Encounters
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
@@ -84,7 +84,7 @@ def rss(met: Encounters, own_mps: FloatArray, law: Rss) -> tuple[BoolArray, Floa
     return danger, np.full(danger.shape, law.full_braking_g * GRAVITY_MPS2)
 
 
-def proactive(gap_m: FloatArray, own_mps: FloatArray, other_mps: FloatArray, law: Fuzzy) -> FloatArray:
+def proactive(gap_m: FloatArray, own_mps: FloatArray, other_mps: FloatArray, law: FuzzySafety) -> FloatArray:
     """[...] PFS in 0..1 (Mattas et al. 2020, Accident Analysis & Prevention 148, 105794): how far one is from being
     able to stop behind who leads, should they brake as hard as they can.
 
@@ -98,7 +98,7 @@ def proactive(gap_m: FloatArray, own_mps: FloatArray, other_mps: FloatArray, law
 
 
 def critical(
-    gap_m: FloatArray, own_mps: FloatArray, own_mps2: FloatArray, other_mps: FloatArray, law: Fuzzy
+    gap_m: FloatArray, own_mps: FloatArray, own_mps2: FloatArray, other_mps: FloatArray, law: FuzzySafety
 ) -> FloatArray:
     """[...] CFS in 0..1 (ibid.): how far one is from avoiding who leads, should they keep their speed.
 
@@ -120,7 +120,7 @@ def critical(
     return np.where(closing <= 0.0, 0.0, np.where(after < 0.0, slowed.astype(float), graded))
 
 
-def fuzzy(met: Encounters, own_mps: FloatArray, own_mps2: FloatArray, law: Fuzzy) -> tuple[BoolArray, FloatArray]:
+def fuzzy(met: Encounters, own_mps: FloatArray, own_mps2: FloatArray, law: FuzzySafety) -> tuple[BoolArray, FloatArray]:
     """The fuzzy safety model: who is in the way, or comes into it before one is past, calls for as much braking as
     PFS (up to comfortable) and CFS (between comfortable and hardest) say."""
     closing = own_mps - met.speed_mps

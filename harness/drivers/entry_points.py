@@ -62,7 +62,7 @@ def installed_driver(point: importlib.metadata.EntryPoint, car: Car, parameters:
         message = f"{point.name} ({point.value}) can't be made: {type(error).__name__}: {error}"
         raise DriverError(message) from error
     if not isinstance(made, Driver):
-        lacks = [name for name in ("takes_over", "begin", "decide") if not hasattr(made, name)]
+        lacks = [name for name in ("takes_over", "reset", "decide") if not hasattr(made, name)]
         raise DriverError(f"{point.name} ({point.value}) made a {type(made).__name__} without {', '.join(lacks)}")
     return made
 

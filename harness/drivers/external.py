@@ -49,7 +49,7 @@ _RUNS = {
 
 
 @dataclass(frozen=True)
-class GivenDriver:
+class ExternalDriver:
     """A driver that was found, with all that its decisions rest on. Small enough to be sent to another process."""
 
     written: str
@@ -109,7 +109,7 @@ class GivenDriver:
         numbers = self.document.numbers if isinstance(self.document, Adjustable) else {}
         return {each.key: numbers[each.key] for each in self.searched}
 
-    def tuned(self, values: Mapping[str, float]) -> GivenDriver:
+    def tuned(self, values: Mapping[str, float]) -> ExternalDriver:
         """The same driver with other values of such parameters. Raises KeyError and ValueError as its document does."""
         assert isinstance(self.document, Adjustable), "a driver that has nothing to tune"
         return replace(self, document=self.document.tuned(values))
@@ -165,9 +165,9 @@ class GivenDriver:
             case Fmu(file=file):
                 return fmu_driver(self.document, resolve_in(self.place, file), car)
             case StableBaselines3(file=file):
-                from harness.drivers.sb3_policy import SavedDriver  # torch is slow to import
+                from harness.drivers.sb3_policy import Sb3Driver  # torch is slow to import
 
-                return SavedDriver(self.document, resolve_in(self.place, file), sampled)
+                return Sb3Driver(self.document, resolve_in(self.place, file), sampled)
             case Python(entry_point=name, parameters=parameters):
                 return installed_driver(entry_point(name, self.written, "entry_point"), car, parameters)
 
@@ -176,7 +176,7 @@ class GivenDriver:
         try:
             driver = self.make(car, sampled)
             if driver.takes_over:
-                driver.begin(np.arange(games))
+                driver.reset(np.arange(games))
                 driver.decide(np.arange(games), np.zeros((games, SIZE), dtype=np.float32), np.zeros((games, 2)))
         except UsageError:
             raise
@@ -186,7 +186,7 @@ class GivenDriver:
             raise UsageError.of(self.written, "", f"could not drive when it was tried: {what}", remedy) from error
 
 
-def find_driver(written: str, file: Path, key: str, allow_code: bool) -> GivenDriver:
+def find_driver(written: str, file: Path, key: str, allow_code: bool) -> ExternalDriver:
     """The driver that is named so under `key` in `file`; paths are relative to that file's folder.
 
     Raises UsageError with what is wrong with it, or where it runs code that comes as a file without leave.
@@ -216,7 +216,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> GivenDr
     return _opened(written, place, document)
 
 
-def _opened(written: str, place: Path, document: DriverDocument) -> GivenDriver:
+def _opened(written: str, place: Path, document: DriverDocument) -> ExternalDriver:
     folder = place.parent
     match document:
         case Process(command=command, files=files):
@@ -251,8 +251,8 @@ def _given(
     files: Any,
     package: Mapping[str, str] | None = None,
     command: tuple[str, ...] = (),
-) -> GivenDriver:
-    return GivenDriver(written, place, document, command, {str(file): _hash(file) for file in files}, package or {})
+) -> ExternalDriver:
+    return ExternalDriver(written, place, document, command, {str(file): _hash(file) for file in files}, package or {})
 
 
 def _program(name: str, folder: Path, document: Path) -> Path:

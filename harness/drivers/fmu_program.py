@@ -92,7 +92,7 @@ def _answer(
     if message["type"] == "hello":
         return {"protocol": PROTOCOL}
     games = message["games"]
-    if message["type"] == "begin":
+    if message["type"] == "reset":
         for game in games:
             if game in twins:
                 twins.pop(game).close()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from harness.config.rule_driver import LaneKeeping
-from harness.drivers.perception import View
+from harness.drivers.perception import OwnMotion
 from harness.game.arrays import FloatArray
 from harness.game.observation import AHEAD_M
 
 
-def steering_rad(view: View, law: LaneKeeping, wheelbase_m: float, step_s: float) -> FloatArray:
+def steering_rad(view: OwnMotion, law: LaneKeeping, wheelbase_m: float, step_s: float) -> FloatArray:
     """Steering angle to ask for (Stanley's law: Hoffmann et al. 2007, Autonomous Automobile Trajectory Tracking,
     with the path's curvature fed forward):
 

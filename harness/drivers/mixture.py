@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 from harness.config.persona import Persona
 from harness.drivers.protocol import Driver
-from harness.game.attention import Habits
+from harness.game.attention import HumanFactors
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class Mixture:
         return self.members[0].driver.takes_over
 
     @property
-    def habits(self) -> list[Habits]:
-        """The members' habits."""
-        return [each.persona.habits for each in self.members]
+    def human_factors(self) -> list[HumanFactors]:
+        """The members' human factors."""
+        return [each.persona.human_factors for each in self.members]
 
     @property
     def shares(self) -> list[float]:

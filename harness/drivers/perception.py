@@ -46,7 +46,7 @@ class Encounters(NamedTuple):
     """Half of theirs and half of one's own."""
 
 
-class View(NamedTuple):
+class OwnMotion(NamedTuple):
     """What is seen of oneself and of the way, [N] or [N, len(AHEAD_M)]."""
 
     speed_mps: FloatArray
@@ -58,13 +58,13 @@ class View(NamedTuple):
     path_turned_rad: FloatArray
 
 
-def look(car: Car, observation: FloatArray) -> tuple[View, Encounters]:
+def look(car: Car, observation: FloatArray) -> tuple[OwnMotion, Encounters]:
     """What there is to see in N games, from what the driver sees [N, SIZE]."""
     seen = car.seen(observation)
     speed = seen[:, _SPEED]
     with np.errstate(divide="ignore", invalid="ignore"):
         limit = np.where(speed > 0.1, speed / (1.0 + seen[:, _OVER]), np.nan)
-    view = View(
+    view = OwnMotion(
         speed,
         limit,
         seen[:, _ACCELERATION],
@@ -76,7 +76,7 @@ def look(car: Car, observation: FloatArray) -> tuple[View, Encounters]:
     return view, _meet(car, view, others)
 
 
-def _meet(car: Car, view: View, others: FloatArray) -> Encounters:
+def _meet(car: Car, view: OwnMotion, others: FloatArray) -> Encounters:
     there, ahead, left, closing, across, sin, cos = np.moveaxis(others, -1, 0)
     own = view.speed_mps[:, None]
     forward = own + closing
@@ -101,7 +101,7 @@ def _meet(car: Car, view: View, others: FloatArray) -> Encounters:
     )
 
 
-def _way_at(view: View, ahead_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _way_at(view: OwnMotion, ahead_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """[N, K] how far to the left one's way is at a distance ahead, and how far it has turned there."""
     turned = view.path_turned_rad
     steps = np.diff(AHEAD_M) * np.sin(0.5 * (turned[:, 1:] + turned[:, :-1]))

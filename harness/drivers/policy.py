@@ -17,7 +17,7 @@ class LearnedDriver:
         self._layers = [(weight.T.copy(), bias) for weight, bias in policy.layers("actor")]
         self._deviation = np.exp(policy.tensors["log_deviation"]) if sampled else None
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Nothing to forget: each decision is made from what is seen at that moment."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:

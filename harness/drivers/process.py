@@ -2,8 +2,8 @@
 
 | message | answer |
 | --- | --- |
-| `{"type": "hello", "protocol": 1, "units": …, "layout": […], "step_s": …, "limits": {…}}` | `{"protocol": 1}` |
-| `{"type": "begin", "games": […]}` | `{}` |
+| `{"type": "hello", "protocol": 2, "units": …, "layout": […], "step_s": …, "limits": {…}}` | `{"protocol": 2}` |
+| `{"type": "reset", "games": […]}` | `{}` |
 | `{"type": "decide", "games": […], "observation": [[…], …], "noise": [[…], …]}` | `{"actions": [[…, …], …]}` |
 
 The hello ends with `"parameters": {…}` where the program has any. To any of them a program may answer
@@ -34,7 +34,7 @@ from harness.errors import DriverError
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation import LAYOUT
 
-PROTOCOL = 1
+PROTOCOL = 2
 _LONGEST_ANSWER_BYTES = 10_000_000
 _LAST_WORDS_BYTES, _LAST_LINES = 4_000, 5
 # A child of the harness that is killed would live on, and one that never looks at its input would do so for ever:
@@ -75,7 +75,7 @@ class ProcessDriver:
             self._hello["parameters"] = dict(parameters)
         self._program: _Program | None = None
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Games [N] start anew. Raises DriverError where the program can't be started or doesn't agree."""
         if self._program is None or not self._program.is_running:
             self.close()
@@ -83,7 +83,7 @@ class ProcessDriver:
             answer = self._ask(self._hello, self._start_deadline_s)
             if answer.get("protocol") != PROTOCOL:
                 raise self._ended(f"does not speak protocol {PROTOCOL}: it answered hello with {_short(answer)}")
-        self._ask({"type": "begin", "games": games.tolist()}, self._start_deadline_s)
+        self._ask({"type": "reset", "games": games.tolist()}, self._start_deadline_s)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """Actions [N, 2] from observations [N, SIZE]. Raises DriverError where the program has none."""

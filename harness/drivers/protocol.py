@@ -18,7 +18,7 @@ class Driver(Protocol):
     takes_over: bool
     """False: SUMO's own models drive the player, and `decide` is never asked."""
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Games [N] start anew: forget what was remembered of them."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:

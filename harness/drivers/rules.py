@@ -11,12 +11,12 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from harness.config.rule_driver import Reacting, Rules
+from harness.config.rule_driver import ReferenceReaction, Rules
 from harness.drivers import emergency_braking
 from harness.drivers.adaptive_cruise import cruise_mps2
 from harness.drivers.car import Car
 from harness.drivers.lane_keeping import steering_rad
-from harness.drivers.perception import Encounters, View, look
+from harness.drivers.perception import Encounters, OwnMotion, look
 from harness.drivers.reaction import Alert, Manner, react
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 
@@ -50,7 +50,7 @@ class RulesDriver:
         self._memory = _Memory.of(0)
         self._manner = _manner(rules)
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Games [N] start anew: nobody is alert, the limit is not known yet."""
         memory, missing = self._memory, int(games.max(initial=-1)) + 1 - len(self._memory.limit_mps)
         for each in fields(memory):
@@ -69,7 +69,7 @@ class RulesDriver:
         wheelbase = float(car.actuators.wheelbase_m[0])
         return car.asked(asked, steering_rad(view, rules.lane_keeping, wheelbase, car.step_s), observation)
 
-    def _react(self, games: IntArray, view: View, met: Encounters, cruising_mps2: FloatArray) -> FloatArray:
+    def _react(self, games: IntArray, view: OwnMotion, met: Encounters, cruising_mps2: FloatArray) -> FloatArray:
         if self._manner is None:
             return cruising_mps2
         memory = self._memory
@@ -82,7 +82,7 @@ class RulesDriver:
         going_on = np.minimum(memory.asked_mps2[games], -self._manner.coasting_mps2)
         return np.where(reacting, going_on, np.minimum(cruising_mps2, np.where(braking > 0.0, -braking, np.inf)))
 
-    def _dangers(self, view: View, met: Encounters, alert: Alert) -> tuple[BoolArray, FloatArray]:
+    def _dangers(self, view: OwnMotion, met: Encounters, alert: Alert) -> tuple[BoolArray, FloatArray]:
         rules, own = self._rules, view.speed_mps[:, None]
         began = alert.braking_mps2[:, None]
         if (braking := rules.emergency_braking) is not None:
@@ -99,7 +99,7 @@ def _manner(rules: Rules) -> Manner | None:
     """How a driver comes to brake; None: by cruising only."""
     if rules.emergency_braking is not None:
         return Manner(0.0, rules.emergency_braking.build_up_mps3)
-    person: Reacting | None = rules.careful_and_competent or rules.rss or rules.fuzzy
+    person: ReferenceReaction | None = rules.careful_and_competent or rules.rss or rules.fuzzy
     if person is None:
         return None
     coasting = rules.careful_and_competent.coasting_mps2 if rules.careful_and_competent else 0.0

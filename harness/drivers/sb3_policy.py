@@ -14,7 +14,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation import SIZE
 
 
-class SavedDriver:
+class Sb3Driver:
     """Drives by a policy of PPO, A2C, SAC or TD3: by its most likely action, or varied as the policy itself varies."""
 
     takes_over = True
@@ -28,7 +28,7 @@ class SavedDriver:
             raise UsageError.of(file, "", f"the ego's persona decides by sampling, but {what}", remedy)
         self._sampled, self._squashed = sampled, document.algorithm == "SAC"
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Nothing to forget: each decision is made from what is seen at that moment."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:

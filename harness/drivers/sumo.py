@@ -10,7 +10,7 @@ class SumoDriver:
 
     takes_over = False
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Nothing to forget: SUMO remembers."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:

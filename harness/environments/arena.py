@@ -26,14 +26,14 @@ import numpy as np
 
 from harness.drivers.protocol import Driver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.attention import let_go
-from harness.game.bicycle import drive, requests
+from harness.game.attention import release_controls
+from harness.game.bicycle import move, requests
 from harness.game.human_limits import PlayersLimits
-from harness.game.initial_state import Start
+from harness.game.initial_state import InitialState
 from harness.game.neighbours import NOTICED_M
 from harness.game.observation import SIZE, observe
 from harness.game.payoff import Payoff
-from harness.game.quantities import Quantities, judge
+from harness.game.quantities import Quantities, terminations
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
 from harness.game.state import Bodies, Outcome, State
 from harness.traffic.open_simulation import open_simulation
@@ -76,9 +76,9 @@ class Arena:
         seed: int = 0,
         recorded: bool = False,
     ) -> None:
-        """Load SUMO. Every game has to be started with `start` before the first step.
+        """Load SUMO. Every game has to be started with `reset` before the first step.
 
-        A player may have several seats: `Start.member` says whose game it is. SUMO drives all of them or none.
+        A player may have several seats: `InitialState.member` says whose game it is. SUMO drives all of them or none.
         `recorded`: `reading` tells of all others in every step, and not only of those near a player (at a price).
         Raises SimulationError if SUMO can't load the scene.
         """
@@ -103,18 +103,20 @@ class Arena:
         self._players_length = np.tile(self.world.length_m, (games, 1))
         self._players_width = np.tile(self.world.width_m, (games, 1))
 
-    def start(self, starts: Mapping[int, Start], departures: Mapping[int, list[Departure]] | None = None) -> None:
-        """(Re)start games, each from its `Start`, and look."""
+    def reset(
+        self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
+    ) -> None:
+        """(Re)start games, each from its `InitialState`, and look."""
         for game, start in starts.items():
-            self._put(game, start)
-            self.simulation.restart(game, start, list((departures or {}).get(game, [])))
+            self._place(game, start)
+            self.simulation.reset(game, start, list((departures or {}).get(game, [])))
             if self.reading is not None:
                 self.reading.present[game] = False
         games = np.array(sorted(starts), dtype=np.int64)
         for player, seats in enumerate(self.seats):
             for member, seat in enumerate(seats):
                 if seat.driver is not None:
-                    seat.driver.begin(games if len(seats) == 1 else games[self._member[games, player] == member])
+                    seat.driver.reset(games if len(seats) == 1 else games[self._member[games, player] == member])
         seen = self.observation[games] = observe(self._first_quantities(games))
         check_observation(seen, games, self.state.step)
 
@@ -133,7 +135,7 @@ class Arena:
         state = self.state = before.copy()  # the quantities of the step before stay what they were
         drove = state.running
         acceleration, steering = self._decide(actions, drove)
-        drive(state, acceleration, steering, drove & self._taken_over, self.world.actuators, self.world.step_s)
+        move(state, acceleration, steering, drove & self._taken_over, self.world.actuators, self.world.step_s)
         reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         self.reading = reading
         self._take_back(reading, drove)
@@ -141,10 +143,10 @@ class Arena:
         state.step = state.step + 1
         if self._limits.misjudges:
             self._limits.look(state)
-        self._judge(quantities, drove)
-        payoff = self._pay(quantities, drove)
+        self._terminations(quantities, drove)
+        payoff = self._payoffs(quantities, drove)
         check_step(before, quantities, drove, payoff, self._slack_m)
-        self._settle(quantities, drove)
+        self._finish(quantities, drove)
         check_observation(self.observation, self._all_games, state.step)
         return Step(payoff, drove, quantities)
 
@@ -174,7 +176,7 @@ class Arena:
         acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
-        state.lapsed = let_go(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
+        state.lapsed = release_controls(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
         return acceleration, steering
 
     def _take_back(self, reading: Reading, drove: BoolArray) -> None:
@@ -195,13 +197,13 @@ class Arena:
         state.station_m, offset = self.world.road.routes.locate(state.x_m, state.y_m, before)
         return state.station_m - before, offset
 
-    def _judge(self, quantities: Quantities, drove: BoolArray) -> None:
+    def _terminations(self, quantities: Quantities, drove: BoolArray) -> None:
         state = self.state
         clearances_m = (quantities.vehicle_clearance_m, quantities.rail_clearance_m)
         time_is_up = state.step >= self.world.steps
-        judge(state.outcome, drove, self._taken_over, time_is_up, quantities.goal_m, *clearances_m)
+        terminations(state.outcome, drove, self._taken_over, time_is_up, quantities.goal_m, *clearances_m)
 
-    def _pay(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
+    def _payoffs(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
         payoff = np.zeros(drove.shape)
         for player, seats in enumerate(self.seats):
             for member, seat in enumerate(seats):
@@ -214,7 +216,7 @@ class Arena:
         """[G] the games in which a player drove who is this one of its drivers."""
         return drove[:, player] & (self._member[:, player] == member)
 
-    def _settle(self, quantities: Quantities, drove: BoolArray) -> None:
+    def _finish(self, quantities: Quantities, drove: BoolArray) -> None:
         """Who reached the goal leaves, who crashed stands; then everyone looks."""
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
@@ -241,17 +243,17 @@ class Arena:
 
     # --- what the players see ------------------------------------------------------------------------------------
 
-    def _put(self, game: int, start: Start) -> None:
+    def _place(self, game: int, start: InitialState) -> None:
         state = self.state
         state.x_m[game], state.y_m[game], state.heading_rad[game] = start.x_m, start.y_m, start.heading_rad
         state.speed_mps[game], state.present[game] = start.speed_mps, start.present
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
-        state.overlooked_m[game], self._member[game] = start.overlooked_m, start.member
+        state.unseen_behind_m[game], self._member[game] = start.unseen_behind_m, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
         for player in range(len(self.seats)):
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
-            self._limits.begin(game, player, start.limits[player], state)
+            self._limits.reset(game, player, start.limits[player], state)
         if self._asks_drivers:
             self._noise[game] = start.noise
 

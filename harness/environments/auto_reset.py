@@ -5,37 +5,37 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from harness.environments.arena import Arena
-from harness.game.initial_state import Chances, Start, draw_start
+from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.traffic.route_file import Departure
 
 
-class NextGames:
+class AutoReset:
     """The games of an arena, each drawn from `parts`, the number of its tile and how many games that tile has had.
 
     They are drawn for all tiles at once that have none in store: what it takes to draw a game is then in the
     processor's caches, where in the middle of a step it is not.
     """
 
-    def __init__(self, arena: Arena, chances: Chances, *parts: str | int) -> None:
-        self._arena, self._chances, self._parts = arena, chances, parts
+    def __init__(self, arena: Arena, start_distribution: StartDistribution, *parts: str | int) -> None:
+        self._arena, self._start_distribution, self._parts = arena, start_distribution, parts
         self._drawn = [0] * arena.games
-        self._store: dict[int, tuple[Start, list[Departure]]] = {}
+        self._store: dict[int, tuple[InitialState, list[Departure]]] = {}
 
-    def start(self, tiles: Iterable[int]) -> None:
+    def reset(self, tiles: Iterable[int]) -> None:
         """Start the next game of each of these tiles."""
         games = {tile: self._take(tile) for tile in tiles}
         starts = {tile: start for tile, (start, _) in games.items()}
-        self._arena.start(starts, {tile: departures for tile, (_, departures) in games.items()})
+        self._arena.reset(starts, {tile: departures for tile, (_, departures) in games.items()})
 
-    def _take(self, tile: int) -> tuple[Start, list[Departure]]:
+    def _take(self, tile: int) -> tuple[InitialState, list[Departure]]:
         if tile not in self._store:
             for each in set(range(self._arena.games)).difference(self._store):
                 self._store[each] = self._draw(each)
         return self._store.pop(tile)
 
-    def _draw(self, tile: int) -> tuple[Start, list[Departure]]:
+    def _draw(self, tile: int) -> tuple[InitialState, list[Departure]]:
         parts, scene = (*self._parts, tile, self._drawn[tile]), self._arena.scene
         self._drawn[tile] += 1
-        departures = scene.departures(generator_of(*parts, "others")) if scene.has_others else []
-        return draw_start(self._chances, *parts), departures
+        departures = scene.departures(generator_of(*parts, "others")) if scene.has_background_traffic else []
+        return draw_initial_state(self._start_distribution, *parts), departures

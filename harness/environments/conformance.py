@@ -3,7 +3,7 @@
 | asked | how |
 | --- | --- |
 | shapes, bounds, finiteness | every decision: [N, 2] numbers in -1 to 1, and the observation left as it was |
-| determinism after `begin` | the same games again: the same actions, bit for bit |
+| determinism after `reset` | the same games again: the same actions, bit for bit |
 | independence | what was seen in the games, shown again with all of them at once and one begun anew: the same actions |
 | time | of a decision, against the scene's step; slow is told, not wrong |
 """
@@ -24,8 +24,8 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.errors import SimulationError, UsageError
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.attention import Habits
-from harness.game.initial_state import draw_start
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import draw_initial_state
 from harness.game.seeding import generator_of
 from harness.game.state import EGO, Outcome
 from harness.traffic.scene import OpenScene, open_scene
@@ -84,8 +84,8 @@ class _Watched:
         self._driver, self._seconds = driver, seconds
         self.decisions: list[Decision] = []
 
-    def begin(self, games: IntArray) -> None:
-        self._driver.begin(games)
+    def reset(self, games: IntArray) -> None:
+        self._driver.reset(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         shown, chance = observation.copy(), noise.copy()
@@ -151,17 +151,17 @@ def check_conformance(driver: Driver, scene: OpenScene, games: int) -> Findings:
 
 def _play(driver: Driver, scene: OpenScene, games: int, found: Findings, doing: str) -> list[list[Decision]]:
     """The decisions of each game."""
-    chances = scene.chances([Habits(), Habits()], [1.0, 1.0])
+    start_distribution = scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0])
     watched, played, outcomes = _Watched(driver, found.seconds), list[list[Decision]](), list[str]()
     arena = Arena(scene, 1, [Seat(watched), Seat(SumoDriver())])
     try:
         for game in range(games):
             parts = ("check-driver", game)
-            start = draw_start(chances, *parts)
+            start = draw_initial_state(start_distribution, *parts)
             watched.decisions = []
             try:
                 arena.reload(start.seed)
-                arena.start({0: start}, {0: scene.departures(generator_of(*parts, "others"))})
+                arena.reset({0: start}, {0: scene.departures(generator_of(*parts, "others"))})
                 while arena.state.running[0, EGO]:
                     arena.step()
             except (SimulationError, _NotConformant, MemoryError):
@@ -186,7 +186,7 @@ def _compare(first: Sequence[Sequence[Decision]], again: Sequence[Sequence[Decis
                 was, now = a.action.tolist(), b.action.tolist()
                 found.wrong.append(
                     f"it is not deterministic: in decision {step} of game {game} it decided {was}, and {now} when the "
-                    "same game was played again; begin has to forget the game before, and chance comes as noise"
+                    "same game was played again; reset has to forget the game before, and chance comes as noise"
                 )
                 return
     found.right.append("the same games again: the same actions, bit for bit")
@@ -199,10 +199,10 @@ def _together(driver: Driver, played: Sequence[Sequence[Decision]], found: Findi
     shown[shortest] = [*played[shortest], *played[shortest]]
     begun_anew = len(played[shortest])
     watched = _Watched(driver, [])
-    watched.begin(np.arange(len(shown)))
+    watched.reset(np.arange(len(shown)))
     for step in range(max(map(len, shown))):
         if step == begun_anew:
-            watched.begin(np.array([shortest]))
+            watched.reset(np.array([shortest]))
         games = np.array([game for game, each in enumerate(shown) if step < len(each)])
         rows = [shown[game][step] for game in games]
         actions = watched.decide(games, np.array([r.observation for r in rows]), np.array([r.noise for r in rows]))

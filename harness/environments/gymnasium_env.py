@@ -23,8 +23,8 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat, Step
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.attention import Habits
-from harness.game.initial_state import draw_start
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import draw_initial_state
 from harness.game.observation import SIZE, observe
 from harness.game.seeding import generator_of
 from harness.game.state import ROLES, Outcome
@@ -102,10 +102,14 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
             opponent = Seat(SumoDriver())
         else:
             opponent = Seat(LearnedDriver(read_policy(_found(other)), theirs.decisions == "sampled"))
-        seats, habits, present = [opponent] * 2, [theirs.habits if other_persona else Habits()] * 2, [1.0] * 2
-        seats[self._player], habits[self._player] = Seat(None, own.payoff), own.habits
+        seats, human_factors, present = (
+            [opponent] * 2,
+            [theirs.human_factors if other_persona else HumanFactors()] * 2,
+            [1.0] * 2,
+        )
+        seats[self._player], human_factors[self._player] = Seat(None, own.payoff), own.human_factors
         present[1 - self._player] = float(other is not None)
-        self._game = _Game(scene, seats, habits, present)
+        self._game = _Game(scene, seats, human_factors, present)
         self._running = False
         self.render_mode = render_mode
         self.observation_space = _observation_space()
@@ -159,7 +163,7 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
         """Open the scene and load SUMO. Paths and errors are as in `DrivingEnv`."""
         personas = [_read_persona(ego_persona), _read_persona(non_ego_persona)]
         seats = [Seat(None, each.payoff) for each in personas]
-        self._game = _Game(scene, seats, [each.habits for each in personas], [1.0, 1.0])
+        self._game = _Game(scene, seats, [each.human_factors for each in personas], [1.0, 1.0])
         self._generator: np.random.Generator | None = None
         self.render_mode = render_mode
         self.possible_agents = list(ROLES)
@@ -218,17 +222,21 @@ class _Game:
     """An arena with one game, which is started anew from a random generator."""
 
     def __init__(
-        self, scene: Place | OpenScene, seats: Sequence[Seat], habits: Sequence[Habits], present: Sequence[float]
+        self,
+        scene: Place | OpenScene,
+        seats: Sequence[Seat],
+        human_factors: Sequence[HumanFactors],
+        present: Sequence[float],
     ) -> None:
         self._scene = scene if isinstance(scene, OpenScene) else open_scene(_found(scene))
-        self._chances = self._scene.chances(habits, present)
+        self._start_distribution = self._scene.start_distribution(human_factors, present)
         self.arena = Arena(self._scene, 1, seats)
 
     def start(self, generator: np.random.Generator) -> None:
         parts = ("environment", int(generator.integers(2**63 - 1)))
-        start = draw_start(self._chances, *parts)
+        start = draw_initial_state(self._start_distribution, *parts)
         self.arena.reload(start.seed)
-        self.arena.start({0: start}, {0: self._scene.departures(generator_of(*parts, "others"))})
+        self.arena.reset({0: start}, {0: self._scene.departures(generator_of(*parts, "others"))})
 
     def play(self, actions: Mapping[int, FloatArray]) -> Step:
         given = np.zeros((1, len(ROLES), ACTIONS))

@@ -15,9 +15,9 @@ import numpy as np
 from harness.config.persona import Persona
 from harness.drivers.mixture import Player, mixture_of
 from harness.environments.arena import Arena, Seat, Step
-from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, Drive
+from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.initial_state import Chances, draw_start
+from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.game.state import EGO, NON_EGO, ROLES, Outcome
 from harness.traffic.scene import OpenScene
@@ -48,28 +48,31 @@ class Game:
 def assess(
     arm: Arm,
     episodes: int | Iterable[int],
-    begin: Callable[[int], None] = lambda episode: None,
-    given_up: Mapping[int, str] = MappingProxyType({}),
+    on_start: Callable[[int], None] = lambda episode: None,
+    abandoned: Mapping[int, str] = MappingProxyType({}),
 ) -> Iterator[Game]:
     """Play episodes: so many from 0 on, or those given. A game that can't be played, or has numbers that can't be
     right, is a record with outcome `error`.
 
-    `begin` is told of each before it is played. Those `given_up` are not played, and why is the error of their record.
+    `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
+    has the reason as its error.
     Raises SimulationError if SUMO can't load the scene at all.
     """
     players = [mixture_of(each or _Absent(), persona) for each, persona in zip(arm.drivers, arm.personas, strict=True)]
     present = [0.0 if driver is None else 1.0 for driver in arm.drivers]
-    chances = arm.scene.chances([each.habits for each in players], present, [each.shares for each in players])
+    start_distribution = arm.scene.start_distribution(
+        [each.human_factors for each in players], present, [each.shares for each in players]
+    )
     seats = [[Seat(member.driver, member.persona.payoff) for member in each.members] for each in players]
     arena = Arena(arm.scene, 1, seats, recorded=True)
     try:
         for episode in range(episodes) if isinstance(episodes, int) else episodes:
-            if episode in given_up:
-                yield Game(_failed(arm, episode, given_up[episode]), None)
+            if episode in abandoned:
+                yield Game(_failed(arm, episode, abandoned[episode]), None)
                 continue
-            begin(episode)
+            on_start(episode)
             try:
-                yield _play(arena, arm, chances, episode)
+                yield _play(arena, arm, start_distribution, episode)
             except MemoryError:
                 raise
             except Exception as error:  # a driver may raise whatever it likes: the other games are played
@@ -83,7 +86,7 @@ class _Absent:
 
     takes_over = True
 
-    def begin(self, games: Any) -> None:
+    def reset(self, games: Any) -> None:
         """Nothing to forget."""
 
     def decide(self, games: Any, observation: FloatArray, noise: FloatArray) -> FloatArray:
@@ -96,11 +99,11 @@ def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
     return ("assessment", seed, "episode", episode)
 
 
-def _play(arena: Arena, arm: Arm, chances: Chances, episode: int) -> Game:
+def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode: int) -> Game:
     parts = parts_of(arm.seed, episode)
-    start = draw_start(chances, *parts)
+    start = draw_initial_state(start_distribution, *parts)
     arena.reload(start.seed)
-    arena.start({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
+    arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
     trace = _Trace(arm, arena, episode)
     trace.add_players(arena.state.present[0])
     steps: list[Step] = []
@@ -126,7 +129,7 @@ def _record(arm: Arm, arena: Arena, episode: int, steps: Sequence[Step]) -> dict
     return record
 
 
-def _drive(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> Drive:
+def _drive(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> PlayerSeries:
     driver = arm.drivers[player]
     has_wheel = driver is not None and driver.takes_over  # SUMO steers nobody: its cars change lanes without a wheel
     drove = [step for step in steps if step.drove[0, player]]
@@ -134,7 +137,7 @@ def _drive(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> Dr
     def series(value: Callable[[Step], FloatArray]) -> FloatArray:
         return np.array([value(step)[0, player] for step in drove], dtype=float)
 
-    return Drive(
+    return PlayerSeries(
         outcome,
         arm.scene.world.step_s,
         series(lambda step: step.quantities.state.speed_mps),

@@ -12,9 +12,9 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena
-from harness.environments.auto_reset import NextGames
+from harness.environments.auto_reset import AutoReset
 from harness.game.arrays import FloatArray
-from harness.game.initial_state import Chances
+from harness.game.initial_state import StartDistribution
 from harness.game.observation import SIZE
 from harness.game.state import Outcome
 
@@ -41,22 +41,27 @@ class ArenaVecEnv(VecEnv):
     render_mode = None
 
     def __init__(
-        self, arena: Arena, learner: int, chances: Chances, *parts: str | int, payoff_scale: float = 1.0
+        self,
+        arena: Arena,
+        learner: int,
+        start_distribution: StartDistribution,
+        *parts: str | int,
+        payoff_scale: float = 1.0,
     ) -> None:
         super().__init__(arena.games, OBSERVATION_SPACE, ACTION_SPACE)
         self.arena, self._learner, self._payoff_scale = arena, learner, payoff_scale
         self._actions = np.zeros((arena.games, len(arena.seats), ACTIONS))
         self._finished: list[Finished] = []
-        self.begin(chances, *parts)
+        self.sample_from(start_distribution, *parts)
 
-    def begin(self, chances: Chances, *parts: str | int) -> None:
+    def sample_from(self, start_distribution: StartDistribution, *parts: str | int) -> None:
         """Draw the games to come like this, from these named parts; `reset` starts them."""
-        self._games = NextGames(self.arena, chances, *parts)
+        self._games = AutoReset(self.arena, start_distribution, *parts)
         self._payoff = np.zeros(self.num_envs)
 
     def reset(self) -> FloatArray:
         """Start every game anew: observations [G, SIZE]."""
-        self._games.start(range(self.num_envs))
+        self._games.reset(range(self.num_envs))
         return self.arena.observation[:, self._learner].copy()
 
     def step_async(self, actions: FloatArray) -> None:
@@ -78,7 +83,7 @@ class ArenaVecEnv(VecEnv):
             for game in ended:
                 infos[game] = {"terminal_observation": self.arena.observation[game, self._learner].copy()}
                 self._finish(int(game))
-            self._games.start(ended.tolist())
+            self._games.reset(ended.tolist())
         return self.arena.observation[:, self._learner].copy(), payoff * self._payoff_scale, done, infos
 
     def take_finished(self) -> list[Finished]:

@@ -15,7 +15,7 @@ from harness.game.state import Outcome
 
 
 @dataclass(frozen=True)
-class Drive:
+class PlayerSeries:
     """One player's game, step by step while it drove, [T]; gaps and times are inf where there is nothing."""
 
     outcome: Outcome
@@ -33,42 +33,42 @@ def _finite(values: FloatArray, statistic: Callable[[FloatArray], float]) -> flo
     return float(statistic(measured)) if len(measured) else None
 
 
-def mean_speed_mps(drive: Drive) -> float | None:
+def mean_speed_mps(drive: PlayerSeries) -> float | None:
     """Mean speed while driving."""
     return _finite(drive.speed_mps, np.mean)
 
 
-def trailing_distance_m(drive: Drive) -> float | None:
+def trailing_distance_m(drive: PlayerSeries) -> float | None:
     """Mean gap to the leader, bumper to bumper, over the steps in which there was one (paper, step 1c)."""
     return _finite(drive.leader_gap_m, np.mean)
 
 
-def min_ttc_s(drive: Drive) -> float | None:
+def min_ttc_s(drive: PlayerSeries) -> float | None:
     """Least time to collision (TTC), of oriented boxes that keep heading and speed; 0 at contact."""
     return _finite(drive.time_to_collision_s, np.min)
 
 
-def max_deceleration_mps2(drive: Drive) -> float | None:
+def max_deceleration_mps2(drive: PlayerSeries) -> float | None:
     """Hardest braking; 0 if the player never slowed."""
     return _finite(np.maximum(-drive.acceleration_mps2, 0.0), np.max)
 
 
-def max_lateral_acceleration_mps2(drive: Drive) -> float | None:
+def max_lateral_acceleration_mps2(drive: PlayerSeries) -> float | None:
     """Greatest lateral acceleration, to either side."""
     return _finite(np.abs(drive.lateral_acceleration_mps2), np.max)
 
 
-def time_to_goal_s(drive: Drive) -> float | None:
+def time_to_goal_s(drive: PlayerSeries) -> float | None:
     """Time until the goal was reached."""
     return len(drive.speed_mps) * drive.step_s if drive.outcome is Outcome.GOAL else None
 
 
-def payoff(drive: Drive) -> float | None:
+def payoff(drive: PlayerSeries) -> float | None:
     """The player's own payoff, summed over the game (equation 1)."""
     return float(drive.payoff.sum())
 
 
-OF_EGO: Mapping[str, Callable[[Drive], float | None]] = {
+OF_EGO: Mapping[str, Callable[[PlayerSeries], float | None]] = {
     "ego_mean_speed_mps": mean_speed_mps,
     "ego_trailing_distance_m": trailing_distance_m,
     "ego_min_ttc_s": min_ttc_s,
@@ -77,7 +77,7 @@ OF_EGO: Mapping[str, Callable[[Drive], float | None]] = {
     "ego_time_to_goal_s": time_to_goal_s,
     "ego_payoff": payoff,
 }
-OF_NON_EGO: Mapping[str, Callable[[Drive], float | None]] = {
+OF_NON_EGO: Mapping[str, Callable[[PlayerSeries], float | None]] = {
     "non_ego_mean_speed_mps": mean_speed_mps,
     "non_ego_payoff": payoff,
 }

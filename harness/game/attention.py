@@ -13,7 +13,7 @@ from math import ceil
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.human_limits import ALL, AT_ONCE, EXACT, NOBODY, Missing, Reaction, Sight, Uses
+from harness.game.human_limits import ALL, AT_ONCE, EXACT, NOBODY, LookedButFailedToSee, Reaction, Sight, Uses
 from harness.game.jit import compiled
 from harness.game.seeding import between
 
@@ -31,7 +31,7 @@ class Attention:
 
 
 @dataclass(frozen=True)
-class Overlooking:
+class NoBlindSpotCheck:
     """A driver who does not always look into the mirrors and over the shoulder: in `share` of the drives, others whose
     centre is not at least `ahead_m` ahead of the driver's own are not seen."""
 
@@ -40,20 +40,20 @@ class Overlooking:
 
 
 @dataclass(frozen=True)
-class Habits:
+class HumanFactors:
     """How a person attends: when attention lapses (None: never), who is overlooked or missed; and the body's limits."""
 
     attention: Attention | None = None
-    overlooking: Overlooking = Overlooking()
-    missing: Missing = NOBODY
+    no_blind_spot_check: NoBlindSpotCheck = NoBlindSpotCheck()
+    looked_but_failed_to_see: LookedButFailedToSee = NOBODY
     reaction: Reaction = AT_ONCE
     sight: Sight = EXACT
     uses: Uses = ALL
 
     @property
-    def with_open_eyes(self) -> Habits:
+    def with_open_eyes(self) -> HumanFactors:
         """The same person who overlooks and misses nobody."""
-        return replace(self, overlooking=Overlooking(), missing=Missing())
+        return replace(self, no_blind_spot_check=NoBlindSpotCheck(), looked_but_failed_to_see=LookedButFailedToSee())
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,8 @@ class Lapses:
         """The same lapses, each with the steps that the first decision after it takes to reach pedals and wheel."""
         steps = np.arange(len(self.lapsed))
         last = np.maximum.accumulate(np.where(self.lapsed, steps, -1 - len(steps)))
-        let_go = steps - last <= delay_steps
-        return Lapses(let_go, np.where(let_go, self.steering_rad[np.maximum(last, 0)], 0.0))
+        release_controls = steps - last <= delay_steps
+        return Lapses(release_controls, np.where(release_controls, self.steering_rad[np.maximum(last, 0)], 0.0))
 
 
 def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.random.Generator) -> Lapses:
@@ -101,7 +101,7 @@ def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.r
 
 
 @compiled
-def let_go(
+def release_controls(
     acceleration_mps2: FloatArray,
     steering_rad: FloatArray,
     lapsed: BoolArray,
@@ -119,7 +119,7 @@ def let_go(
     return elsewhere
 
 
-def overlooked_m(overlooking: Overlooking, luck: float) -> float:
+def unseen_behind_m(neglect: NoBlindSpotCheck, luck: float) -> float:
     """How far ahead of a player others must be to be seen by it in one game, by a number drawn from 0 to 1; -inf:
     anywhere."""
-    return overlooking.ahead_m if luck < overlooking.share else -np.inf
+    return neglect.ahead_m if luck < neglect.share else -np.inf

@@ -74,7 +74,7 @@ def actions(
     return np.clip(np.stack((acceleration_mps2 / strongest, wheel), axis=-1), -1.0, 1.0)
 
 
-def drive(
+def move(
     state: State,
     acceleration_mps2: FloatArray,
     steering_rad: FloatArray,
@@ -88,11 +88,11 @@ def drive(
     braking (friction circle), and where the grip is not enough for the curve the car runs wide.
     """
     motion = (state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad)
-    _drive(*motion, acceleration_mps2, steering_rad, moving, actuators, step_s)
+    _move(*motion, acceleration_mps2, steering_rad, moving, actuators, step_s)
 
 
 @compiled
-def _drive(
+def _move(
     x_m: FloatArray,
     y_m: FloatArray,
     heading_rad: FloatArray,

@@ -41,7 +41,7 @@ class Sight:
 
 
 @dataclass(frozen=True)
-class Missing:
+class LookedButFailedToSee:
     """Looking and failing to see: in `share` of the games, others are noticed only within a distance."""
 
     share: float = 0.0
@@ -57,7 +57,7 @@ class Uses:
     steering: float = 1.0
 
 
-AT_ONCE, EXACT, NOBODY, ALL = Reaction(), Sight(), Missing(), Uses()
+AT_ONCE, EXACT, NOBODY, ALL = Reaction(), Sight(), LookedButFailedToSee(), Uses()
 """No limits: decisions count at once, sight is exact, nobody is missed, all of the car is used."""
 
 
@@ -81,7 +81,7 @@ def draw_delay_steps(reaction: Reaction, step_s: float, generator: np.random.Gen
     return round(generator.uniform(*reaction.delay_s) / step_s)
 
 
-def draw_noticed_m(missing: Missing, generator: np.random.Generator) -> float:
+def draw_noticed_m(missing: LookedButFailedToSee, generator: np.random.Generator) -> float:
     """Up to what distance others are noticed in one game; inf: as far as one sees."""
     return missing.within_m if generator.random() < missing.share else np.inf
 
@@ -116,7 +116,7 @@ class PlayersLimits:
         self.delays = self.misjudges = self.spares = False
         """Whether anybody's decisions were ever late, others misjudged, the car not used in full."""
 
-    def begin(self, game: int, player: int, limits: Limits, state: State) -> None:
+    def reset(self, game: int, player: int, limits: Limits, state: State) -> None:
         """A player's limits in a game that starts."""
         self._delay_steps[game, player] = limits.delay_steps
         self._uses[game, player] = limits.uses

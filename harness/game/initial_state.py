@@ -15,7 +15,7 @@ from math import atan2, hypot
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.attention import Attention, Habits, Lapses, draw_lapses, overlooked_m
+from harness.game.attention import Attention, HumanFactors, Lapses, draw_lapses, unseen_behind_m
 from harness.game.human_limits import (
     ALL,
     AT_ONCE,
@@ -33,7 +33,7 @@ _UNLIMITED = (NOBODY, AT_ONCE, EXACT, ALL)  # the defaults themselves: compared 
 
 
 @dataclass(frozen=True)
-class Place:
+class StartRange:
     """Where a player may start: ranges along a lane's centre line [n, 2], of its front bumper and of its speed."""
 
     line: FloatArray
@@ -72,7 +72,7 @@ class Noise:
 
 
 @dataclass(frozen=True)
-class Start:
+class InitialState:
     """One game's start. Arrays are [P], or [P, T, ...] over its T steps."""
 
     x_m: FloatArray
@@ -83,7 +83,7 @@ class Start:
     present: BoolArray
     variation: Noise
     lapses: tuple[Lapses, ...]
-    overlooked_m: FloatArray  # how far ahead of a player others must be to be seen by it
+    unseen_behind_m: FloatArray  # how far ahead of a player others must be to be seen by it
     limits: tuple[Limits, ...]
     member: tuple[int, ...]  # who of a player's drivers drives in this game
     parts: tuple[str | int, ...]  # what names all this chance
@@ -100,47 +100,53 @@ class Start:
 
 
 @dataclass(frozen=True)
-class Chances:
+class StartDistribution:
     """What is drawn for a game: places [P], lengths [P], the chance that each player takes part [P]; and of each
-    player's drivers one, by their shares, with its habits."""
+    player's drivers one, by their shares, with its human factors."""
 
-    places: Sequence[Place]
+    places: Sequence[StartRange]
     length_m: FloatArray
-    habits: Sequence[Sequence[Habits]]
+    human_factors: Sequence[Sequence[HumanFactors]]
     shares: Sequence[Sequence[float]]
     present_share: Sequence[float]
     steps: int
     step_s: float
 
 
-def draw_start(chances: Chances, *parts: str | int) -> Start:
+def draw_initial_state(start_distribution: StartDistribution, *parts: str | int) -> InitialState:
     """Draw one game from named parts."""
     chance = generator_of(*parts, "start")
-    players = range(len(chances.places))
+    players = range(len(start_distribution.places))
     luck = iter(chance.random(4 * len(players)).tolist())  # one by one they would be the same
     poses: list[tuple[float, ...]] = []
-    for place, length in zip(chances.places, chances.length_m.tolist(), strict=True):
+    for place, length in zip(start_distribution.places, start_distribution.length_m.tolist(), strict=True):
         position = between(place.position_m, next(luck)) + (poses[0][-1] if place.beside_ego else 0.0)
         speed = between(place.speed_mps, next(luck))
         poses.append((*place.pose(position, length), speed, position))
-    present = [next(luck) < share for share in chances.present_share]
-    member = [0 if len(of) == 1 else draw_member(of, player, *parts) for player, of in enumerate(chances.shares)]
-    habits = [chances.habits[player][member[player]] for player in players]
-    overlooked = [overlooked_m(each.overlooking, next(luck)) for each in habits]
+    present = [next(luck) < share for share in start_distribution.present_share]
+    member = [
+        0 if len(of) == 1 else draw_member(of, player, *parts) for player, of in enumerate(start_distribution.shares)
+    ]
+    human_factors = [start_distribution.human_factors[player][member[player]] for player in players]
+    overlooked = [unseen_behind_m(each.no_blind_spot_check, next(luck)) for each in human_factors]
     limits = [
-        NO_LIMITS if (of.missing, of.reaction, of.sight, of.uses) == _UNLIMITED else _limits(of, chances, p, *parts)
-        for p, of in enumerate(habits)
+        NO_LIMITS
+        if (of.looked_but_failed_to_see, of.reaction, of.sight, of.uses) == _UNLIMITED
+        else _limits(of, start_distribution, p, *parts)
+        for p, of in enumerate(human_factors)
     ]
     x, y, heading, speeds, positions = np.array(poses).T
-    return Start(
+    return InitialState(
         x,
         y,
         heading,
         speeds,
         positions,
         np.array(present),
-        Noise(chance, (len(players), chances.steps, 2)),
-        tuple(_lapses(habits[p].attention, chances, p, limits[p].delay_steps, *parts) for p in players),
+        Noise(chance, (len(players), start_distribution.steps, 2)),
+        tuple(
+            _lapses(human_factors[p].attention, start_distribution, p, limits[p].delay_steps, *parts) for p in players
+        ),
         np.array(overlooked),
         tuple(limits),
         tuple(member),
@@ -154,23 +160,37 @@ def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:
     return int(np.searchsorted(upper, generator_of(*parts, "member", player).random() * upper[-1], side="right"))
 
 
-def _lapses(attention: Attention | None, chances: Chances, player: int, delay_steps: int, *parts: str | int) -> Lapses:
+def _lapses(
+    attention: Attention | None, start_distribution: StartDistribution, player: int, delay_steps: int, *parts: str | int
+) -> Lapses:
     if attention is None:
-        return Lapses.none(chances.steps)
-    lapses = draw_lapses(attention, chances.steps, chances.step_s, generator_of(*parts, "attention", player))
+        return Lapses.none(start_distribution.steps)
+    lapses = draw_lapses(
+        attention, start_distribution.steps, start_distribution.step_s, generator_of(*parts, "attention", player)
+    )
     return lapses.until_hands_obey(delay_steps) if delay_steps else lapses
 
 
-def _limits(habits: Habits, chances: Chances, player: int, *parts: str | int) -> Limits:
+def _limits(
+    human_factors: HumanFactors, start_distribution: StartDistribution, player: int, *parts: str | int
+) -> Limits:
     """Each limit from a generator of its own, which nobody needs who does not have it."""
 
     def chance(of: str) -> np.random.Generator:
         return generator_of(*parts, of, player)
 
-    sight, step_s = habits.sight, chances.step_s
-    delay_steps = draw_delay_steps(habits.reaction, step_s, chance("reaction")) if any(habits.reaction.delay_s) else 0
-    noticed_m = draw_noticed_m(habits.missing, chance("missing")) if habits.missing.share else np.inf
+    sight, step_s = human_factors.sight, start_distribution.step_s
+    delay_steps = (
+        draw_delay_steps(human_factors.reaction, step_s, chance("reaction"))
+        if any(human_factors.reaction.delay_s)
+        else 0
+    )
+    noticed_m = (
+        draw_noticed_m(human_factors.looked_but_failed_to_see, chance("missing"))
+        if human_factors.looked_but_failed_to_see.share
+        else np.inf
+    )
     exact = sight.distance_error == sight.closing_error_per_s == 0.0
-    misjudged = None if exact else draw_misjudged(sight, chances.steps, step_s, chance("sight"))
-    uses = (habits.uses.throttle, habits.uses.braking, habits.uses.steering)
+    misjudged = None if exact else draw_misjudged(sight, start_distribution.steps, step_s, chance("sight"))
+    uses = (human_factors.uses.throttle, human_factors.uses.braking, human_factors.uses.steering)
     return Limits(delay_steps, min(sight.range_m, noticed_m), misjudged, uses)

@@ -78,7 +78,7 @@ def observe(q: Quantities) -> FloatArray:
     return _view(
         *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
         *(state.station_m, q.lateral_offset_m, state.present),
-        (state.overlooked_m, state.sight_m, state.distance_error, state.closing_error_per_s),
+        (state.unseen_behind_m, state.sight_m, state.distance_error, state.closing_error_per_s),
         *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
         *(bodies.present, actuators.max_steering_rad, tuple(q.world.road.routes)),
     )
@@ -108,7 +108,7 @@ def _view(
 ) -> FloatArray:
     """All of it at once: in games that begin anew there is too little to look at for the price of several calls."""
     routes = Routes(*table)
-    overlooked_m, sight_m, distance_error, closing_error_per_s = sight
+    unseen_behind_m, sight_m, distance_error, closing_error_per_s = sight
     bounded = np.zeros((*present.shape, SIZE), dtype=np.float32)
     view = np.empty(SIZE)
     bodies = body_present.shape[1]
@@ -139,7 +139,7 @@ def _view(
                 dx, dy = body_x_m[g, b] - x_m[g, p], body_y_m[g, b] - y_m[g, p]
                 ahead_m[b], left_m[b] = dx * cosine + dy * sine, dy * cosine - dx * sine
                 distance_m[b] = np.hypot(dx, dy)
-                looked_at = ahead_m[b] >= overlooked_m[g, p] and distance_m[b] <= sight_m[g, p]
+                looked_at = ahead_m[b] >= unseen_behind_m[g, p] and distance_m[b] <= sight_m[g, p]
                 seen[b] = body_present[g, b] and b != p and looked_at
                 if seen[b]:
                     off = distance_error[g, p]

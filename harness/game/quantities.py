@@ -189,7 +189,7 @@ class Quantities:
 
 
 @compiled
-def judge(
+def terminations(
     outcome: IntArray,
     drove: BoolArray,
     taken_over: BoolArray,

@@ -51,7 +51,7 @@ class State:
     outcome: IntArray
     present: BoolArray  # takes part and has not left the scene
     lapsed: BoolArray  # attention is elsewhere in this step
-    overlooked_m: FloatArray  # others are seen from this far ahead of the player on; -inf: all around
+    unseen_behind_m: FloatArray  # others are seen from this far ahead of the player on; -inf: all around
     sight_m: FloatArray  # others are seen up to this far away
     distance_error: FloatArray  # share by which others seem farther away (+) or nearer (-) than they are
     closing_error_per_s: FloatArray  # what others seem to move away (+) or nearer (-), per distance
@@ -71,7 +71,7 @@ class State:
             outcome=np.zeros(shape, dtype=np.int8),
             present=np.zeros(shape, dtype=bool),
             lapsed=np.zeros(shape, dtype=bool),
-            overlooked_m=np.full(shape, -np.inf),
+            unseen_behind_m=np.full(shape, -np.inf),
             sight_m=np.full(shape, np.inf),
             distance_error=np.zeros(shape),
             closing_error_per_s=np.zeros(shape),

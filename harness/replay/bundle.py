@@ -21,9 +21,9 @@ import pandas as pd
 from harness.game.arrays import FloatArray
 from harness.replay.contact import Contact, contacts
 from harness.replay.floating_car_data import shown_at, write_recording, write_xml
-from harness.replay.gui_settings import WINDOW_PX, View, choose_view, view_settings
+from harness.replay.gui_settings import WINDOW_PX, Viewport, choose_view, view_settings
 from harness.replay.lanes import Lanes
-from harness.replay.vehicles import VehicleType, types_of_vehicles
+from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
 
 _RING_RADIUS_M = 4.0
 
@@ -101,10 +101,10 @@ def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTre
 
 
 def _scenery(
-    types: Mapping[str, VehicleType],
+    types: Mapping[str, DrawnVehicle],
     rails: Sequence[FloatArray],
     found: Sequence[Contact],
-    view: View,
+    view: Viewport,
     title: str,
 ) -> ElementTree.Element:
     root = ElementTree.Element("additional")

@@ -12,7 +12,7 @@ import shapely
 from shapely.affinity import rotate, translate
 
 from harness.game.arrays import FloatArray
-from harness.replay.vehicles import VehicleType
+from harness.replay.vehicles import DrawnVehicle
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Contact:
     label: str
 
 
-def contacts(trace: pd.DataFrame, types: Mapping[str, VehicleType], rails: Sequence[FloatArray]) -> list[Contact]:
+def contacts(trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], rails: Sequence[FloatArray]) -> list[Contact]:
     """Every contact of one game, in the order of time; two players that hit each other make one."""
     hit = trace[trace["outcome"].isin(["collision", "rail"])].sort_values("step", kind="stable")
     hit = hit.drop_duplicates("player")
@@ -44,7 +44,7 @@ def contacts(trace: pd.DataFrame, types: Mapping[str, VehicleType], rails: Seque
     return found
 
 
-def _box(row: Any, drawn: VehicleType) -> shapely.Polygon:
+def _box(row: Any, drawn: DrawnVehicle) -> shapely.Polygon:
     """The body of a vehicle at a row of the trace."""
     half_length, half_width = 0.5 * drawn.length_m, 0.5 * drawn.width_m
     box = rotate(

@@ -22,7 +22,7 @@ import numpy as np
 import pandas as pd
 
 from harness.replay.lanes import Lanes
-from harness.replay.vehicles import VehicleType
+from harness.replay.vehicles import DrawnVehicle
 
 _SEND_OFF_MPS = 1e6
 
@@ -33,7 +33,7 @@ def shown_at(time_s: float, step_length_s: float) -> float:
 
 
 def write_recording(
-    trace: pd.DataFrame, types: Mapping[str, VehicleType], lanes: Lanes, step_length_s: float, file: Path
+    trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], lanes: Lanes, step_length_s: float, file: Path
 ) -> None:
     """Write one game as plain XML: a few ten kB, the same bytes on any machine, and readable by a person."""
     records = _records(trace, types, lanes, step_length_s)
@@ -51,7 +51,9 @@ def write_recording(
     write_xml(root, file)
 
 
-def _records(trace: pd.DataFrame, types: Mapping[str, VehicleType], lanes: Lanes, step_length_s: float) -> pd.DataFrame:
+def _records(
+    trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], lanes: Lanes, step_length_s: float
+) -> pd.DataFrame:
     """The trace's rows in SUMO's terms: the front bumper's middle, and degrees clockwise from north."""
     trace = trace.sort_values(["step", "player"], kind="stable")
     length = trace["player"].map(lambda player: types[player].length_m).to_numpy(float)

@@ -25,7 +25,7 @@ _DELAY_MS = 2000
 
 
 @dataclass(frozen=True)
-class View:
+class Viewport:
     """The piece of road to show: its centre and size (m)."""
 
     x_m: float
@@ -34,7 +34,7 @@ class View:
     height_m: float
 
 
-def choose_view(trace: pd.DataFrame, found: Sequence[Contact]) -> View:
+def choose_view(trace: pd.DataFrame, found: Sequence[Contact]) -> Viewport:
     """Where the players were; if that is too much to be legible, around a contact or the closest approach."""
     players = trace[trace["player"].isin(PLAYER_COLOURS)]
     places = players[["x_m", "y_m"]].to_numpy(float)
@@ -46,7 +46,7 @@ def choose_view(trace: pd.DataFrame, found: Sequence[Contact]) -> View:
     focus = np.array([found[-1].x_m, found[-1].y_m]) if found else _closest_approach(trace)
     fits = high - low <= size
     centre = np.where(fits, 0.5 * (low + high), np.clip(focus, low + 0.5 * size, high - 0.5 * size))
-    return View(float(centre[0]), float(centre[1]), float(size[0]), float(size[1]))
+    return Viewport(float(centre[0]), float(centre[1]), float(size[0]), float(size[1]))
 
 
 def _closest_approach(trace: pd.DataFrame) -> np.ndarray:
@@ -60,7 +60,7 @@ def _closest_approach(trace: pd.DataFrame) -> np.ndarray:
     return pairs.loc[distance.idxmin(), ["x_m", "y_m"]].to_numpy(float)
 
 
-def view_settings(view: View, halts_s: Sequence[float], lanes: Lanes) -> ElementTree.Element:
+def view_settings(view: Viewport, halts_s: Sequence[float], lanes: Lanes) -> ElementTree.Element:
     """SUMO-GUI's settings file. It halts at these times of its own clock; "play" goes on from there."""
     left, bottom, right, top = lanes.bounds()
     net = (right - left + 2 * _NET_MARGIN_M, top - bottom + 2 * _NET_MARGIN_M)

@@ -39,7 +39,7 @@ _SHAPES = {name: name for name in _DEFAULT_SIZES_M} | {
 
 
 @dataclass(frozen=True)
-class VehicleType:
+class DrawnVehicle:
     """What is drawn of a vehicle; `name` is the type's id in the replay."""
 
     name: str
@@ -66,7 +66,7 @@ class VehicleType:
         }
 
 
-def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, VehicleType]:
+def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, DrawnVehicle]:
     """The type that each vehicle of one game is drawn as, by the vehicle's id.
 
     The players get a type of their own; the others keep theirs, grey where it has no colour. A type that the
@@ -85,10 +85,10 @@ def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, Vehicl
     return types
 
 
-def _drawn(name: str, attributes: Mapping[str, str]) -> VehicleType:
+def _drawn(name: str, attributes: Mapping[str, str]) -> DrawnVehicle:
     vehicle_class = attributes.get("vClass", "passenger")
     length_m, width_m = _DEFAULT_SIZES_M.get(vehicle_class, _CAR_SIZE_M)
-    return VehicleType(
+    return DrawnVehicle(
         name=name,
         length_m=float(attributes.get("length", length_m)),
         width_m=float(attributes.get("width", width_m)),

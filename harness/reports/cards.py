@@ -12,7 +12,7 @@ from harness.reports import wording
 from harness.reports.distributions import MOST_LINES, paired_figure, pairs_of, spread_figure, spreads_of
 from harness.reports.figures import Column, Point, rate_figure, speed_figure
 from harness.reports.results import Results
-from harness.reports.wording import Row, Verdicts, failures, failures_of, interval, percent, played
+from harness.reports.wording import Row, Conclusion, failures, failures_of, interval, percent, played
 
 QUESTIONS = {
     "RQ1": "Does the persona make the ego fail?",
@@ -56,7 +56,7 @@ class Card:
 
     persona: str
     anchor: str
-    verdicts: Sequence[tuple[str, Verdicts]]
+    verdicts: Sequence[tuple[str, Conclusion]]
     """Each with its question in plain words."""
     rates: Sequence[Rate]
     facts: Sequence[tuple[str, Sequence[str]]]

@@ -11,8 +11,8 @@ import pandas as pd
 from harness.evaluation.comparison import Verdict
 from harness.reports.data_table import Table, table
 from harness.reports.game_wording import equilibrium_sentences, gap_verdicts, last_pairs, other_pairs
-from harness.reports.heatmaps import View, views
-from harness.reports.wording import Answer, Row, Verdicts, interval, number, p_number, percent, trimmed
+from harness.reports.heatmaps import MatrixView, views
+from harness.reports.wording import Answer, Row, Conclusion, interval, number, p_number, percent, trimmed
 from harness.evaluation.tables import typed
 from harness.evaluation.game_theory.records import GameFindings
 
@@ -61,11 +61,11 @@ class Stranger:
 class GameSection:
     """All that the page says of the game."""
 
-    verdicts: Sequence[tuple[str, Verdicts]]
+    verdicts: Sequence[tuple[str, Conclusion]]
     others: Sequence[tuple[str, str, Answer]]
     """Persona, name and answer of each pair that is not of the last round."""
     gaps: Sequence[Gap]
-    views: Sequence[View]
+    views: Sequence[MatrixView]
     solutions: Sequence[tuple[int, str, Sequence[str]]]
     """Of each seed and game, what its solutions say."""
     strangers: Sequence[Stranger]

@@ -11,7 +11,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.reports.wording import (NO_SPACE, Answer, Row, Tone, Verdicts, interval, left_out, number, p_text, percent, trimmed)
+from harness.reports.wording import (NO_SPACE, Answer, Row, Tone, Conclusion, interval, left_out, number, p_text, percent, trimmed)
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
 
@@ -19,7 +19,7 @@ QUESTION = "Equilibrium"
 NO, NEAR, OPEN = "no", "not refuted", "not decided"
 
 
-def gap_verdicts(gaps: pd.DataFrame) -> list[tuple[str, Verdicts]]:
+def gap_verdicts(gaps: pd.DataFrame) -> list[tuple[str, Conclusion]]:
     """Of each persona, whether its last pair is an equilibrium (equation 2), as the page and the terminal say it."""
     found = []
     for persona in dict.fromkeys(gaps["persona"]):
@@ -140,10 +140,10 @@ def _span(row: Row) -> str:
     return f" (95{NO_SPACE}%: {low} to {high}{NO_SPACE}%)"
 
 
-def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]) -> Verdicts:
+def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]) -> Conclusion:
     if len(answers) == 1:
         (only,) = answers
-        return Verdicts(QUESTION, only.label, only.tone, only.sentence, only.speed, ())
+        return Conclusion(QUESTION, only.label, only.tone, only.sentence, only.speed, ())
     several, no = len(answers), sum(answer.label == NO for answer in answers)
     near = sum(answer.label == NEAR for answer in answers)
     what = "seeds" if len({answer.seed for answer in answers}) == several else "pairs"
@@ -159,7 +159,7 @@ def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]
     said = [f"in {count} of {several} {what} {finding[each]}" for each, count in counts.items() if count]
     sentence = "; ".join(said)
     sentence = f"{sentence[0].upper()}{sentence[1:]}."
-    return Verdicts(QUESTION, label, tone, sentence, _induced_in_several(persona, responders, what), answers)
+    return Conclusion(QUESTION, label, tone, sentence, _induced_in_several(persona, responders, what), answers)
 
 
 def equilibrium_sentences(equilibria: pd.DataFrame) -> list[tuple[int, str, list[str]]]:

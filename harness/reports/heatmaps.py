@@ -37,7 +37,7 @@ class HeatMap:
 
 
 @dataclass(frozen=True)
-class View:
+class MatrixView:
     """The heat maps of one training seed, or of the mean over all."""
 
     label: str
@@ -66,14 +66,14 @@ QUANTITIES = (
 )
 
 
-def views(crossplay: pd.DataFrame) -> list[View]:
+def views(crossplay: pd.DataFrame) -> list[MatrixView]:
     """The heat maps of `crossplay`: of its seed, or of the mean over its seeds first and then of each."""
     seeds = list(dict.fromkeys(crossplay["seed"]))
     shown = [(f"seed {seed}", crossplay[crossplay["seed"] == seed]) for seed in seeds]
     if len(seeds) > 1:
         shown.insert(0, (f"mean over {len(seeds)} seeds", _mean(crossplay)))
     return [
-        View(label, [_map(quantity, found, label, place) for quantity in QUANTITIES])
+        MatrixView(label, [_map(quantity, found, label, place) for quantity in QUANTITIES])
         for place, (label, found) in enumerate(shown)
     ]
 

@@ -44,7 +44,7 @@ QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 
 
 @dataclass(frozen=True)
-class Stage:
+class StageRow:
     """One stage of the manifest, in words."""
 
     name: str
@@ -187,9 +187,9 @@ def _rounds(stages: Iterable[Mapping[str, Any]]) -> str:
     return "0 and 1: there is nothing to train or to tune in this ego"
 
 
-def _stage(name: str, stage: Mapping[str, Any]) -> Stage:
+def _stage(name: str, stage: Mapping[str, Any]) -> StageRow:
     steps, budget = stage.get("steps"), stage.get("budget_steps")
-    return Stage(
+    return StageRow(
         name,
         str(stage.get("kind", "")),
         str(stage.get("seed", "")),

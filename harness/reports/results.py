@@ -10,7 +10,7 @@ import pandas as pd
 
 from harness.reports import wording
 from harness.reports.treatment import ARMS, RECONFIGURED, RETRAINED, Change
-from harness.reports.wording import Row, Verdicts, played
+from harness.reports.wording import Row, Conclusion, played
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Results:
         compared = {row["seed"] for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)}
         return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.planned or seed in compared]
 
-    def verdicts(self, question: str, persona: str) -> Verdicts:
+    def verdicts(self, question: str, persona: str) -> Conclusion:
         """The answer to a question about a persona, in words."""
         rows = [row for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)]
         seeds = self.asked(question, persona)

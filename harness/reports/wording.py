@@ -46,7 +46,7 @@ class Answer:
 
 
 @dataclass(frozen=True)
-class Verdicts:
+class Conclusion:
     """One research question of one persona: the headline, and each seed's answer when there are several."""
 
     question: str
@@ -65,7 +65,7 @@ def verdicts(
     arms: Mapping[tuple[str, int], Row],
     significance: float | None,
     change: Change = RETRAINED,
-) -> Verdicts:
+) -> Conclusion:
     """Answer `question` for the training seeds it is asked of, by `rows`: its comparisons of this persona.
 
     `arms` are the rows of `summary` by arm and seed, `change` what round 2 does. A seed without rows is not answered yet.
@@ -77,17 +77,17 @@ def verdicts(
     if not answers:
         what = "Round 2 was not played: there is nothing to train or to tune in this ego."
         what = what if question == "RQ2" else "Not compared."
-        return Verdicts(question, "not asked", "open", what, "", ())
+        return Conclusion(question, "not asked", "open", what, "", ())
     if len(answers) == 1:
         (only,) = answers
-        return Verdicts(question, only.label, only.tone, only.sentence, only.speed, ())
+        return Conclusion(question, only.label, only.tone, only.sentence, only.speed, ())
     yes, several = sum(answer.yes for answer in answers), len(answers)
     if question == "RQ1":
         finding = f"the {persona} driver makes the naive ego fail significantly more often than it does alone"
     else:
         finding = f"{change.doing} makes the ego fail significantly less often against the {persona} driver"
     label = f"yes in {yes} of {several} seeds" if yes else f"not shown in any of {several} seeds"
-    return Verdicts(
+    return Conclusion(
         question,
         "not answered" if all(answer.label == "not answered" for answer in answers) else label,
         TONE_OF_YES[question] if yes == several or (yes and question == "RQ1") else "open",

@@ -64,7 +64,7 @@ class _Table:
         self.due[:, self.due.shape[1] // 2 :] = _NEVER
 
 
-class Others:
+class BackgroundTraffic:
     """All others of all games. `enter` starts one in SUMO under a name."""
 
     def __init__(
@@ -85,7 +85,7 @@ class Others:
         self._table = _Table(len(prefixes))
         self._nobody = self._reading(np.zeros(0, dtype=np.int64), np.zeros((4, 0)))
 
-    def begin(self, game: int, departures: Sequence[Departure]) -> None:
+    def reset(self, game: int, departures: Sequence[Departure]) -> None:
         """A game starts anew: take away who is there, and let others depart as time goes by."""
         if self._table.count[game]:
             for known in self._table.known[game, : self._table.count[game]].tolist():

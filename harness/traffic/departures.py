@@ -10,7 +10,7 @@ from sumolib.net import Net
 from sumolib.net.edge import Edge
 
 from harness.config.toml_reading import nearest
-from harness.errors import Problem, UsageError, attempt
+from harness.errors import Problem, UsageError, collect
 from harness.game.state import ROLES
 from harness.traffic import network
 from harness.traffic.route_file import Departure, RouteFile
@@ -28,7 +28,7 @@ def edges_of(departure: Departure, net: Net, routes: RouteFile) -> list[Edge]:
     key = f"vehicle {departure.name}"
     problems: list[Problem] = []
     found = [
-        attempt(problems, lambda name=name: network.find_edge(net, routes.path, key, name))  # type: ignore[misc]
+        collect(problems, lambda name=name: network.find_edge(net, routes.path, key, name))  # type: ignore[misc]
         for name in dict.fromkeys(departure.edges)
     ]
     if problems:
@@ -51,7 +51,7 @@ def check_departures(players: set[str], net: Net, routes: RouteFile) -> None:
         where = (str(routes.path), f"vehicle {other.name}")
         if other.name in ROLES and players <= routes.vehicles.keys():
             problems.append(Problem(*where, "has a player's name without being it", "call it something else"))
-        edges = attempt(problems, lambda other=other: edges_of(other, net, routes))  # type: ignore[misc]
+        edges = collect(problems, lambda other=other: edges_of(other, net, routes))  # type: ignore[misc]
         if edges:
             problems += [Problem(*where, *each) for each in _not_connected(edges)]
             problems += _of_start(*where, other, edges[0], routes)

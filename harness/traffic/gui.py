@@ -31,7 +31,7 @@ class WindowClosed(SimulationError):
     """SUMO-GUI has ended, or its user closed it."""
 
 
-class Window:
+class GuiWindow:
     """A SUMO-GUI that waits for steps."""
 
     def __init__(self, connection: Any, process: subprocess.Popen[bytes], patient: bool) -> None:
@@ -87,7 +87,7 @@ class Window:
 @contextlib.contextmanager
 def steered_gui(
     program: Path, options: list[str], environment: Mapping[str, str], patient: bool = True
-) -> Iterator[Window]:
+) -> Iterator[GuiWindow]:
     """Start SUMO-GUI with these options and steer it; it is ended when the block is left.
 
     `patient`: a step may take as long as it likes, for a user may halt it. Raises SimulationError, with what
@@ -100,7 +100,7 @@ def steered_gui(
         process = subprocess.Popen([str(program), *options, *more], env=dict(environment), stdout=said, stderr=said)
         try:
             try:
-                window = Window(_connect(port, process), process, patient)
+                window = GuiWindow(_connect(port, process), process, patient)
             except (OSError, WindowClosed) as error:
                 said.seek(0)
                 logged = errors.read_bytes() if errors.is_file() else b""

@@ -27,10 +27,10 @@ from libsumo import _libsumo  # its functions without the Python function around
 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
-from harness.game.initial_state import Start
+from harness.game.initial_state import InitialState
 from harness.game.state import ROLES
 from harness.traffic.angles import compass_deg_of, heading_rad_of
-from harness.traffic.background_traffic import Others
+from harness.traffic.background_traffic import BackgroundTraffic
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading
@@ -56,7 +56,7 @@ class _Tile:
     inside: set[int] = field(default_factory=set)  # players that SUMO knows
 
 
-class LocalSimulation:
+class LibsumoSimulation:
     """The simulation of this process. It is given back by `close`, or when nobody refers to it any more."""
 
     @staticmethod
@@ -72,7 +72,7 @@ class LocalSimulation:
             raise SimulationError("this process has a libsumo simulation already")
         self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
         self._recorded = recorded
-        self._drives_nobody = all(self._taken_over) and not scene.has_others
+        self._drives_nobody = all(self._taken_over) and not scene.has_background_traffic
         self._placing = _ON_ITS_ROUTE if self._drives_nobody else _ON_ANY_LANE
         self._half_length = 0.5 * scene.world.length_m
         offset = tile_offset_m(scene.net_file, games)
@@ -118,7 +118,7 @@ class LocalSimulation:
         self._there = np.zeros((self._games, len(self._taken_over)), dtype=bool)
         self._entrances = [self._entrance(player) for player in range(len(self._taken_over))]
         world = self._scene.world
-        self._others = Others(
+        self._others = BackgroundTraffic(
             [tile.prefix for tile in self._tiles],
             self._offsets,
             world.step_s,
@@ -131,7 +131,7 @@ class LocalSimulation:
         """Start SUMO anew, with its random numbers from `seed`: every game has to be started again."""
         self._load([*self._options, "--seed", str(seed)], libsumo.load)
 
-    def restart(self, game: int, start: Start, departures: list[Departure]) -> None:
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
         """Clear a game's tile and put its players at their start; others depart as time goes by."""
         tile = self._tiles[game]
         with self._asking(f"start game {game}"):
@@ -141,7 +141,7 @@ class LocalSimulation:
                 self._take_out(game, player)
             for player in sorted(taking_part - staying):
                 self._add_player(game, player, start)
-            self._others.begin(game, departures)
+            self._others.reset(game, departures)
 
     def halt(self, game: int, player: int) -> None:
         """Whoever drove a player, from now on it stands where `step` says."""
@@ -199,7 +199,7 @@ class LocalSimulation:
     def _name(self, game: int, player: int) -> str:
         return self._tiles[game].prefix + ROLES[player]
 
-    def _add_player(self, game: int, player: int, start: Start) -> None:
+    def _add_player(self, game: int, player: int, start: InitialState) -> None:
         tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
         kind, lane, fastest = self._entrances[player]
         entering = (kind, lane, str(start.position_m[player]), str(min(speed, fastest)))

@@ -29,7 +29,7 @@ _OF_VEHICLES = re.compile(r"vtype|vehicle|car.following", re.IGNORECASE)
 _MOST_SAID = 500
 
 
-def try_scene(scene: OpenScene) -> None:
+def check_loads(scene: OpenScene) -> None:
     """Raise UsageError, naming the file and what SUMO says of it, unless SUMO loads the scene."""
     net, routes = scene.net_file.resolve(), scene.routes.path
     patience_s = PATIENCE_S + PATIENCE_S_PER_BYTE * net.stat().st_size

@@ -17,10 +17,10 @@ def open_simulation(
     Both give the same numbers; only the second costs a message each way per verb. Raises SimulationError if SUMO
     can't load the scene.
     """
-    from harness.traffic.libsumo_simulation import LocalSimulation
+    from harness.traffic.libsumo_simulation import LibsumoSimulation
 
-    if not LocalSimulation.in_use():
-        return LocalSimulation(scene, games, taken_over, seed, recorded)
-    from harness.traffic.subprocess_simulation import RemoteSimulation
+    if not LibsumoSimulation.in_use():
+        return LibsumoSimulation(scene, games, taken_over, seed, recorded)
+    from harness.traffic.subprocess_simulation import SubprocessSimulation
 
-    return RemoteSimulation(scene, games, taken_over, seed, recorded)
+    return SubprocessSimulation(scene, games, taken_over, seed, recorded)

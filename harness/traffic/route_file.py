@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from harness.config.toml_reading import nearest
-from harness.errors import Problem, UsageError, attempt
+from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
 from harness.traffic.schema import Kind, kinds, problems_in
 from harness.traffic.xml_file import number_of, parse_xml
@@ -102,7 +102,7 @@ def read_route_file(path: Path) -> RouteFile:
     problems: list[Problem] = []
     types = {_DEFAULT_TYPE: VehicleType(_DEFAULT_TYPE)}
     for element in only_types.iter("vType"):
-        kind = attempt(problems, lambda element=element: _vehicle_type(path, element))  # type: ignore[misc]
+        kind = collect(problems, lambda element=element: _vehicle_type(path, element))  # type: ignore[misc]
         if kind is not None:
             types[kind.name] = kind
     distributions = {_attribute(path, element, "id") for element in root.iter("vTypeDistribution")}
@@ -115,7 +115,7 @@ def read_route_file(path: Path) -> RouteFile:
     flows: dict[str, Flow] = {}
     for element in root:
         if element.tag in ("vehicle", "flow"):
-            departure = attempt(
+            departure = collect(
                 problems,
                 lambda element=element: _departure(path, element, routes, set(types) | distributions),  # type: ignore[misc]
             )
@@ -127,7 +127,7 @@ def read_route_file(path: Path) -> RouteFile:
             elif element.tag == "vehicle":
                 vehicles[departure.name] = departure
             else:
-                flow = attempt(problems, lambda e=element, d=departure: _flow(path, e, d))  # type: ignore[misc]
+                flow = collect(problems, lambda e=element, d=departure: _flow(path, e, d))  # type: ignore[misc]
                 if flow is not None:
                     flows[departure.name] = flow
     if problems:

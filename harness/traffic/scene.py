@@ -16,12 +16,12 @@ from sumolib.net.lane import Lane
 
 from harness.config.scene import PlainFile, Player, Scene, scene_file
 from harness.config.toml_reading import Document, nearest, read_document
-from harness.errors import Problem, UsageError, attempt
+from harness.errors import Problem, UsageError, collect
 from harness.files import leads_out
 from harness.game.arrays import FloatArray
-from harness.game.attention import Habits
+from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
-from harness.game.initial_state import Chances, Place
+from harness.game.initial_state import StartDistribution, StartRange
 from harness.game.quantities import REACH_M, World
 from harness.game.road import Road, Route, Routes
 from harness.game.state import ROLES
@@ -42,7 +42,7 @@ class OpenScene:
     document: Scene
     world: World
     routes: RouteFile
-    places: tuple[Place, ...]
+    places: tuple[StartRange, ...]
     edges: tuple[tuple[str, ...], ...]  # each player's route from the edge it starts on
     rail_lines: tuple[FloatArray, ...]
 
@@ -51,7 +51,7 @@ class OpenScene:
         return self.folder / self.document.net
 
     @cached_property
-    def has_others(self) -> bool:
+    def has_background_traffic(self) -> bool:
         """Whether anyone but the players may depart."""
         players = {player.vehicle for player in self.document.players}
         return bool(self.routes.flows) or bool(set(self.routes.vehicles) - players)
@@ -65,18 +65,18 @@ class OpenScene:
         players = {player.vehicle for player in self.document.players}
         return self.routes.departures(players, self.document.time_limit_s, generator)
 
-    def chances(
+    def start_distribution(
         self,
-        habits: Sequence[Habits | Sequence[Habits]],
+        human_factors: Sequence[HumanFactors | Sequence[HumanFactors]],
         present_share: Sequence[float],
         shares: Sequence[Sequence[float]] | None = None,
-    ) -> Chances:
+    ) -> StartDistribution:
         """What is drawn at the start of each game, for players that attend and take part like this. A player with
         several drivers has the habits of each, and the `shares` [P][n] of the games that each has."""
-        of_each = [[each] if isinstance(each, Habits) else list(each) for each in habits]
+        of_each = [[each] if isinstance(each, HumanFactors) else list(each) for each in human_factors]
         shares = shares or [[1.0] * len(each) for each in of_each]
         place = (self.places, self.world.length_m, of_each, shares, present_share)
-        return Chances(*place, self.world.steps, self.world.step_s)
+        return StartDistribution(*place, self.world.steps, self.world.step_s)
 
 
 class _NamedFiles(Document):
@@ -94,25 +94,25 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     """
     document_file = scene_file(folder)
     problems: list[Problem] = []
-    attempt(problems, lambda: _check_within(document_file, folder))
+    collect(problems, lambda: _check_within(document_file, folder))
     if problems:
         raise UsageError(problems)
-    document = attempt(problems, lambda: read_document(document_file, Scene))
-    named = document or attempt([], lambda: read_document(document_file, _NamedFiles))
+    document = collect(problems, lambda: read_document(document_file, Scene))
+    named = document or collect([], lambda: read_document(document_file, _NamedFiles))
     if named is None:
         raise UsageError(problems)
     net_file, route_path = folder / named.net, folder / named.routes
-    net = attempt(problems, lambda: _checked_net(net_file, folder))
-    routes = attempt(problems, lambda: _checked_routes(route_path, folder, document, ego_type))
+    net = collect(problems, lambda: _checked_net(net_file, folder))
+    routes = collect(problems, lambda: _checked_routes(route_path, folder, document, ego_type))
     if document is None or net is None or routes is None:
         raise UsageError(problems)
     area = network.drivable_area(net)
     opened = [
-        attempt(problems, lambda k=k: _open_player(document_file, document, ROLES[k], net, area, routes))  # type: ignore[misc]
+        collect(problems, lambda k=k: _open_player(document_file, document, ROLES[k], net, area, routes))  # type: ignore[misc]
         for k in range(len(ROLES))
     ]
     players = {player.vehicle for player in document.players}
-    attempt(problems, lambda: check_departures(players, net, routes))
+    collect(problems, lambda: check_departures(players, net, routes))
     if problems or None in opened:
         raise UsageError(problems)
     places, tables, edges, types = zip(*opened, strict=True)
@@ -156,14 +156,14 @@ def _checked_routes(path: Path, folder: Path, document: Scene | None, ego_type: 
 
 def _open_player(
     file: Path, document: Scene, role: str, net: Net, area: BaseGeometry, routes: RouteFile
-) -> tuple[Place, Route, tuple[str, ...], VehicleType]:
+) -> tuple[StartRange, Route, tuple[str, ...], VehicleType]:
     player: Player = getattr(document, role)
     problems: list[Problem] = []
-    lane = attempt(problems, lambda: network.find_lane(net, file, f"{role}.lane", player.lane))
-    goal = attempt(problems, lambda: _goal(file, document, net))
-    vehicle = attempt(problems, lambda: _vehicle(file, role, player, routes))
-    edges = attempt(problems, lambda: edges_of(vehicle, net, routes)) if vehicle else None
-    place = attempt(problems, lambda: _place(file, document, role, player, lane, net)) if lane else None
+    lane = collect(problems, lambda: network.find_lane(net, file, f"{role}.lane", player.lane))
+    goal = collect(problems, lambda: _goal(file, document, net))
+    vehicle = collect(problems, lambda: _vehicle(file, role, player, routes))
+    edges = collect(problems, lambda: edges_of(vehicle, net, routes)) if vehicle else None
+    place = collect(problems, lambda: _place(file, document, role, player, lane, net)) if lane else None
     if lane is None or goal is None or vehicle is None or edges is None or place is None:
         raise UsageError(problems)
     if lane.getEdge() not in edges:
@@ -243,7 +243,7 @@ def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Depart
     return vehicle
 
 
-def _place(file: Path, document: Scene, role: str, player: Player, lane: Lane, net: Net) -> Place:
+def _place(file: Path, document: Scene, role: str, player: Player, lane: Lane, net: Net) -> StartRange:
     if player.beside_ego_m is None:
         reach, key = player.position_m, "position_m"
     else:
@@ -264,7 +264,7 @@ def _place(file: Path, document: Scene, role: str, player: Player, lane: Lane, n
         )
     line = network.lane_line(lane)
     scale = float(np.hypot(*np.diff(line, axis=0).T).sum()) / lane.getLength()
-    return Place(line, player.beside_ego_m or reach, player.beside_ego_m is not None, player.speed_mps, scale)
+    return StartRange(line, player.beside_ego_m or reach, player.beside_ego_m is not None, player.speed_mps, scale)
 
 
 def _beside_ego(

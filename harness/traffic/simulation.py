@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.initial_state import Start
+from harness.game.initial_state import InitialState
 from harness.traffic.route_file import Departure
 
 
@@ -39,7 +39,7 @@ class Simulation(Protocol):
     def reload(self, seed: int) -> None:
         """Start SUMO anew, with its random numbers from `seed`: every game has to be started again."""
 
-    def restart(self, game: int, start: Start, departures: list[Departure]) -> None:
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
         """Clear a game's tile and put its players at their start; others depart as time goes by."""
 
     def halt(self, game: int, player: int) -> None:

@@ -22,7 +22,7 @@ from typing import IO, Any
 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
-from harness.game.initial_state import Start
+from harness.game.initial_state import InitialState
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading
@@ -31,8 +31,8 @@ _LENGTH = struct.Struct("<Q")
 _PATIENCE_S = 10.0  # how long a child may take to end
 
 
-class RemoteSimulation:
-    """A `LocalSimulation` of a child process. The child ends with `close`, or when nobody refers to this any more."""
+class SubprocessSimulation:
+    """A `LibsumoSimulation` of a child process. The child ends with `close`, or when nobody refers to this any more."""
 
     def __init__(
         self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
@@ -53,9 +53,9 @@ class RemoteSimulation:
         """Start SUMO anew, with its random numbers from `seed`: every game has to be started again."""
         self._ask("reload", seed)
 
-    def restart(self, game: int, start: Start, departures: list[Departure]) -> None:
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
         """Clear a game's tile and put its players at their start; others depart as time goes by."""
-        self._ask("restart", game, start, departures)
+        self._ask("reset", game, start, departures)
 
     def halt(self, game: int, player: int) -> None:
         """Whoever drove a player, from now on it stands where `step` says."""
@@ -156,18 +156,18 @@ def _read(stream: IO[bytes], count: int) -> bytes:
 
 
 def serve() -> None:
-    """Answer the parent: its first message is what a `LocalSimulation` is made of, each further one a verb."""
-    from harness.traffic.libsumo_simulation import LocalSimulation
+    """Answer the parent: its first message is what a `LibsumoSimulation` is made of, each further one a verb."""
+    from harness.traffic.libsumo_simulation import LibsumoSimulation
 
     incoming = sys.stdin.buffer
     outgoing = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    simulation: LocalSimulation | None = None
+    simulation: LibsumoSimulation | None = None
 
     def answer(verb: Any, *arguments: Any) -> Any:
         nonlocal simulation
         if simulation is None:
-            simulation = LocalSimulation(verb, *arguments)
+            simulation = LibsumoSimulation(verb, *arguments)
             return None
         return getattr(simulation, verb)(*arguments)
 

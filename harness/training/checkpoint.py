@@ -23,7 +23,7 @@ from harness.files import write_atomically
 
 
 @dataclass(frozen=True)
-class Window:
+class CurvePoint:
     """A stretch of the learning curve, of the games that ended in it."""
 
     steps: int
@@ -40,7 +40,7 @@ class Progress:
     segments: int
     steps: int
     segment_payoffs: list[float]
-    curve: list[Window]
+    curve: list[CurvePoint]
 
 
 def write_checkpoint(model: PPO, progress: Progress, key: str, path: Path) -> None:
@@ -82,7 +82,7 @@ def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
 def _progress(text: str) -> Progress:
     """Raises ValueError, TypeError or KeyError where it is none."""
     stored: dict[str, Any] = json.loads(text)
-    curve = [Window(**window) for window in stored["curve"]]
+    curve = [CurvePoint(**window) for window in stored["curve"]]
     return Progress(stored["segments"], stored["steps"], stored["segment_payoffs"], curve)
 
 

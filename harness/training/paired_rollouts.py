@@ -13,21 +13,21 @@ from harness.drivers.mixture import Mixture, mixture_of
 from harness.drivers.protocol import Driver
 from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.initial_state import draw_start
+from harness.game.initial_state import draw_initial_state
 from harness.game.seeding import generator_of, seed_of
 from harness.game.state import EGO, NON_EGO, Outcome
 from harness.traffic.scene import OpenScene
 
 
 @dataclass(frozen=True)
-class Results:
+class RolloutTotals:
     """What came of a driver's games: payoff [N] of each, and whether the ego failed [N]."""
 
     payoff: FloatArray
     failed: FloatArray
 
 
-class PairedGames:
+class PairedRollouts:
     """N seeded games, as many at once as are asked for. Game k is the same for every ego that plays it."""
 
     def __init__(
@@ -49,12 +49,12 @@ class PairedGames:
         self._tiles = ceil(games / self._loads)
         self._ego = _InTurn()
         other, ego = mixture_of(opponent, personas[NON_EGO]), personas[EGO]
-        habits, shares = [[ego.habits], other.habits], [[1.0], other.shares]
-        self._chances = scene.chances(habits, [1.0, 1.0 - alone_share], shares)
+        human_factors, shares = [[ego.human_factors], other.human_factors], [[1.0], other.shares]
+        self._start_distribution = scene.start_distribution(human_factors, [1.0, 1.0 - alone_share], shares)
         seats = [[Seat(self._ego, ego.payoff)], [Seat(member.driver) for member in other.members]]
         self._arena = Arena(scene, self._tiles, seats)
 
-    def play(self, driver: Driver) -> Results:
+    def play(self, driver: Driver) -> RolloutTotals:
         """Play all games with this ego, each until the ego's part in it ends.
 
         Raises whatever the driver does, and as `Arena.step` does. The games after that are played as if it hadn't.
@@ -62,7 +62,7 @@ class PairedGames:
         self._ego.driver = driver
         played = [self._play(load) for load in range(self._loads)]  # what fills the last load up does not count
         payoff, failed = (np.concatenate(each)[: self._games] for each in zip(*played, strict=True))
-        return Results(payoff, failed)
+        return RolloutTotals(payoff, failed)
 
     def close(self) -> None:
         """Give SUMO back."""
@@ -72,9 +72,9 @@ class PairedGames:
         arena, scene = self._arena, self._scene
         arena.reload(seed_of(*self._parts, "load", load) % 2**31)
         parts = {tile: (*self._parts, "game", load * self._tiles + tile) for tile in range(self._tiles)}
-        starts = {tile: draw_start(self._chances, *each) for tile, each in parts.items()}
+        starts = {tile: draw_initial_state(self._start_distribution, *each) for tile, each in parts.items()}
         departures = {tile: scene.departures(generator_of(*each, "others")) for tile, each in parts.items()}
-        arena.start(starts, departures if scene.has_others else {})
+        arena.reset(starts, departures if scene.has_background_traffic else {})
         payoff = np.zeros(self._tiles)
         while arena.state.running[:, EGO].any():
             payoff += arena.step().payoff[:, EGO]
@@ -89,10 +89,10 @@ class _InTurn:
     def __init__(self) -> None:
         self.driver: Driver | None = None
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Games [N] start anew."""
         assert self.driver is not None, "games are played by a driver"
-        self.driver.begin(games)
+        self.driver.reset(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """As the driver whose turn it is."""

@@ -22,7 +22,7 @@ from harness.config.campaign import Reconfiguration
 from harness.config.persona import Persona
 from harness.config.tunable import Tunable
 from harness.drivers.car import car_of
-from harness.drivers.external import GivenDriver
+from harness.drivers.external import ExternalDriver
 from harness.drivers.mixture import Mixture
 from harness.drivers.protocol import Driver
 from harness.errors import SimulationError, StageFailed, is_of_memory
@@ -30,7 +30,7 @@ from harness.files import write_atomically
 from harness.game.seeding import seed_of
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
-from harness.training.paired_rollouts import PairedGames
+from harness.training.paired_rollouts import PairedRollouts
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Search:
     """What one search is made of: whose parameters, on what payoff, against whom."""
 
     scene: OpenScene
-    driver: GivenDriver
+    driver: ExternalDriver
     personas: tuple[Persona, Persona]  # of the ego's seat and of the non-ego's
     opponent: Driver | Mixture
     settings: Reconfiguration
@@ -61,30 +61,30 @@ class Trial:
 def run_search(
     search: Search,
     kept: Path,
-    report: Callable[[int, int], None] = lambda done, total: None,
-    begin: Callable[[int], None] = lambda trial: None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+    on_start: Callable[[int], None] = lambda trial: None,
 ) -> list[Trial]:
     """Every trial of a search, those in the file `kept` taken as they are; each new one is added to it.
 
-    `report` is told trials done and trials in all, `begin` the number of each trial before it. A driver that can't be
-    made or can't play with some values is a trial without a payoff. Raises StageFailed where the ego can't as it was
-    given, SimulationError where SUMO fails.
+    `on_progress` gets the number of trials done and their total, `on_start` the number of each trial before it starts.
+    A driver that can't be made or can't play with some values is a trial without a payoff. Raises StageFailed where the
+    ego can't play as it was given, SimulationError where SUMO fails.
     """
     trials, wanted = read_trials(kept)[: search.settings.trials], search.settings.trials
-    report(len(trials), wanted)
+    on_progress(len(trials), wanted)
     if len(trials) == wanted:
         return trials
     settings = search.settings
     how = settings.games, settings.games_at_once, settings.alone_share, (*search.parts, "games")
-    with closing(PairedGames(search.scene, search.personas, search.opponent, *how)) as games:
+    with closing(PairedRollouts(search.scene, search.personas, search.opponent, *how)) as games:
         while len(trials) < wanted:
-            begin(len(trials))
+            on_start(len(trials))
             values = propose(search.driver.searched, trials, *search.parts) if trials else search.driver.numbers
             trials.append(_try(search, games, values))
             if trials[0].error:
                 raise StageFailed(f"the ego could not play as it was given: {trials[0].error}")
             write_trials(trials, kept)
-            report(len(trials), wanted)
+            on_progress(len(trials), wanted)
     return trials
 
 
@@ -110,7 +110,7 @@ def propose(tunable: Sequence[Tunable], trials: Sequence[Trial], *parts: str | i
     return dict(study.ask(ranges).params)
 
 
-def _try(search: Search, games: PairedGames, values: Mapping[str, float]) -> Trial:
+def _try(search: Search, games: PairedRollouts, values: Mapping[str, float]) -> Trial:
     sampled = search.personas[EGO].decisions == "sampled"
     driver: Driver | None = None
     try:

@@ -25,13 +25,13 @@ from harness.drivers.mixture import Mixture, Player, mixture_of
 from harness.drivers.policy_file import Policy
 from harness.environments.arena import Arena, Seat
 from harness.environments.vector_env import ArenaVecEnv, Finished
-from harness.game.attention import Habits
-from harness.game.initial_state import Chances
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import StartDistribution
 from harness.game.observation import OF_OTHERS
 from harness.game.seeding import seed_of
 from harness.game.state import Outcome
 from harness.traffic.scene import OpenScene
-from harness.training.checkpoint import Progress, Window, policy_of, put_policy, read_checkpoint, write_checkpoint
+from harness.training.checkpoint import CurvePoint, Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
 from harness.training.early_stopping import has_converged
 
 CURVE_WINDOW_STEPS = 16_384
@@ -39,7 +39,7 @@ _GAE_LAMBDA = 0.95
 
 
 @dataclass(frozen=True)
-class Lesson:
+class TrainingSpec:
     """What one training is made of: who learns, on what payoff, against whom, beginning from what."""
 
     scene: OpenScene
@@ -68,92 +68,93 @@ class Trained:
 
 
 def train(
-    lesson: Lesson,
+    spec: TrainingSpec,
     checkpoint: Path,
     key: str,
     card: dict[str, Any],
     tensorboard: Path | None = None,
-    report: Callable[[int, int], None] = lambda done, total: None,
-    begin: Callable[[int], None] = lambda segment: None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
+    on_start: Callable[[int], None] = lambda segment: None,
 ) -> Trained:
     """Train to convergence or to the end of the budget, going on from `checkpoint` if it was made with this `key`.
 
-    `report` is told steps done and steps in all, several times a second, `begin` the number of each segment before it.
+    `on_progress` gets the steps done and their total, several times a second, `on_start` the number of each segment
+    before it starts.
     Raises FloatingPointError where a parameter is not finite or a number of the game can't be right
     (`game.plausibility`), SimulationError where SUMO fails, ValueError where the initial policy doesn't fit.
     """
     torch.set_num_threads(1)
-    environment = _environment(lesson)
+    environment = _environment(spec)
     try:
-        model = _learner(lesson, environment, tensorboard)
+        model = _learner(spec, environment, tensorboard)
         progress = read_checkpoint(model, key, checkpoint) or Progress(0, 0, [], [])
-        while (stopped := _why_to_stop(lesson, progress)) is None:
-            begin(progress.segments)
-            progress = _segment(lesson, model, environment, progress, report)
+        while (stopped := _why_to_stop(spec, progress)) is None:
+            on_start(progress.segments)
+            progress = _segment(spec, model, environment, progress, on_progress)
             write_checkpoint(model, progress, key, checkpoint)
         return Trained(policy_of(model, card), progress, stopped)
     finally:
         environment.close()
 
 
-def _why_to_stop(lesson: Lesson, progress: Progress) -> str | None:
+def _why_to_stop(spec: TrainingSpec, progress: Progress) -> str | None:
     """Asked before each segment, so that one who goes on from a finished training's checkpoint is told as well."""
-    settings = lesson.settings
-    attentive = ceil(_attentive_steps(lesson) / settings.segment_steps)
+    settings = spec.settings
+    attentive = ceil(_attentive_steps(spec) / settings.segment_steps)
     if settings.early_convergence and has_converged(progress.segment_payoffs[attentive:]):
         return "converged"
     return "budget" if progress.steps >= settings.steps else None
 
 
-def _environment(lesson: Lesson) -> ArenaVecEnv:
-    others = _others(lesson)
+def _environment(spec: TrainingSpec) -> ArenaVecEnv:
+    others = _others(spec)
     nobody = [Seat(None)]  # and is in no game
     seats = [[Seat(each.driver) for each in others.members] if others is not None else nobody] * 2
-    seats[lesson.learner] = [Seat(None, lesson.personas[lesson.learner].payoff)]
-    seed = seed_of(*lesson.parts, "sumo") % 2**31
-    arena = Arena(lesson.scene, lesson.settings.games, seats, seed)
-    scale = lesson.settings.payoff_scale
-    return ArenaVecEnv(arena, lesson.learner, _chances(lesson, 0), *lesson.parts, payoff_scale=scale)
+    seats[spec.learner] = [Seat(None, spec.personas[spec.learner].payoff)]
+    seed = seed_of(*spec.parts, "sumo") % 2**31
+    arena = Arena(spec.scene, spec.settings.games, seats, seed)
+    scale = spec.settings.payoff_scale
+    return ArenaVecEnv(arena, spec.learner, _start_distribution(spec, 0), *spec.parts, payoff_scale=scale)
 
 
-def _chances(lesson: Lesson, steps: int) -> Chances:
+def _start_distribution(spec: TrainingSpec, steps: int) -> StartDistribution:
     """What the games are drawn from, `steps` into the training."""
-    present = [0.0 if lesson.opponent is None else 1.0 - lesson.alone_share] * 2
-    present[lesson.learner] = 1.0
-    theirs, their_shares = _of_other(lesson)
-    habits, shares = [theirs, theirs], [their_shares, their_shares]
+    present = [0.0 if spec.opponent is None else 1.0 - spec.alone_share] * 2
+    present[spec.learner] = 1.0
+    theirs, their_shares = _of_other(spec)
+    human_factors, shares = [theirs, theirs], [their_shares, their_shares]
     # Nobody learns from what was overlooked and went well: a driver learns with open eyes, and drives by habit. What
     # the body can't do is there from the first lesson on.
-    own = lesson.personas[lesson.learner].habits
-    eyes_open = own if lesson.as_it_drives else own.with_open_eyes
-    habits[lesson.learner], shares[lesson.learner] = [eyes_open], [1.0]
-    if steps < _attentive_steps(lesson):
-        habits = [[replace(each, attention=None) for each in of_player] for of_player in habits]
-    return lesson.scene.chances(habits, present, shares)
+    own = spec.personas[spec.learner].human_factors
+    eyes_open = own if spec.as_it_drives else own.with_open_eyes
+    human_factors[spec.learner], shares[spec.learner] = [eyes_open], [1.0]
+    if steps < _attentive_steps(spec):
+        human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
+    return spec.scene.start_distribution(human_factors, present, shares)
 
 
-def _others(lesson: Lesson) -> Mixture | None:
-    opponent = lesson.opponent
-    return mixture_of(opponent, lesson.personas[1 - lesson.learner]) if opponent is not None else None
+def _others(spec: TrainingSpec) -> Mixture | None:
+    opponent = spec.opponent
+    return mixture_of(opponent, spec.personas[1 - spec.learner]) if opponent is not None else None
 
 
-def _of_other(lesson: Lesson) -> tuple[list[Habits], list[float]]:
-    """Habits and shares of who has the other seat."""
-    others = _others(lesson)
+def _of_other(spec: TrainingSpec) -> tuple[list[HumanFactors], list[float]]:
+    """HumanFactors and shares of who has the other seat."""
+    others = _others(spec)
     if others is None:
-        return [lesson.personas[1 - lesson.learner].habits], [1.0]
-    return others.habits, others.shares
+        return [spec.personas[1 - spec.learner].human_factors], [1.0]
+    return others.human_factors, others.shares
 
 
-def _attentive_steps(lesson: Lesson) -> float:
-    habits, _ = _of_other(lesson)
-    lapses = any(each.attention is not None for each in (lesson.personas[lesson.learner].habits, *habits))
-    return lesson.attentive_share * lesson.settings.steps if lapses else 0.0
+def _attentive_steps(spec: TrainingSpec) -> float:
+    human_factors, _ = _of_other(spec)
+    lapses = any(each.attention is not None for each in (spec.personas[spec.learner].human_factors, *human_factors))
+    return spec.attentive_share * spec.settings.steps if lapses else 0.0
 
 
-def _learner(lesson: Lesson, environment: ArenaVecEnv, tensorboard: Path | None) -> PPO:
-    settings = lesson.settings
-    set_random_seed(seed_of(*lesson.parts, "parameters") % 2**32)
+def _learner(spec: TrainingSpec, environment: ArenaVecEnv, tensorboard: Path | None) -> PPO:
+    settings = spec.settings
+    set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
     model = PPO(
         "MlpPolicy",
         environment,
@@ -172,8 +173,8 @@ def _learner(lesson: Lesson, environment: ArenaVecEnv, tensorboard: Path | None)
         device="cpu",
     )
     model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else configure(None, []))
-    if lesson.initial is not None:
-        put_policy(model, lesson.initial, settings.initial_deviation)
+    if spec.initial is not None:
+        put_policy(model, spec.initial, settings.initial_deviation)
     else:
         _ignore_others(model)
     return model
@@ -188,18 +189,22 @@ def _ignore_others(model: PPO) -> None:
 
 
 def _segment(
-    lesson: Lesson, model: PPO, environment: ArenaVecEnv, progress: Progress, report: Callable[[int, int], None]
+    spec: TrainingSpec,
+    model: PPO,
+    environment: ArenaVecEnv,
+    progress: Progress,
+    on_progress: Callable[[int, int], None],
 ) -> Progress:
-    parts = (*lesson.parts, "segment", progress.segments)
+    parts = (*spec.parts, "segment", progress.segments)
     set_random_seed(seed_of(*parts, "learner") % 2**32)
-    environment.begin(_chances(lesson, progress.steps), *parts)
+    environment.sample_from(_start_distribution(spec, progress.steps), *parts)
     environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
-    steps = min(lesson.settings.segment_steps, lesson.settings.steps - progress.steps)
-    curve = _Curve(environment, progress, report, lesson)
+    steps = min(spec.settings.segment_steps, spec.settings.steps - progress.steps)
+    curve = _Curve(environment, progress, on_progress, spec)
     model.num_timesteps = progress.steps
     model._last_obs = None  # the games start anew
     try:
-        keep = _KeepDeviation(lesson.settings.max_deviation)
+        keep = _KeepDeviation(spec.settings.max_deviation)
         model.learn(steps, callback=[curve, keep], reset_num_timesteps=False)
     except FloatingPointError as error:
         raise FloatingPointError(f"{error}, after {model.num_timesteps} steps") from error
@@ -238,10 +243,14 @@ class _Curve(BaseCallback):
     """Gathers the learning curve of a segment and tells how far it has come."""
 
     def __init__(
-        self, environment: ArenaVecEnv, progress: Progress, report: Callable[[int, int], None], lesson: Lesson
+        self,
+        environment: ArenaVecEnv,
+        progress: Progress,
+        on_progress: Callable[[int, int], None],
+        spec: TrainingSpec,
     ) -> None:
         super().__init__()
-        self._environment, self._report, self._lesson = environment, report, lesson
+        self._environment, self._report, self._lesson = environment, on_progress, spec
         self._window: list[Finished] = []
         self._window_start = progress.steps
         self.windows, self.games = list(progress.curve), list[Finished]()
@@ -265,7 +274,7 @@ class _Curve(BaseCallback):
         games = self._window
         if not games:
             return
-        window = Window(
+        window = CurvePoint(
             steps=self.num_timesteps,
             mean_payoff=float(np.mean([game.payoff for game in games])),
             failure_rate=float(np.mean([game.outcome != Outcome.GOAL for game in games])),

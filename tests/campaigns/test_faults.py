@@ -19,7 +19,7 @@ from rich.console import Console
 from harness.campaign.execution import run_campaign as campaign_run
 from harness.campaign.execution.crash_retries import TRIES, Attempt, Begin, Report
 from harness.campaign.execution.run_campaign import run_campaign
-from harness.campaign.execution.run_context import Conditions
+from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.worker_pool import Work, run_stages
 from harness.campaign.plan.stages import Stage
@@ -53,7 +53,7 @@ def command_of(folder: Path) -> tuple[object, ...]:
 
 
 def die_in_game_1(
-    stage: Stage, conditions: Conditions, report: Report, begin: Begin, attempt: Attempt
+    stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt
 ) -> dict[str, Any]:
     """Game 1 of one arm is SUMO's death; one of a training's segments is so once."""
 

@@ -39,12 +39,12 @@ from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, Ga
 from harness.evaluation.game_theory.records import Response
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 from harness.game.arrays import FloatArray
-from harness.game.attention import Habits
-from harness.game.initial_state import draw_start
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import draw_initial_state
 from harness.game.observation import SIZE
 from harness.game.state import EGO, NON_EGO, ROLES
 from harness.traffic.scene import OpenScene, open_scene
-from harness.training.ppo import Lesson, train
+from harness.training.ppo import TrainingSpec, train
 from tests.support.scenes import build_scene
 from tests.support.tiny import harness, settings, write_campaign
 
@@ -134,8 +134,8 @@ def all_starts() -> tuple[FloatArray, FloatArray]:
 
 def starts_of(scene: OpenScene, episodes: Iterable[int]) -> tuple[FloatArray, FloatArray]:
     """How far ahead and how much faster the ego starts in episodes of seed 1, [N] each."""
-    chances = scene.chances([Habits(), Habits()], [1.0, 1.0])
-    starts = [draw_start(chances, *parts_of(1, episode)) for episode in episodes]
+    start_distribution = scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0])
+    starts = [draw_initial_state(start_distribution, *parts_of(1, episode)) for episode in episodes]
     ahead, faster = (np.array([-np.diff(getattr(each, name))[0] for each in starts]) for name in ("x_m", "speed_mps"))
     return ahead, faster
 
@@ -352,9 +352,11 @@ class Coin:
 
     def best_response(self, initial: Policy | None) -> LearnedDriver:
         how, named = settings(**TRAINING), ("coin", 1)
-        lesson = Lesson(self.scene, EGO, self.personas, self.player, 0.0, 0.0, initial, how, named, as_it_drives=True)
+        spec = TrainingSpec(
+            self.scene, EGO, self.personas, self.player, 0.0, 0.0, initial, how, named, as_it_drives=True
+        )
         name = self.personas[EGO].name
-        return LearnedDriver(train(lesson, self.folder / f"{name}.safetensors", name, {}).policy, False)
+        return LearnedDriver(train(spec, self.folder / f"{name}.safetensors", name, {}).policy, False)
 
     def gap(self, response: LearnedDriver) -> pd.Series:
         asked = Response(1, "ego", "blind", 2, "pair", "response", "coin", "coin")
@@ -364,9 +366,11 @@ class Coin:
 
     def by_hand(self, ego: FloatArray | None = None) -> FloatArray:
         """Of each episode: what the two earn as their coins fell, or the ego by other pedals than its coin's."""
-        habits = [each.habits for each in self.personas]
-        chances = self.scene.chances([[each] * 2 for each in habits], [1.0, 1.0], [[1.0, 1.0]] * 2)
-        fell = [draw_start(chances, *parts_of(1, episode)).member for episode in range(40)]
+        human_factors = [each.human_factors for each in self.personas]
+        start_distribution = self.scene.start_distribution(
+            [[each] * 2 for each in human_factors], [1.0, 1.0], [[1.0, 1.0]] * 2
+        )
+        fell = [draw_initial_state(start_distribution, *parts_of(1, episode)).member for episode in range(40)]
         pedals = np.array([FAST, SLOW])[np.array(fell)]
         ahead, faster = starts_of(self.scene, range(40))
         mine = pedals[:, EGO] if ego is None else ego * pedals[:, NON_EGO]

@@ -98,7 +98,7 @@ def soak() -> Iterator[Weight]:
             ended = np.flatnonzero(~arena.state.running.any(1))
         if len(ended):
             outcomes |= set(arena.state.outcome[ended].ravel().tolist())
-            arena.start({int(game): drawn(scene, "soak", int(game), step) for game in ended})
+            arena.reset({int(game): drawn(scene, "soak", int(game), step) for game in ended})
             played += len(ended)
         arena.step(actions[step % len(actions)])
     assert played > 10_000

@@ -20,7 +20,7 @@ from harness.errors import UsageError
 from harness.game.payoff import FUZZY_QUANTITIES, TERMS
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
-from harness.training.ppo import Lesson, train
+from harness.training.ppo import TrainingSpec, train
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, settings, write_campaign
 
@@ -74,7 +74,7 @@ def test_template__is_a_persona_as_it_stands(tmp_path: Path) -> None:
     persona = read_document(file, Persona)
     assert persona.name == "anna"
     careful = read_document(REPOSITORY / "personas" / "careful.toml", Persona)
-    assert persona.habits == careful.habits
+    assert persona.human_factors == careful.human_factors
     assert {each.name for each in persona.payoff.terms} == {each.name for each in careful.payoff.terms}
 
 
@@ -174,7 +174,7 @@ def test_new__is_checked_in_a_campaign(tmp_path: Path) -> None:
 
 def test_new__is_trained(tmp_path: Path, merge: OpenScene) -> None:
     anna = read_document(create_persona("anna", tmp_path / "anna.toml"), Persona)
-    lesson = Lesson(
+    spec = TrainingSpec(
         scene=merge,
         learner=EGO,
         personas=(anna, anna),
@@ -185,5 +185,5 @@ def test_new__is_trained(tmp_path: Path, merge: OpenScene) -> None:
         settings=settings(steps=1024),
         parts=("training", 1, "anna"),
     )
-    trained = train(lesson, tmp_path / "checkpoint.safetensors", "key", {})
+    trained = train(spec, tmp_path / "checkpoint.safetensors", "key", {})
     assert trained.progress.steps >= 1024

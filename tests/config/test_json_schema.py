@@ -172,7 +172,7 @@ def test_schema__of_a_persona_has_each_term_in_its_group() -> None:
             assert TERMS[name].meaning in node["description"]
             limited = {"weight", TERMS[name].parameter} if TERMS[name].parameter else set()
             assert set(node.get("required", ())) == limited
-    assert schema["$defs"]["Fuzzy"]["properties"]["quantity"]["enum"] == list(FUZZY_QUANTITIES)
+    assert schema["$defs"]["FuzzyTerm"]["properties"]["quantity"]["enum"] == list(FUZZY_QUANTITIES)
 
 
 # --- documents against their schemas ---

@@ -241,7 +241,10 @@ def test_persona__limits_are_written_and_read_again(write: Write) -> None:
     person = read_document(write(PERSONA + limits), Persona)
     written = person.model_dump(mode="json")
     assert Persona.model_validate(written, strict=False) == person
-    assert person.habits.sight == Sight(50.0, 0.1, 0.0, 5.0)
-    assert person.habits.reaction == Reaction((0.2, 0.3))
-    assert person.habits.uses == Uses(braking=0.5)
-    assert person.habits.missing is read_document(write(PERSONA), Persona).habits.missing
+    assert person.human_factors.sight == Sight(50.0, 0.1, 0.0, 5.0)
+    assert person.human_factors.reaction == Reaction((0.2, 0.3))
+    assert person.human_factors.uses == Uses(braking=0.5)
+    assert (
+        person.human_factors.looked_but_failed_to_see
+        is read_document(write(PERSONA), Persona).human_factors.looked_but_failed_to_see
+    )

@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.config.rule_driver import CarefulAndCompetent, EmergencyBraking, Fuzzy, Rss
+from harness.config.rule_driver import CarefulAndCompetent, EmergencyBraking, FuzzySafety, Rss
 from harness.drivers import emergency_braking
 from harness.drivers.perception import Encounters
 from harness.drivers.reaction import Alert, Manner, react
@@ -60,12 +60,14 @@ def test_proactive__is_the_published_formula() -> None:
     # v = 20, other 10: 15 + 400 / 8 - 100 / 14 + 4 = 61.857143; 15 + 400 / 12 - 100 / 14 + 2 = 43.190476
     own, other = np.array(20.0), np.array(10.0)
     gaps = np.array([61.86, 61.857143 - 0.25 * 18.666667, 43.19, 5.0])
-    np.testing.assert_allclose(emergency_braking.proactive(gaps, own, other, Fuzzy()), [0.0, 0.25, 1.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(
+        emergency_braking.proactive(gaps, own, other, FuzzySafety()), [0.0, 0.25, 1.0, 1.0], atol=1e-6
+    )
 
 
 def test_critical__is_the_published_formula() -> None:
     # v = 20, other 10, a = 0: 7.5 + 100 / 8 = 20; 7.5 + 100 / 12 = 15.833333
-    law = Fuzzy()
+    law = FuzzySafety()
     gaps = np.array([20.01, 17.916667, 15.83])
     found = emergency_braking.critical(gaps, np.array(20.0), np.array(0.0), np.array(10.0), law)
     np.testing.assert_allclose(found, [0.0, 0.5, 1.0], atol=1e-6)
@@ -76,19 +78,21 @@ def test_critical__is_the_published_formula() -> None:
 
 def test_critical__who_brakes_enough_already_is_in_danger_only_if_it_is_too_late() -> None:
     # closing 2, a = -3: v' - other = -0.25; 4 / 6 = 0.666667 m are needed
-    found = emergency_braking.critical(np.array([0.66, 0.67]), np.array(12.0), np.array(-3.0), np.array(10.0), Fuzzy())
+    found = emergency_braking.critical(
+        np.array([0.66, 0.67]), np.array(12.0), np.array(-3.0), np.array(10.0), FuzzySafety()
+    )
     np.testing.assert_array_equal(found, [1.0, 0.0])
-    assert emergency_braking.critical(np.array(0.1), np.array(9.0), np.array(0.0), np.array(10.0), Fuzzy()) == 0.0
+    assert emergency_braking.critical(np.array(0.1), np.array(9.0), np.array(0.0), np.array(10.0), FuzzySafety()) == 0.0
 
 
 def test_fuzzy__brakes_by_degrees() -> None:
     """PFS up to comfortable, CFS from comfortable to hardest."""
     own, zero = np.array([[20.0]]), np.array([[0.0]])
     for gap, braking in ((61.857143 - 0.25 * 18.666667, 1.0), (17.916667, 5.0), (10.0, 6.0)):
-        danger, demand = emergency_braking.fuzzy(meet(gap, other_mps=10.0), own, zero, Fuzzy())
+        danger, demand = emergency_braking.fuzzy(meet(gap, other_mps=10.0), own, zero, FuzzySafety())
         assert danger.all()
         assert demand[0, 0] == pytest.approx(braking, abs=1e-5)
-    assert not emergency_braking.fuzzy(meet(62.0, other_mps=10.0), own, zero, Fuzzy())[0].any()
+    assert not emergency_braking.fuzzy(meet(62.0, other_mps=10.0), own, zero, FuzzySafety())[0].any()
 
 
 def test_fuzzy__who_comes_over_too_late_is_no_danger() -> None:
@@ -96,8 +100,8 @@ def test_fuzzy__who_comes_over_too_late_is_no_danger() -> None:
     own, zero = np.array([[20.0]]), np.array([[0.0]])
     soon = meet(10.0, LANE_M, 10.0, 1.6 / 1.9)
     late = meet(10.0, LANE_M, 10.0, 1.6 / 2.0)
-    assert emergency_braking.fuzzy(soon, own, zero, Fuzzy())[0].all()
-    assert not emergency_braking.fuzzy(late, own, zero, Fuzzy())[0].any()
+    assert emergency_braking.fuzzy(soon, own, zero, FuzzySafety())[0].all()
+    assert not emergency_braking.fuzzy(late, own, zero, FuzzySafety())[0].any()
 
 
 def test_careful_and_competent__a_cut_in_is_perceived_beyond_the_wander_after_the_perception_time() -> None:
@@ -179,7 +183,7 @@ def test_more_gap__never_calls_for_harder_braking(one: float, two: float, own: f
     near, far = (meet(gap, other_mps=other) for gap in sorted((one, two)))
     mine, pushed, no = np.array([[own]]), np.array([[a]]), np.array([[False]])
     reactions: tuple[Callable[[Encounters], tuple[BoolArray, FloatArray]], ...] = (
-        lambda met: emergency_braking.fuzzy(met, mine, pushed, Fuzzy()),
+        lambda met: emergency_braking.fuzzy(met, mine, pushed, FuzzySafety()),
         lambda met: emergency_braking.rss(met, mine, Rss()),
         lambda met: emergency_braking.careful_and_competent(met, mine, no, CarefulAndCompetent()),
         lambda met: emergency_braking.emergency(met, mine, no, EmergencyBraking()) if met.gap_m[0, 0] > 0.0 else full(),
@@ -196,7 +200,7 @@ def full() -> tuple[BoolArray, FloatArray]:
 @settings(deadline=None)
 @given(gaps, speeds, speeds)
 def test_fuzzy__is_between_nothing_and_hardest(gap: float, own: float, other: float) -> None:
-    law = Fuzzy()
+    law = FuzzySafety()
     for share in (
         emergency_braking.proactive(np.array(gap), np.array(own), np.array(other), law),
         emergency_braking.critical(np.array(gap), np.array(own), np.array(0.0), np.array(other), law),
@@ -242,7 +246,7 @@ REACTIONS: dict[str, tuple[Manner, React]] = {
         lambda met, own, a, began: emergency_braking.careful_and_competent(met, own, began > 0.4, PERSON),
     ),
     "rss": (Manner(0.75, 12.65), lambda met, own, a, began: emergency_braking.rss(met, own, Rss())),
-    "fuzzy": (Manner(0.75, 12.65), lambda met, own, a, began: emergency_braking.fuzzy(met, own, a, Fuzzy())),
+    "fuzzy": (Manner(0.75, 12.65), lambda met, own, a, began: emergency_braking.fuzzy(met, own, a, FuzzySafety())),
 }
 
 # driver, lateral speed (m/s), own speed and the other's (km/h), greatest gap (m) at the start of the cut-in from which

@@ -12,7 +12,7 @@ import pytest
 
 from harness.config.campaign import LEARNED
 from harness.drivers.car import Car, car_of
-from harness.drivers.external import GivenDriver, find_driver
+from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import UsageError
 from harness.game.observation import SIZE
 from harness.game.state import EGO
@@ -49,7 +49,7 @@ def car(merge: OpenScene) -> Car:
     return car_of(merge.world, EGO)
 
 
-def find(written: str, folder: Path) -> GivenDriver:
+def find(written: str, folder: Path) -> ExternalDriver:
     return find_driver(written, folder / "campaign.toml", "ego.driver", allow_code=False)
 
 
@@ -101,7 +101,7 @@ def test_installed__two_packages_of_one_name_are_refused(site: Path, tmp_path: P
         ("steady:Stedy", "can't be made: AttributeError"),
         ("stedy:Steady", "can't be made: ModuleNotFoundError"),
         ("steady:LAYOUT", "can't be made: TypeError"),
-        ("builtins:id", "made a int without takes_over, begin, decide"),
+        ("builtins:id", "made a int without takes_over, reset, decide"),
     ],
 )
 def test_installed__what_makes_no_driver_is_named(

@@ -19,7 +19,7 @@ from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.config.driver import KINDS
 from harness.config.toml_reading import tomllib
-from harness.drivers.external import GivenDriver, find_driver
+from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy_file import write_policy
 from harness.errors import UsageError
 from harness.game.observation import LAYOUT
@@ -31,7 +31,7 @@ PERL = REPOSITORY / "egos" / "examples" / "process"
 ADAS, RSS = (REPOSITORY / "egos" / f"{name}.toml" for name in ("adas", "rss"))
 
 
-def find(written: str, folder: Path, allow_code: bool = True) -> GivenDriver:
+def find(written: str, folder: Path, allow_code: bool = True) -> ExternalDriver:
     return find_driver(written, folder / "campaign.toml", "ego.driver", allow_code)
 
 

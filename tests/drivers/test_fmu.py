@@ -95,10 +95,10 @@ def expected(car: Car, seen: np.ndarray, before: np.ndarray, time_gap_s: float) 
 def test_fmu__sees_units_keeps_a_state_for_each_game_and_forgets_it(fmi: int, twins: dict[int, Path], car: Car) -> None:
     driver = fmu_driver(document(start={"time_gap_s": 1.8}), twins[fmi], car)
     random, before = np.random.default_rng(1), np.zeros(3)
-    driver.begin(GAMES)
+    driver.reset(GAMES)
     for step in range(6):
         if step == 4:
-            driver.begin(GAMES[1:2])
+            driver.reset(GAMES[1:2])
             before[1] = 0.0
         view = random.uniform(-1.0, 1.0, (3, SIZE)).astype(np.float32)
         view[:, LAYOUT.index("other0_seen")] = [0.0, 1.0, 1.0]
@@ -186,12 +186,12 @@ def test_fmu__native_code_that_fails_costs_a_game_and_not_the_process(
     )
     driver = fmu_driver(document(deadline_s=0.5), file, car)
     view = np.zeros((1, SIZE), dtype=np.float32)
-    driver.begin(GAMES[:1])
+    driver.reset(GAMES[:1])
     driver.decide(GAMES[:1], view, np.zeros((1, 2)))
     view[0, LAYOUT.index("speed_mps")] = 0.5
     with pytest.raises(DriverError, match=said):
         driver.decide(GAMES[:1], view, np.zeros((1, 2)))
-    driver.begin(GAMES[:1])
+    driver.reset(GAMES[:1])
     assert driver.decide(GAMES[:1], 0.0 * view, np.zeros((1, 2))).shape == (1, 2)
 
 
@@ -203,16 +203,16 @@ def test_fmu__that_plays_one_game_at_a_time_says_so(tmp_path: Path, car: Car, tw
             single.writestr(name, content.replace(b"<CoSimulation ", once) if name.endswith(".xml") else content)
     driver = fmu_driver(document(), tmp_path / "single.fmu", car)
     for _ in range(2):  # one after the other is well
-        driver.begin(GAMES[:1])
+        driver.reset(GAMES[:1])
         driver.decide(GAMES[:1], np.zeros((1, SIZE), dtype=np.float32), np.zeros((1, 2)))
     with pytest.raises(DriverError, match=r"one game at a time only: give the campaign training\.games = 1"):
-        driver.begin(GAMES)
+        driver.reset(GAMES)
 
 
 def test_fmu__an_error_status_is_named(tmp_path: Path, car: Car) -> None:
     build = example()
     source = build.SOURCE.read_text().replace("step(twin, step_s);\n    return fmi2OK;", "return fmi2Error;")
     driver = fmu_driver(document(), build.build(tmp_path / "failing.fmu", 2, source), car)
-    driver.begin(GAMES)
+    driver.reset(GAMES)
     with pytest.raises(DriverError, match=r"failing\.fmu reports an error: .*fmi2DoStep"):
         driver.decide(GAMES, np.zeros((3, SIZE), dtype=np.float32), np.zeros((3, 2)))

@@ -18,11 +18,11 @@ from harness.environments.arena import Arena, Seat
 from harness.environments.rollout import Arm, Game, assess
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.attention import Attention, Habits
-from harness.game.initial_state import Start, draw_start
+from harness.game.attention import Attention, HumanFactors
+from harness.game.initial_state import InitialState, draw_initial_state
 from harness.traffic.scene import OpenScene, open_scene
 
-TEXTING = Habits(Attention(2.0, (1.0, 2.0), 0.02))
+TEXTING = HumanFactors(Attention(2.0, (1.0, 2.0), 0.02))
 
 
 class Steady:
@@ -35,7 +35,7 @@ class Steady:
         self.begun: list[int] = []
         self.asked: set[int] = set()
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         self.begun += games.tolist()
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
@@ -53,9 +53,11 @@ def people(repository: Any) -> dict[str, Persona]:
     return {name: read_document(repository / f"personas/{name}.toml", Persona) for name in ("careful", "speedy")}
 
 
-def mixed_starts(merge: OpenScene, shares: list[float], games: int) -> list[Start]:
-    chances = merge.chances([Habits(), [Habits(), TEXTING]], [1.0, 1.0], [[1.0], shares])
-    return [draw_start(chances, "test", 1, "episode", k) for k in range(games)]
+def mixed_starts(merge: OpenScene, shares: list[float], games: int) -> list[InitialState]:
+    start_distribution = merge.start_distribution(
+        [HumanFactors(), [HumanFactors(), TEXTING]], [1.0, 1.0], [[1.0], shares]
+    )
+    return [draw_initial_state(start_distribution, "test", 1, "episode", k) for k in range(games)]
 
 
 def test_mixture__is_drawn_by_its_shares(merge: OpenScene) -> None:
@@ -72,9 +74,9 @@ def test_mixture__each_has_its_own_habits(merge: OpenScene) -> None:
 
 
 def test_mixture__a_game_starts_as_with_one_driver(merge: OpenScene) -> None:
-    alone = merge.chances([Habits(), TEXTING], [1.0, 1.0])
+    alone = merge.start_distribution([HumanFactors(), TEXTING], [1.0, 1.0])
     for k, mixed in enumerate(mixed_starts(merge, [1.0, 1.0], 20)):
-        one = draw_start(alone, "test", 1, "episode", k)
+        one = draw_initial_state(alone, "test", 1, "episode", k)
         for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "noise", "seed", "present"):
             assert np.array_equal(getattr(one, name), getattr(mixed, name))
         if mixed.member[1] == 1:
@@ -88,7 +90,7 @@ def test_arena__asks_in_each_game_the_driver_whose_it_is(merge: OpenScene, peopl
         starts = dict(enumerate(mixed_starts(merge, [1.0, 1.0], 8)))
         whose = np.array([starts[game].member[1] for game in range(8)])
         assert 0 < whose.sum() < 8
-        arena.start(starts)
+        arena.reset(starts)
         before = arena.state.speed_mps[:, 1].copy()
         arena.step()
         attends = ~arena.state.lapsed[:, 1]
@@ -116,8 +118,10 @@ def test_assess__plays_each_episode_as_its_member_alone_would(merge: OpenScene, 
         records(list(assess(Arm("alone", merge, (Steady(0.0), each.driver), (careful, each.persona), 1), 6)))
         for each in members
     ]
-    chances = merge.chances([Habits(), [each.persona.habits for each in members]], [1.0, 1.0], [[1.0], [1.0, 1.0]])
-    whose = [draw_start(chances, "assessment", 1, "episode", k).member[1] for k in range(6)]
+    start_distribution = merge.start_distribution(
+        [HumanFactors(), [each.persona.human_factors for each in members]], [1.0, 1.0], [[1.0], [1.0, 1.0]]
+    )
+    whose = [draw_initial_state(start_distribution, "assessment", 1, "episode", k).member[1] for k in range(6)]
     assert set(whose) == {0, 1}
     assert records(list(assess(mixed, 6))) == [alone[member][k] for k, member in enumerate(whose)]
 
@@ -146,8 +150,12 @@ def test_by_who_drove__is_who_did(merge: OpenScene, people: dict[str, Persona]) 
     episodes = typed(played.reindex(columns=list(EPISODE_COLUMNS)))
     campaign = Campaign(name="any", scene="any", personas=["any"], population=[Population(name="town", shares=shares)])
     found = by_who_drove(campaign, episodes).set_index("persona")
-    chances = merge.chances([Habits(), [Habits(), Habits()]], [1.0, 1.0], [[1.0], [1.0, 1.0]])
-    drove = [list(shares)[draw_start(chances, "assessment", 3, "episode", k).member[1]] for k in range(8)]
+    start_distribution = merge.start_distribution(
+        [HumanFactors(), [HumanFactors(), HumanFactors()]], [1.0, 1.0], [[1.0], [1.0, 1.0]]
+    )
+    drove = [
+        list(shares)[draw_initial_state(start_distribution, "assessment", 3, "episode", k).member[1]] for k in range(8)
+    ]
     assert set(drove) == set(shares)
     for name in shares:
         theirs = episodes[[who == name for who in drove]]

@@ -36,7 +36,7 @@ for number, line in enumerate(sys.stdin):
     message = json.loads(line)
     games = message.get("games", [])
     decided = {{"actions": [[1.0, 0.01]] * len(games)}}
-    answer = {{"hello": {{"protocol": 1}}, "begin": {{}}, "decide": decided}}[message["type"]]
+    answer = {{"hello": {{"protocol": 2}}, "reset": {{}}, "decide": decided}}[message["type"]]
     {change}
     print(json.dumps(answer), flush=True)
 """
@@ -57,7 +57,7 @@ def driver(
 
 def refusal(driver: ProcessDriver) -> str:
     def drive() -> None:
-        driver.begin(GAMES)
+        driver.reset(GAMES)
         driver.decide(GAMES, SEEN, NOISE)
 
     with pytest.raises(DriverError) as caught:
@@ -75,7 +75,7 @@ def is_running(pid: int) -> bool:
 def test_process__is_told_all_it_needs_and_asks_in_units(tmp_path: Path, car: Car) -> None:
     tells = 'open("heard.jsonl", "a").write(line)'
     mine = driver(tmp_path, car, tells)
-    mine.begin(GAMES)
+    mine.reset(GAMES)
     actions = mine.decide(GAMES, SEEN, NOISE)
     np.testing.assert_array_equal(actions, car.asked(np.array([1.0, 1.0]), np.array([0.01, 0.01]), SEEN))
 
@@ -84,7 +84,7 @@ def test_process__is_told_all_it_needs_and_asks_in_units(tmp_path: Path, car: Ca
     assert hello["step_s"] == 0.1
     assert hello["limits"]["max_braking_mps2"] == 8.0
     assert hello["limits"]["length_m"] == 4.6
-    assert begin == {"type": "begin", "games": [3, 7]}
+    assert begin == {"type": "reset", "games": [3, 7]}
     assert decide["games"] == [3, 7]
     np.testing.assert_array_equal(decide["observation"], car.seen(SEEN))
     np.testing.assert_array_equal(decide["noise"], NOISE)
@@ -93,7 +93,7 @@ def test_process__is_told_all_it_needs_and_asks_in_units(tmp_path: Path, car: Ca
 def test_process__may_see_and_act_as_policies_do(tmp_path: Path, car: Car) -> None:
     change = 'if games and message["type"] == "decide": answer["actions"] = [row[:2] for row in message["observation"]]'
     mine = driver(tmp_path, car, change, units="scaled")
-    mine.begin(GAMES)
+    mine.reset(GAMES)
     np.testing.assert_array_equal(mine.decide(GAMES, SEEN, NOISE), SEEN[:, :2])
 
 
@@ -113,7 +113,7 @@ def test_process__may_see_and_act_as_policies_do(tmp_path: Path, car: Car) -> No
         ("if number == 2: answer['actions'][1] = [float('nan'), 0]", "is not finite"),
         ("if number == 2: answer['actions'][1] = [10**400, 0]", "too large"),
         ("if number == 2: answer = {'error': 'no such lane'}", "reports an error: 'no such lane'"),
-        ("if number == 0: answer = {'protocol': 2}", "does not speak protocol 1"),
+        ("if number == 0: answer = {'protocol': 1}", "does not speak protocol 2"),
         ("if number == 1: print('{}', flush=True)", "answered"),
         ("if number == 2: os.write(1, b'[' * 11_000_000)", "answers with more than 10,000,000 bytes"),
     ],
@@ -125,7 +125,7 @@ def test_process__what_is_no_answer_is_named(change: str, said: str, tmp_path: P
 @pytest.mark.parametrize("change", ["time.sleep(600)", "os.write(1, b'{'); time.sleep(600)", "any(iter(int, 1))"])
 def test_process__a_late_answer_is_not_waited_for(change: str, tmp_path: Path, car: Car) -> None:
     mine = driver(tmp_path, car, f"if number == 2: {change}", deadline_s=0.3)
-    mine.begin(GAMES)
+    mine.reset(GAMES)
     began = time.monotonic()
     with pytest.raises(DriverError, match=r"did not answer within 0.3 s \(asked: decide\)"):
         mine.decide(GAMES, SEEN, NOISE)
@@ -135,34 +135,34 @@ def test_process__a_late_answer_is_not_waited_for(change: str, tmp_path: Path, c
 def test_process__who_never_reads_is_late_however_much_there_is_to_say(tmp_path: Path, car: Car) -> None:
     many = np.arange(500)
     mine = driver(tmp_path, car, "if number == 1: print('{}', flush=True); time.sleep(600)", deadline_s=0.3)
-    mine.begin(many)
+    mine.reset(many)
     with pytest.raises(DriverError, match="did not answer within"):
         mine.decide(many, np.zeros((500, SIZE), dtype=np.float32), np.zeros((500, 2)))
 
 
 def test_process__many_games_fit_through_the_pipes(tmp_path: Path, car: Car) -> None:
     many, mine = np.arange(1000), driver(tmp_path, car)
-    mine.begin(many)
+    mine.reset(many)
     assert mine.decide(many, np.zeros((1000, SIZE), dtype=np.float32), np.zeros((1000, 2))).shape == (1000, 2)
 
 
 def test_process__may_talk_on_its_standard_error_as_much_as_it_likes(tmp_path: Path, car: Car) -> None:
     mine = driver(tmp_path, car, "sys.stderr.write('blah ' * 100_000 + chr(10)); sys.stderr.flush()")
     for _ in range(3):
-        mine.begin(GAMES)
+        mine.reset(GAMES)
         mine.decide(GAMES, SEEN, NOISE)
 
 
 def test_process__that_cannot_be_started_is_named(tmp_path: Path, car: Car) -> None:
     mine = ProcessDriver(["./nowhere"], tmp_path, car, "si", 1.0, 5.0)
     with pytest.raises(DriverError, match=r"\./nowhere ended with exit code 1.*FileNotFoundError"):
-        mine.begin(GAMES)
+        mine.reset(GAMES)
 
 
 def started(tmp_path: Path, car: Car, change: str = "pass") -> tuple[ProcessDriver, int]:
     """A driver that has begun, and its program's process id."""
     mine = driver(tmp_path, car, f'open("pid", "w").write(str(os.getpid())); {change}')
-    mine.begin(GAMES)
+    mine.reset(GAMES)
     return mine, int((tmp_path / "pid").read_text())
 
 
@@ -204,8 +204,8 @@ def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car:
     """The second game's program dies in its fourth decision; every other game is played, by a new one."""
     counts = (
         "path = os.path.join(os.getcwd(), 'games'); n = (len(open(path).read()) if os.path.exists(path) else 0);"
-        "message['type'] == 'begin' and open(path, 'a').write('x');"
-        "globals().__setitem__('steps', 0 if message['type'] == 'begin' else globals().get('steps', 0) + 1);"
+        "message['type'] == 'reset' and open(path, 'a').write('x');"
+        "globals().__setitem__('steps', 0 if message['type'] == 'reset' else globals().get('steps', 0) + 1);"
         "n == 2 and message['type'] == 'decide' and steps == 4 and sys.exit('flat tyre')"
     )
     mine, careful = driver(tmp_path, car, counts), read_document(CAREFUL, Persona)

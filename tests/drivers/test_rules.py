@@ -20,13 +20,13 @@ from harness.drivers.adaptive_cruise import cruise_mps2, in_way, speed_aimed_at_
 from harness.drivers.car import Car, car_of
 from harness.drivers.external import find_driver
 from harness.drivers.lane_keeping import steering_rad
-from harness.drivers.perception import Encounters, View, look
+from harness.drivers.perception import Encounters, OwnMotion, look
 from harness.drivers.protocol import Driver
 from harness.drivers.rules import UNKNOWN_LIMIT_MPS, RulesDriver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
-from harness.game.bicycle import drive, lateral_acceleration_mps2, requests
+from harness.game.bicycle import lateral_acceleration_mps2, move, requests
 from harness.game.observation import AHEAD_M, LAYOUT, SIZE
 from harness.game.state import EGO, State
 from harness.traffic.scene import OpenScene, open_scene
@@ -215,7 +215,7 @@ def _cruise(gap_m: float, own_mps: float, other_mps: float, before_mps2: float |
     columns = (gap_m + 4.6, gap_m, 0.0, -1.8, other_mps, 0.0, 4.6)
     met = Encounters(np.array([[True]]), *(nothing + column for column in columns))
     own = np.array([own_mps])
-    view = View(own, np.array([13.89]), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, len(AHEAD_M))))
+    view = OwnMotion(own, np.array([13.89]), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, len(AHEAD_M))))
     step_s = 1000.0 if before_mps2 is None else 0.1
     return float(cruise_mps2(view, met, view.limit_mps, np.array([before_mps2 or 0.0]), Cruise(), step_s)[0])
 
@@ -229,7 +229,7 @@ def test_steering__by_hand() -> None:
     law = LaneKeeping(max_lateral_mps2=6.0, max_lateral_jerk_mps3=20.0)
     for turned, expected in ((0.0, 0.0299910), (0.1, 0.05 + np.arctan(0.03 * (1.0 + 1.35 * np.sin(0.1))))):
         along = np.full((1, len(AHEAD_M)), turned)
-        view = View(np.array([9.0]), np.array([13.9]), np.zeros(1), np.array([expected]), np.ones(1), along)
+        view = OwnMotion(np.array([9.0]), np.array([13.9]), np.zeros(1), np.array([expected]), np.ones(1), along)
         assert steering_rad(view, law, 2.7, 0.1)[0] == pytest.approx(expected, abs=1e-6)
 
 
@@ -245,7 +245,7 @@ def test_steering__brings_the_car_onto_its_path_and_keeps_it_there(car: Car, spe
         seen, _ = look(car, view)
         action = car.asked(np.zeros(1), steering_rad(seen, law, 2.7, car.step_s), view)
         acceleration, steering = requests(action[:, None], state.speed_mps, actuators)
-        drive(state, acceleration, steering, np.ones((1, 1), dtype=bool), actuators, car.step_s)
+        move(state, acceleration, steering, np.ones((1, 1), dtype=bool), actuators, car.step_s)
         offsets.append(float(state.y_m[0, 0]))
         lateral.append(float(lateral_acceleration_mps2(state, actuators)[0, 0]))
     assert max(abs(each) for each in offsets[-50:]) < 0.05
@@ -270,7 +270,7 @@ def decided(driver: RulesDriver, car: Car, *views: np.ndarray, game: int = 0) ->
 def begun(document: Rules, car: Car, games: int = 1) -> RulesDriver:
     driver = RulesDriver(document, car)
     assert isinstance(driver, Driver)
-    driver.begin(np.arange(games))
+    driver.reset(np.arange(games))
     return driver
 
 
@@ -303,7 +303,7 @@ def test_driver__remembers_each_game_by_itself(car: Car) -> None:
     decided(driver, car, *[danger] * 15, game=2)
     assert decided(driver, car, danger, game=2)[0] < -7.0
     assert decided(driver, car, danger, game=0)[0] == 0.0
-    driver.begin(np.array([2]))
+    driver.reset(np.array([2]))
     assert decided(driver, car, danger, game=2)[0] == 0.0
 
 

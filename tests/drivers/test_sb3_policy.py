@@ -19,7 +19,7 @@ from harness.config.driver import StableBaselines3
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.external import find_driver
-from harness.drivers.sb3_policy import SavedDriver
+from harness.drivers.sb3_policy import Sb3Driver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
 from harness.game.observation import SIZE
@@ -66,7 +66,7 @@ def document(algorithm: str, **keys: Any) -> StableBaselines3:
 def test_saved__drives_as_its_own_library_would(name: str, saved: dict[str, Path]) -> None:
     model = getattr(stable_baselines3, name).load(saved[name], device="cpu")
     expected, _ = model.predict(SEEN, deterministic=True)
-    driver = SavedDriver(document(name), saved[name], sampled=False)
+    driver = Sb3Driver(document(name), saved[name], sampled=False)
     actions = driver.decide(GAMES, SEEN, NOISE)
     assert actions.shape == (20, 2)
     np.testing.assert_allclose(actions, expected, atol=1e-6)
@@ -76,7 +76,7 @@ def test_saved__drives_as_its_own_library_would(name: str, saved: dict[str, Path
 @pytest.mark.parametrize("name", ["PPO", "A2C", "SAC"])
 def test_saved__varies_by_the_noise_it_is_given_and_its_own_deviation(name: str, saved: dict[str, Path]) -> None:
     policy = getattr(stable_baselines3, name).load(saved[name], device="cpu").policy
-    driver = SavedDriver(document(name), saved[name], sampled=True)
+    driver = Sb3Driver(document(name), saved[name], sampled=True)
     with torch.no_grad():
         seen = torch.from_numpy(SEEN)
         if name == "SAC":
@@ -88,19 +88,19 @@ def test_saved__varies_by_the_noise_it_is_given_and_its_own_deviation(name: str,
     np.testing.assert_allclose(driver.decide(GAMES, SEEN, NOISE), expected, atol=1e-5)
     likeliest = driver.decide(GAMES, SEEN, 0.0 * NOISE)
     np.testing.assert_allclose(
-        likeliest, SavedDriver(document(name), saved[name], False).decide(GAMES, SEEN, NOISE), atol=1e-5
+        likeliest, Sb3Driver(document(name), saved[name], False).decide(GAMES, SEEN, NOISE), atol=1e-5
     )
 
 
 def test_saved__a_policy_that_does_not_vary_is_not_sampled(saved: dict[str, Path]) -> None:
     with pytest.raises(UsageError, match="TD3's policies don't vary"):
-        SavedDriver(document("TD3"), saved["TD3"], sampled=True)
+        Sb3Driver(document("TD3"), saved["TD3"], sampled=True)
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_saved__plays_games(name: str, saved: dict[str, Path], merge: OpenScene) -> None:
     careful = read_document(CAREFUL, Persona)
-    driver = SavedDriver(document(name), saved[name], sampled=False)
+    driver = Sb3Driver(document(name), saved[name], sampled=False)
     (game,) = assess(Arm("naive_alone", merge, (driver, None), (careful, careful), 1), 1)
     assert game.record["error"] == ""
 
@@ -130,20 +130,20 @@ def test_saved__what_was_trained_on_something_else_is_refused(
     file = tmp_path / "PPO.zip"
     stable_baselines3.PPO("MlpPolicy", Other(*spaces), n_steps=8, batch_size=8, device="cpu").save(file)
     with pytest.raises(UsageError) as caught:
-        SavedDriver(document("PPO"), file, sampled=False)
+        Sb3Driver(document("PPO"), file, sampled=False)
     assert said in str(caught.value)
 
 
 @pytest.mark.parametrize(("name", "taken_for"), [("SAC", "PPO"), ("PPO", "TD3"), ("TD3", "SAC")])
 def test_saved__the_wrong_algorithm_is_named(name: str, taken_for: str, saved: dict[str, Path]) -> None:
     with pytest.raises(UsageError, match=f"can't be read as a policy of {taken_for}.*is the algorithm right"):
-        SavedDriver(document(taken_for), saved[name], sampled=False)
+        Sb3Driver(document(taken_for), saved[name], sampled=False)
 
 
 def test_saved__what_is_no_zip_is_refused(tmp_path: Path) -> None:
     (tmp_path / "PPO.zip").write_bytes(b"PK nothing")
     with pytest.raises(UsageError, match="can't be read as a policy of PPO"):
-        SavedDriver(document("PPO"), tmp_path / "PPO.zip", sampled=False)
+        Sb3Driver(document("PPO"), tmp_path / "PPO.zip", sampled=False)
 
 
 class Trap:
@@ -172,6 +172,6 @@ def test_saved__nothing_is_read_without_leave(tmp_path: Path) -> None:
     allowed = find_driver("mine.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=True)
     assert not touched.exists(), "finding it is not reading it"
     with pytest.raises(UsageError):
-        SavedDriver(document("PPO"), file, sampled=False)
+        Sb3Driver(document("PPO"), file, sampled=False)
     assert touched.exists(), "and so the trap is one"
     assert allowed.files == {str(file): allowed.files[str(file)]}

@@ -15,7 +15,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat, Step
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.initial_state import Start
+from harness.game.initial_state import InitialState
 from harness.game.observation import LAYOUT, SIZE
 from harness.game.payoff import Payoff
 from harness.game.state import Outcome
@@ -76,8 +76,8 @@ def opened(payoff: Payoff) -> Iterator[Open]:
     assert not libsumo.isLoaded()
 
 
-def begun(arena: Arena, start: Start, *others: Departure) -> Arena:
-    arena.start({0: start}, {0: list(others)})
+def begun(arena: Arena, start: InitialState, *others: Departure) -> Arena:
+    arena.reset({0: start}, {0: list(others)})
     return arena
 
 
@@ -122,13 +122,13 @@ def test_step__sumo_has_the_players_where_the_arena_has_them(merge: OpenScene, o
 def test_tiles__a_game_evolves_as_it_does_alone(merge: OpenScene, opened: Open) -> None:
     actions = np.random.default_rng(0).normal(0.05, 0.1, (100, 2, 2))
     together = opened(merge, 4)
-    together.start({game: drawn(merge, "tile", game) for game in range(4)})
+    together.reset({game: drawn(merge, "tile", game) for game in range(4)})
     four = [(s.payoff.copy(), together.observation.copy()) for s in (together.step(np.array([a] * 4)) for a in actions)]
     together.close()
     alone = opened(merge)
     for game in range(4):
         alone.reload(7)
-        alone.start({0: drawn(merge, "tile", game)})
+        alone.reset({0: drawn(merge, "tile", game)})
         for action, (payoffs, observations) in zip(actions, four, strict=True):
             step = alone.step(action[None])
             np.testing.assert_allclose(step.payoff[0], payoffs[game], atol=1e-9)
@@ -137,12 +137,12 @@ def test_tiles__a_game_evolves_as_it_does_alone(merge: OpenScene, opened: Open) 
 
 def test_start__in_place_restarts_one_game_and_leaves_the_others_alone(merge: OpenScene, opened: Open) -> None:
     arena, start = opened(merge, 2), drawn(merge, "restart")
-    arena.start({0: start, 1: drawn(merge, "goes on")})
+    arena.reset({0: start, 1: drawn(merge, "goes on")})
     first = arena.observation[0].copy()
     actions = np.random.default_rng(0).normal(0.0, 0.05, (20, 2, 2, 2))
     seen = [(arena.step(action), arena.observation[0].copy())[1] for action in actions]
     before = arena.observation[1].copy()
-    arena.start({0: start})
+    arena.reset({0: start})
     np.testing.assert_array_equal(arena.observation[0], first)
     np.testing.assert_array_equal(arena.observation[1], before)
     for action, expected in zip(actions, seen, strict=True):
@@ -324,7 +324,7 @@ def test_drivers__see_exactly_what_learners_see(merge: OpenScene, opened: Open) 
     class Watching:
         takes_over = True
 
-        def begin(self, games: IntArray) -> None:
+        def reset(self, games: IntArray) -> None:
             told.clear()
 
         def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
@@ -352,7 +352,7 @@ def test_soak__random_driving_among_others_keeps_every_promise(tmp_path: Any, op
     arena, generator, ended = opened(scene, 4), np.random.default_rng(0), []
     waiting = list(range(4))
     for k in range(800):
-        arena.start(
+        arena.reset(
             {game: drawn(scene, k, game) for game in waiting}, {game: scene.departures(generator) for game in waiting}
         )
         running = arena.state.running.copy()

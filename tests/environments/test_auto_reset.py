@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.environments.arena import Arena, Seat
-from harness.environments.auto_reset import NextGames
-from harness.game.attention import Habits
-from harness.game.initial_state import Start, draw_start
+from harness.environments.auto_reset import AutoReset
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
@@ -29,9 +29,9 @@ class _Started:
 
     def __init__(self, scene: OpenScene) -> None:
         self.scene = scene
-        self.games_started: list[tuple[int, Start, list[Departure]]] = []
+        self.games_started: list[tuple[int, InitialState, list[Departure]]] = []
 
-    def start(self, starts: Mapping[int, Start], departures: Mapping[int, list[Departure]]) -> None:
+    def reset(self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]]) -> None:
         self.games_started += [(tile, start, departures[tile]) for tile, start in starts.items()]
 
 
@@ -42,28 +42,28 @@ def scene(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
 
 @given(order=st.lists(st.sets(st.integers(0, TILES - 1), min_size=1), max_size=12))
 def test_games__are_each_tiles_own_in_their_order_whoever_else_starts(scene: OpenScene, order: list[set[int]]) -> None:
-    chances = scene.chances([Habits(), Habits()], [1.0, 0.5])
+    start_distribution = scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 0.5])
     arena = _Started(scene)
-    games = NextGames(arena, chances, "a", 1)  # type: ignore[arg-type]
+    games = AutoReset(arena, start_distribution, "a", 1)  # type: ignore[arg-type]
     for tiles in order:
-        games.start(tiles)
+        games.reset(tiles)
     assert [tile for tile, *_ in arena.games_started] == [tile for tiles in order for tile in tiles]
     had = [0] * TILES
     for tile, start, departures in arena.games_started:
         parts = ("a", 1, tile, had[tile])
         had[tile] += 1
-        alone = draw_start(chances, *parts)
+        alone = draw_initial_state(start_distribution, *parts)
         assert start.parts == parts
         assert np.array_equal(start.position_m, alone.position_m)
         assert np.array_equal(start.present, alone.present)
         assert np.array_equal(start.noise, alone.noise)
-        assert departures == (scene.departures(generator_of(*parts, "others")) if scene.has_others else [])
+        assert departures == (scene.departures(generator_of(*parts, "others")) if scene.has_background_traffic else [])
 
 
 def test_games__start_in_the_arena(scene: OpenScene) -> None:
     arena = Arena(scene, TILES, [Seat(None), Seat(None)])
     try:
-        NextGames(arena, scene.chances([Habits(), Habits()], [1.0, 1.0]), "a").start([2])
+        AutoReset(arena, scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0]), "a").reset([2])
         assert arena.state.present.tolist() == [[game == 2] * 2 for game in range(TILES)]
     finally:
         arena.close()

@@ -23,7 +23,7 @@ class Good:
     def __init__(self) -> None:
         self.steps: dict[int, int] = {}
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         self.steps |= dict.fromkeys(games.tolist(), 0)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
@@ -70,7 +70,7 @@ class Raising(Good):
 class Forgetful(Good):
     """Never forgets: its second game is driven on."""
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         for game in games.tolist():
             self.steps.setdefault(game, 0)
 
@@ -87,7 +87,7 @@ class Dicing(Good):
 class Sharing(Good):
     """One memory for all its games."""
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         self.steps = {-1: 0}
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
@@ -138,7 +138,7 @@ for line in sys.stdin:
     message = json.loads(line)
     step += 1
     decided = {{"actions": [[0, 0]] * len(message.get("games", []))}}
-    answer = {{"hello": {{"protocol": 1}}, "begin": {{}}, "decide": decided}}[message["type"]]
+    answer = {{"hello": {{"protocol": 2}}, "reset": {{}}, "decide": decided}}[message["type"]]
     {change}
     print(json.dumps(answer), flush=True)
 """)

@@ -24,11 +24,11 @@ from harness import Arena, ArenaVecEnv, DrivingEnv, ParallelDrivingEnv, Seat, Us
 from harness.config.persona import Persona
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.sumo import SumoDriver
-from harness.game.attention import Habits
+from harness.game.attention import HumanFactors
 from harness.game.observation import LAYOUT
-from harness.traffic.libsumo_simulation import LocalSimulation
+from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene
-from harness.traffic.subprocess_simulation import RemoteSimulation
+from harness.traffic.subprocess_simulation import SubprocessSimulation
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
 
@@ -145,7 +145,7 @@ def test_docstring__names_every_entry_of_the_observation() -> None:
 def test_seed__the_same_seed_gives_the_same_games_in_this_process_and_another(opened: Open, busy: OpenScene) -> None:
     environments = [opened(DrivingEnv, busy, other="sumo") for _ in range(2)]
     kinds = [type(each._game.arena.simulation) for each in environments]
-    assert kinds == [LocalSimulation, RemoteSimulation]
+    assert kinds == [LibsumoSimulation, SubprocessSimulation]
 
     def games(environment: DrivingEnv) -> list[Any]:
         first = [environment.reset(seed=5)[0], played(environment)]
@@ -312,11 +312,13 @@ def test_sb3__trains_beside_an_eval_callback_in_the_same_process(opened: Open, k
         scene = open_scene(REPOSITORY / "networks/merge")
         careful = read_document(REPOSITORY / "personas/careful.toml", Persona)
         arena = Arena(scene, 4, [Seat(None, careful.payoff), Seat(SumoDriver())])
-        training = opened(ArenaVecEnv, arena, 0, scene.chances([Habits(), Habits()], [1.0, 1.0]), "test")
+        training = opened(
+            ArenaVecEnv, arena, 0, scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0]), "test"
+        )
     else:
         training = opened(DummyVecEnv, [lambda: Monitor(DrivingEnv())])
     judging = opened(Monitor, DrivingEnv(other="sumo"))
-    assert isinstance(judging.unwrapped._game.arena.simulation, RemoteSimulation)
+    assert isinstance(judging.unwrapped._game.arena.simulation, SubprocessSimulation)
     callback = EvalCallback(judging, n_eval_episodes=2, eval_freq=256 // training.num_envs, verbose=0, warn=False)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Training and eval env are not of the same type")

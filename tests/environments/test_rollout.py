@@ -33,7 +33,7 @@ class Steady:
 
     takes_over = True
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Nothing to forget."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
@@ -46,7 +46,7 @@ class Failing(Steady):
     def __init__(self, error: Exception) -> None:
         self.error, self.games, self.steps = error, 0, 0
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         self.games, self.steps = self.games + 1, 0
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:

@@ -27,8 +27,8 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.game.attention import Habits
-from harness.game.initial_state import Chances, draw_start
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.game.state import Outcome
 from harness.traffic.scene import OpenScene, open_scene
@@ -91,14 +91,16 @@ class Counting:
         persona = read_document(PERSONA, Persona)
         seats = [Seat(None, persona.payoff), Seat(SumoDriver() if sumo_drives else None, persona.payoff)]
         self.arena = Arena(scene, games, seats, seed=1)
-        self._chances: Chances = scene.chances(
-            [Habits()] * 2, [1.0, 1.0]
+        self._start_distribution: StartDistribution = scene.start_distribution(
+            [HumanFactors()] * 2, [1.0, 1.0]
         )  # always attentive: nobody drifts off the road
         self._coast = np.zeros((games, 2, 2))
 
     def start(self, *games: int) -> None:
         departures = {game: self.arena.scene.departures(generator_of(1)) for game in games}
-        self.arena.start({game: draw_start(self._chances, "cost", game) for game in games}, departures)
+        self.arena.reset(
+            {game: draw_initial_state(self._start_distribution, "cost", game) for game in games}, departures
+        )
 
     def steps(self, count: int = STEPS) -> None:
         for _ in range(count):

@@ -493,7 +493,7 @@ class Scripted:
     def __init__(self, wheel: Sequence[float]) -> None:
         self._wheel, self._step = wheel, 0
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         self._step = 0
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from harness.evaluation import metrics
-from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, Drive
+from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
 from harness.evaluation.tables import EPISODE_COLUMNS
 from harness.game.state import Outcome
 
 INF = np.inf
 
 
-def drive(**changes: Any) -> Drive:
+def drive(**changes: Any) -> PlayerSeries:
     """Four steps of 0.5 s."""
     series: dict[str, Any] = {
         "speed_mps": [10.0, 12.0, 11.0, 3.0],
@@ -26,7 +26,7 @@ def drive(**changes: Any) -> Drive:
         "payoff": [0.25, 0.5, -1.0, 5.0],
     }
     outcome = changes.pop("outcome", Outcome.GOAL)
-    return Drive(outcome, 0.5, **{name: np.array(values) for name, values in {**series, **changes}.items()})
+    return PlayerSeries(outcome, 0.5, **{name: np.array(values) for name, values in {**series, **changes}.items()})
 
 
 def test_metrics__by_hand() -> None:
@@ -71,7 +71,7 @@ def test_max_deceleration__who_never_slowed_braked_by_zero() -> None:
 
 
 def test_metrics__of_no_steps_are_unscored() -> None:
-    empty = drive(**{name: [] for name in Drive.__dataclass_fields__ if name not in ("outcome", "step_s")})
+    empty = drive(**{name: [] for name in PlayerSeries.__dataclass_fields__ if name not in ("outcome", "step_s")})
     assert metrics.mean_speed_mps(empty) is None
     assert metrics.max_deceleration_mps2(empty) is None
     assert metrics.max_lateral_acceleration_mps2(empty) is None

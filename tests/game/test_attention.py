@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.game.arrays import BoolArray
-from harness.game.attention import Attention, Lapses, Overlooking, draw_lapses, overlooked_m
+from harness.game.attention import Attention, Lapses, NoBlindSpotCheck, draw_lapses, unseen_behind_m
 
 TEXTING = Attention(mean_attentive_s=10.0, lapse_s=(4.0, 6.0), bumps_rad=0.01)
 
@@ -98,11 +98,11 @@ def test_lapses__are_apart_and_within_the_range(
 
 
 def test_overlooking__in_its_share_of_the_drives() -> None:
-    drawn = [overlooked_m(Overlooking(0.75, 1.0), luck) for luck in np.random.default_rng(1).random(2000)]
+    drawn = [unseen_behind_m(NoBlindSpotCheck(0.75, 1.0), luck) for luck in np.random.default_rng(1).random(2000)]
     assert set(drawn) == {1.0, -np.inf}
     # standard error sqrt(0.75 * 0.25 / 2000) = 0.0097
     assert np.mean(np.isfinite(drawn)) == pytest.approx(0.75, abs=4 * 0.0097)
 
 
 def test_overlooking__never_without_the_habit() -> None:
-    assert overlooked_m(Overlooking(), 0.0) == -np.inf
+    assert unseen_behind_m(NoBlindSpotCheck(), 0.0) == -np.inf

@@ -12,8 +12,8 @@ from harness.game.bicycle import (
     GRAVITY_MPS2,
     Actuators,
     curvature_per_m,
-    drive,
     lateral_acceleration_mps2,
+    move,
     requests,
     steering_range_rad,
 )
@@ -45,7 +45,7 @@ def state_of(speed_mps: float, heading_rad: float = 0.0, steering_rad: float = 0
 
 
 def advance(state: State, acceleration_mps2: float, steering_rad: float, car: Actuators | None = None) -> None:
-    drive(
+    move(
         state,
         np.array([[acceleration_mps2]]),
         np.array([[steering_rad]]),
@@ -138,7 +138,7 @@ def test_drive__players_that_do_not_move_are_untouched() -> None:
     two = Actuators(
         **{name: value if name == "friction" else np.repeat(value, 2) for name, value in actuators()._asdict().items()}
     )
-    drive(state, np.full((1, 2), 2.0), np.full((1, 2), 0.1), np.array([[True, False]]), two, STEP_S)
+    move(state, np.full((1, 2), 2.0), np.full((1, 2), 0.1), np.array([[True, False]]), two, STEP_S)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"):
         assert getattr(state, name)[0, 1] == getattr(before, name)[0, 1]
         assert getattr(state, name)[0, 0] != getattr(before, name)[0, 0]

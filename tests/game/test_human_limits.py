@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray
-from harness.game.attention import Attention, Habits, Lapses, Overlooking, draw_lapses
+from harness.game.attention import Attention, HumanFactors, Lapses, NoBlindSpotCheck, draw_lapses
 from harness.game.human_limits import (
     NO_LIMITS,
     Limits,
-    Missing,
+    LookedButFailedToSee,
     PlayersLimits,
     Reaction,
     Sight,
@@ -26,7 +26,7 @@ from harness.game.human_limits import (
     draw_misjudged,
     draw_noticed_m,
 )
-from harness.game.initial_state import Start, draw_start
+from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import LAYOUT, observe
 from harness.game.quantities import Quantities, World
 from harness.game.state import State
@@ -53,16 +53,16 @@ def arena(straight: OpenScene) -> Iterator[Arena]:
     opened.close()
 
 
-def limited(start: Start, player: int, limits: Limits) -> Start:
+def limited(start: InitialState, player: int, limits: Limits) -> InitialState:
     """A start in which one player has limits."""
     of = list(start.limits)
     of[player] = limits
     return replace(start, limits=tuple(of))
 
 
-def played(arena: Arena, starts: dict[int, Start], actions: FloatArray) -> list[tuple[FloatArray, ...]]:
+def played(arena: Arena, starts: dict[int, InitialState], actions: FloatArray) -> list[tuple[FloatArray, ...]]:
     """Accelerations, steering angles and observations of each step [G, P, ...]."""
-    arena.start(starts)
+    arena.reset(starts)
     found = []
     for action in actions:
         state = arena.step(action).quantities.state
@@ -76,7 +76,7 @@ def played(arena: Arena, starts: dict[int, Start], actions: FloatArray) -> list[
 def test_delay__decisions_arrive_so_many_steps_later_and_until_then_the_car_coasts() -> None:
     limits = PlayersLimits(games=2, players=2, steps=10)
     state = State.empty(2, 2)
-    limits.begin(0, 0, Limits(delay_steps=2), state)
+    limits.reset(0, 0, Limits(delay_steps=2), state)
     for step in range(6):
         decided = np.full((2, 2, 2), 0.1 * (step + 1))
         arriving = limits.arriving(decided, np.array([step, step]))
@@ -90,7 +90,7 @@ def test_delay__a_game_that_begins_anew_has_forgotten_what_was_decided_before() 
     limits = PlayersLimits(games=1, players=1, steps=10)
     state = State.empty(1, 1)
     for _ in range(2):
-        limits.begin(0, 0, Limits(delay_steps=3), state)
+        limits.reset(0, 0, Limits(delay_steps=3), state)
         for step in range(5):
             arriving = limits.arriving(np.full((1, 1, 2), 0.5), np.array([step]))
             assert (arriving == (0.5 if step >= 3 else 0.0)).all()
@@ -222,16 +222,19 @@ def test_misjudged__an_arena_shows_each_step_its_own_error(arena: Arena, straigh
 
 
 def test_missing__in_its_share_of_the_drives() -> None:
-    found = [draw_noticed_m(Missing(0.25, 8.0), np.random.default_rng(seed)) for seed in range(2000)]
+    found = [draw_noticed_m(LookedButFailedToSee(0.25, 8.0), np.random.default_rng(seed)) for seed in range(2000)]
     assert set(found) == {8.0, np.inf}
     assert np.mean(np.isfinite(found)) == pytest.approx(0.25, abs=4 * 0.0097)
 
 
 def test_missing__is_a_habit_of_driving_and_the_rest_is_there_from_the_first_lesson() -> None:
-    person = Habits(
-        overlooking=Overlooking(0.5, 1.0), missing=Missing(0.5, 5.0), reaction=Reaction((0.2, 0.4)), sight=Sight(60.0)
+    person = HumanFactors(
+        no_blind_spot_check=NoBlindSpotCheck(0.5, 1.0),
+        looked_but_failed_to_see=LookedButFailedToSee(0.5, 5.0),
+        reaction=Reaction((0.2, 0.4)),
+        sight=Sight(60.0),
     )
-    assert person.with_open_eyes == Habits(reaction=Reaction((0.2, 0.4)), sight=Sight(60.0))
+    assert person.with_open_eyes == HumanFactors(reaction=Reaction((0.2, 0.4)), sight=Sight(60.0))
 
 
 # --- what is used of the car ------------------------------------------------------------------------------------------
@@ -241,7 +244,7 @@ def test_uses__shares_of_throttle_brake_and_wheel() -> None:
     limits = PlayersLimits(games=1, players=3, steps=5)
     state = State.empty(1, 3)
     for player in range(2):
-        limits.begin(0, player, Limits(uses=(0.5, 0.25, 0.1)), state)
+        limits.reset(0, player, Limits(uses=(0.5, 0.25, 0.1)), state)
     acceleration, steering = limits.within(np.array([[2.0, -4.0, 2.0]]), np.array([[0.2, -0.2, 0.2]]))
     assert acceleration.tolist() == [[1.0, -1.0, 2.0]]
     assert steering[0] == pytest.approx([0.02, -0.02, 0.2])
@@ -258,8 +261,8 @@ def test_uses__the_car_does_no_more(arena: Arena, straight: OpenScene) -> None:
 
 # --- nobody else's numbers --------------------------------------------------------------------------------------------
 
-BODY = Habits(
-    missing=Missing(0.5, 8.0),
+BODY = HumanFactors(
+    looked_but_failed_to_see=LookedButFailedToSee(0.5, 8.0),
     reaction=Reaction((0.2, 0.9)),
     sight=Sight(60.0, 0.1, 0.01, 5.0),
     uses=Uses(0.8, 0.7, 0.6),
@@ -268,17 +271,23 @@ BODY = Habits(
 
 def test_start__without_limits_has_none(straight: OpenScene) -> None:
     assert all(each is NO_LIMITS for each in drawn(straight, 1).limits)
-    assert draw_start(straight.chances([[Habits(sight=Sight())]] * 2, [1.0, 1.0]), 1).limits == (NO_LIMITS,) * 2
+    assert (
+        draw_initial_state(straight.start_distribution([[HumanFactors(sight=Sight())]] * 2, [1.0, 1.0]), 1).limits
+        == (NO_LIMITS,) * 2
+    )
 
 
 def test_start__anothers_limits_move_nothing_that_is_drawn(straight: OpenScene) -> None:
     texting = Attention(4.0, (1.0, 2.0), 0.005, 0.001)
-    own = Habits(attention=texting, overlooking=Overlooking(0.5, 1.0), sight=Sight(distance_error=0.1))
+    own = HumanFactors(
+        attention=texting, no_blind_spot_check=NoBlindSpotCheck(0.5, 1.0), sight=Sight(distance_error=0.1)
+    )
     for episode in range(5):
         plain, beside = (
-            draw_start(straight.chances([[own], [other]], [0.7, 0.7]), "episode", episode) for other in (Habits(), BODY)
+            draw_initial_state(straight.start_distribution([[own], [other]], [0.7, 0.7]), "episode", episode)
+            for other in (HumanFactors(), BODY)
         )
-        for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "present", "noise", "overlooked_m"):
+        for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "present", "noise", "unseen_behind_m"):
             assert (getattr(plain, name) == getattr(beside, name)).all()
         assert plain.seed == beside.seed
         assert (plain.lapses[0].lapsed == beside.lapses[0].lapsed).all()
@@ -288,10 +297,16 @@ def test_start__anothers_limits_move_nothing_that_is_drawn(straight: OpenScene) 
 
 
 def test_start__each_limit_is_drawn_apart_from_the_others(straight: OpenScene) -> None:
-    def limits(habits: Habits) -> Limits:
-        return draw_start(straight.chances([[Habits()], [habits]], [1.0, 1.0]), "episode", 3).limits[1]
+    def limits(human_factors: HumanFactors) -> Limits:
+        return draw_initial_state(
+            straight.start_distribution([[HumanFactors()], [human_factors]], [1.0, 1.0]), "episode", 3
+        ).limits[1]
 
-    everything, late, inexact = limits(BODY), limits(Habits(reaction=BODY.reaction)), limits(Habits(sight=BODY.sight))
+    everything, late, inexact = (
+        limits(BODY),
+        limits(HumanFactors(reaction=BODY.reaction)),
+        limits(HumanFactors(sight=BODY.sight)),
+    )
     assert everything.delay_steps == late.delay_steps
     assert late.misjudged is None
     assert everything.misjudged is not None

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.game.attention import Attention, Habits
-from harness.game.initial_state import Chances, Place, Start, draw_start
+from harness.game.attention import Attention, HumanFactors
+from harness.game.initial_state import InitialState, StartDistribution, StartRange, draw_initial_state
 from harness.game.seeding import generator_of, seed_of
 from harness.traffic.scene import OpenScene
 
@@ -18,16 +18,16 @@ TEXTING = Attention(2.0, (1.0, 2.0), 0.02)
 
 
 @pytest.fixture(scope="module")
-def chances(merge: OpenScene) -> Chances:
-    return merge.chances((Habits(), Habits()), (1.0, 1.0))
+def start_distribution(merge: OpenScene) -> StartDistribution:
+    return merge.start_distribution((HumanFactors(), HumanFactors()), (1.0, 1.0))
 
 
-def starts(chances: Chances, games: int = 200) -> list[Start]:
-    return [draw_start(chances, "test", 1, "episode", k) for k in range(games)]
+def starts(start_distribution: StartDistribution, games: int = 200) -> list[InitialState]:
+    return [draw_initial_state(start_distribution, "test", 1, "episode", k) for k in range(games)]
 
 
-def test_start__is_within_the_ranges_of_the_scene(chances: Chances) -> None:
-    drawn = starts(chances)
+def test_start__is_within_the_ranges_of_the_scene(start_distribution: StartDistribution) -> None:
+    drawn = starts(start_distribution)
     positions = np.array([each.position_m for each in drawn])
     speeds = np.array([each.speed_mps for each in drawn])
     beside = positions[:, 1] - positions[:, 0]
@@ -37,16 +37,16 @@ def test_start__is_within_the_ranges_of_the_scene(chances: Chances) -> None:
         assert values.max() - values.min() > 0.9 * (high - low)  # and the whole of the range is used
 
 
-def test_start__is_on_the_lane_with_the_bumper_at_the_position(chances: Chances) -> None:
-    for each in starts(chances, 20):
+def test_start__is_on_the_lane_with_the_bumper_at_the_position(start_distribution: StartDistribution) -> None:
+    for each in starts(start_distribution, 20):
         assert each.x_m == pytest.approx(each.position_m - 2.3)  # the centre of 4.6 m
         assert each.y_m == pytest.approx([-1.6, -4.8])  # lanes 1 and 0
         assert each.heading_rad == pytest.approx([0.0, 0.0])
 
 
-def test_start__the_same_parts_give_the_same_start(chances: Chances) -> None:
-    one, two = draw_start(chances, "a", 1), draw_start(chances, "a", 1)
-    for field in fields(Start):
+def test_start__the_same_parts_give_the_same_start(start_distribution: StartDistribution) -> None:
+    one, two = draw_initial_state(start_distribution, "a", 1), draw_initial_state(start_distribution, "a", 1)
+    for field in fields(InitialState):
         if field.name not in ("lapses", "variation"):
             assert np.array_equal(getattr(one, field.name), getattr(two, field.name))
     assert np.array_equal(one.noise, two.noise)
@@ -54,16 +54,18 @@ def test_start__the_same_parts_give_the_same_start(chances: Chances) -> None:
 
 
 @pytest.mark.parametrize("parts", [("a", 2), ("b", 1), (1, "a"), ("a", "1"), ("a",), ("a", 1, 1)])
-def test_start__other_parts_give_another(chances: Chances, parts: tuple[str | int, ...]) -> None:
-    one, other = draw_start(chances, "a", 1), draw_start(chances, *parts)
+def test_start__other_parts_give_another(start_distribution: StartDistribution, parts: tuple[str | int, ...]) -> None:
+    one, other = draw_initial_state(start_distribution, "a", 1), draw_initial_state(start_distribution, *parts)
     assert one.position_m[0] != other.position_m[0]
     assert one.seed != other.seed
     assert (one.noise != other.noise).any()
 
 
-def test_start__pairs_whoever_drives_and_attends(chances: Chances) -> None:
-    texting = replace(chances, habits=([Habits()], [Habits(TEXTING)]), present_share=(1.0, 0.0))
-    one, two = draw_start(chances, "a", 1), draw_start(texting, "a", 1)
+def test_start__pairs_whoever_drives_and_attends(start_distribution: StartDistribution) -> None:
+    texting = replace(
+        start_distribution, human_factors=([HumanFactors()], [HumanFactors(TEXTING)]), present_share=(1.0, 0.0)
+    )
+    one, two = draw_initial_state(start_distribution, "a", 1), draw_initial_state(texting, "a", 1)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "noise", "seed"):
         assert np.array_equal(getattr(one, name), getattr(two, name))
     assert not one.lapses[1].lapsed.any()
@@ -71,29 +73,33 @@ def test_start__pairs_whoever_drives_and_attends(chances: Chances) -> None:
     assert two.present.tolist() == [True, False]
 
 
-def test_start__one_players_lapses_do_not_hang_on_the_others(chances: Chances) -> None:
-    both = draw_start(replace(chances, habits=([Habits(TEXTING)], [Habits(TEXTING)])), "a", 1)
-    alone = draw_start(replace(chances, habits=([Habits()], [Habits(TEXTING)])), "a", 1)
+def test_start__one_players_lapses_do_not_hang_on_the_others(start_distribution: StartDistribution) -> None:
+    both = draw_initial_state(
+        replace(start_distribution, human_factors=([HumanFactors(TEXTING)], [HumanFactors(TEXTING)])), "a", 1
+    )
+    alone = draw_initial_state(
+        replace(start_distribution, human_factors=([HumanFactors()], [HumanFactors(TEXTING)])), "a", 1
+    )
     assert (both.lapses[1].lapsed == alone.lapses[1].lapsed).all()
     assert (both.lapses[0].lapsed != both.lapses[1].lapsed).any()
 
 
-def test_start__a_share_of_games_is_alone(chances: Chances) -> None:
-    drawn = starts(replace(chances, present_share=(1.0, 0.25)), 800)
+def test_start__a_share_of_games_is_alone(start_distribution: StartDistribution) -> None:
+    drawn = starts(replace(start_distribution, present_share=(1.0, 0.25)), 800)
     present = np.array([each.present for each in drawn])
     assert present[:, 0].all()
     assert present[:, 1].mean() == pytest.approx(0.25, abs=4 * 0.0153)  # sqrt(0.25 * 0.75 / 800)
 
 
-def test_start__has_noise_and_lapses_for_every_step(chances: Chances) -> None:
-    start = draw_start(chances, "a", 1)
+def test_start__has_noise_and_lapses_for_every_step(start_distribution: StartDistribution) -> None:
+    start = draw_initial_state(start_distribution, "a", 1)
     assert start.noise.shape == (2, 250, 2)  # 25 s in steps of 0.1 s
     assert replace(start, parts=("b", 1)).noise is start.noise  # drawn once
     assert [each.lapsed.shape for each in start.lapses] == [(250,), (250,)]
 
 
-def place(line: list[tuple[float, float]], scale: float = 1.0) -> Place:
-    return Place(np.array(line), (0.0, 1.0), False, (0.0, 1.0), scale)
+def place(line: list[tuple[float, float]], scale: float = 1.0) -> StartRange:
+    return StartRange(np.array(line), (0.0, 1.0), False, (0.0, 1.0), scale)
 
 
 @pytest.mark.parametrize(

@@ -261,7 +261,7 @@ def test_observation__shows_a_wreck_as_what_stands_there(moment: Moment, world: 
 
 
 def test_observation__who_overlooks_sees_nobody_beside_or_behind(moment: Moment, world: World) -> None:
-    players = [car(50.0, overlooked_m=1.0), car(50.9, -4.8)]
+    players = [car(50.0, unseen_behind_m=1.0), car(50.9, -4.8)]
     overlooked, looked = moment(world, players), moment(world, [car(50.0), car(50.9, -4.8)])
     assert seen(overlooked)["other0_seen"] == 0.0
     assert seen(overlooked)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
@@ -270,4 +270,4 @@ def test_observation__who_overlooks_sees_nobody_beside_or_behind(moment: Moment,
 
 
 def test_observation__who_overlooks_sees_whoever_is_ahead(moment: Moment, world: World) -> None:
-    assert seen(moment(world, [car(50.0, overlooked_m=1.0), car(51.1, -4.8)]))["other0_seen"] == 1.0
+    assert seen(moment(world, [car(50.0, unseen_behind_m=1.0), car(51.1, -4.8)]))["other0_seen"] == 1.0

@@ -17,7 +17,7 @@ import pytest
 
 import harness.environments.arena
 from harness.campaign.execution.cache_keys import stage_keys
-from harness.campaign.execution.run_context import conditions_of
+from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
@@ -28,7 +28,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.environments.gymnasium_env import DrivingEnv
 from harness.errors import StageFailed, UsageError
-from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, Drive
+from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.observation import LAYOUT, observe
@@ -36,9 +36,9 @@ from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS, Payoff, Weighte
 from harness.game.quantities import Quantities
 from harness.game.sanity_checks import ImpossibleNumber, check_observation, check_step, slack_m
 from harness.game.state import EGO, NON_EGO, ROLES, Bodies, Outcome, State
-from harness.traffic.libsumo_simulation import LocalSimulation
+from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene, open_scene
-from harness.training.ppo import Lesson
+from harness.training.ppo import TrainingSpec
 from tests.environments.test_rollout import Steady, arm, play, records, trace
 from tests.support.scenes import build_scene, drawn
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign
@@ -53,7 +53,7 @@ class Misbehaving(Steady):
     def __init__(self, decision: Callable[[FloatArray], Any]) -> None:
         self._decision, self._games, self._steps = decision, 0, 0
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         self._games, self._steps = self._games + 1, 0
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> Any:
@@ -102,7 +102,7 @@ def test_driver__that_misbehaves_is_an_error_row_with_driver_and_step(
 @pytest.mark.parametrize("name", ["nan", "too much", "no axis of games", "words"])
 def test_opponent__that_misbehaves_ends_a_training_with_driver_and_step(
     name: str,
-    alone: Lesson,  # noqa: F811
+    alone: TrainingSpec,  # noqa: F811
     tmp_path: Path,
 ) -> None:
     decision, _ = DECISIONS[name]
@@ -166,7 +166,7 @@ def test_payoff__that_is_no_number_fails_a_training_stage_by_name(
     monkeypatch.setattr(Quantities, "lane_offset_m", broken(Quantities.lane_offset_m, np.nan))
     said = rf"^naive-seed1: the payoff of ego is nan in step {STEP} of game 0, after \d+ steps$"
     with pytest.raises(StageFailed, match=said):
-        carry_out(stages[0], conditions_of(campaign, folder, keys), lambda done, total: None)
+        carry_out(stages[0], run_context_of(campaign, folder, keys), lambda done, total: None)
     assert folder.finished(stages[0].id, keys[stages[0].id]) is None
     assert not folder.policy(stages[0].id).exists()
 
@@ -177,21 +177,21 @@ def test_payoff__that_is_no_number_fails_a_training_stage_by_name(
 def carried_on_by_sumo(monkeypatch: pytest.MonkeyPatch, far_m: float) -> None:
     """In the fifth step of every second game SUMO itself moves its non-ego so much farther along its lane."""
     steps = {"now": 0, "games": 0}
-    begin, step = LocalSimulation.restart, LocalSimulation.step
+    begin, step = LibsumoSimulation.reset, LibsumoSimulation.step
 
-    def restarted(simulation: LocalSimulation, *arguments: Any) -> None:
+    def restarted(simulation: LibsumoSimulation, *arguments: Any) -> None:
         steps.update(now=0, games=steps["games"] + 1)
         begin(simulation, *arguments)
 
-    def stepped(simulation: LocalSimulation, *poses: FloatArray) -> Any:
+    def stepped(simulation: LibsumoSimulation, *poses: FloatArray) -> Any:
         steps["now"] += 1
         if steps["now"] == STEP and steps["games"] % 2 == 0:
             vehicle = libsumo.vehicle
             vehicle.moveTo("non_ego", vehicle.getLaneID("non_ego"), vehicle.getLanePosition("non_ego") + far_m)
         return step(simulation, *poses)
 
-    monkeypatch.setattr(LocalSimulation, "restart", restarted)
-    monkeypatch.setattr(LocalSimulation, "step", stepped)
+    monkeypatch.setattr(LibsumoSimulation, "reset", restarted)
+    monkeypatch.setattr(LibsumoSimulation, "step", stepped)
 
 
 def test_motion__a_player_that_sumo_carries_off_is_an_error_row_with_step_and_distance(
@@ -213,29 +213,29 @@ def test_motion__a_player_that_sumo_carries_off_is_an_error_row_with_step_and_di
 
 def test_motion__a_training_fails_where_sumo_carries_a_player_off(
     road: OpenScene,
-    alone: Lesson,  # noqa: F811
+    alone: TrainingSpec,  # noqa: F811
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     carried_on_by_sumo(monkeypatch, 50.0)
     one = alone.settings.model_copy(update={"games": 1})  # of two: SB3 asks for more than one step at a time
-    lesson = replace(alone, scene=road, opponent=SumoDriver(), alone_share=0.0, settings=one)
+    spec = replace(alone, scene=road, opponent=SumoDriver(), alone_share=0.0, settings=one)
     with pytest.raises(FloatingPointError, match=rf"non_ego moved 5\d\.\d+ m in step {STEP}, .* after \d+ steps"):
-        in_one_go(lesson, tmp_path)
+        in_one_go(spec, tmp_path)
 
 
 @pytest.mark.parametrize(("farther_m", "wrong"), [(50.0, True), (0.01, True), (1e-4, False)])
 def test_motion__a_car_the_harness_moves_goes_as_far_as_its_speed_to_a_millimetre(
     farther_m: float, wrong: bool, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drive = harness.environments.arena.drive
+    drive = harness.environments.arena.move
 
     def drive_too_far(state: State, *rest: Any) -> None:
         drive(state, *rest)
         if state.step[0] + 1 == STEP:
             state.x_m[0, EGO] += farther_m
 
-    monkeypatch.setattr(harness.environments.arena, "drive", drive_too_far)
+    monkeypatch.setattr(harness.environments.arena, "move", drive_too_far)
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
     if wrong:
         assert re.match(rf"ImpossibleNumber: ego moved [\d.]+ m in step {STEP}, ", game.record["error"])
@@ -262,16 +262,16 @@ def test_motion__of_another_road_user_that_is_no_number_is_an_error_row(
 ) -> None:
     van = '<vehicle id="v" type="van" depart="0" departPos="60" departSpeed="9"><route edges="road"/></vehicle>'
     scene = build_scene(tmp_path, others=van)
-    step = LocalSimulation.step
+    step = LibsumoSimulation.step
 
-    def lose(simulation: LocalSimulation, *poses: FloatArray) -> Any:
+    def lose(simulation: LibsumoSimulation, *poses: FloatArray) -> Any:
         reading = step(simulation, *poses)
         if libsumo.simulation.getTime() > (STEP - 0.5) * 0.1:
             reading.speed_mps[:] = np.nan
         return reading
 
     assert not play(arm(scene, Steady(), SumoDriver()), 1)[0].record["error"]
-    monkeypatch.setattr(LocalSimulation, "step", lose)
+    monkeypatch.setattr(LibsumoSimulation, "step", lose)
     (game,) = play(arm(scene, Steady(), SumoDriver()), 1)
     assert game.record["error"].endswith(f"another road user is nowhere, or has no speed, in step {STEP}")
 
@@ -408,7 +408,7 @@ def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(name: s
     assert not any(np.isnan(each).any() for each in series)
     for outcome in (Outcome.GOAL, Outcome.RAIL):
         for game in (0, len(q.state.step) - 1):
-            value = metric(Drive(outcome, 0.1, *(each[game, :1] for each in series)))
+            value = metric(PlayerSeries(outcome, 0.1, *(each[game, :1] for each in series)))
             assert value is None or np.isfinite(value)
 
 
@@ -443,7 +443,7 @@ def test_checks__cost_less_than_a_hundredth_of_a_step_of_64_games(merge: OpenSce
     persona = read_document(SPEEDY, Persona)
     arena = Arena(merge, 64, [Seat(None, persona.payoff), Seat(None, persona.payoff)])
     try:
-        arena.start({game: drawn(merge, "cost", game) for game in range(64)})
+        arena.reset({game: drawn(merge, "cost", game) for game in range(64)})
         before, step = arena.state, arena.step(np.zeros((64, 2, 2)))
         slack, games = slack_m(np.array([True, True])), np.arange(64)
 

@@ -48,7 +48,7 @@ def test_film__shows_the_players_where_the_trace_has_them(merge_net: Path, tmp_p
         tmp_path / "film.gif",
         title="a game",
         step_length_s=STEP_S,
-        report=lambda done, total: told.append((done, total)),
+        on_progress=lambda done, total: told.append((done, total)),
     )
     steps = int(trace["step"].max()) + 1
     assert count == steps

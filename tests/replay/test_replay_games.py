@@ -35,7 +35,7 @@ class Steady:
     def __init__(self, pedals: float, wheel: float) -> None:
         self._action = (pedals, wheel)
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Nothing to forget."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:

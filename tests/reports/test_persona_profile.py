@@ -20,16 +20,16 @@ from harness.errors import UsageError
 from harness.game.attention import Attention, draw_lapses
 from harness.game.payoff import GROUPS, TERMS
 from harness.reports.persona.drives import DRIFT_SPEED_MPS, drift_m, free_share, lapsed_share, lapses_per_minute
-from harness.reports.persona.page import render_portrait, write_portrait
+from harness.reports.persona.page import render_profile, write_profile
 from harness.reports.persona.plotting import area, axis, curve, stretches, ticks
 from harness.reports.persona.profile import (
     SHOWN,
-    Portrait,
+    PersonaProfile,
     attends,
     body,
     decides,
     function_in_words,
-    portrait_of,
+    persona_profile,
     sees,
     wants,
 )
@@ -39,11 +39,11 @@ from harness.reports.persona.worth import EXAMPLES, LIMITED
 TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), crown_rad=0.005, bumps_rad=0.001)
 
 
-def portrait(file: Path) -> Portrait:
-    return portrait_of(read_document(file, Persona))
+def portrait(file: Path) -> PersonaProfile:
+    return persona_profile(read_document(file, Persona))
 
 
-def made(**changes: Any) -> Portrait:
+def made(**changes: Any) -> PersonaProfile:
     """The portrait of somebody made up."""
     document = {
         "name": "anna",
@@ -52,10 +52,10 @@ def made(**changes: Any) -> Portrait:
         "operational": {"terms": {"goal": 2.0}},
         **changes,
     }
-    return portrait_of(Persona.model_validate(document, strict=False))
+    return persona_profile(Persona.model_validate(document, strict=False))
 
 
-def drawn(of: Portrait, width: int, encoding: str = "utf-8") -> str:
+def drawn(of: PersonaProfile, width: int, encoding: str = "utf-8") -> str:
     """What the terminal shows, without colour, as where it is not a terminal."""
     file = io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline="")
     show(of, Console(file=file, width=width, color_system=None, legacy_windows=False))
@@ -268,30 +268,30 @@ def test_terminal__takes_what_a_document_says_as_it_is() -> None:
 
 
 def test_page__escapes_what_a_document_says() -> None:
-    page = render_portrait(made())
+    page = render_profile(made())
     assert "<script" not in page
     assert "&lt;script&gt;alert(&#39;anna&#39;)&lt;/script&gt;" in page
     assert "one of &lt;b&gt;two&lt;/b&gt; people" in page
 
 
 def test_page__of_equal_portraits_is_equal() -> None:
-    assert render_portrait(portrait(SPEEDY)) == render_portrait(portrait(SPEEDY))
+    assert render_profile(portrait(SPEEDY)) == render_profile(portrait(SPEEDY))
 
 
 def test_page__is_not_written_over_a_document(tmp_path: Path) -> None:
     file = tmp_path / "anna.toml"
     file.write_text("mine")
     with pytest.raises(UsageError, match=r"has to end with \.html"):
-        write_portrait(made(), file)
+        write_profile(made(), file)
     assert file.read_text() == "mine"
     with pytest.raises(UsageError, match="there is no folder"):
-        write_portrait(made(), tmp_path / "no" / "anna.html")
+        write_profile(made(), tmp_path / "no" / "anna.html")
 
 
 def test_page__opens_in_dark_and_light_asks_for_nothing_and_never_scrolls_sideways(tmp_path: Path) -> None:
     file = tmp_path / "portrait.html"
     fuzzy = read_document(SPEEDY, Persona).model_dump(exclude_none=True)["human"]
-    write_portrait(made(human=fuzzy, attention={"mean_attentive_s": 5.0, "lapse_s": [4.0, 6.0]}), file)
+    write_profile(made(human=fuzzy, attention={"mean_attentive_s": 5.0, "lapse_s": [4.0, 6.0]}), file)
     with launched() as browser, opener(browser, file) as open_page:
         for scheme in ("light", "dark"):
             page = open_page(color_scheme=scheme)

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import sumo
 
-from harness.game.attention import Habits
-from harness.game.initial_state import Start, draw_start
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import InitialState, draw_initial_state
 from harness.traffic.scene import OpenScene, open_scene
 
 STRAIGHT_NODES = '<node id="a" x="0" y="0"/><node id="b" x="300" y="0"/>'
@@ -83,12 +83,12 @@ non_ego = {{ vehicle = "non_ego", lane = "{non_ego[1]}", position_m = [30.0, 40.
     return open_scene(folder)
 
 
-def drawn(scene: OpenScene, *parts: str | int, present: Sequence[float] = (1.0, 1.0)) -> Start:
+def drawn(scene: OpenScene, *parts: str | int, present: Sequence[float] = (1.0, 1.0)) -> InitialState:
     """A start drawn from named parts."""
-    return draw_start(scene.chances([Habits(), Habits()], present), *parts)
+    return draw_initial_state(scene.start_distribution([HumanFactors(), HumanFactors()], present), *parts)
 
 
-def placed(scene: OpenScene, *poses: tuple[float, float, float, float] | None) -> Start:
+def placed(scene: OpenScene, *poses: tuple[float, float, float, float] | None) -> InitialState:
     """A start with the players' centres at x_m, y_m, heading_rad, speed_mps; None: the player takes no part."""
     start = drawn(scene, "placed")
     given = np.array([pose or (40.0, LEFT_Y, 0.0, 0.0) for pose in poses])

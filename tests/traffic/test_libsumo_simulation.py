@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from harness.errors import SimulationError
-from harness.game.initial_state import Start
-from harness.traffic.libsumo_simulation import LocalSimulation
+from harness.game.initial_state import InitialState
+from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading
@@ -26,7 +26,7 @@ from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed
 
 HARNESS, SUMO = True, False
 OTHERS = '<vehicle id="other" type="van" depart="0"><route edges="road"/></vehicle>'
-Open = Callable[..., LocalSimulation]
+Open = Callable[..., LibsumoSimulation]
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +48,7 @@ def opened(scene: OpenScene) -> Iterator[Open]:
     def opened(
         taken_over: tuple[bool, bool] = (HARNESS, HARNESS), games: int = 1, on: OpenScene = scene, seed: int = 1
     ):
-        simulations.append(LocalSimulation(on, games, taken_over, seed))
+        simulations.append(LibsumoSimulation(on, games, taken_over, seed))
         return simulations[-1]
 
     yield opened
@@ -61,7 +61,7 @@ def other(name: str, depart_s: float = 0.0, lane: str = "0", position: str = "10
     return Departure(name, "van", ("road",), depart_s, lane, position, speed)
 
 
-def step(simulation: LocalSimulation, start: Start) -> Reading:
+def step(simulation: LibsumoSimulation, start: InitialState) -> Reading:
     """A step in which the players stay at their start."""
     return simulation.step(start.x_m[None], start.y_m[None], start.heading_rad[None])
 
@@ -77,7 +77,7 @@ def centre_in_sumo(name: str) -> tuple[float, float, float]:
 
 def test_step__poses_given_are_the_poses_sumo_has(scene: OpenScene, opened: Open) -> None:
     simulation = opened()
-    simulation.restart(0, placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), [])
+    simulation.reset(0, placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), [])
     generator = np.random.default_rng(0)
     for _ in range(50):
         x, y = generator.uniform(10, 290, (1, 2)), generator.uniform(-9, 3, (1, 2))  # on the road and off it
@@ -90,7 +90,7 @@ def test_step__poses_given_are_the_poses_sumo_has(scene: OpenScene, opened: Open
 def test_step__tiles_lie_beside_one_another_and_know_nothing_of_it(busy: OpenScene, opened: Open) -> None:
     simulation = opened(games=3, on=busy)
     for game in range(3):
-        simulation.restart(game, placed(busy, (40, RIGHT_Y, 0, 10), None), [other("van")])
+        simulation.reset(game, placed(busy, (40, RIGHT_Y, 0, 10), None), [other("van")])
     poses = np.array([[50.0, 0.0], [60.0, 0.0], [70.0, 0.0]]), np.full((3, 2), RIGHT_Y), np.zeros((3, 2))
     reading = simulation.step(*poses)
     assert [round(libsumo.vehicle.getPosition(f"g{k}_ego")[0] - 2.3) for k in range(3)] == [50, 60, 70]
@@ -101,7 +101,7 @@ def test_step__tiles_lie_beside_one_another_and_know_nothing_of_it(busy: OpenSce
 
 def test_step__a_player_stays_in_the_traffic_wherever_it_is_placed(scene: OpenScene, opened: Open) -> None:
     simulation = opened()
-    simulation.restart(0, placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), [])
+    simulation.reset(0, placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), [])
     for x in (60.0, 297.0, 299.9, 310.0, 2000.0, 5.0, -400.0, 40.0):  # the road ends at 300
         for _ in range(20):
             simulation.step(np.array([[x, x + 6.0]]), np.array([[RIGHT_Y, LEFT_Y]]), np.zeros((1, 2)))
@@ -111,7 +111,7 @@ def test_step__a_player_stays_in_the_traffic_wherever_it_is_placed(scene: OpenSc
 
 def test_step__sumo_shows_the_others_the_speed_a_player_has_even_above_the_limit(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
-    simulation.restart(0, placed(busy, (40, RIGHT_Y, 0, 12), None), [])
+    simulation.reset(0, placed(busy, (40, RIGHT_Y, 0, 12), None), [])
     shown = []
     for k in range(1, 4):
         simulation.step(np.array([[40 + 2.5 * k, 0]]), np.array([[RIGHT_Y, 0]]), np.zeros((1, 2)))
@@ -124,7 +124,7 @@ def test_restart__players_left_to_sumo_start_at_their_pose_and_speed_and_drive_o
 ) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (40, RIGHT_Y, 0, 10), (50, LEFT_Y, 0, 9))
-    simulation.restart(0, start, [])
+    simulation.reset(0, start, [])
     players = [step(simulation, start).players[0] for _ in range(20)]
     assert np.isnan(players[0][0]).all()
     np.testing.assert_allclose(players[0][1], (50.9, LEFT_Y, 0, 9), atol=1e-6)
@@ -136,7 +136,7 @@ def test_restart__players_left_to_sumo_start_at_their_pose_and_speed_and_drive_o
 def test_restart__a_player_left_to_sumo_starts_though_sumo_would_not_let_it_in(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (45.2, RIGHT_Y, 0, 0), (40, RIGHT_Y, 0, 13))
-    simulation.restart(0, start, [])
+    simulation.reset(0, start, [])
     assert step(simulation, start).players[0, 1, 3] == pytest.approx(13)
 
 
@@ -147,7 +147,7 @@ def test_restart__a_start_above_what_sumo_lets_its_vehicles_drive_is_slowed_to_t
     scene = build_scene(tmp_path / "slow", cars=slow)
     simulation = opened((HARNESS, SUMO), on=scene)
     start = placed(scene, (40, RIGHT_Y, 0, 30), (40, LEFT_Y, 0, 14))
-    simulation.restart(0, start, [])
+    simulation.reset(0, start, [])
     assert step(simulation, start).players[0, 1, 3] == pytest.approx(0.9 * 13.89)
 
 
@@ -155,7 +155,7 @@ def test_restart__in_place_leaves_nothing_of_the_game_before(scene: OpenScene, o
     simulation = opened((HARNESS, SUMO))
     both, alone = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), placed(scene, (90, LEFT_Y, 0, 10), None)
     for start, expected in ((both, {"ego", "non_ego", "van"}), (alone, {"ego"}), (both, {"ego", "non_ego"})):
-        simulation.restart(0, start, [other("van")] if len(expected) == 3 else [])
+        simulation.reset(0, start, [other("van")] if len(expected) == 3 else [])
         for _ in range(5):
             step(simulation, start)
         assert set(libsumo.vehicle.getIDList()) == expected
@@ -166,13 +166,13 @@ def test_restart__where_sumo_drives_nobody_players_stay_in_the_traffic_and_begin
 ) -> None:
     simulation, generator = opened(games=2), np.random.default_rng(0)
     far = placed(scene, (250, RIGHT_Y, 0, 10), (240, LEFT_Y, 0, 10))
-    simulation.restart(1, far, [])
+    simulation.reset(1, far, [])
     for _ in range(30):
         starts = [
             placed(scene, (generator.uniform(30, 60), RIGHT_Y, 0, 10), (generator.uniform(30, 60), LEFT_Y, 0, 10)),
             far,
         ]
-        simulation.restart(0, starts[0], [])
+        simulation.reset(0, starts[0], [])
         for k in range(20):  # along the road, and off it
             x, y, heading = (
                 np.array([getattr(start, name) for start in starts]) for name in ("x_m", "y_m", "heading_rad")
@@ -190,7 +190,7 @@ def test_restart__where_sumo_drives_nobody_who_takes_no_part_is_gone(scene: Open
     simulation = opened()
     both, alone = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), placed(scene, (90, LEFT_Y, 0, 10), None)
     for start, expected in ((both, {"ego", "non_ego"}), (alone, {"ego"}), (both, {"ego", "non_ego"})):
-        simulation.restart(0, start, [])
+        simulation.reset(0, start, [])
         for _ in range(5):
             step(simulation, start)
         assert set(libsumo.vehicle.getIDList()) == expected
@@ -199,7 +199,7 @@ def test_restart__where_sumo_drives_nobody_who_takes_no_part_is_gone(scene: Open
 def test_remove__the_player_is_gone_and_the_other_goes_on(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10))
-    simulation.restart(0, start, [])
+    simulation.reset(0, start, [])
     step(simulation, start)
     simulation.remove(0, 0)
     step(simulation, start)
@@ -209,14 +209,14 @@ def test_remove__the_player_is_gone_and_the_other_goes_on(scene: OpenScene, open
 def test_halt__a_player_that_sumo_drove_stands_where_it_is_told(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10))
-    simulation.restart(0, start, [])
+    simulation.reset(0, start, [])
     step(simulation, start)
     simulation.halt(0, 1)
     for _ in range(3):
         reading = step(simulation, start)
     assert np.isnan(reading.players).all()
     assert centre_in_sumo("non_ego") == pytest.approx((40, LEFT_Y, 0), abs=1e-6)
-    simulation.restart(0, start, [])
+    simulation.reset(0, start, [])
     assert step(simulation, start).players[0, 1, 0] == pytest.approx(41.0)
 
 
@@ -226,7 +226,7 @@ def test_halt__a_player_that_sumo_drove_stands_where_it_is_told(scene: OpenScene
 def test_others__depart_when_they_are_due_and_are_seen_once_they_are_in(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (40, LEFT_Y, 0, 0), None)
-    simulation.restart(0, start, [other("early"), other("late", 0.3, "0", "50")])
+    simulation.reset(0, start, [other("early"), other("late", 0.3, "0", "50")])
     names, present = zip(
         *((r.names[0].tolist(), r.present[0].tolist()) for r in (step(simulation, start) for _ in range(5))),
         strict=True,
@@ -238,7 +238,7 @@ def test_others__depart_when_they_are_due_and_are_seen_once_they_are_in(busy: Op
 def test_others__are_read_by_their_centre_with_their_size_and_type(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (40, LEFT_Y, 0, 0), None)
-    simulation.restart(0, start, [other("van")])
+    simulation.reset(0, start, [other("van")])
     reading = step(simulation, start)
     seen = [float(getattr(reading, name)[0, 0]) for name in ("x_m", "y_m", "heading_rad", "speed_mps")]
     assert seen == pytest.approx([97, RIGHT_Y, 0, 5])
@@ -248,7 +248,7 @@ def test_others__are_read_by_their_centre_with_their_size_and_type(busy: OpenSce
 def test_others__wait_while_a_player_stands_in_their_way(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (4, RIGHT_Y, 0, 0), None)
-    simulation.restart(0, start, [other("waiting", 0.2, "0", "base", "10")])
+    simulation.reset(0, start, [other("waiting", 0.2, "0", "base", "10")])
     readings = [step(simulation, start) for _ in range(10)]
     assert not any(reading.present.any() for reading in readings)
     away = replace(start, x_m=start.x_m + 60)
@@ -259,11 +259,11 @@ def test_others__waiting_to_get_in_are_cleared_by_a_restart(busy: OpenScene, ope
     simulation = opened(on=busy)
     start = placed(busy, (4, RIGHT_Y, 0, 0), None)
     for _ in range(2):
-        simulation.restart(0, start, [other("waiting", 0.0, "0", "base", "10")])
+        simulation.reset(0, start, [other("waiting", 0.0, "0", "base", "10")])
         for _ in range(3):
             reading = step(simulation, start)
     assert reading.names.tolist() == [["waiting"]]
-    simulation.restart(0, replace(start, x_m=start.x_m + 60), [])
+    simulation.reset(0, replace(start, x_m=start.x_m + 60), [])
     assert step(simulation, replace(start, x_m=start.x_m + 60)).names.tolist() == [[]]
     assert libsumo.vehicle.getIDList() == ("ego",)
 
@@ -271,14 +271,14 @@ def test_others__waiting_to_get_in_are_cleared_by_a_restart(busy: OpenScene, ope
 def test_others__leave_the_reading_when_they_arrive(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (40, LEFT_Y, 0, 0), None)
-    simulation.restart(0, start, [other("gone", 0.0, "0", "298", "10"), other("stays")])
+    simulation.reset(0, start, [other("gone", 0.0, "0", "298", "10"), other("stays")])
     assert [step(simulation, start).names[0].tolist() for _ in range(5)][-1] == ["stays"]
 
 
 def test_others__that_sumo_refuses_are_an_error_with_its_message(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     with pytest.raises(SimulationError, match=r"start game 0.*departLane.*wrong"):
-        simulation.restart(0, placed(busy, (40, LEFT_Y, 0, 0), None), [other("wrong", lane="7")])
+        simulation.reset(0, placed(busy, (40, LEFT_Y, 0, 0), None), [other("wrong", lane="7")])
 
 
 def test_reload__the_same_seed_brings_the_same_traffic(tmp_path: Path, opened: Open) -> None:
@@ -287,7 +287,7 @@ def test_reload__the_same_seed_brings_the_same_traffic(tmp_path: Path, opened: O
 
     def played(seed: int) -> bytes:
         simulation.reload(seed)
-        simulation.restart(0, start, scene.departures(np.random.default_rng(0)))
+        simulation.reset(0, start, scene.departures(np.random.default_rng(0)))
         return b"".join(step(simulation, start).x_m.tobytes() for _ in range(80))
 
     assert played(1) == played(1) != played(2)
@@ -310,33 +310,33 @@ def test_close__twice_is_once_and_takes_nothing_from_the_next(scene: OpenScene, 
     second = opened()
     first.close()
     start = placed(scene, (40, LEFT_Y, 0, 0), None)
-    second.restart(0, start, [])
+    second.reset(0, start, [])
     step(second, start)
-    for verb in (lambda: first.reload(1), lambda: first.restart(0, start, []), lambda: step(first, start)):
+    for verb in (lambda: first.reload(1), lambda: first.reset(0, start, []), lambda: step(first, start)):
         with pytest.raises(SimulationError, match="closed"):
             verb()
 
 
 def test_garbage__gives_libsumo_back(scene: OpenScene) -> None:
-    gone = weakref.ref(LocalSimulation(scene, 1, (True, True), 1))
+    gone = weakref.ref(LibsumoSimulation(scene, 1, (True, True), 1))
     gc.collect()
     assert gone() is None
-    assert not LocalSimulation.in_use()
+    assert not LibsumoSimulation.in_use()
 
 
 def test_failed_load__is_an_error_and_leaves_libsumo_free(scene: OpenScene) -> None:
     broken = replace(scene, routes=replace(scene.routes, types_xml="<routes><vType/></routes>"))
     with pytest.raises(SimulationError, match="load scene 'small'"):
-        LocalSimulation(broken, 1, (True, True), 1)
-    assert not LocalSimulation.in_use()
+        LibsumoSimulation(broken, 1, (True, True), 1)
+    assert not LibsumoSimulation.in_use()
 
 
 def test_exit__without_close_is_quiet_and_leaves_no_file(scene: OpenScene, tmp_path: Path) -> None:
     program = f"""
 import pathlib
-from harness.traffic.libsumo_simulation import LocalSimulation
+from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import open_scene
-simulation = LocalSimulation(open_scene(pathlib.Path({str(scene.folder)!r})), 1, (True, True), 1)
+simulation = LibsumoSimulation(open_scene(pathlib.Path({str(scene.folder)!r})), 1, (True, True), 1)
 """
     done = subprocess.run(
         [sys.executable, "-X", "dev", "-c", program],

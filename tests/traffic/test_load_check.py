@@ -18,7 +18,7 @@ VAN = '<vehicle id="van" type="van" depart="3" departPos="80" departSpeed="9"><r
 
 def complaint(scene: OpenScene) -> str:
     with pytest.raises(UsageError) as raised:
-        load_check.try_scene(scene)
+        load_check.check_loads(scene)
     (problem,) = raised.value.problems
     assert problem.remedy
     return str(problem)
@@ -35,9 +35,9 @@ def other_sumo(folder: Path, script: str, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_scene__in_order_passes(merge: OpenScene, tmp_path: Path) -> None:
-    load_check.try_scene(merge)
+    load_check.check_loads(merge)
     flow = '<flow id="vans" type="van" begin="0" period="3" departLane="random"><route edges="road"/></flow>'
-    load_check.try_scene(build_scene(tmp_path, others=VAN + flow))
+    load_check.check_loads(build_scene(tmp_path, others=VAN + flow))
 
 
 def test_net__that_sumo_refuses_is_named_with_the_place(repository: Path, tmp_path: Path) -> None:

@@ -20,11 +20,11 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.errors import SimulationError
 from harness.traffic import subprocess_simulation
-from harness.traffic.libsumo_simulation import LocalSimulation
+from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.subprocess_simulation import RemoteSimulation
+from harness.traffic.subprocess_simulation import SubprocessSimulation
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import LEFT_Y, ZIPPER, ZIPPER_EDGES, ZIPPER_NODES, build_scene, drawn, placed
 
@@ -37,8 +37,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 
 
 @pytest.fixture
-def far(scene: OpenScene) -> Iterator[RemoteSimulation]:
-    simulation = RemoteSimulation(scene, 1, (True, True), 1)
+def far(scene: OpenScene) -> Iterator[SubprocessSimulation]:
+    simulation = SubprocessSimulation(scene, 1, (True, True), 1)
     yield simulation
     simulation.close()
 
@@ -69,13 +69,13 @@ def test_open__the_first_is_local_further_ones_are_not_and_after_it_the_next_is_
     kinds = [type(each) for each in (first, second, third)]
     for each in (second, third):
         each.close()
-    assert kinds == [LocalSimulation, RemoteSimulation, LocalSimulation]
+    assert kinds == [LibsumoSimulation, SubprocessSimulation, LibsumoSimulation]
     assert not libsumo.isLoaded()
 
 
 def test_both__give_the_same_numbers(scene: OpenScene) -> None:
     arenas = [Arena(scene, 2, [Seat(None), Seat(SumoDriver())], seed=3) for _ in range(2)]
-    assert isinstance(arenas[1].simulation, RemoteSimulation)
+    assert isinstance(arenas[1].simulation, SubprocessSimulation)
     actions = np.random.default_rng(0).normal(0.0, 0.1, (120, 2, 2, 2))
 
     def played(arena: Arena) -> bytes:
@@ -83,7 +83,7 @@ def test_both__give_the_same_numbers(scene: OpenScene) -> None:
         for seed in (1, 2):
             arena.reload(seed)
             starts = {game: drawn(scene, "both", game) for game in range(2)}
-            arena.start(starts, {game: scene.departures(np.random.default_rng(game)) for game in range(2)})
+            arena.reset(starts, {game: scene.departures(np.random.default_rng(game)) for game in range(2)})
             for action in actions:
                 arena.step(action)
                 seen += [arena.observation.tobytes(), arena.state.x_m.tobytes(), arena.state.outcome.tobytes()]
@@ -97,13 +97,15 @@ def test_both__give_the_same_numbers(scene: OpenScene) -> None:
     assert here == there
 
 
-def test_refusal__in_the_child_is_an_error_here_and_the_child_goes_on(scene: OpenScene, far: RemoteSimulation) -> None:
+def test_refusal__in_the_child_is_an_error_here_and_the_child_goes_on(
+    scene: OpenScene, far: SubprocessSimulation
+) -> None:
     start = placed(scene, (40, LEFT_Y, 0, 0), None)
     wrong = Departure("wrong", "van", ("road",), 0.0, "7", "base", "0")
     with pytest.raises(SimulationError, match=r"start game 0.*departLane.*wrong"):
-        far.restart(0, start, [wrong])
+        far.reset(0, start, [wrong])
     far.reload(1)
-    far.restart(0, start, [])
+    far.reset(0, start, [])
     assert far.step(start.x_m[None], start.y_m[None], start.heading_rad[None]).names.tolist() == [[]]
 
 
@@ -111,11 +113,11 @@ def test_refusal__to_load_leaves_no_child(scene: OpenScene, tmp_path: Path) -> N
     broken = build_scene(tmp_path)
     broken.net_file.write_text("<net")
     with pytest.raises(SimulationError, match=r"n\.net\.xml"):
-        RemoteSimulation(broken, 1, (True, True), 1)
+        SubprocessSimulation(broken, 1, (True, True), 1)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
-def test_death__of_the_child_is_an_error_that_names_the_signal(far: RemoteSimulation) -> None:
+def test_death__of_the_child_is_an_error_that_names_the_signal(far: SubprocessSimulation) -> None:
     os.kill(far._child.pid, signal.SIGSEGV)
     for _ in range(2):
         with pytest.raises(SimulationError, match="SIGSEGV"):
@@ -123,7 +125,7 @@ def test_death__of_the_child_is_an_error_that_names_the_signal(far: RemoteSimula
 
 
 def test_interrupt__ends_the_child_rather_than_leave_an_answer_to_come(
-    far: RemoteSimulation, monkeypatch: pytest.MonkeyPatch
+    far: SubprocessSimulation, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patched:
 
@@ -137,7 +139,7 @@ def test_interrupt__ends_the_child_rather_than_leave_an_answer_to_come(
         far.reload(2)
 
 
-def test_close__ends_the_child_and_twice_is_once(far: RemoteSimulation) -> None:
+def test_close__ends_the_child_and_twice_is_once(far: SubprocessSimulation) -> None:
     far.close()
     assert far._child.poll() == 0
     far.close()
@@ -146,7 +148,7 @@ def test_close__ends_the_child_and_twice_is_once(far: RemoteSimulation) -> None:
 
 
 def test_garbage__ends_the_child(scene: OpenScene) -> None:
-    child = RemoteSimulation(scene, 1, (True, True), 1)._child
+    child = SubprocessSimulation(scene, 1, (True, True), 1)._child
     gc.collect()
     assert child.poll() == 0
 
@@ -160,7 +162,7 @@ class Printing:
     def __init__(self, *arguments): os.write(1, b"SUMO says"); print("this", flush=True)
     def reload(self, seed): os.write(1, b"and that"); return seed
     def close(self): print("bye", flush=True)
-libsumo_simulation.LocalSimulation = Printing
+libsumo_simulation.LibsumoSimulation = Printing
 subprocess_simulation.serve()
 """
     child = subprocess.Popen(
@@ -211,13 +213,13 @@ def test_parent__a_script_without_a_main_guard_leaves_no_orphan_however_it_ends(
 def test_soak__players_off_the_road_around_a_zipper_junction_do_not_kill_sumo(tmp_path: Path) -> None:
     """SUMO 1.28 dies of this (SIGSEGV in a thousand steps) if lane changes take time, and with its sublane model."""
     scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, goal_m=100.0)
-    simulation, generator = RemoteSimulation(scene, 4, (True, True), 1), np.random.default_rng(0)
+    simulation, generator = SubprocessSimulation(scene, 4, (True, True), 1), np.random.default_rng(0)
     try:
         for episode in range(14):
             x, y = generator.uniform(90, 150, (4, 2)), generator.uniform(-9, 0, (4, 2))
             heading, turning = np.zeros((4, 2)), generator.normal(0.0, 0.03, (4, 2))
             for game in range(4):
-                simulation.restart(game, drawn(scene, episode, game), [])
+                simulation.reset(game, drawn(scene, episode, game), [])
             for _ in range(250):
                 heading = heading + turning + generator.normal(0.0, 0.05, (4, 2))
                 x, y = x + 0.6 * np.cos(heading), y + 0.6 * np.sin(heading)

@@ -25,7 +25,7 @@ from harness.errors import StageFailed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene, open_scene
-from harness.training.paired_rollouts import PairedGames
+from harness.training.paired_rollouts import PairedRollouts
 from harness.training.parameter_search import Search, Trial, best, propose, read_trials, run_search, write_trials
 from tests.drivers.test_entry_points import install
 from tests.drivers.test_external import document, find
@@ -70,9 +70,9 @@ class Watched:
         self.first: list[FloatArray] = []
         self._new: set[int] = set()
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         self._new |= {*games.tolist()}
-        self._driver.begin(games)
+        self._driver.reset(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         self.first += [seen.copy() for game, seen in zip(games, observation, strict=True) if int(game) in self._new]
@@ -82,7 +82,7 @@ class Watched:
 
 def play(scene: OpenScene, driver: Driver, other: Driver | Mixture | None = None, **changes: Any) -> Any:
     given = {"games": 7, "at_once": 3, "alone_share": 0.3, "parts": ("test", 1)} | changes
-    games = PairedGames(scene, personas(), other or opponent(), **given)
+    games = PairedRollouts(scene, personas(), other or opponent(), **given)
     try:
         return games.play(driver), games.play(driver)
     finally:
@@ -118,7 +118,7 @@ class _Counting:
     def __init__(self) -> None:
         self.games: set[int] = set()
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         """Nothing to forget."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
@@ -196,7 +196,7 @@ def test_search__interrupted_is_the_same_search(stops_at: list[int], scene: Open
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            run_search(search, tmp_path / "kept.json", begin=begin)
+            run_search(search, tmp_path / "kept.json", on_start=begin)
         assert len(read_trials(tmp_path / "kept.json")) == stop
     told: list[tuple[int, int]] = []
     assert run_search(search, tmp_path / "kept.json", lambda *of: told.append(of)) == whole
@@ -209,7 +209,7 @@ def test_search__that_is_finished_plays_nothing(
 ) -> None:
     search = search_of(scene, tmp_path, SLOW + SPEED, trials=2)
     whole = run_search(search, tmp_path / "kept.json")
-    monkeypatch.setattr(harness.training.parameter_search, "PairedGames", None)
+    monkeypatch.setattr(harness.training.parameter_search, "PairedRollouts", None)
     assert run_search(search, tmp_path / "kept.json") == whole
 
 
@@ -277,8 +277,8 @@ for line in sys.stdin:
     message = json.loads(line)
     if message["type"] == "hello":
         speed, entries = message["parameters"]["speed_mps"], message["layout"]
-        answer = {"protocol": 1}
-    elif message["type"] == "begin":
+        answer = {"protocol": 2}
+    elif message["type"] == "reset":
         answer = {}
     else:
         now = [dict(zip(entries, seen)) for seen in message["observation"]]

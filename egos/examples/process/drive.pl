@@ -31,8 +31,8 @@ while (my $line = <STDIN>) {
         my $place = 0;
         %entry = map { $_ => $place++ } $names =~ /"(.*?)"/g;
         ($length) = $line =~ /"length_m": ([-+.\deE]+)/;
-        print qq({"protocol": 1}\n);
-    } elsif ($line =~ /"type": "begin"/) {
+        print qq({"protocol": 2}\n);
+    } elsif ($line =~ /"type": "reset"/) {
         print "{}\n";    # nothing is remembered of a game
     } else {
         my ($views) = $line =~ /"observation": \[(.*?)\]\]/;

@@ -18,7 +18,7 @@ class Steady:
     def __init__(self, car: Car, speed_mps: float = 10.0) -> None:
         self._car, self._speed_mps = car, speed_mps
 
-    def begin(self, games: np.ndarray) -> None:
+    def reset(self, games: np.ndarray) -> None:
         """Nothing to forget."""
 
     def decide(self, games: np.ndarray, observation: np.ndarray, noise: np.ndarray) -> np.ndarray:

@@ -18,8 +18,8 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.execution.crash_retries import Attempt, Begin, Report
-from harness.campaign.storage.checksums import broken, read_seal, write_seal
+from harness.campaign.execution.crash_retries import Attempt, OnProgress, OnStart
+from harness.campaign.storage.checksums import broken, read_checksums, write_checksums
 from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES, name_manoeuvres
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.environments.rollout import Arm, Game, assess
@@ -44,7 +44,7 @@ class Segment:
 
     def errors(self) -> int | None:
         """How many of its games could not be played; None if it has not been played whole, by these versions."""
-        said = read_seal(self.file("json"))
+        said = read_checksums(self.file("json"))
         if said is None or said.get("versions") != versions_of_numbers() or broken(said, self.folder):
             return None
         errors = said.get("errors")
@@ -65,7 +65,7 @@ class Segment:
         write_csv(name_manoeuvres(table, self.file(_TRACES), arm.scene), self.file(MANOEUVRES))
         files = [self.file(name) for name in (EPISODES, MANOEUVRES, _TRACES)]
         errors = int((table["error"] != "").sum())
-        write_seal(self.file("json"), self.folder, files, {"errors": errors, "versions": versions_of_numbers()})
+        write_checksums(self.file("json"), self.folder, files, {"errors": errors, "versions": versions_of_numbers()})
         return errors
 
 
@@ -80,13 +80,13 @@ def play_segments(
     segments: Sequence[Segment],
     labels: Mapping[str, Any],
     attempt: Attempt,
-    begin: Begin,
-    report: Report,
+    on_start: OnStart,
+    on_progress: OnProgress,
 ) -> int:
-    """Play what is missing of an arm; how many of all its games could not be played.
+    """Play the games of an arm that are missing. Returns how many of all its games could not be played.
 
-    `labels` are the cells that all its records share. `begin` is told of each game before it is played, `report` of
-    the games played and of all there are. Raises as `assess` does.
+    `labels` are the cells that all records share. `on_start` gets each episode number before that game is played,
+    `on_progress` the number of games played and their total. Raises as `assess` does.
     """
     make_folder(segments[0].folder)
     errors = {segment: segment.errors() for segment in segments}
@@ -97,10 +97,10 @@ def play_segments(
     def tell() -> None:
         nonlocal done
         done += 1
-        report(done, total)
+        on_progress(done, total)
 
     episodes = chain.from_iterable(segment.episodes for segment in missing)
-    with closing(assess(arm, episodes, begin, attempt.given_up)) as games:  # type: ignore[type-var]
+    with closing(assess(arm, episodes, on_start, attempt.abandoned)) as games:  # type: ignore[type-var]
         for segment in missing:
             segment.file("json").unlink(missing_ok=True)
             errors[segment] = segment.play(games, labels, arm, tell)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 from harness.campaign.plan.stages import AssessmentStage, Stage
 
-Report = Callable[[int, int], None]
+OnProgress = Callable[[int, int], None]
 """Told how much of a stage is done, and how much there is: steps or games."""
-Begin = Callable[[int], None]
+OnStart = Callable[[int], None]
 """Told of each segment of a training, and of each game of an arm, before it is gone about: if the process dies, it is
 known what of."""
 
@@ -21,7 +21,7 @@ class Attempt:
 
     first: bool = True
     """Games of an earlier run that could not be played are played again: what was wrong may have been mended."""
-    given_up: Mapping[int, str] = field(default_factory=dict)
+    abandoned: Mapping[int, str] = field(default_factory=dict)
     """Episodes that killed their worker too often, each with what is said of it."""
 
 
@@ -29,19 +29,19 @@ FIRST = Attempt()
 
 TRIES = 3
 """So often one segment, or one game, may kill its worker."""
-MOST_GIVEN_UP = 20
+MOST_ABANDONED = 20
 """So many games of an arm may be given up in one run of the command: beyond it the scene is to blame, not a game."""
 
 
 @dataclass(frozen=True)
-class Verdict:
+class CrashResponse:
     """What a death means for its stage."""
 
     message: str
     stage_fails: bool = False
 
 
-class Deaths:
+class Crashes:
     """Counts the deaths in each place of each stage: a segment of a training, a game of an arm, or the way there.
 
     Only those of this run of the command count: whoever kills the whole command accuses no game.
@@ -68,17 +68,17 @@ class Deaths:
             self._farthest[stage] = place
             del self._counts[stage, None]
 
-    def note(self, stage: Stage, cause: str) -> Verdict:
+    def note(self, stage: Stage, cause: str) -> CrashResponse:
         """A worker has died of `cause`."""
         place = self._place.get(stage.id)
         self._counts[stage.id, place] += 1
         if self._counts[stage.id, place] < TRIES:
-            return Verdict(cause)
+            return CrashResponse(cause)
         often = f"{cause}, {TRIES} times over"
         if place is None or not isinstance(stage, AssessmentStage):
-            return Verdict(often, stage_fails=True)
-        given_up = self._given_up.setdefault(stage.id, {})
-        given_up[place] = often
-        if len(given_up) > MOST_GIVEN_UP:
-            return Verdict(f"{len(given_up)} games killed their worker; the last: {often}", stage_fails=True)
-        return Verdict(f"{often} in game {place}, which is given up")
+            return CrashResponse(often, stage_fails=True)
+        abandoned = self._given_up.setdefault(stage.id, {})
+        abandoned[place] = often
+        if len(abandoned) > MOST_ABANDONED:
+            return CrashResponse(f"{len(abandoned)} games killed their worker; the last: {often}", stage_fails=True)
+        return CrashResponse(f"{often} in game {place}, which is given up")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.campaign.execution.run_context import Conditions
+from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.stages import AssessmentStage, Drives
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
@@ -28,10 +28,10 @@ _LEAST_SHARE = 1e-6  # of a mixture that is worth a driver
 
 
 @dataclass(frozen=True)
-class Casting:
+class PlayerFactory:
     """What drivers are made from."""
 
-    conditions: Conditions
+    conditions: RunContext
     folder: RunFolder
     scene: OpenScene
 

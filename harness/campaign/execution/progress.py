@@ -58,7 +58,7 @@ class StageProgress:
     def __exit__(self, *exception: object) -> None:
         self._bars.stop()
 
-    def tell(self, event: Event) -> None:
+    def emit(self, event: Event) -> None:
         """Show an event."""
         if event.kind == "progress":
             if event.stage not in self._rows:

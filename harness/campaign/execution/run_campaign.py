@@ -9,12 +9,12 @@ from rich.console import Console
 
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.progress import StageProgress
-from harness.campaign.execution.run_context import conditions_of
+from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.worker_pool import Event, run_stages
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, Stage, TrainingStage
 from harness.campaign.preflight import OpenCampaign
-from harness.campaign.results.results import FINISHED, Outcome, warn, write_results
+from harness.campaign.results.results import FINISHED, RunResult, warn, write_results
 from harness.campaign.storage.run_folder import FORMAT, RunFolder
 from harness.campaign.storage.versions import versions, versions_of_numbers
 from harness.reports.provenance import mixed_versions
@@ -22,7 +22,7 @@ from harness.reports.provenance import mixed_versions
 _KINDS = {TrainingStage: "training", AssessmentStage: "assessment", ReconfigurationStage: "reconfiguration"}
 
 
-def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: Console) -> Outcome:
+def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: Console) -> RunResult:
     """Carry out what is left of a campaign, and write its tables, replays and report.
 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
@@ -39,11 +39,11 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
             ledger.warn_of_versions(console)
             with StageProgress(stages, len(finished), console) as progress:
 
-                def tell(event: Event) -> None:
+                def emit(event: Event) -> None:
                     ledger.note(event)
-                    progress.tell(event)
+                    progress.emit(event)
 
-                run_stages(stages, finished, conditions_of(campaign, folder, keys), jobs, tell)
+                run_stages(stages, finished, run_context_of(campaign, folder, keys), jobs, emit)
         return write_results(folder, console)
 
 

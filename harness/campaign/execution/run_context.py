@@ -11,11 +11,11 @@ from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
-from harness.drivers.external import GivenDriver
+from harness.drivers.external import ExternalDriver
 
 
 @dataclass(frozen=True)
-class Conditions:
+class RunContext:
     """What all stages of a run share; small enough to be sent to another process."""
 
     folder: Path
@@ -23,8 +23,8 @@ class Conditions:
     document: Campaign
     ego_persona: Persona
     personas: Mapping[str, Persona]
-    ego_driver: GivenDriver | None
-    other_egos: Mapping[str, GivenDriver]
+    ego_driver: ExternalDriver | None
+    other_egos: Mapping[str, ExternalDriver]
     policies: Path | None
     keys: Mapping[str, str]  # of every stage
 
@@ -37,7 +37,7 @@ class Conditions:
         population, whose people have each their own."""
         return self.persona(name if name in self.personas else "")
 
-    def given(self, name: str) -> GivenDriver:
+    def given(self, name: str) -> ExternalDriver:
         """A driver that the campaign names: its ego, or another one by name."""
         driver = self.other_egos[name] if name else self.ego_driver
         assert driver is not None
@@ -57,10 +57,10 @@ class Conditions:
         return self.policies / stage
 
 
-def conditions_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str]) -> Conditions:
+def run_context_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str]) -> RunContext:
     """The conditions of a run of a campaign: on the run folder's copy of the scene, which stays what it was."""
     personas = {each.name: each for each in campaign.personas}
-    return Conditions(
+    return RunContext(
         folder.path,
         folder.scene,
         campaign.document,

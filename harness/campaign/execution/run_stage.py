@@ -15,10 +15,10 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.execution.crash_retries import FIRST, Attempt, Begin, Report
+from harness.campaign.execution.crash_retries import FIRST, Attempt, OnProgress, OnStart
 from harness.campaign.execution.equilibrium_stop import settled
-from harness.campaign.execution.player_factory import Casting
-from harness.campaign.execution.run_context import Conditions
+from harness.campaign.execution.player_factory import PlayerFactory
+from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.best_responses import settings_of
 from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, Stage, TrainingStage
 from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES
@@ -35,9 +35,9 @@ from harness.traffic.scene import OpenScene, open_scene
 
 def carry_out(
     stage: Stage,
-    conditions: Conditions,
-    report: Report,
-    begin: Begin = lambda place: None,
+    conditions: RunContext,
+    on_progress: OnProgress,
+    on_start: OnStart = lambda place: None,
     attempt: Attempt = FIRST,
 ) -> dict[str, Any]:
     """Do a stage, seal what it made, say what came of it. What it wrote from other inputs is dropped."""
@@ -51,7 +51,7 @@ def carry_out(
         return info
     scene = open_scene(conditions.scene_folder, conditions.vehicle_type(stage))
     do: Any = {TrainingStage: _train, AssessmentStage: _assess, ReconfigurationStage: _reconfigure}[type(stage)]
-    info, files = do(stage, conditions, folder, scene, report, begin, attempt)
+    info, files = do(stage, conditions, folder, scene, on_progress, on_start, attempt)
     info["seconds"] = round(time.monotonic() - began, 1)
     folder.finish(stage.id, key, info, files)
     if not info.get("errors"):  # failures are not kept: the next run tries those games again, and only those segments
@@ -73,22 +73,22 @@ def _made_by(checkpoint: Path, besides: Mapping[str, str] = MappingProxyType({})
 
 def _train(
     stage: TrainingStage,
-    conditions: Conditions,
+    conditions: RunContext,
     folder: RunFolder,
     scene: OpenScene,
-    report: Report,
-    begin: Begin,
+    on_progress: OnProgress,
+    on_start: OnStart,
     attempt: Attempt,
 ) -> tuple[dict[str, Any], list[Path]]:
     from harness.training.early_stopping import RULE
-    from harness.training.ppo import Lesson, train  # torch is slow to import, and assessment does without
+    from harness.training.ppo import TrainingSpec, train  # torch is slow to import, and assessment does without
 
     settings = settings_of(conditions.document, stage)
-    lesson = Lesson(
+    spec = TrainingSpec(
         scene,
         stage.learner,
         (conditions.ego_persona, conditions.persona_met(stage.persona)),
-        Casting(conditions, folder, scene).player(stage.opponent),
+        PlayerFactory(conditions, folder, scene).player(stage.opponent),
         stage.alone_share,
         stage.attentive_share,
         _initial(stage, conditions, folder),
@@ -96,7 +96,7 @@ def _train(
         ("training", stage.seed, stage.name),
         as_it_drives=bool(stage.responds_in),
     )
-    learner = lesson.personas[stage.learner]
+    learner = spec.personas[stage.learner]
     card = {
         "stage": stage.id,
         "player": ROLES[stage.learner],
@@ -110,7 +110,7 @@ def _train(
     checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
     made_by = _made_by(checkpoint)
     try:
-        trained = train(lesson, checkpoint, key, card, folder.tensorboard(stage.id), report, begin)
+        trained = train(spec, checkpoint, key, card, folder.tensorboard(stage.id), on_progress, on_start)
     except (FloatingPointError, ValueError) as error:
         raise StageFailed(f"{stage.id}: {error}") from error
     make_folder(folder.policy(stage.id))
@@ -131,17 +131,17 @@ def _train(
 
 def _reconfigure(
     stage: ReconfigurationStage,
-    conditions: Conditions,
+    conditions: RunContext,
     folder: RunFolder,
     scene: OpenScene,
-    report: Report,
-    begin: Begin,
+    on_progress: OnProgress,
+    on_start: OnStart,
     attempt: Attempt,
 ) -> tuple[dict[str, Any], list[Path]]:
     from harness.campaign.execution.search_output import reconfigure  # Optuna is slow to import
     from harness.training.parameter_search import Search, version_of_search
 
-    opponent = Casting(conditions, folder, scene).player(stage.opponent)
+    opponent = PlayerFactory(conditions, folder, scene).player(stage.opponent)
     assert opponent is not None
     other = conditions.persona_met(stage.persona)
     personas, settings = (conditions.ego_persona, other), conditions.document.reconfiguration
@@ -151,7 +151,7 @@ def _reconfigure(
     made_by = _made_by(kept, version_of_search())
     labels = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed}
     try:
-        info, files = reconfigure(search, labels, kept, folder.policy(stage.id), report, begin)
+        info, files = reconfigure(search, labels, kept, folder.policy(stage.id), on_progress, on_start)
     except StageFailed as error:
         raise StageFailed(f"{stage.id}: {error}") from error
     return {**info, "versions": made_by}, files
@@ -159,17 +159,17 @@ def _reconfigure(
 
 def _assess(
     stage: AssessmentStage,
-    conditions: Conditions,
+    conditions: RunContext,
     folder: RunFolder,
     scene: OpenScene,
-    report: Report,
-    begin: Begin,
+    on_progress: OnProgress,
+    on_start: OnStart,
     attempt: Attempt,
 ) -> tuple[dict[str, Any], list[Path]]:
     from harness.campaign.execution.arm_segments import join_segments, play_segments, segments_of
     from harness.environments.rollout import Arm  # the parent, who plays nothing, does without
 
-    casting = Casting(conditions, folder, scene)
+    casting = PlayerFactory(conditions, folder, scene)
     personas = (conditions.ego_persona, conditions.persona(stage.non_ego.persona if stage.non_ego else ""))
     players: list[Player] = []
     chosen: dict[str, Any] = {}
@@ -184,7 +184,7 @@ def _assess(
     arm = Arm(stage.arm, scene, (players[EGO], players[NON_EGO]), personas, stage.seed)
     segments = segments_of(folder.segments(stage.id), conditions.document.assessment.episodes)
     labels = {"arm": stage.arm, "persona": stage.persona, "seed": stage.seed}
-    errors = play_segments(arm, segments, labels, attempt, begin, report)
+    errors = play_segments(arm, segments, labels, attempt, on_start, on_progress)
     work = folder.work(stage.id)
     files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
     join_segments(segments, *files)
@@ -192,7 +192,7 @@ def _assess(
     return info, files
 
 
-def _initial(stage: TrainingStage, conditions: Conditions, folder: RunFolder) -> Policy | None:
+def _initial(stage: TrainingStage, conditions: RunContext, folder: RunFolder) -> Policy | None:
     """The policy that a training begins from."""
     if stage.begins_as:
         return read_policy(conditions.policy_before(stage.begins_as[0]))

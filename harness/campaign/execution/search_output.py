@@ -8,11 +8,11 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.execution.crash_retries import Begin, Report
+from harness.campaign.execution.crash_retries import OnProgress, OnStart
 from harness.config.driver import read_driver
 from harness.config.toml_writing import toml_of
 from harness.config.tunable import Adjustable, Tunable
-from harness.drivers.external import GivenDriver
+from harness.drivers.external import ExternalDriver
 from harness.errors import StageFailed
 from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed, write_csv
 from harness.files import make_folder, write_atomically
@@ -23,11 +23,11 @@ TABLE = "reconfiguration.csv"
 
 
 def reconfigure(
-    search: Search, labels: Mapping[str, Any], kept: Path, folder: Path, report: Report, begin: Begin
+    search: Search, labels: Mapping[str, Any], kept: Path, folder: Path, on_progress: OnProgress, on_start: OnStart
 ) -> tuple[dict[str, Any], list[Path]]:
     """Carry out a search, and write what it found into `folder` and its table beside `kept`, its trials: what came of
     it, and the files. `labels` are the cells that all rows of the table share. Raises as `run_search` does."""
-    trials = run_search(search, kept, report, begin)
+    trials = run_search(search, kept, on_progress, on_start)
     chosen = best(trials)
     first, found = trials[0], trials[chosen]
     said = [
@@ -45,7 +45,7 @@ def reconfigure(
     return info, [folder / DRIVER, kept.with_name(TABLE)]
 
 
-def read_found(given: GivenDriver, folder: Path) -> GivenDriver:
+def read_found(given: ExternalDriver, folder: Path) -> ExternalDriver:
     """The ego as the search that wrote into this folder reconfigured it."""
     document = read_driver(folder / DRIVER)
     if not isinstance(document, Adjustable):

@@ -24,8 +24,8 @@ from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, Literal
 
-from harness.campaign.execution.crash_retries import Attempt, Begin, Deaths, Report
-from harness.campaign.execution.run_context import Conditions
+from harness.campaign.execution.crash_retries import Attempt, Crashes, OnProgress, OnStart
+from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.locks import share
@@ -38,7 +38,7 @@ _REQUESTS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHU
 _CONTEXT = multiprocessing.get_context("spawn")
 
 
-Work = Callable[[Stage, Conditions, Report, Begin, Attempt], dict[str, Any]]
+Work = Callable[[Stage, RunContext, OnProgress, OnStart, Attempt], dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class _Worker:
     stage: Stage | None = None
 
 
-Hire = Callable[[], _Worker]
+Spawn = Callable[[], _Worker]
 
 
 def cores() -> int:
@@ -72,9 +72,9 @@ def cores() -> int:
 def run_stages(
     stages: Sequence[Stage],
     finished: Iterable[str],
-    conditions: Conditions,
+    conditions: RunContext,
     jobs: int,
-    tell: Callable[[Event], None],
+    emit: Callable[[Event], None],
     work: Work = carry_out,
 ) -> None:
     """Carry out every stage that is not finished, at most `jobs` at a time, each after what it needs.
@@ -83,12 +83,12 @@ def run_stages(
     """
     done, lost = set(finished), set[str]()
     waiting = [stage for stage in stages if stage.id not in done]
-    deaths = Deaths()
-    hire = partial(_start, work, conditions)
-    with _workers(min(jobs, len(waiting)), hire) as workers:
+    deaths = Crashes()
+    spawn = partial(_start, work, conditions)
+    with _workers(min(jobs, len(waiting)), spawn) as workers:
         while waiting or any(worker.stage for worker in workers):
-            _skip_what_cannot_be(waiting, lost, tell)
-            _hand_out(waiting, workers, done, deaths, hire, tell)
+            _skip_what_cannot_be(waiting, lost, emit)
+            _dispatch(waiting, workers, done, deaths, spawn, emit)
             busy = [worker for worker in workers if worker.stage]
             if not busy:
                 continue
@@ -96,7 +96,7 @@ def run_stages(
             for worker in busy:
                 if worker.connection not in ready and worker.process.sentinel not in ready:
                     continue
-                event = _listen(worker)
+                event = _receive(worker)
                 if event is None or worker.stage is None:
                     continue
                 if event.kind == "began":
@@ -107,32 +107,32 @@ def run_stages(
                     event = Event("failed" if verdict.stage_fails else "died", event.stage, message=verdict.message)
                     if not verdict.stage_fails:
                         waiting.insert(0, worker.stage)
-                    _replace(worker, hire)
+                    _replace(worker, spawn)
                 if event.kind == "done":
                     done.add(event.stage)
                 if event.kind == "failed":
                     lost.add(event.stage)
                 if event.kind != "progress":
                     worker.stage = None
-                tell(event)
+                emit(event)
 
 
-def _skip_what_cannot_be(waiting: list[Stage], lost: set[str], tell: Callable[[Event], None]) -> None:
+def _skip_what_cannot_be(waiting: list[Stage], lost: set[str], emit: Callable[[Event], None]) -> None:
     for stage in list(waiting):
         missing = [name for name in stage.needs if name in lost]
         if missing:
             waiting.remove(stage)
             lost.add(stage.id)
-            tell(Event("skipped", stage.id, message=f"needs {', '.join(missing)}, which failed"))
+            emit(Event("skipped", stage.id, message=f"needs {', '.join(missing)}, which failed"))
 
 
-def _hand_out(
+def _dispatch(
     waiting: list[Stage],
     workers: list[_Worker],
     done: set[str],
-    deaths: Deaths,
-    hire: Hire,
-    tell: Callable[[Event], None],
+    deaths: Crashes,
+    spawn: Spawn,
+    emit: Callable[[Event], None],
 ) -> None:
     for worker in workers:
         ready = [stage for stage in waiting if set(stage.needs) <= done]
@@ -145,12 +145,12 @@ def _hand_out(
             try:
                 worker.connection.send(task)
             except OSError:  # it died while it had nothing to do
-                _replace(worker, hire)
+                _replace(worker, spawn)
                 worker.connection.send(task)
-            tell(Event("started", stage.id))
+            emit(Event("started", stage.id))
 
 
-def _listen(worker: _Worker) -> Event | None:
+def _receive(worker: _Worker) -> Event | None:
     """What a worker has to say; its death if it died without a word."""
     assert worker.stage is not None
     try:
@@ -172,11 +172,11 @@ def _cause(exitcode: int | None) -> str:
 
 
 @contextmanager
-def _workers(count: int, hire: Hire) -> Iterator[list[_Worker]]:
+def _workers(count: int, spawn: Spawn) -> Iterator[list[_Worker]]:
     workers: list[_Worker] = []
     try:
         for _ in range(count):
-            workers.append(hire())
+            workers.append(spawn())
         yield workers
     finally:
         for worker in workers:
@@ -188,7 +188,7 @@ def _workers(count: int, hire: Hire) -> Iterator[list[_Worker]]:
             worker.connection.close()
 
 
-def _start(work: Work, conditions: Conditions) -> _Worker:
+def _start(work: Work, conditions: RunContext) -> _Worker:
     ours, theirs = _CONTEXT.Pipe()
     process = _CONTEXT.Process(target=_work, args=(theirs, work, conditions), daemon=True)
     with _interrupts_held_back():
@@ -217,16 +217,16 @@ def _interrupts_held_back() -> Iterator[None]:
         signal.raise_signal(number)
 
 
-def _replace(worker: _Worker, hire: Hire) -> None:
+def _replace(worker: _Worker, spawn: Spawn) -> None:
     worker.connection.close()
-    fresh = hire()
+    fresh = spawn()
     worker.process, worker.connection = fresh.process, fresh.connection
 
 
 # --- in the worker's process -----------------------------------------------------------------------------------------
 
 
-def _work(connection: Connection, work: Work, conditions: Conditions) -> None:
+def _work(connection: Connection, work: Work, conditions: RunContext) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
@@ -238,7 +238,7 @@ def _work(connection: Connection, work: Work, conditions: Conditions) -> None:
 
 
 @cache
-def _settle_in(run: Path) -> None:
+def _register(run: Path) -> None:
     """Be known as a worker in a run folder, and make temporary files in it: of a worker that was killed they are taken
     away by the next command."""
     folder = RunFolder(run)
@@ -248,22 +248,22 @@ def _settle_in(run: Path) -> None:
     share(folder.workers_lock)
 
 
-def _carry_out(stage: Stage, attempt: Attempt, connection: Connection, work: Work, conditions: Conditions) -> Event:
+def _carry_out(stage: Stage, attempt: Attempt, connection: Connection, work: Work, conditions: RunContext) -> Event:
     last = 0.0
 
-    def report(done: int, total: int) -> None:
+    def on_progress(done: int, total: int) -> None:
         nonlocal last
         now = time.monotonic()
         if now - last >= _REPORT_EVERY_S or done >= total:
             last = now
             connection.send(Event("progress", stage.id, done, total))
 
-    def begin(place: int) -> None:
+    def on_start(place: int) -> None:
         connection.send(Event("began", stage.id, place))
 
     try:
-        _settle_in(conditions.folder)
-        return Event("done", stage.id, info=work(stage, conditions, report, begin, attempt))
+        _register(conditions.folder)
+        return Event("done", stage.id, info=work(stage, conditions, on_progress, on_start, attempt))
     except (HarnessError, OSError) as error:
         return Event("failed", stage.id, message=str(error))
     except Exception as error:

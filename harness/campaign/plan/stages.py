@@ -25,7 +25,7 @@ class Drives:
     kind: Literal["sumo", "given", "reconfigured", "policy", "before", "mixture", "best"]
     stage: str = ""
     persona: str = ""
-    """Whose habits it has; empty: the ego's own."""
+    """Whose human factors it has; empty: the ego's own."""
     members: tuple[Drives, ...] = ()
     shares: tuple[float, ...] = ()
     weighed_by: tuple[tuple[str, ...], ...] = ()

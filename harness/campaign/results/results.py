@@ -47,7 +47,7 @@ from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions
 from harness.reports.results import results
 from harness.reports.treatment import ARMS
-from harness.reports.wording import Verdicts
+from harness.reports.wording import Conclusion
 from harness.traffic.scene import OpenScene, open_scene
 
 FINISHED = ("done", "settled")
@@ -55,16 +55,16 @@ FINISHED = ("done", "settled")
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunResult:
     """What a run came to."""
 
-    verdicts: Sequence[tuple[str, Verdicts]]
+    verdicts: Sequence[tuple[str, Conclusion]]
     """Of each persona and question."""
     failed_stages: tuple[str, ...]
     error_games: int
 
 
-def write_results(folder: RunFolder, console: Console) -> Outcome:
+def write_results(folder: RunFolder, console: Console) -> RunResult:
     """Tables, replays and report of what is done, from the run folder alone."""
     manifest = folder.manifest()
     folder.check_whole(manifest)
@@ -114,7 +114,7 @@ def write_results(folder: RunFolder, console: Console) -> Outcome:
     met = [*manifest["personas"], *(each.name for each in campaign.population)]
     verdicts = [(persona, found.verdicts(each, persona)) for persona in met for each in ARMS]
     verdicts += gap_verdicts(game.gaps) if game is not None else []
-    return Outcome(verdicts, failed, int((episodes["error"] != "").sum()))
+    return RunResult(verdicts, failed, int((episodes["error"] != "").sum()))
 
 
 def warn(sentences: Sequence[str], console: Console) -> None:

@@ -17,7 +17,7 @@ from harness.files import content_of, sync_file, sync_folder, write_atomically
 _MOST_BYTES = 50_000_000
 
 
-def write_seal(seal: Path, top: Path, files: Iterable[Path], facts: Mapping[str, Any]) -> None:
+def write_checksums(seal: Path, top: Path, files: Iterable[Path], facts: Mapping[str, Any]) -> None:
     """Vouch for files below `top`, and say `facts` of them."""
     vouched = {}
     for file in files:
@@ -27,7 +27,7 @@ def write_seal(seal: Path, top: Path, files: Iterable[Path], facts: Mapping[str,
     write_atomically(seal, (json.dumps({**facts, "files": vouched}, indent=2) + "\n").encode())
 
 
-def read_seal(seal: Path) -> dict[str, Any] | None:
+def read_checksums(seal: Path) -> dict[str, Any] | None:
     """What a seal says; None where there is none that can be read."""
     try:
         said = json.loads(content_of(seal, _MOST_BYTES))

@@ -28,7 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from harness.campaign.plan.stages import stage_id
-from harness.campaign.storage.checksums import broken, read_seal, write_seal
+from harness.campaign.storage.checksums import broken, read_checksums, write_checksums
 from harness.campaign.storage.locks import InUse, only_one, wait_for_all
 from harness.campaign.storage.manifest import StageEntry, check_manifest, problems_for_report
 from harness.errors import Problem, UsageError
@@ -118,7 +118,7 @@ class RunFolder:
 
     def done(self, stage: str) -> dict[str, Any] | None:
         """What the seal of a stage says, whether it holds or not; None if there is none."""
-        said = read_seal(self.work(stage) / "done.json")
+        said = read_checksums(self.work(stage) / "done.json")
         try:
             StageEntry.model_validate({**_ANY_STAGE, **(said or {})["info"]})
         except (ValueError, LookupError, TypeError):
@@ -148,7 +148,7 @@ class RunFolder:
 
     def finish(self, stage: str, key: str, info: Mapping[str, Any], files: Sequence[Path] = ()) -> None:
         """A stage is done: everything it wrote is there, and `files` are what its numbers are read from."""
-        write_seal(self.work(stage) / "done.json", self.path, files, {"key": key, "info": dict(info)})
+        write_checksums(self.work(stage) / "done.json", self.path, files, {"key": key, "info": dict(info)})
 
     def drop_segments(self, stage: str) -> None:
         """Drop the segments of an arm that is done: its files hold them."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.config.persona import Persona
 from harness.config.scene import Actuators
-from harness.game.attention import Attention, Lapses, draw_lapses, overlooked_m
+from harness.game.attention import Attention, Lapses, draw_lapses, unseen_behind_m
 from harness.game.seeding import generator_of
 
 DRIVES, DRIVE_S, STEP_S = 8, 60.0, 0.1
@@ -18,7 +18,7 @@ WHEELBASE_M = float(Actuators.model_fields["wheelbase_m"].default)
 
 
 @dataclass(frozen=True)
-class Drive:
+class SampleDrive:
     """One seeded drive of `DRIVE_S`."""
 
     lapses: tuple[tuple[float, float], ...]
@@ -32,19 +32,19 @@ class Drive:
         return sum(end - begin for begin, end in self.lapses) / DRIVE_S
 
 
-def sample(persona: Persona) -> list[Drive]:
+def sample(persona: Persona) -> list[SampleDrive]:
     """The same drives each time, for the same persona."""
-    habits, steps = persona.habits, round(DRIVE_S / STEP_S)
+    human_factors, steps = persona.human_factors, round(DRIVE_S / STEP_S)
     found = []
     for k in range(DRIVES):
         lapses = Lapses.none(steps)
-        if habits.attention is not None:
+        if human_factors.attention is not None:
             lapses = draw_lapses(
-                habits.attention, steps, STEP_S, generator_of("portrait", persona.name, "attention", k)
+                human_factors.attention, steps, STEP_S, generator_of("portrait", persona.name, "attention", k)
             )
-        ahead_m = overlooked_m(habits.overlooking, generator_of("portrait", persona.name, "start", k).random())
+        ahead_m = unseen_behind_m(human_factors.no_blind_spot_check, generator_of("portrait", persona.name, "start", k).random())
         changes = np.flatnonzero(np.diff(np.concatenate(([0], lapses.lapsed.astype(int), [0])))).reshape(-1, 2) * STEP_S
-        found.append(Drive(tuple((float(begin), float(end)) for begin, end in changes), math.isfinite(ahead_m)))
+        found.append(SampleDrive(tuple((float(begin), float(end)) for begin, end in changes), math.isfinite(ahead_m)))
     return found
 
 

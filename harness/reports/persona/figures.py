@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from harness.reports.persona.drives import DRIVE_S, Drive
+from harness.reports.persona.drives import DRIVE_S, SampleDrive
 from harness.reports.persona.profile import number
 from harness.reports.persona.worth import Drawn
 from harness.reports.figures import GRID, INK, SERIES, figure_of, svg
@@ -36,7 +36,7 @@ def function_figure(function: Drawn, name: str, alternative: str) -> Markup:
         return svg(figure, name, alternative)
 
 
-def drives_figure(drives: Sequence[Drive], name: str, alternative: str) -> Markup:
+def drives_figure(drives: Sequence[SampleDrive], name: str, alternative: str) -> Markup:
     """A row for each drive, its lapses as bars on the axis of time."""
     with figure_of(9.6, 0.9 + 0.34 * len(drives)) as figure:
         axes = figure.subplots()

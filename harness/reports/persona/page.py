@@ -10,19 +10,19 @@ from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.reports.persona.drives import DRIVE_S
 from harness.reports.persona.figures import drives_figure, function_figure
-from harness.reports.persona.profile import FORMULA, Portrait, attends, body, decides, function_in_words, number, sees, wants
+from harness.reports.persona.profile import FORMULA, PersonaProfile, attends, body, decides, function_in_words, number, sees, wants
 
 
-def write_portrait(portrait: Portrait, file: Path) -> None:
+def write_profile(portrait: PersonaProfile, file: Path) -> None:
     """Write the page. Raises UsageError when it can't be written there."""
     if file.suffix.lower() not in (".html", ".htm"):
         raise UsageError.of("--html", str(file), "is not the name of a page", "it has to end with .html")
     if not file.absolute().parent.is_dir():
         raise UsageError.of("--html", str(file), f"there is no folder {file.parent}", "make it, or name another file")
-    write_atomically(file, render_portrait(portrait).encode())
+    write_atomically(file, render_profile(portrait).encode())
 
 
-def render_portrait(portrait: Portrait) -> str:
+def render_profile(portrait: PersonaProfile) -> str:
     """The page as text. Equal portraits give equal pages."""
     environment = Environment(
         loader=ChoiceLoader([PackageLoader("harness", "reports/persona"), PackageLoader("harness", "reports")]),
@@ -36,7 +36,7 @@ def render_portrait(portrait: Portrait) -> str:
         words = function_in_words(each)
         functions.append((each, words, function_figure(each, f"function{k}", f"{each.name}: {words}")))
     lapses = None
-    if portrait.persona.habits.attention is not None:
+    if portrait.persona.human_factors.attention is not None:
         words = f"When attention lapses in {len(portrait.drives)} drives of {DRIVE_S:g} s"
         lapses = drives_figure(portrait.drives, "drives", words)
     page = environment.get_template("profile.html.jinja").render(

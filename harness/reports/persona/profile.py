@@ -12,7 +12,7 @@ from harness.reports.persona.drives import (
     DRIFT_SPEED_MPS,
     DRIVE_S,
     WHEELBASE_M,
-    Drive,
+    SampleDrive,
     drift_m,
     free_share,
     lapsed_share,
@@ -40,18 +40,18 @@ FORMULA = "payoff = α₀ · Σ safety + α₁ · Σ operational + α₂ · Σ h
 
 
 @dataclass(frozen=True)
-class Portrait:
+class PersonaProfile:
     """A persona, and what follows from its document."""
 
     persona: Persona
     terms: Sequence[Counted]
     functions: Sequence[Drawn]
-    drives: Sequence[Drive]
+    drives: Sequence[SampleDrive]
 
 
-def portrait_of(persona: Persona) -> Portrait:
+def persona_profile(persona: Persona) -> PersonaProfile:
     """A persona's portrait; equal documents give equal ones."""
-    return Portrait(persona, counted(persona), drawn(persona), sample(persona))
+    return PersonaProfile(persona, counted(persona), drawn(persona), sample(persona))
 
 
 def number(value: float) -> str:
@@ -67,7 +67,7 @@ def percent(share: float) -> str:
     return "under 1 %" if 0.0 < share < 0.01 else f"{share * 100:.0f} %"
 
 
-def wants(portrait: Portrait) -> Iterator[str]:
+def wants(portrait: PersonaProfile) -> Iterator[str]:
     """What the payoff's terms come to, against each other."""
     worth = {each.name: each.worth for each in portrait.terms}
     collision, progress, goal = (worth.get(name, 0.0) for name in ("collision", "progress", "goal"))
@@ -104,9 +104,9 @@ def _stretch(ends: Sequence[float], unit: str) -> str:
     return f"at {low:.3g}{unit}" if low == high else f"from {low:.3g} to {high:.3g}{unit}"
 
 
-def attends(portrait: Portrait) -> Iterator[str]:
+def attends(portrait: PersonaProfile) -> Iterator[str]:
     """When attention lapses, and what the car does then."""
-    attention = portrait.persona.habits.attention
+    attention = portrait.persona.human_factors.attention
     if attention is None:
         yield "Attention never lapses."
         return
@@ -138,9 +138,9 @@ def _drifts(crown_rad: float, bumps_rad: float, lapse_s: float) -> str:
     )
 
 
-def sees(portrait: Portrait) -> Iterator[str]:
+def sees(portrait: PersonaProfile) -> Iterator[str]:
     """Who is overlooked, and how often."""
-    overlooking = portrait.persona.habits.overlooking
+    overlooking = portrait.persona.human_factors.no_blind_spot_check
     if overlooking.share == 0.0:
         yield "Nobody is overlooked."
         return
@@ -153,10 +153,10 @@ def sees(portrait: Portrait) -> Iterator[str]:
     )
 
 
-def body(portrait: Portrait) -> Iterator[str]:
+def body(portrait: PersonaProfile) -> Iterator[str]:
     """How far and how exactly the person sees, how late its decisions count, how much of the car it uses."""
-    habits = portrait.persona.habits
-    sight, missing = habits.sight, habits.missing
+    human_factors = portrait.persona.human_factors
+    sight, missing = human_factors.sight, human_factors.looked_but_failed_to_see
     if missing.share:
         yield (
             f"In {percent(missing.share)} of the drives it looks and fails to see: others are noticed within "
@@ -172,12 +172,12 @@ def body(portrait: Portrait) -> Iterator[str]:
         yield f"At {NEAR_M:g} m, closing speeds are off by {off_mps:.2g} m/s (standard deviation)."
     if sight.distance_error or sight.closing_error_per_s:
         yield f"What is misjudged stays so for {sight.error_s:g} s or so."
-    yield from _slowly(habits.reaction.delay_s, habits.attention is not None)
-    uses = habits.uses
+    yield from _slowly(human_factors.reaction.delay_s, human_factors.attention is not None)
+    uses = human_factors.uses
     shares = {"acceleration": uses.throttle, "braking": uses.braking, "steering": uses.steering}
     if used := [f"{percent(share)} of its {name}" for name, share in shares.items() if share < 1.0]:
         yield f"Of what the car can do it uses {', '.join(used)}."
-    if habits.missing.share or habits.overlooking.share:
+    if human_factors.looked_but_failed_to_see.share or human_factors.no_blind_spot_check.share:
         yield "While the person itself is trained, nobody is overlooked or missed; all else is as in driving."
 
 
@@ -192,7 +192,7 @@ def _slowly(delay_s: tuple[float, float], lapses: bool) -> Iterator[str]:
         yield "After a lapse the car is let go for as long again."
 
 
-def decides(portrait: Portrait) -> str:
+def decides(portrait: PersonaProfile) -> str:
     """How the person makes its policy's decisions."""
     if portrait.persona.decisions == "sampled":
         return "Varies: actions are drawn from what its policy holds likely, so no two drives are alike."

@@ -12,7 +12,7 @@ from rich.text import Text
 
 from harness.reports.persona.drives import DRIVE_S
 from harness.reports.persona.plotting import area, axis, curve, stretches, ticks
-from harness.reports.persona.profile import FORMULA, Portrait, attends, body, decides, function_in_words, number, sees, wants
+from harness.reports.persona.profile import FORMULA, PersonaProfile, attends, body, decides, function_in_words, number, sees, wants
 from harness.reports.persona.worth import Drawn
 
 ROWS, SET_ROWS = 10, 2
@@ -24,7 +24,7 @@ _SPELLING = str.maketrans({
 })  # fmt: skip
 
 
-def show(portrait: Portrait, console: Console) -> None:
+def show(portrait: PersonaProfile, console: Console) -> None:
     """Draw it as wide as the console is."""
     persona = portrait.persona
     plain = console.options.ascii_only
@@ -55,7 +55,7 @@ def show(portrait: Portrait, console: Console) -> None:
     say("How this person attends", "bold")
     for sentence in (*attends(portrait), *sees(portrait), *body(portrait)):
         say(sentence)
-    if persona.habits.attention is not None:
+    if persona.human_factors.attention is not None:
         for line in _drives(portrait, columns, plain):
             console.print(line, highlight=False, no_wrap=True, overflow="crop")
     say("")
@@ -63,7 +63,7 @@ def show(portrait: Portrait, console: Console) -> None:
     say(decides(portrait))
 
 
-def _terms(portrait: Portrait, plain: bool) -> Table:
+def _terms(portrait: PersonaProfile, plain: bool) -> Table:
     table = Table(show_edge=False, pad_edge=False, header_style="", show_lines=False)
     table.add_column("term", no_wrap=True)
     table.add_column(_spelt("α × weight", plain), justify="right", no_wrap=True)
@@ -107,7 +107,7 @@ def _function(function: Drawn, columns: int, plain: bool) -> Iterator[Text]:
     yield Text(f"{function.quantity:>{_LABEL}} {axis(places, columns)}")
 
 
-def _drives(portrait: Portrait, columns: int, plain: bool) -> Iterator[Text]:
+def _drives(portrait: PersonaProfile, columns: int, plain: bool) -> Iterator[Text]:
     """A line for each drive, and the axis of time."""
     for k, drive in enumerate(portrait.drives, 1):
         label = f"drive {k}" + (", overlooks" if drive.overlooks else "")

@@ -77,7 +77,7 @@ def test_arm__killed_in_any_game_is_uninterrupted(dies_in: int, steady: Arm, who
             raise Killed
 
     with pytest.raises(Killed):
-        play(steady, tmp_path, begin=die)
+        play(steady, tmp_path, on_start=die)
     assert play(steady, tmp_path, AGAIN) == (0, list(range(dies_in // 3 * 3, EPISODES)))
     assert files(tmp_path) == files(whole)
 
@@ -90,7 +90,7 @@ def test_arm__has_every_game_once_in_order(whole: Path) -> None:
 def test_arm__a_game_that_is_given_up_is_an_error_and_the_others_are_played(
     steady: Arm, whole: Path, tmp_path: Path
 ) -> None:
-    errors, played = play(steady, tmp_path, Attempt(first=False, given_up={4: "the worker died of SIGSEGV"}))
+    errors, played = play(steady, tmp_path, Attempt(first=False, abandoned={4: "the worker died of SIGSEGV"}))
     assert (errors, played) == (1, [0, 1, 2, 3, 5, 6])
     expected, table = (read_csv(folder / "episodes.csv") for folder in (whole, tmp_path))
     assert table.loc[4, ["ego_outcome", "non_ego_outcome", "error"]].tolist() == [
@@ -105,7 +105,7 @@ class FailsOnce(Steady):
 
     games = 0
 
-    def begin(self, games: IntArray) -> None:
+    def reset(self, games: IntArray) -> None:
         self.games += 1
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
@@ -156,7 +156,7 @@ def game(episode):
     columns = {name: [texts.get(name, 0.5)] * 2000 for name in SCHEMA.names}
     columns |= {"episode": [episode] * 2000, "step": list(range(2000)), "lapsed": [False] * 2000}
     return Game({"episode": episode, "ego_outcome": "goal", "ego_failed": 0, "error": ""}, columns)
-segments.assess = lambda arm, episodes, begin, given_up: (game(each) for each in episodes)
+segments.assess = lambda arm, episodes, begin, abandoned: (game(each) for each in episodes)
 segments.name_manoeuvres = lambda table, traces, scene: segments.pd.DataFrame(columns=list(MANOEUVRE_COLUMNS))
 from harness.evaluation.tables import MANOEUVRE_COLUMNS
 class Anyone:

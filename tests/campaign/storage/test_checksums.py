@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.campaign.storage.checksums import broken, read_seal, write_seal
+from harness.campaign.storage.checksums import broken, read_checksums, write_checksums
 
 
 @pytest.fixture
@@ -16,18 +16,20 @@ def sealed(tmp_path: Path) -> Path:
     (tmp_path / "deep").mkdir()
     (tmp_path / "a.csv").write_bytes(b"one,two\n")
     (tmp_path / "deep" / "b.parquet").write_bytes(bytes(range(200)))
-    write_seal(tmp_path / "seal.json", tmp_path, [tmp_path / "a.csv", tmp_path / "deep" / "b.parquet"], {"of": "x"})
+    write_checksums(
+        tmp_path / "seal.json", tmp_path, [tmp_path / "a.csv", tmp_path / "deep" / "b.parquet"], {"of": "x"}
+    )
     return tmp_path
 
 
 def broken_in(folder: Path) -> list[str]:
-    said = read_seal(folder / "seal.json")
+    said = read_checksums(folder / "seal.json")
     assert said is not None
     return [file.relative_to(folder).as_posix() for file in broken(said, folder)]
 
 
 def test_seal__holds_and_says_what_it_was_told(sealed: Path) -> None:
-    said = read_seal(sealed / "seal.json")
+    said = read_checksums(sealed / "seal.json")
     assert said is not None
     assert said["of"] == "x"
     assert broken_in(sealed) == []
@@ -57,16 +59,16 @@ def test_seal__a_torn_file_breaks_it(name: str, tear: str, sealed: Path) -> None
 @pytest.mark.parametrize("content", ["", "[]", "7", '{"files": ', "\udcff", "[" * 100_000])
 def test_seal__that_is_torn_itself_is_none(content: str, sealed: Path) -> None:
     (sealed / "seal.json").write_bytes(content.encode(errors="surrogateescape"))
-    assert read_seal(sealed / "seal.json") is None
+    assert read_checksums(sealed / "seal.json") is None
 
 
 @pytest.mark.parametrize("files", [7, {"a.csv": 7}, {"a.csv": {}}, {"a.csv": {"bytes": 8}}, {"\0": {"bytes": 8}}])
 def test_seal__that_says_nothing_sensible_vouches_for_nothing(files: object, sealed: Path) -> None:
     (sealed / "seal.json").write_text(json.dumps({"files": files}))
-    assert len(broken(read_seal(sealed / "seal.json") or {}, sealed)) == 1
+    assert len(broken(read_checksums(sealed / "seal.json") or {}, sealed)) == 1
 
 
 def test_write_seal__what_is_not_there_can_not_be_vouched_for(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
-        write_seal(tmp_path / "seal.json", tmp_path, [tmp_path / "nothing"], {})
+        write_checksums(tmp_path / "seal.json", tmp_path, [tmp_path / "nothing"], {})
     assert not (tmp_path / "seal.json").exists()
