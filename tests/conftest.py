@@ -17,6 +17,12 @@ from harness.game.quantities import Quantities, World
 from harness.game.state import Bodies, State
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
+from tests.support.shared import shared_folder
+
+
+def pytest_configure() -> None:
+    """Make the session's shared folder in the first process, before pytest-xdist starts others."""
+    shared_folder()
 
 
 @pytest.fixture(scope="session")

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import atexit
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +16,7 @@ import pytest
 
 from harness.config.campaign import Training
 from tests.support.repository import REPOSITORY
+from tests.support.shared import built_once
 
 MERGE = REPOSITORY / "networks" / "merge"
 CAREFUL, SPEEDY, DISTRACTED = (REPOSITORY / "personas" / f"{name}.toml" for name in ("careful", "speedy", "distracted"))
@@ -177,31 +174,27 @@ def numbers(run: Path) -> dict[str, bytes]:
     return found
 
 
-@cache
-def _scratch() -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="harness-tests-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
-
-
 def finished(*options: object, **changes: Any) -> Path:
-    """Run a campaign to its end: its run folder, beside its document."""
-    campaign = write_campaign(_scratch(), **changes)
-    run = campaign.with_suffix("")
-    done = harness("campaign", campaign, "--out", run, *options, timeout_s=600.0)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return run
+    """The run folder of a finished campaign, beside its document and `printed`, what the command printed. Built once
+    for the whole test session, by the campaign's name: tests read it, and none may change it."""
+    name = changes["name"]
+
+    def build(folder: Path) -> None:
+        campaign = write_campaign(folder, **changes)
+        done = harness("campaign", campaign, "--out", campaign.with_suffix(""), *options, timeout_s=900.0)
+        assert done.returncode == 0, done.stdout + done.stderr
+        (folder / "printed").write_text(done.stdout, encoding="utf-8")
+
+    return built_once(name, build) / name
 
 
-@cache
 def learned_run() -> Path:
-    """The run folder of a finished campaign with a learned ego. Many tests read it; none may change it."""
+    """The run folder of a finished campaign with a learned ego."""
     return finished(name="learned")
 
 
-@cache
 def sumo_run() -> Path:
-    """The run folder of a finished campaign whose ego SUMO drives. Many tests read it; none may change it."""
+    """The run folder of a finished campaign whose ego SUMO drives."""
     return finished("--jobs", 1, **BY_SUMO)
 
 
