@@ -46,7 +46,8 @@ from harness.game.state import EGO, NON_EGO, ROLES
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.ppo import TrainingSpec, train
 from tests.support.scenes import build_scene
-from tests.support.tiny import harness, settings, write_campaign
+from tests.support.shared import built_once
+from tests.support.tiny import finished, settings
 
 STEPS, STEP_S, PEDALS_MPS2 = 15, 0.2, 1.1
 LENGTH_M, BESIDE_M, FAR_M = 2.5, 1.4, 10.0
@@ -184,9 +185,12 @@ def always(pedals: float, stage: str = "") -> Policy:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder() -> Path:
     """Scene, personas and strategies: the naive ego and `other` are fast, those who answer are slow."""
-    folder = tmp_path_factory.mktemp("known")
+    return built_once("known_equilibrium", write_known)
+
+
+def write_known(folder: Path) -> None:
     build_scene(folder / "scene", cars=CARS)
     (folder / "scene" / "scene.toml").write_text(SCENE)
     (folder / "ego.toml").write_text(PERSONA.format(name="alone", weight=WEIGHTS["ego"]))
@@ -195,7 +199,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "seeing.toml").write_text(PERSONA.format(name="seeing", weight=1.0))
     for name, pedals in (("naive", FAST), ("retrained_other", SLOW), ("other", FAST), ("other_round3", SLOW)):
         write_policy(always(pedals, f"{name}-seed1"), folder / "policies" / f"{name}-seed1")
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -235,22 +238,19 @@ MEASURED = (EQUILIBRIUM, *NO_EQUILIBRIA)
 @pytest.fixture(scope="module")
 def matrix(folder: Path, scene: OpenScene) -> Matrix:
     """Every cell played, and both players' best responses searched in three of them."""
-    campaign = write_campaign(
-        folder,
+    run = finished(
         name="matrix",
-        scene="scene",
-        personas=["other.toml"],
-        ego={"persona": "ego.toml"},
-        policies="policies",
+        scene=str(folder / "scene"),
+        personas=[str(folder / "other.toml")],
+        ego={"persona": str(folder / "ego.toml")},
+        policies=str(folder / "policies"),
         training=TRAINING,
         rounds={"count": 3, "stop_early": False},
         best_response={"steps": TRAINING["steps"], "starts": 2, "choice_episodes": 4, "arms": list(MEASURED)},
         crossplay={},
         assessment={"episodes": 20},
     )
-    done = harness("campaign", campaign, "--out", folder / "run")
-    assert done.returncode == 0, done.stdout + done.stderr
-    return Matrix(folder / "run", *starts_of(scene, range(20)))
+    return Matrix(run, *starts_of(scene, range(20)))
 
 
 @pytest.mark.slow

@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
@@ -290,10 +289,8 @@ def test_campaign__is_the_same_with_one_worker_from_elsewhere_and_writes_nowhere
 def test_campaign__running_again_skips_everything(run: Path, tmp_path: Path) -> None:
     again = shutil.copytree(run, tmp_path / "run")
     before = files_in(again)
-    began = time.monotonic()
     done = harness("campaign", run.with_suffix(".toml"), "--out", again)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert time.monotonic() - began < 30.0
     assert "started" not in done.stdout
     assert files_in(again) == before
 
