@@ -10,15 +10,13 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
-from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 from tests.support.repository import REPOSITORY
-
-PACKAGE = REPOSITORY / "harness"
+from tests.support.sources import PACKAGE, SOURCES, label, tree_of
 
 # Which room may import which others, from the lowest floor to the highest. A room is a module or folder directly under
 # harness/, or a folder under harness/campaign/. A new arrow is a decision: add it here first. "harness" is the public
@@ -64,18 +62,8 @@ FILE_ACCESS_CALLS = {
 }
 FORBIDDEN_WORDS = {"utils", "helpers", "common", "base", "core", "manager", "handler", "misc"}
 LONGEST = {".py": 300, ".jinja": 400, ".css": 400, ".js": 400}
+TESTS = sorted((REPOSITORY / "tests").rglob("*.py"))
 SEEDED_RANDOMNESS = {"Generator", "BitGenerator", "SeedSequence", "PCG64", "Philox", "default_rng"}
-
-SOURCES = sorted(PACKAGE.rglob("*.py"))
-
-
-def label(path: Path) -> str:
-    return path.relative_to(REPOSITORY).as_posix()
-
-
-@cache
-def tree_of(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"), str(path))
 
 
 def module_of(path: Path) -> str:
@@ -196,6 +184,17 @@ def loaded_with(*modules: str) -> set[str]:
     run = subprocess.run([sys.executable, "-c", program], cwd=REPOSITORY, capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     return set(run.stdout.split())
+
+
+def test_tests__no_test_module_imports_another() -> None:
+    """What several of them use is in tests/support."""
+    wrong = [
+        f"{label(path)} imports {module}"
+        for path in TESTS
+        for module in sorted(set(imported_modules(tree_of(path), path)))
+        if module.split(".")[-1].startswith("test_") and module.split(".")[0] == "tests"
+    ]
+    assert wrong == []
 
 
 # --- names, docstrings, length ---

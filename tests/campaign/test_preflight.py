@@ -11,7 +11,7 @@ import pytest
 from harness.campaign.preflight import QUICK_SEGMENT_STEPS, QUICK_STEPS, open_campaign
 from harness.drivers.policy_file import write_policy
 from harness.errors import Problem, UsageError
-from tests.drivers.test_policy_file import some_policy
+from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign, write_persona
 
 

@@ -17,14 +17,14 @@ import pytest
 from rich.console import Console
 
 from harness.campaign.execution import run_campaign as campaign_run
-from harness.campaign.execution.crash_retries import TRIES, Attempt, Begin, Report
+from harness.campaign.execution.crash_retries import TRIES, Attempt, OnProgress, OnStart
 from harness.campaign.execution.run_campaign import run_campaign
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.worker_pool import Work, run_stages
 from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import open_campaign
-from harness.campaign.results.results import Outcome
+from harness.campaign.results.results import RunResult
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.tables import read_csv
 from tests.support.tiny import (
@@ -53,7 +53,7 @@ def command_of(folder: Path) -> tuple[object, ...]:
 
 
 def die_in_game_1(
-    stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt
+    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
 ) -> dict[str, Any]:
     """Game 1 of one arm is SUMO's death; one of a training's segments is so once."""
 
@@ -69,7 +69,7 @@ def die_in_game_1(
     return carry_out(stage, conditions, report, begin_or_die, attempt)
 
 
-def run_by(work: Work, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Outcome, str]:
+def run_by(work: Work, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[RunResult, str]:
     """The campaign of `sumo_run`, its stages carried out by `work`; what came of it, and what was said."""
     said = io.StringIO()
     monkeypatch.setattr(campaign_run, "run_stages", partial(run_stages, work=work))

@@ -21,6 +21,7 @@ from tests.support.tiny import (
     end,
     harness,
     in_session,
+    numbers,
     wait_for,
     workers_of,
     write_campaign,
@@ -36,17 +37,6 @@ CAMPAIGN: dict[str, Any] = {
     "training": {**TRAINING, "steps": 3072},
     "assessment": {"episodes": 52},  # a full segment and a bit
 }
-FILES = ("episodes.csv", "summary.csv", "comparisons.csv", "training.csv", "manoeuvres.csv")
-
-
-def numbers(run: Path) -> dict[str, bytes]:
-    """The bytes of all that a run's numbers are in."""
-    found = {name: (run / name).read_bytes() for name in FILES}
-    for folder in ("policies", "traces"):
-        for file in (run / folder).rglob("*"):
-            if file.is_file():
-                found[file.relative_to(run).as_posix()] = file.read_bytes()
-    return found
 
 
 def kill(process: subprocess.Popen[str], whom: str, chance: random.Random) -> bool:

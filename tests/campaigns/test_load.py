@@ -41,9 +41,9 @@ from harness.replay.selection import MOST_FAILURES_PER_ARM, choose_games, replay
 from harness.reports.manoeuvres import MOST_LISTED
 from harness.reports.page import PAGE_BYTES, render_page
 from harness.traffic.scene import OpenScene, open_scene
-from tests.environments.test_rollout import Steady, arm, play
-from tests.reports.test_page import campaign
 from tests.support.chromium import launched, opener, until
+from tests.support.pages import campaign
+from tests.support.rollouts import Steady, arm, play
 from tests.support.scenes import build_scene, drawn
 from tests.support.tiny import MERGE, SPEEDY
 

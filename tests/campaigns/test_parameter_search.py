@@ -23,10 +23,9 @@ from harness.campaign.preflight import QUICK_TRIALS, open_campaign
 from harness.config.driver import read_driver
 from harness.evaluation.tables import read_csv
 from harness.training.parameter_search import read_trials
-from tests.campaigns.test_killed import FILES
-from tests.drivers.test_external import document, find, problems
+from tests.support.external_drivers import document, find, problems
 from tests.support.repository import REPOSITORY
-from tests.support.tiny import CAREFUL, SPEEDY, begin, end, harness, wait_for, write_campaign
+from tests.support.tiny import ALL_TABLES, CAREFUL, SPEEDY, begin, end, harness, wait_for, write_campaign
 
 ADAS = REPOSITORY / "egos" / "adas.toml"
 POLICIES = REPOSITORY / "policies" / "merge"
@@ -183,7 +182,7 @@ def run(campaign: Path) -> Path:
 
 def numbers(run: Path) -> dict[str, bytes]:
     """The bytes of all that a run's numbers are in."""
-    files = [run / name for name in (*FILES, "reconfiguration.csv")]
+    files = [run / name for name in (*ALL_TABLES, "reconfiguration.csv")]
     files += [file for folder in ("policies", "traces") for file in (run / folder).rglob("*") if file.is_file()]
     return {file.relative_to(run).as_posix(): file.read_bytes() for file in files}
 

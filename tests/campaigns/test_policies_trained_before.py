@@ -19,7 +19,7 @@ from harness.config.campaign import Campaign
 from harness.drivers.policy_file import write_policy
 from harness.errors import Problem, UsageError
 from harness.evaluation.tables import read_csv
-from tests.drivers.test_policy_file import some_policy
+from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, SPEEDY, TRAINING, harness, learned_run, tables, write_campaign, write_persona
 
 NAMES = ("naive", "speedy", "retrained_speedy")

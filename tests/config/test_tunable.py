@@ -16,7 +16,7 @@ from harness.config.toml_reading import tomllib
 from harness.config.toml_writing import toml_of
 from harness.config.tunable import Adjustable, Tunable
 from harness.errors import UsageError
-from tests.drivers.test_external import document, find
+from tests.support.external_drivers import document, find
 from tests.support.repository import REPOSITORY
 
 PYTHON = 'kind = "python"\nentry_point = "steady"\n[parameters]\nspeed_mps = 8\nname = "x"\nloud = true\n'

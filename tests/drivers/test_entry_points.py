@@ -17,22 +17,9 @@ from harness.errors import UsageError
 from harness.game.observation import SIZE
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
+from tests.support.external_drivers import EXAMPLE, install
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, write_campaign
-
-EXAMPLE = REPOSITORY / "egos" / "examples" / "python"
-
-
-def install(
-    folder: Path, name: str = "steady-driver", points: str = "steady = steady:Steady", version: str = "1.0"
-) -> None:
-    """Put the example package where an installer would: its module, and its metadata."""
-    folder.mkdir(exist_ok=True)
-    shutil.copy(EXAMPLE / "steady.py", folder)
-    info = folder / f"{name.replace('-', '_')}-{version}.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
-    (info / "entry_points.txt").write_text(f"[harness.drivers]\n{points}\n")
 
 
 @pytest.fixture

@@ -19,11 +19,11 @@ from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.config.driver import KINDS
 from harness.config.toml_reading import tomllib
-from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy_file import write_policy
 from harness.errors import UsageError
 from harness.game.observation import LAYOUT
-from tests.drivers.test_policy_file import some_policy
+from tests.support.external_drivers import document, find, problems
+from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, TRAINING, harness, write_campaign
 
@@ -31,19 +31,10 @@ PERL = REPOSITORY / "egos" / "examples" / "process"
 ADAS, RSS = (REPOSITORY / "egos" / f"{name}.toml" for name in ("adas", "rss"))
 
 
-def find(written: str, folder: Path, allow_code: bool = True) -> ExternalDriver:
-    return find_driver(written, folder / "campaign.toml", "ego.driver", allow_code)
-
-
 def refusal(written: str, folder: Path, allow_code: bool = True) -> str:
     with pytest.raises(UsageError) as caught:
         find(written, folder, allow_code)
     return str(caught.value)
-
-
-def document(folder: Path, text: str, name: str = "mine.toml") -> str:
-    (folder / name).write_text(text)
-    return name
 
 
 def ego(driver: object) -> dict[str, Any]:
@@ -130,12 +121,6 @@ def test_find__a_link_of_a_virtual_environment_stays_one(tmp_path: Path) -> None
 
 
 # --- the campaign's check ---
-
-
-def problems(file: Path, allow_code: bool = True) -> list[str]:
-    with pytest.raises(UsageError) as caught:
-        open_campaign(file, allow_code=allow_code)
-    return [str(problem) for problem in caught.value.problems]
 
 
 def test_open_campaign__tries_the_driver_before_anything_runs(tmp_path: Path) -> None:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import zipfile
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import fmpy
@@ -22,26 +20,17 @@ from harness.errors import DriverError, UsageError
 from harness.game.observation import LAYOUT, SIZE
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
-from tests.support.repository import REPOSITORY
+from tests.support.external_drivers import fmu_example
 from tests.support.tiny import CAREFUL
 
 GAMES = np.arange(3)
-
-
-def example() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("build_twin", REPOSITORY / "egos/examples/fmu/build.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture(scope="module")
 def twins(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     """The example, built for both versions of the standard."""
     folder = tmp_path_factory.mktemp("twins")
-    return {fmi: example().build(folder / f"twin{fmi}.fmu", fmi) for fmi in (2, 3)}
+    return {fmi: fmu_example().build(folder / f"twin{fmi}.fmu", fmi) for fmi in (2, 3)}
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +44,7 @@ def document(**keys: Any) -> Fmu:
 
 def changed(folder: Path, *replacements: tuple[str, str]) -> Path:
     """The example with another model description, and a binary that is none: nothing is run."""
-    text = example().description(2)
+    text = fmu_example().description(2)
     for old, new in replacements:
         assert old in text
         text = text.replace(old, new)
@@ -177,7 +166,7 @@ def test_fmu__that_is_no_fmu_is_refused(tmp_path: Path) -> None:
 def test_fmu__native_code_that_fails_costs_a_game_and_not_the_process(
     fault: str, said: str, tmp_path: Path, car: Car
 ) -> None:
-    build = example()
+    build = fmu_example()
     end = "v[STEERING] = 0.5 * v[TURNED] + 0.5 * atan2(v[LEFT], 4.0 + v[SPEED]);"
     source = build.SOURCE.read_text()
     assert end in source
@@ -210,7 +199,7 @@ def test_fmu__that_plays_one_game_at_a_time_says_so(tmp_path: Path, car: Car, tw
 
 
 def test_fmu__an_error_status_is_named(tmp_path: Path, car: Car) -> None:
-    build = example()
+    build = fmu_example()
     source = build.SOURCE.read_text().replace("step(twin, step_s);\n    return fmi2OK;", "return fmi2Error;")
     driver = fmu_driver(document(), build.build(tmp_path / "failing.fmu", 2, source), car)
     driver.reset(GAMES)

@@ -17,7 +17,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.game.observation import SIZE
 from harness.training.checkpoint import policy_of, put_policy
-from tests.drivers.test_policy_file import some_policy
+from tests.support.policies import some_policy
 
 GAMES = np.arange(300)
 

@@ -17,19 +17,7 @@ from harness.drivers.policy_file import Policy, read_policy, write_policy
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.observation import SIZE
-
-
-def some_policy(seed: int = 0, hidden: int = 5) -> Policy:
-    draw = np.random.default_rng(seed)
-
-    def array(*shape: int) -> FloatArray:
-        return draw.standard_normal(shape).astype(np.float32)
-
-    tensors = {"log_deviation": array(2)}
-    for part, outputs in (("actor", 2), ("critic", 1)):
-        tensors |= {f"{part}.0.weight": array(hidden, SIZE), f"{part}.0.bias": array(hidden)}
-        tensors |= {f"{part}.1.weight": array(outputs, hidden), f"{part}.1.bias": array(outputs)}
-    return Policy(tensors, {"stage": "naive-seed1"})
+from tests.support.policies import some_policy
 
 
 def test_policy__comes_back_exactly(tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -24,35 +23,18 @@ from harness.errors import DriverError
 from harness.game.observation import LAYOUT, SIZE
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
+from tests.support.processes import driver, is_running, started
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, wait_for
 
 GAMES = np.array([3, 7])
 SEEN = np.linspace(-1.0, 1.0, 2 * SIZE, dtype=np.float32).reshape(2, SIZE)
 NOISE = np.array([[0.5, -0.5], [1.0, 2.0]])
-OBEDIENT = """
-import json, os, sys, time
-for number, line in enumerate(sys.stdin):
-    message = json.loads(line)
-    games = message.get("games", [])
-    decided = {{"actions": [[1.0, 0.01]] * len(games)}}
-    answer = {{"hello": {{"protocol": 2}}, "reset": {{}}, "decide": decided}}[message["type"]]
-    {change}
-    print(json.dumps(answer), flush=True)
-"""
 
 
 @pytest.fixture(scope="module")
 def car(merge: OpenScene) -> Car:
     return car_of(merge.world, EGO)
-
-
-def driver(
-    folder: Path, car: Car, change: str = "pass", units: str = "si", deadline_s: float = 5.0, **options: Any
-) -> ProcessDriver:
-    """A driver by a Python program that answers well, but for the change."""
-    (folder / "program.py").write_text(OBEDIENT.format(change=change))
-    return ProcessDriver([sys.executable, "program.py"], folder, car, units, deadline_s, 20.0, **options)
 
 
 def refusal(driver: ProcessDriver) -> str:
@@ -63,13 +45,6 @@ def refusal(driver: ProcessDriver) -> str:
     with pytest.raises(DriverError) as caught:
         drive()
     return str(caught.value)
-
-
-def is_running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def test_process__is_told_all_it_needs_and_asks_in_units(tmp_path: Path, car: Car) -> None:
@@ -159,13 +134,6 @@ def test_process__that_cannot_be_started_is_named(tmp_path: Path, car: Car) -> N
         mine.reset(GAMES)
 
 
-def started(tmp_path: Path, car: Car, change: str = "pass") -> tuple[ProcessDriver, int]:
-    """A driver that has begun, and its program's process id."""
-    mine = driver(tmp_path, car, f'open("pid", "w").write(str(os.getpid())); {change}')
-    mine.reset(GAMES)
-    return mine, int((tmp_path / "pid").read_text())
-
-
 def test_process__ends_with_its_driver(tmp_path: Path, car: Car) -> None:
     mine, pid = started(tmp_path, car)
     assert is_running(pid)
@@ -182,7 +150,7 @@ import pathlib, numpy as np, sys, time
 sys.path.insert(0, {str(REPOSITORY)!r})
 from harness.traffic.scene import open_scene
 from harness.drivers.car import car_of
-from tests.drivers.test_process import started
+from tests.support.processes import started
 mine, pid = started(pathlib.Path({str(tmp_path)!r}),
     car_of(open_scene(pathlib.Path({str(REPOSITORY / "networks" / "merge")!r})).world, 0),
     "number == 1 and (print(json.dumps(answer), flush=True), time.sleep(600))")

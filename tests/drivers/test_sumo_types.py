@@ -18,7 +18,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, Game, assess
 from harness.errors import UsageError
 from harness.traffic.scene import OpenScene, open_scene
-from tests.drivers.test_policy_file import some_policy
+from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, MERGE
 
 FOLLOWING = ("Krauss", "IDM", "EIDM", "ACC", "CACC")

@@ -2,42 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
 from harness.drivers.policy import LearnedDriver
-from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import TRACE_COLUMNS, Arm, Game, assess
+from harness.environments.rollout import TRACE_COLUMNS
 from harness.errors import SimulationError
 from harness.evaluation.metrics import OF_EGO, OF_NON_EGO
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 from harness.evaluation.trace_file import SCHEMA
 from harness.game.arrays import FloatArray, IntArray
 from harness.traffic.scene import OpenScene
-from tests.drivers.test_policy_file import some_policy
-from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY
+from tests.support.policies import some_policy
+from tests.support.rollouts import Steady, arm, play, records, trace
+from tests.support.tiny import DISTRACTED
 
 CHANCE = LearnedDriver(some_policy(), sampled=True)
 POSE = ["x_m", "y_m", "heading_rad", "speed_mps"]
-
-
-class Steady:
-    """Straight on, at the speed it has."""
-
-    takes_over = True
-
-    def reset(self, games: IntArray) -> None:
-        """Nothing to forget."""
-
-    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        return np.zeros((len(games), 2))
 
 
 class Failing(Steady):
@@ -54,24 +39,6 @@ class Failing(Steady):
         if self.games % 2 == 0 and self.steps == 3:
             raise self.error
         return np.zeros((len(games), 2))
-
-
-def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: int = 1) -> Arm:
-    careful, other = (read_document(file, Persona) for file in (CAREFUL, persona))
-    return Arm("naive_vs_someone", merge, drivers, (careful, other), seed)  # type: ignore[arg-type]
-
-
-def play(assessed: Arm, episodes: int = 3) -> list[Game]:
-    return list(assess(assessed, episodes))
-
-
-def trace(game: Game) -> pd.DataFrame:
-    assert game.trace is not None
-    return pd.DataFrame(game.trace)
-
-
-def records(games: Sequence[Game]) -> list[str]:
-    return [repr(game.record) for game in games]
 
 
 def test_assess__twice_is_the_same(merge: OpenScene) -> None:

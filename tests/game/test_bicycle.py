@@ -18,41 +18,9 @@ from harness.game.bicycle import (
     steering_range_rad,
 )
 from harness.game.state import State
+from tests.support.bicycle import STEP_S, actuators, advance, state_of
 
-STEP_S = 0.1
 GRIP_MPS2 = 0.8 * GRAVITY_MPS2
-
-
-def actuators(**changes: float) -> Actuators:
-    values = {
-        "max_acceleration_mps2": 3.0,
-        "max_braking_mps2": 8.0,
-        "max_speed_mps": 40.0,
-        "max_steering_rad": 0.6,
-        "max_steering_rate_radps": 0.8,
-        "wheelbase_m": 2.7,
-        **{name: value for name, value in changes.items() if name != "friction"},
-    }
-    arrays = {name: np.array([value]) for name, value in values.items()}
-    return Actuators(**arrays, friction=changes.get("friction", 0.8))
-
-
-def state_of(speed_mps: float, heading_rad: float = 0.0, steering_rad: float = 0.0) -> State:
-    state = State.empty(1, 1)
-    state.speed_mps[:], state.heading_rad[:], state.steering_rad[:] = speed_mps, heading_rad, steering_rad
-    state.present[:] = True
-    return state
-
-
-def advance(state: State, acceleration_mps2: float, steering_rad: float, car: Actuators | None = None) -> None:
-    move(
-        state,
-        np.array([[acceleration_mps2]]),
-        np.array([[steering_rad]]),
-        np.array([[True]]),
-        car or actuators(),
-        STEP_S,
-    )
 
 
 @pytest.mark.parametrize(("acceleration", "speed"), [(2.0, 10.2), (-5.0, 9.5), (0.0, 10.0)])

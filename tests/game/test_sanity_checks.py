@@ -38,11 +38,10 @@ from harness.game.sanity_checks import ImpossibleNumber, check_observation, chec
 from harness.game.state import EGO, NON_EGO, ROLES, Bodies, Outcome, State
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene, open_scene
-from harness.training.ppo import TrainingSpec
-from tests.environments.test_rollout import Steady, arm, play, records, trace
+from tests.support.rollouts import Steady, arm, play, records, trace
 from tests.support.scenes import build_scene, drawn
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign
-from tests.training.test_ppo import alone, in_one_go  # noqa: F401 - a fixture
+from tests.support.trainings import in_one_go, naive_ego
 
 STEP = 5  # in which something goes wrong
 
@@ -102,7 +101,7 @@ def test_driver__that_misbehaves_is_an_error_row_with_driver_and_step(
 @pytest.mark.parametrize("name", ["nan", "too much", "no axis of games", "words"])
 def test_opponent__that_misbehaves_ends_a_training_with_driver_and_step(
     name: str,
-    alone: TrainingSpec,  # noqa: F811
+    merge: OpenScene,
     tmp_path: Path,
 ) -> None:
     decision, _ = DECISIONS[name]
@@ -116,7 +115,7 @@ def test_opponent__that_misbehaves_ends_a_training_with_driver_and_step(
 
     said = rf"the driver of non_ego, AfterAWhile, decided .* in step {STEP} of game \d, after \d+ steps"
     with pytest.raises(FloatingPointError, match=said):
-        in_one_go(replace(alone, opponent=AfterAWhile(), alone_share=0.0), tmp_path)
+        in_one_go(replace(naive_ego(merge), opponent=AfterAWhile(), alone_share=0.0), tmp_path)
     assert not (tmp_path / "checkpoint.safetensors").exists()
 
 
@@ -213,11 +212,12 @@ def test_motion__a_player_that_sumo_carries_off_is_an_error_row_with_step_and_di
 
 def test_motion__a_training_fails_where_sumo_carries_a_player_off(
     road: OpenScene,
-    alone: TrainingSpec,  # noqa: F811
+    merge: OpenScene,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     carried_on_by_sumo(monkeypatch, 50.0)
+    alone = naive_ego(merge)
     one = alone.settings.model_copy(update={"games": 1})  # of two: SB3 asks for more than one step at a time
     spec = replace(alone, scene=road, opponent=SumoDriver(), alone_share=0.0, settings=one)
     with pytest.raises(FloatingPointError, match=rf"non_ego moved 5\d\.\d+ m in step {STEP}, .* after \d+ steps"):

@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import save
 
-from tests.drivers.test_policy_file import some_policy
 from tests.hostile.inputs import (
     CAMPAIGN,
     CARD,
@@ -32,6 +31,7 @@ from tests.hostile.inputs import (
     several,
     whole_file,
 )
+from tests.support.policies import some_policy
 
 
 def bombs(file: str) -> list[Bad]:

@@ -21,7 +21,7 @@ import pytest
 
 from harness.cli.main import main as cli
 from harness.drivers.policy_file import write_policy
-from tests.drivers.test_policy_file import some_policy
+from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, sumo_run
 

@@ -20,8 +20,8 @@ from harness.drivers.policy_file import read_policy, write_policy
 from harness.errors import UsageError
 from harness.traffic.scene import open_scene
 from harness.traffic.tiles import tile_offset_m
-from tests.drivers.test_policy_file import some_policy
 from tests.hostile.inputs import CAMPAIGN_TEXT, NET, PERSONA_TEXT, ROUTES, SCENE, write_project
+from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 
 SCENE_TEXT = (REPOSITORY / "tests" / "data" / "merge" / "scene.toml").read_text(encoding="utf-8")

@@ -15,11 +15,11 @@ import pytest
 
 from harness.reports.page import render_page
 from tests.hostile.inputs import CARD, CHECK, TENSORS, write_project, write_run
-from tests.reports.test_page import campaign
 from tests.support.chromium import launched, opener
+from tests.support.pages import campaign
 from tests.support.recorded import SCENE, manoeuvres, recorded
+from tests.support.sources import SOURCES, label, tree_of
 from tests.support.tiny import HARNESS
-from tests.test_architecture import SOURCES, label, tree_of
 
 # --- the source -------------------------------------------------------------------------------------------------------
 

@@ -13,10 +13,8 @@ from harness.errors import HarnessError, UsageError
 from harness.replay import write_film
 from harness.replay.encoding import encode, find_ffmpeg
 from harness.replay.film import SIZE_PX, WIDTH_M, film_problems, shown_steps
-from tests.replay.test_bundle import STEP_S, clean_game, collision_game, drive, game, merge_net, straight, write
-from tests.replay.test_sumo_gui import blue, orange, require_gui
-
-__all__ = ["merge_net"]  # a fixture of test_replay
+from tests.support.pictures import blue, orange, require_gui
+from tests.support.replays import STEP_S, clean_game, collision_game, drive, game, straight, write
 
 PX_PER_M = SIZE_PX[0] / WIDTH_M
 

@@ -17,7 +17,7 @@ from harness.environments.rollout import Arm, assess
 from harness.game.arrays import FloatArray, IntArray
 from harness.replay import write_replay
 from harness.traffic.scene import OpenScene, open_scene
-from tests.replay.test_bundle import assert_plays
+from tests.support.replays import assert_plays
 from tests.support.scenes import CARS, build_scene
 
 TRAFFIC = """

@@ -22,20 +22,8 @@ from harness.replay.sumo_gui import find_sumo_gui
 from harness.replay.vehicles import types_of_vehicles
 from harness.replay.virtual_screen import find_xvfb, virtual_screen
 from harness.traffic import gui
-from tests.replay.test_bundle import GAMES, RAILS, STEP_S, collision_game, merge_net, write
-
-__all__ = ["merge_net"]  # a fixture of test_replay
-
-
-def require_gui() -> None:
-    """Skips where SUMO-GUI can't run on a virtual screen; under HARNESS_REQUIRE_GUI=1, fails."""
-    needed = {"Xvfb": find_xvfb(), "sumo-gui": find_sumo_gui()}
-    missing = [name for name, found in needed.items() if not found]
-    if missing:
-        reason = f"needs {' and '.join(missing)}"
-        if os.environ.get("HARNESS_REQUIRE_GUI") == "1":
-            pytest.fail(reason)
-        pytest.skip(reason)
+from tests.support.pictures import blue, orange, require_gui
+from tests.support.replays import GAMES, RAILS, STEP_S, collision_game, write
 
 
 @pytest.fixture(scope="module")
@@ -64,16 +52,6 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
     )
     assert done.returncode == 0, done.stderr
     return [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files]
-
-
-def blue(picture: np.ndarray) -> np.ndarray:
-    red, green, blue = np.moveaxis(picture, -1, 0)
-    return (blue > 180) & (blue > red + 90) & (blue > green + 50)
-
-
-def orange(picture: np.ndarray) -> np.ndarray:
-    red, green, blue = np.moveaxis(picture, -1, 0)
-    return (red > 200) & (green > 80) & (green < 215) & (blue < 110)
 
 
 def place(mask: np.ndarray, trace: pd.DataFrame, net: Path) -> tuple[float, float]:

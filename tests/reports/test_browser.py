@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from tests.support.chromium import launched, opener
-from tests.reports.test_page import campaign, recordings, with_errors
 
 from harness.reports.page import render_page
+from tests.support.chromium import launched, opener
+from tests.support.pages import CONTRAST, campaign, recordings, with_errors
 
 
 @pytest.fixture(scope="module")
@@ -104,20 +104,3 @@ def test_report__prints_with_its_verdicts_and_figures(opened):
     for gone in ("nav", ".clock", ".filters"):
         assert not page.locator(gone).first.is_visible()
     assert page.pdf().startswith(b"%PDF")
-
-
-CONTRAST = """element => {
-  const parse = colour => colour.match(/[\\d.]+/g).map(Number);
-  const luminance = colour => {
-    const [r, g, b] = parse(colour).map(part => part / 255)
-      .map(part => part <= 0.03928 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const style = getComputedStyle(element);
-  const ink = luminance(element instanceof SVGElement ? style.fill : style.color);
-  let ground = element;
-  while (ground && (parse(getComputedStyle(ground).backgroundColor)[3] ?? 1) === 0) ground = ground.parentElement;
-  const paper = luminance(getComputedStyle(ground).backgroundColor);
-  return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
-}"""
-"""WCAG's contrast ratio of an element's text with the first ground behind it that is not transparent."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import pytest
-from tests.support.chromium import launched, opener, until
-from tests.reports.test_page import campaign, recordings, with_errors
 
-from harness.reports.page import render_page
 from harness.evaluation.tables import write_csv
+from harness.reports.page import render_page
+from tests.support.chromium import launched, opener, until
+from tests.support.pages import campaign, recordings, with_errors
 
 
 @pytest.fixture(scope="module")

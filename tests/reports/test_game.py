@@ -8,19 +8,18 @@ import re
 
 import pandas as pd
 import pytest
-from tests.support.chromium import launched, opener
-from tests.support.game_tables import arm, findings, table
-from tests.reports.test_page import Page, campaign
-from tests.reports.test_browser import CONTRAST
 
+from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps
+from harness.evaluation.game_theory.empirical_game import equilibria
+from harness.evaluation.game_theory.records import GameFindings, Response
+from harness.evaluation.tables import write_csv
 from harness.reports.game import CAPTIONS, game_section
 from harness.reports.game_wording import equilibrium_sentences, gap_verdicts
 from harness.reports.heatmaps import views
 from harness.reports.page import render_page
-from harness.evaluation.tables import write_csv
-from harness.evaluation.game_theory.empirical_game import equilibria
-from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps
-from harness.evaluation.game_theory.records import GameFindings, Response
+from tests.support.chromium import launched, opener
+from tests.support.game_tables import arm, findings, table
+from tests.support.pages import CONTRAST, Page, campaign
 
 PERSONAS = ("speedy", "distracted")
 

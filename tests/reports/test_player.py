@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 
 import pytest
-from tests.support.chromium import launched, opener, until
-from tests.support.recorded import STEP_S, recorded
-from tests.reports.test_page import campaign, recordings
 
-from harness.reports.player_data import key
 from harness.reports.page import GAMES_BYTES, PAGE_BYTES, render_page
+from harness.reports.player_data import key
+from tests.support.chromium import launched, opener, until
+from tests.support.pages import campaign, recordings
+from tests.support.recorded import STEP_S, recorded
 
 GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and what retraining made of it
 

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.support.tiny import harness, sumo_run
 
 from harness.reports.provenance import mixed_versions
+from tests.support.tiny import harness, sumo_run
 
 NEW, OLD = {"python": "3.11.7", "numpy": "2.2.6"}, {"python": "3.11.7", "numpy": "2.1.0"}
 

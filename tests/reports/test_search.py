@@ -9,13 +9,12 @@ import re
 from typing import Any
 
 import pandas as pd
-from tests.reports.test_page import campaign
 
+from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions
 from harness.reports.search import searches
-from harness.evaluation.tables import RECONFIGURATION_COLUMNS
-from harness.evaluation.tables import typed
+from tests.support.pages import campaign
 
 PAYOFFS = (2.0, 1.5, math.nan, 4.25, 4.25)
 

@@ -25,6 +25,7 @@ MERGE = REPOSITORY / "networks" / "merge"
 CAREFUL, SPEEDY, DISTRACTED = (REPOSITORY / "personas" / f"{name}.toml" for name in ("careful", "speedy", "distracted"))
 HARNESS = Path(sys.executable).with_name("harness")
 TABLES = ("episodes.csv", "summary.csv", "comparisons.csv")
+ALL_TABLES = (*TABLES, "training.csv", "manoeuvres.csv")
 
 TRAINING: dict[str, Any] = {
     "steps": 2048,
@@ -164,6 +165,16 @@ def wait_for(condition: Callable[[], object], what: str, seconds: float = 60.0) 
 def tables(run: Path) -> dict[str, bytes]:
     """The bytes of a run's tables."""
     return {name: (run / name).read_bytes() for name in TABLES}
+
+
+def numbers(run: Path) -> dict[str, bytes]:
+    """The bytes of all that a run's numbers are in."""
+    found = {name: (run / name).read_bytes() for name in ALL_TABLES}
+    for folder in ("policies", "traces"):
+        for file in (run / folder).rglob("*"):
+            if file.is_file():
+                found[file.relative_to(run).as_posix()] = file.read_bytes()
+    return found
 
 
 @cache

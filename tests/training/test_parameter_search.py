@@ -27,9 +27,7 @@ from harness.game.state import EGO
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.paired_rollouts import PairedRollouts
 from harness.training.parameter_search import Search, Trial, best, propose, read_trials, run_search, write_trials
-from tests.drivers.test_entry_points import install
-from tests.drivers.test_external import document, find
-from tests.drivers.test_fmu import example
+from tests.support.external_drivers import document, find, fmu_example, install
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, SPEEDY
 
@@ -322,7 +320,7 @@ def _command(pid: str) -> bytes:
 
 
 def test_search__of_a_digital_twin(scene: OpenScene, tmp_path: Path) -> None:
-    example().build(tmp_path / "twin.fmu")
+    fmu_example().build(tmp_path / "twin.fmu")
     text = 'kind = "fmu"\nfile = "twin.fmu"\n[start]\ntime_gap_s = 1.8\n[tunable]\ntime_gap_s = [0.8, 4.0]\n'
     search = search_of(scene, tmp_path, text, trials=3, games=4, games_at_once=4, alone_share=0.0)
     trials = run_search(search, tmp_path / "kept.json")

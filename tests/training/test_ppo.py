@@ -29,36 +29,21 @@ from harness.game.state import EGO, NON_EGO
 from harness.traffic.scene import OpenScene
 from harness.training.checkpoint import Progress
 from harness.training.ppo import Trained, TrainingSpec, train
-from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY, settings
+from tests.support.tiny import DISTRACTED, settings
+from tests.support.trainings import in_one_go, naive_ego
 
 OTHERS = np.flatnonzero(OF_OTHERS)
 
 
 @pytest.fixture(scope="session")
 def alone(merge: OpenScene) -> TrainingSpec:
-    """The naive ego's spec, tiny: three segments."""
-    careful, speedy = (read_document(file, Persona) for file in (CAREFUL, SPEEDY))
-    return TrainingSpec(
-        scene=merge,
-        learner=EGO,
-        personas=(careful, speedy),
-        opponent=None,
-        alone_share=1.0,
-        attentive_share=0.0,
-        initial=None,
-        settings=settings(steps=3072),
-        parts=("training", 1, "naive"),
-    )
+    return naive_ego(merge)
 
 
 @pytest.fixture(scope="session")
 def trained(alone: TrainingSpec, tmp_path_factory: pytest.TempPathFactory) -> Trained:
     """What the lesson comes to in one go."""
     return in_one_go(alone, tmp_path_factory.mktemp("training"))
-
-
-def in_one_go(spec: TrainingSpec, folder: Path, **options: Any) -> Trained:
-    return train(spec, folder / "checkpoint.safetensors", "key", {}, **options)
 
 
 def stop_after(segments: int) -> Callable[[int, int], None]:

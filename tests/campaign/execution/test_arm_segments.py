@@ -19,8 +19,8 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_traces
 from harness.game.arrays import FloatArray, IntArray
 from harness.traffic.scene import OpenScene
-from tests.environments.test_rollout import Steady, arm
 from tests.support.repository import REPOSITORY
+from tests.support.rollouts import Steady, arm
 
 EPISODES = 7
 LABELS = {"arm": "naive_vs_sumo", "persona": "", "seed": 1}

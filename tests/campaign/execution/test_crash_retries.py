@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from harness.campaign.execution.crash_retries import MOST_ABANDONED, TRIES, Crashes, Verdict
+from harness.campaign.execution.crash_retries import MOST_ABANDONED, TRIES, Crashes, CrashResponse
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage
 
 TRAINING = TrainingStage("naive", 1, "", 0, None, None, 1.0)
@@ -10,7 +10,7 @@ ARM = AssessmentStage("naive_alone", 1, "", None, None)
 SEGV = "the worker died of SIGSEGV"
 
 
-def die(deaths: Crashes, stage: TrainingStage | AssessmentStage, *places: int) -> Verdict:
+def die(deaths: Crashes, stage: TrainingStage | AssessmentStage, *places: int) -> CrashResponse:
     """A try that begins these places, and dies in the last."""
     deaths.attempt_at(stage)
     for place in places:

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.execution.crash_retries import TRIES, Attempt, Begin, Report
+from harness.campaign.execution.crash_retries import TRIES, Attempt, OnProgress, OnStart
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.worker_pool import Event, run_stages
 from harness.campaign.plan.stages import Drives, Stage, TrainingStage
@@ -54,19 +54,23 @@ def told(events: list[Event], kind: str) -> list[str]:
 # What the workers do here. They are in the processes that run_stages starts, which import this module.
 
 
-def note(stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+def note(stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt) -> dict[str, Any]:
     with (conditions.folder / "done").open("a") as file:
         file.write(f"{stage.id}\n")
     return {"pid": os.getpid(), "deaf": signal.getsignal(signal.SIGINT) == signal.SIG_IGN}
 
 
-def report_much(stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+def report_much(
+    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+) -> dict[str, Any]:
     for done in range(1, 1001):
         report(done, 1000)
     return {}
 
 
-def raise_in_b(stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+def raise_in_b(
+    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+) -> dict[str, Any]:
     if stage.id == "b-seed1":
         raise StageFailed("b-seed1: a payoff is not finite")
     if stage.id == "bug-seed1":
@@ -74,13 +78,17 @@ def raise_in_b(stage: Stage, conditions: RunContext, report: Report, begin: Begi
     return {}
 
 
-def die_in_b(stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+def die_in_b(
+    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+) -> dict[str, Any]:
     if stage.id == "b-seed1":
         os.kill(os.getpid(), signal.SIGSEGV)
     return {}
 
 
-def die_once(stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt) -> dict[str, Any]:
+def die_once(
+    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+) -> dict[str, Any]:
     mark = conditions.folder / stage.id
     if not mark.exists():
         mark.touch()
@@ -89,7 +97,7 @@ def die_once(stage: Stage, conditions: RunContext, report: Report, begin: Begin,
 
 
 def die_when_idle(
-    stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt
+    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
 ) -> dict[str, Any]:
     """Kill whoever else works for the same parent: it has nothing to do."""
     if stage.id == "a-seed1":
@@ -166,7 +174,7 @@ def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path:
 
 
 def need_too_much(
-    stage: Stage, conditions: RunContext, report: Report, begin: Begin, attempt: Attempt
+    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
 ) -> dict[str, Any]:
     """Ask the system itself for more memory than it may give, by NumPy and by torch."""
     import resource

@@ -16,8 +16,8 @@ from harness.campaign.results.matchups import who_met
 from harness.drivers.policy_file import Policy, write_policy
 from harness.errors import UsageError
 from harness.game.state import EGO, NON_EGO
-from tests.campaign.plan.test_paper_rounds import planned
-from tests.drivers.test_policy_file import some_policy
+from tests.support.plans import planned
+from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, write_campaign, write_persona
 

@@ -7,23 +7,14 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.drivers.policy_file import write_policy
 from harness.game.state import EGO, NON_EGO
-from tests.drivers.test_policy_file import some_policy
+from tests.support.plans import planned
+from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, SPEEDY, write_campaign, write_persona
-
-
-def planned(folder: Path, **changes: Any) -> tuple[dict[str, Stage], dict[str, str]]:
-    """A campaign's stages and their keys, by id and in order."""
-    campaign = open_campaign(write_campaign(folder, **changes))
-    stages = plan(campaign.document, [persona.name for persona in campaign.personas])
-    assert len({stage.id for stage in stages}) == len(stages)
-    return {stage.id: stage for stage in stages}, stage_keys(campaign, stages)
 
 
 @pytest.fixture

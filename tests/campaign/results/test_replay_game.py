@@ -18,7 +18,7 @@ from harness.errors import UsageError
 from harness.evaluation.manoeuvres import pairs_in
 from harness.evaluation.tables import MANOEUVRE_COLUMNS, read_csv, typed, write_csv
 from harness.replay import replay_name
-from tests.replay.test_sumo_gui import require_gui
+from tests.support.pictures import require_gui
 
 
 @pytest.fixture

@@ -1,0 +1,222 @@
+"""Reports of made-up campaigns: what render_page takes, and what a page holds."""
+
+from __future__ import annotations
+
+import math
+from html.parser import HTMLParser
+
+import numpy as np
+import pandas as pd
+
+from harness.evaluation.comparison import compare
+from harness.evaluation.research_questions import Question
+from harness.evaluation.summary import summarise
+from harness.evaluation.tables import TABLES, typed
+from harness.replay.selection import choose_games, replay_name
+from tests.support.recorded import SCENE, manoeuvres, recorded
+
+GAMES = 60
+FAILING = {"alone": 0.0, "sumo": 0.03, "naive": 0.3, "retrained": 0.03}
+
+
+def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=GAMES, quick=False, retrained=True):
+    """The arguments of render_page for a made-up campaign, its tables computed as those of a real one.
+
+    `failing` overrides FAILING: the share of games the ego fails, by kind of arm.
+    """
+    rates = FAILING | (failing or {})
+    arms = [("naive_alone", "", "alone"), ("naive_vs_sumo", "", "sumo")]
+    stages = ["naive"]
+    for persona in personas:
+        arms += [(f"{persona}_alone", persona, None), (f"naive_vs_{persona}", persona, "naive")]
+        stages.append(persona)
+        if retrained:
+            arms += [
+                (f"retrained_vs_{persona}", persona, "retrained"),
+                (f"retrained_alone_{persona}", persona, "alone"),
+            ]
+            stages.append(f"retrained_{persona}")
+    random = np.random.default_rng(7)
+    rows = [
+        _game(arm, persona, seed, episode, rates.get(kind), random)
+        for arm, persona, kind in arms
+        for seed in seeds
+        for episode in range(games)
+    ]
+    episodes = typed(pd.DataFrame(rows, columns=list(TABLES["episodes"])))
+    questions = [
+        Question(question, persona, seed, before, after)
+        for persona in personas
+        for seed in seeds
+        for question, before, after in (
+            ("RQ1", "naive_alone", f"naive_vs_{persona}"),
+            ("RQ2", f"naive_vs_{persona}", f"retrained_vs_{persona}"),
+        )
+        if question == "RQ1" or retrained
+    ]
+    training = pd.DataFrame([row for stage in stages for seed in seeds for row in _windows(stage, seed, random)])
+    manifest = {
+        "format": 1,
+        "name": "merge",
+        "quick": quick,
+        "seeds": list(seeds),
+        "personas": list(personas),
+        "versions": {"harness": "0.1.0", "sumo": "1.28.0"},
+        "campaign": {
+            "name": "merge",
+            "scene": "../networks/merge",
+            "ego": {"driver": "learned"},
+            "training": {"steps": 3_000_000},
+            "assessment": {"episodes": games, "significance": 0.01},
+        },
+        "stages": {f"{stage}-seed{seed}": _training_stage(seed) for stage in stages for seed in seeds}
+        | {f"{arm}-seed{seed}": _done(seed) for arm, _, _ in arms for seed in seeds},
+    }
+    replays = [
+        replay_name(game["arm"], game["seed"], game["episode"]) for game in choose_games(episodes).to_dict("records")
+    ]
+    return {
+        "manifest": manifest,
+        "episodes": episodes,
+        "summary": summarise(episodes),
+        "comparisons": compare(questions, episodes, 0.01),
+        "training": typed(training),
+        "replays": replays,
+    }
+
+
+def _game(arm, persona, seed, episode, failing, random):
+    row = {"arm": arm, "persona": persona, "seed": seed, "episode": episode, "duration_s": random.uniform(9, 14)}
+    row |= {"ego_outcome": "", "non_ego_outcome": "", "error": ""}
+    if failing is not None:
+        failed = episode < failing * GAMES
+        cause = ("collision", "rail", "timeout")[episode % 3]
+        row |= {"ego_outcome": cause if failed else "goal", "ego_failed": int(failed)}
+        row |= {
+            "ego_mean_speed_mps": random.normal(13.2, 0.8) - 3 * failed,
+            "ego_max_deceleration_mps2": random.uniform(1, 8),
+            "ego_max_lateral_acceleration_mps2": random.uniform(0, 2),
+            "ego_time_to_goal_s": math.nan if failed else random.uniform(9, 14),
+            "ego_payoff": random.normal(8, 1) - 12 * failed,
+        }
+    if "_vs_" in arm:
+        row |= {"ego_trailing_distance_m": random.uniform(2, 30)}
+        row |= {"ego_min_ttc_s": random.uniform(0.2, 8) if episode % 4 else math.nan}
+    if "_vs_" in arm or failing is None:
+        row |= {"non_ego_outcome": "goal" if random.uniform() < 0.97 else "rail"}
+        row |= {"non_ego_mean_speed_mps": random.normal(15, 1), "non_ego_payoff": random.normal(10, 2)}
+    return row
+
+
+def _windows(stage, seed, random):
+    persona = stage.removeprefix("retrained_") if stage != "naive" else ""
+    for window in range(1, 10):
+        yield {
+            "stage": stage,
+            "persona": persona,
+            "seed": seed,
+            "steps": window * 131_072,
+            "mean_payoff": 10 - 25 * math.exp(-window / 2) + random.normal(0, 0.4),
+            "failure_rate": min(1, math.exp(-window / 2) + abs(random.normal(0, 0.01))),
+            "games": 900,
+            "mean_duration_s": 11.5,
+        }
+
+
+def recordings(arguments, others=2):
+    """What render_page takes beside a campaign, of games drawn to fit it."""
+    games = recorded(arguments["episodes"], others)
+    return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
+
+
+def _done(seed):
+    return {"kind": "assessment", "seed": seed, "status": "done", "seconds": 12.34, "message": ""}
+
+
+def _training_stage(seed):
+    trained = {"steps": 1_179_648, "budget_steps": 3_000_000, "stopped": "converged", "rule": "the curve is flat"}
+    return {"kind": "training", "seed": seed, "status": "done", "seconds": 3725.0, "message": ""} | trained
+
+
+class Page(HTMLParser):
+    """What a test asks of a page: its text, its tables by id, every tag with its attributes."""
+
+    def __init__(self, html):
+        super().__init__()
+        self.tags, self.pieces, self.tables = [], [], {}
+        self._table = self._cell = None
+        self._silent = 0
+        self.feed(html)
+        self.text = " ".join("".join(self.pieces).split())
+
+    def handle_starttag(self, tag, attributes):
+        attributes = dict(attributes)
+        self.tags.append((tag, attributes))
+        self._silent += tag in ("style", "script")
+        if tag == "table":
+            self._table = self.tables.setdefault(attributes.get("id", f"table {len(self.tables)}"), [])
+        elif tag == "tr":
+            self._table.append([])
+        elif tag in ("td", "th"):
+            self._cell = {"exact": attributes.get("data-value", attributes.get("data-column")), "text": ""}
+            self._table[-1].append(self._cell)
+
+    def handle_endtag(self, tag):
+        self._silent -= tag in ("style", "script")
+        if tag in ("td", "th"):
+            self._cell = None
+
+    def handle_data(self, data):
+        if not self._silent:
+            self.pieces.append(data)
+        if self._cell is not None:
+            self._cell["text"] += data
+
+    def cells(self, name):
+        """A table of the page as the CSV file should have it, its header first."""
+        return [[cell["text"] if cell["exact"] is None else cell["exact"] for cell in row] for row in self.tables[name]]
+
+
+def with_errors(arguments, games):
+    """The campaign with `games`, a mask over its episodes, that could not be played."""
+    frame = arguments["episodes"]
+    frame.loc[games, "ego_outcome"] = "error"
+    frame.loc[games, "error"] = "the simulator died"
+    measured = [name for name, dtype in TABLES["episodes"].items() if dtype in ("float64", "Int64")]
+    frame.loc[games, measured] = None
+    return recomputed(arguments)
+
+
+CONTRAST = """element => {
+  const parse = colour => colour.match(/[\\d.]+/g).map(Number);
+  const luminance = colour => {
+    const [r, g, b] = parse(colour).map(part => part / 255)
+      .map(part => part <= 0.03928 ? part / 12.92 : ((part + 0.055) / 1.055) ** 2.4);
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
+  };
+  const style = getComputedStyle(element);
+  const ink = luminance(element instanceof SVGElement ? style.fill : style.color);
+  let ground = element;
+  while (ground && (parse(getComputedStyle(ground).backgroundColor)[3] ?? 1) === 0) ground = ground.parentElement;
+  const paper = luminance(getComputedStyle(ground).backgroundColor);
+  return (Math.max(ink, paper) + 0.05) / (Math.min(ink, paper) + 0.05);
+}"""
+"""WCAG's contrast ratio of an element's text with the first ground behind it that is not transparent."""
+
+
+def recomputed(arguments):
+    """The campaign with tables that fit its changed episodes."""
+    old = arguments["comparisons"]
+    questions = [
+        Question(
+            row["question"],
+            row["persona"],
+            row["seed"],
+            "naive_alone" if row["question"] == "RQ1" else f"naive_vs_{row['persona']}",
+            f"{'naive' if row['question'] == 'RQ1' else 'retrained'}_vs_{row['persona']}",
+        )
+        for row in old[old["metric"] == "failure"].to_dict("records")
+    ]
+    arguments["summary"] = summarise(arguments["episodes"])
+    arguments["comparisons"] = compare(questions, arguments["episodes"], 0.01)
+    return arguments

@@ -1,0 +1,51 @@
+"""Assessed games of drivers that tests make up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
+from harness.drivers.protocol import Driver
+from harness.environments.rollout import Arm, Game, assess
+from harness.game.arrays import FloatArray, IntArray
+from harness.traffic.scene import OpenScene
+from tests.support.tiny import CAREFUL, SPEEDY
+
+
+class Steady:
+    """Straight on, at the speed it has."""
+
+    takes_over = True
+
+    def reset(self, games: IntArray) -> None:
+        """Nothing to forget."""
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return np.zeros((len(games), 2))
+
+
+def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: int = 1) -> Arm:
+    """An arm in which a careful ego meets a driver of the persona."""
+    careful, other = (read_document(file, Persona) for file in (CAREFUL, persona))
+    return Arm("naive_vs_someone", merge, drivers, (careful, other), seed)  # type: ignore[arg-type]
+
+
+def play(assessed: Arm, episodes: int = 3) -> list[Game]:
+    """The first games of an arm."""
+    return list(assess(assessed, episodes))
+
+
+def trace(game: Game) -> pd.DataFrame:
+    """The trace of a game that was recorded."""
+    assert game.trace is not None
+    return pd.DataFrame(game.trace)
+
+
+def records(games: Sequence[Game]) -> list[str]:
+    """The records of games, as text that can be compared: NaN equals NaN."""
+    return [repr(game.record) for game in games]
