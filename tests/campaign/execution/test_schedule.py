@@ -81,10 +81,10 @@ def test_schedule__what_needs_a_failed_stage_is_skipped_with_the_reason_once() -
 
 
 def test_schedule__a_need_that_is_neither_planned_nor_finished_is_an_error() -> None:
-    with pytest.raises(PlanError, match="^b-seed1 needs gone-seed1: neither planned nor finished$"):
+    with pytest.raises(PlanError, match=r"^b-seed1 needs gone-seed1: neither planned nor finished$"):
         Schedule([stage("a"), stage("b", "gone")], [])
 
 
 def test_schedule__needs_in_a_circle_are_an_error() -> None:
-    with pytest.raises(PlanError, match="in a circle: .*a-seed1"):
+    with pytest.raises(PlanError, match=r"in a circle: .*a-seed1"):
         Schedule([stage("a", "b"), stage("b", "a")], [])
