@@ -23,7 +23,7 @@ import os
 import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -261,6 +261,8 @@ class RunFolder:
                     yield
                 finally:
                     shutil.rmtree(self.scratch, ignore_errors=True)
+                    with suppress(InUse):  # the locks of this command's own workers
+                        wait_for_workers(self.workers, 0.0)
         except InUse as holder:
             raise UsageError.of(
                 self.path, "", f"is in use by {holder}", "wait until it has ended, or choose another folder with --out"
