@@ -111,10 +111,11 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
     from rich.console import Console
 
     from harness.campaign.plan.plan import plan
-    from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, TrainingStage
+    from harness.campaign.plan.stages import AssessmentStage, TrainingStage
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain
+    from harness.evaluation.strategies import BestResponse
 
     opened = open_campaign(file, allow_code=allow_code)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
@@ -134,7 +135,7 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
             ranges = ", ".join(f"{key} from {low:g} to {high:g}" for key, low, high in opened.ego_driver.searched)
             round_2 = f"Round 2 searches it in {search.trials} trials of {search.games} games: {ranges}."
         say(plain(f"The ego: {ego}. {round_2}"))
-    responses = sum(isinstance(stage, TrainingStage) and bool(stage.responds_in) for stage in stages)
+    responses = sum(isinstance(stage, TrainingStage) and isinstance(stage.strategy, BestResponse) for stage in stages)
     how = f"{trainings - responses} trainings of up to {opened.document.training.steps:,} steps"
     if opened.policies is not None:
         how = f"Players trained before, read from {opened.policies}: nothing is trained"
@@ -142,10 +143,9 @@ def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
         how += f", {responses} trainings of best responses of up to {opened.document.best_response.steps:,} steps"
     say(f"{how}, {arms} arms of {opened.document.assessment.episodes} episodes:")
     for stage in stages:
-        kind = {TrainingStage: "train", AssessmentStage: "assess", ReconfigurationStage: "tune"}[type(stage)]
         reads = () if isinstance(stage, TrainingStage) else stage.reads
         after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
-        say(f"  {kind:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else ""))
+        say(f"  {stage.verb:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else ""))
 
 
 @app.command()

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -19,6 +20,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load as load_tensors
 from safetensors.numpy import save as save_tensors
 
+from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.files import content_of, write_atomically
@@ -57,6 +59,12 @@ def write_policy(policy: Policy, folder: Path) -> None:
         save_tensors({k: np.ascontiguousarray(v) for k, v in policy.tensors.items()}),
     )
     write_atomically(card_file, (json.dumps(card, indent=2) + "\n").encode())
+
+
+def persona_hash(persona: Persona) -> str:
+    """SHA-256 of what a policy learns by: the persona's document without its name, description and sources."""
+    learned_by = persona.model_dump(mode="json", exclude={"name", "description", "sources"})
+    return hashlib.sha256(json.dumps(learned_by, sort_keys=True).encode()).hexdigest()
 
 
 def policy_files(folder: Path) -> tuple[Path, Path]:

@@ -17,7 +17,7 @@ import pytest
 from rich.console import Console
 
 from harness.campaign.execution import run_campaign as campaign_run
-from harness.campaign.execution.crash_retries import TRIES, Attempt, OnProgress, OnStart
+from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
 from harness.campaign.execution.run_campaign import run_campaign
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
@@ -80,11 +80,13 @@ def run_by(work: Work, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[R
 def test_sigsegv__of_a_game_is_one_error_and_of_a_segment_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     outcome, said = run_by(die_in_game_1, tmp_path, monkeypatch)
     assert (outcome.error_games, outcome.failed_stages) == (1, ())  # for which the command's exit code is 1
-    assert f"naive_vs_sumo-seed1: the worker died of SIGSEGV, {TRIES} times over in game 1, which is given up" in said
+    assert (
+        f"naive_vs_sumo-seed1: the worker died of SIGSEGV, {MOST_CRASHES} times in game 1, which is abandoned" in said
+    )
     games, expected = (read_csv(run / "episodes.csv") for run in (tmp_path / "run", sumo_run()))
     (bad,) = games.index[games["error"] != ""]
     assert games.loc[bad, ["arm", "episode", "ego_outcome"]].tolist() == ["naive_vs_sumo", 1, "error"]
-    assert games.loc[bad, "error"] == f"the worker died of SIGSEGV, {TRIES} times over"
+    assert games.loc[bad, "error"] == f"the worker died of SIGSEGV, {MOST_CRASHES} times"
     assert games.drop(bad).equals(expected.drop(bad))
     assert (tmp_path / "run" / "training.csv").read_bytes() == (sumo_run() / "training.csv").read_bytes()
 

@@ -11,7 +11,7 @@ import pandas as pd
 import pytest
 
 from harness.campaign.execution.player_factory import equilibrium_of
-from harness.campaign.plan.stages import Drives
+from harness.campaign.plan.planned_drivers import EquilibriumMixture, Trained
 from harness.campaign.storage.run_folder import RunFolder
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import DISTRACTED, SPEEDY, finished, harness
@@ -35,10 +35,10 @@ def arms_race() -> Path:
     )
 
 
-def settled() -> Path:
+def at_equilibrium() -> Path:
     """Of players who have learned nothing in a game of two episodes no gain can be told from 0."""
     return finished(
-        name="settled",
+        name="equilibrium",
         rounds={"count": 4},
         best_response=RESPONSE,
         assessment={"episodes": 2},
@@ -93,10 +93,9 @@ def test_arms_race__the_report_and_the_terminal_say_who_could_still_gain() -> No
 
 
 def test_arms_race__an_equilibriums_mixture_has_shares_that_add_up() -> None:
-    opponent = Drives(
-        "mixture",
-        members=(Drives("policy", "naive-seed1"), Drives("policy", "retrained_speedy-seed1")),
-        weighed_by=(("naive_vs_speedy-seed1",), ("retrained_vs_speedy-seed1",)),
+    opponent = EquilibriumMixture(
+        members=(Trained(stage="naive-seed1"), Trained(stage="retrained_speedy-seed1")),
+        arms=(("naive_vs_speedy-seed1",), ("retrained_vs_speedy-seed1",)),
     )
     table = pd.read_csv(arms_race() / "crossplay.csv").set_index(["ego", "non_ego"])
     earned = [table.loc[(ego, "speedy"), "ego_payoff"] for ego in ("naive", "retrained_speedy")]
@@ -106,20 +105,20 @@ def test_arms_race__an_equilibriums_mixture_has_shares_that_add_up() -> None:
         assert shares[earned.index(max(earned))] == pytest.approx(1.0)
 
 
-def test_settled__nothing_follows_an_exchange_in_which_nobody_gains() -> None:
-    stages = manifest(settled())["stages"]
+def test_equilibrium__nothing_follows_a_pair_in_which_no_player_gains() -> None:
+    stages = manifest(at_equilibrium())["stages"]
     status = {name: entry["status"] for name, entry in stages.items()}
     assert status["retrained_vs_speedy_ego_response-seed1"] == "done"
     after = {name for name in stages if "round" in name}
     assert after
     assert {status[name] for name in after} == {"settled"}
     assert "not needed" in stages["speedy_round3-seed1"]["message"]
-    assert not (settled() / "policies" / "speedy_round3-seed1").exists()
+    assert not (at_equilibrium() / "policies" / "speedy_round3-seed1").exists()
 
 
-def test_settled__is_no_failure_and_nothing_to_do_again(tmp_path: Path) -> None:
-    run = shutil.copytree(settled(), tmp_path / "run", symlinks=True)
-    done = harness("campaign", settled().with_suffix(".toml"), "--out", run)
+def test_equilibrium__is_no_failure_and_nothing_to_do_again(tmp_path: Path) -> None:
+    run = shutil.copytree(at_equilibrium(), tmp_path / "run", symlinks=True)
+    done = harness("campaign", at_equilibrium().with_suffix(".toml"), "--out", run)
     assert done.returncode == 0
-    assert "settled  " not in done.stdout  # the stages were finished before
+    assert "skipped  " not in done.stdout  # the stages were finished before
     assert "Not finished" not in done.stdout

@@ -1,10 +1,10 @@
-"""Carrying out an arm in segments of games, each on the disk when it is played, put together when all are.
+"""Carrying out an arm in segments of games: each is stored when it is played, and all are joined at the end.
 
-<work>/segments/<first>-<last>.json            seal: the segment is whole; says by which versions it was played
+<work>/segments/<first>-<last>.json            checksums: the segment is complete; and the versions that played it
 <work>/segments/<first>-<last>.<table>         its records, its manoeuvres, its traces
 
-So an arm goes on where it stopped, and needs the memory of one segment, however many games it has. A game depends on
-nothing but itself: the files of an arm are the same bytes whatever interrupted it.
+So an arm continues where it stopped, and needs the memory of one segment, however many games it has. A game depends on
+nothing but itself: the files of an arm are the same bytes with and without interruptions.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from typing import Any
 import pandas as pd
 
 from harness.campaign.execution.crash_retries import Attempt, OnProgress, OnStart
-from harness.campaign.storage.checksums import broken, read_checksums, write_checksums
+from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES, name_manoeuvres
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.environments.rollout import Arm, Game, assess
@@ -33,7 +33,7 @@ _TRACES = "traces.parquet"
 
 @dataclass(frozen=True)
 class Segment:
-    """Some games of an arm, one after the other, and where they are kept."""
+    """Consecutive games of an arm, and the folder that stores them."""
 
     folder: Path
     episodes: range
@@ -43,15 +43,15 @@ class Segment:
         return self.folder / f"{self.episodes[0]:06d}-{self.episodes[-1]:06d}.{name}"
 
     def errors(self) -> int | None:
-        """How many of its games could not be played; None if it has not been played whole, by these versions."""
-        said = read_checksums(self.file("json"))
-        if said is None or said.get("versions") != versions_of_numbers() or broken(said, self.folder):
+        """How many of its games could not be played; None if it is not complete, or was played by other versions."""
+        record = read_checksums(self.file("json"))
+        if record is None or record.get("versions") != versions_of_numbers() or mismatches(record, self.folder):
             return None
-        errors = said.get("errors")
+        errors = record.get("errors")
         return errors if isinstance(errors, int) else None
 
-    def play(self, games: Iterator[Game], labels: Mapping[str, Any], arm: Arm, tell: Callable[[], None]) -> int:
-        """Play it: the next of `games` are its own. How many of them could not be played."""
+    def play(self, games: Iterator[Game], labels: Mapping[str, Any], arm: Arm, on_game: Callable[[], None]) -> int:
+        """Play it; `games` yields its games next. Returns how many of them could not be played."""
         records = []
         with TraceWriter(self.file(_TRACES)) as traces:
             for _ in self.episodes:
@@ -59,7 +59,7 @@ class Segment:
                 records.append({**game.record, **labels})
                 if game.trace is not None:
                     traces.add(game.trace)
-                tell()
+                on_game()
         table = typed(pd.DataFrame(records).reindex(columns=list(EPISODE_COLUMNS)))
         write_csv(table, self.file(EPISODES))
         write_csv(name_manoeuvres(table, self.file(_TRACES), arm.scene), self.file(MANOEUVRES))
@@ -70,7 +70,7 @@ class Segment:
 
 
 def segments_of(folder: Path, episodes: int) -> list[Segment]:
-    """The segments of an arm of so many games."""
+    """The segments of an arm with this number of games."""
     firsts = range(0, episodes, SEGMENT_EPISODES)
     return [Segment(folder, range(first, min(first + SEGMENT_EPISODES, episodes))) for first in firsts]
 
@@ -94,7 +94,7 @@ def play_segments(
     total = segments[-1].episodes.stop
     done = total - sum(len(segment.episodes) for segment in missing)
 
-    def tell() -> None:
+    def on_game() -> None:
         nonlocal done
         done += 1
         on_progress(done, total)
@@ -103,12 +103,12 @@ def play_segments(
     with closing(assess(arm, episodes, on_start, attempt.abandoned)) as games:  # type: ignore[type-var]
         for segment in missing:
             segment.file("json").unlink(missing_ok=True)
-            errors[segment] = segment.play(games, labels, arm, tell)
+            errors[segment] = segment.play(games, labels, arm, on_game)
     return sum(found or 0 for found in errors.values())
 
 
 def join_segments(segments: Sequence[Segment], episodes: Path, manoeuvres: Path, traces: Path) -> None:
-    """Put the segments of an arm together into its files."""
+    """Join the segments of an arm into its files."""
     join_csv([segment.file(EPISODES) for segment in segments], episodes)
     join_csv([segment.file(MANOEUVRES) for segment in segments], manoeuvres)
     join_traces([segment.file(_TRACES) for segment in segments], traces)

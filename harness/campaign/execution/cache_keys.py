@@ -1,71 +1,134 @@
-"""A stage's key: the hash of all that its numbers depend on."""
+"""A stage's key: the hash of everything that its numbers depend on.
+
+What is hashed is written out here, apart from the records of the plan: renaming a field changes no key.
+"""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
 from typing import Any
 
-from harness.campaign.plan.best_responses import settings_of
-from harness.campaign.plan.stages import AssessmentStage, Drives, ReconfigurationStage, Stage, TrainingStage
+from harness.campaign.plan.budgets import training_settings
+from harness.campaign.plan.planned_drivers import (
+    BestOf,
+    EquilibriumMixture,
+    External,
+    Mixture,
+    PlannedDriver,
+    Reconfigured,
+    SumoDriven,
+    Trained,
+    TrainedBefore,
+    members_of,
+    persona_of,
+)
+from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.versions import NUMBERS_FORMAT
 from harness.drivers.policy_file import policy_files
+from harness.evaluation.strategies import BestResponse
 
 
 def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str]:
-    """Each stage's key: the hash of all that its numbers depend on, through the stages it needs."""
-    document, scene = campaign.document, campaign.scene.document
-    files = ("scene.toml", scene.net, scene.routes)
-    rests_on = {name: campaign.hash_of(campaign.scene.folder / name) for name in files}
-    personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
-    given = campaign.ego_driver.identity if campaign.ego_driver is not None else ""
+    """Each stage's key. It covers what the stage reads itself, and the keys of the stages that it needs."""
+    scene = campaign.scene.document
+    files = {name: campaign.hash_of(campaign.scene.folder / name) for name in ("scene.toml", scene.net, scene.routes)}
+    shared = {
+        "format": NUMBERS_FORMAT,
+        "scene": files,
+        "given": campaign.ego_driver.identity if campaign.ego_driver is not None else "",
+    }
     keys: dict[str, str] = {}
     for stage in stages:
-        players = list(_players(stage))
-        names = ("", *([stage.persona] if stage.persona in personas else []), *(each.persona for each in players))
-        inputs: dict[str, Any] = {
-            "format": NUMBERS_FORMAT,
-            "stage": _without_unused(asdict(stage)),
-            "scene": rests_on,
-            "personas": [personas[name].model_dump(mode="json") for name in dict.fromkeys(names)],
-            "needs": [keys[name] for name in stage.needs],
-            "given": given,
-        }
-        if isinstance(stage, TrainingStage):
-            inputs["training"] = settings_of(document, stage).model_dump(mode="json")
-        elif isinstance(stage, ReconfigurationStage):
-            assert campaign.ego_driver is not None
-            inputs["reconfiguration"] = document.reconfiguration.model_dump(mode="json")
-            inputs["tunable"] = campaign.ego_driver.searched
-        else:
-            inputs["episodes"] = document.assessment.episodes
-        if campaign.policies is not None and (reads := stage.reads):
-            files_of = {name: policy_files(campaign.policies / name) for name in reads}
-            inputs["policies"] = {name: [campaign.hash_of(file) for file in each] for name, each in files_of.items()}
-        if others := sorted({each.stage for each in players if each.kind == "given" and each.stage}):
-            inputs["others"] = {name: campaign.other_egos[name].identity for name in others}
-        if any(each.kind == "best" for each in _seats(stage)) and document.best_response is not None:
-            inputs["choice_episodes"] = document.best_response.choice_episodes
-        if stage.unless:
-            inputs["significance"] = document.assessment.significance
+        inputs = {**shared, **_inputs(campaign, stage), "needs": [keys[name] for name in stage.needs]}
         keys[stage.id] = hashlib.sha256(json.dumps(inputs, sort_keys=True).encode()).hexdigest()
     return keys
 
 
-def _seats(stage: Stage) -> Iterable[Drives]:
-    planned = (stage.ego, stage.non_ego) if isinstance(stage, AssessmentStage) else (stage.opponent,)
-    return [each for each in planned if each is not None]
+def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
+    """What one stage's numbers depend on, beside the scene and other stages."""
+    document = campaign.document
+    inputs: dict[str, Any] = {"stage": _stage(stage), "personas": _personas(campaign, stage)}
+    match stage:
+        case TrainingStage():
+            inputs["training"] = training_settings(document, stage).model_dump(mode="json")
+        case SearchStage():
+            assert campaign.ego_driver is not None
+            inputs["reconfiguration"] = document.reconfiguration.model_dump(mode="json")
+            inputs["tunable"] = campaign.ego_driver.searched
+        case AssessmentStage():
+            inputs["episodes"] = document.assessment.episodes
+    if campaign.policies is not None and stage.reads:
+        read = {name: policy_files(campaign.policies / name) for name in stage.reads}
+        inputs["policies"] = {name: [campaign.hash_of(file) for file in each] for name, each in read.items()}
+    drivers = [each for driver in stage.drivers for each in members_of(driver)]
+    if others := sorted({each.name for each in drivers if isinstance(each, External) and each.name}):
+        inputs["others"] = {name: campaign.other_egos[name].identity for name in others}
+    if any(isinstance(each, BestOf) for each in stage.drivers) and document.best_response is not None:
+        inputs["choice_episodes"] = document.best_response.choice_episodes
+    if stage.gates:
+        inputs["significance"] = document.assessment.significance
+    return inputs
 
 
-def _players(stage: Stage) -> Iterable[Drives]:
-    return [each for seat in _seats(stage) for each in seat.everyone]
+def _personas(campaign: OpenCampaign, stage: Stage) -> list[Any]:
+    """The documents of the ego's persona, the stage's own, and those of its drivers, each once."""
+    personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
+    own = [stage.persona] if stage.persona in personas else []
+    players = stage.drivers if isinstance(stage, AssessmentStage) else (stage.opponent,)
+    names = ["", *own, *(persona_of(each) for driver in players for each in members_of(driver))]
+    return [personas[name].model_dump(mode="json") for name in dict.fromkeys(names)]
 
 
-def _without_unused(described: Any) -> Any:
-    """Leave out what is empty: a stage that does not use what a later version can do keeps its key."""
-    if isinstance(described, dict):
-        return {name: _without_unused(value) for name, value in described.items() if value != ()}
-    return [_without_unused(each) for each in described] if isinstance(described, tuple) else described
+def _stage(stage: Stage) -> dict[str, Any]:
+    described: dict[str, Any] = {"seed": stage.seed, "persona": stage.persona}
+    if stage.gates:
+        described["unless"] = [
+            {"pair": each.pair, "ego_response": each.ego_response, "non_ego_response": each.non_ego_response}
+            for each in stage.gates
+        ]
+    match stage:
+        case TrainingStage(strategy=strategy, initial=initial):
+            described |= {
+                "name": stage.name,
+                "learner": stage.learner,
+                "opponent": _driver(stage.opponent),
+                "initial": initial.stage if isinstance(initial, Trained) else None,
+                "alone_share": stage.alone_share,
+                "attentive_share": stage.attentive_share,
+            }
+            if isinstance(strategy, BestResponse):
+                described["responds_in"] = [strategy.arm.pair.name]
+            if isinstance(initial, TrainedBefore):
+                described["begins_as"] = [initial.stage]
+        case AssessmentStage():
+            described |= {"arm": stage.name, "ego": _driver(stage.ego), "non_ego": _driver(stage.non_ego)}
+        case SearchStage():
+            described |= {"name": stage.name, "opponent": _driver(stage.opponent)}
+    return described
+
+
+def _driver(driver: PlannedDriver | None) -> dict[str, Any] | None:
+    match driver:
+        case None:
+            return None
+        case SumoDriven():
+            return {"kind": "sumo", "stage": "", "persona": ""}
+        case External(name=name):
+            return {"kind": "given", "stage": name, "persona": ""}
+        case Reconfigured(stage=stage):
+            return {"kind": "reconfigured", "stage": stage, "persona": ""}
+        case Trained(stage=stage, persona=persona):
+            return {"kind": "policy", "stage": stage, "persona": persona}
+        case TrainedBefore(stage=stage, persona=persona):
+            return {"kind": "before", "stage": stage, "persona": persona}
+        case Mixture(members=members, shares=shares):
+            several = {"kind": "mixture", "stage": "", "persona": "", "members": [_driver(each) for each in members]}
+            return several | {"shares": list(shares)}
+        case EquilibriumMixture(members=members, arms=arms):
+            several = {"kind": "mixture", "stage": "", "persona": "", "members": [_driver(each) for each in members]}
+            return several | {"weighed_by": [list(row) for row in arms]}
+        case BestOf(members=members, persona=persona):
+            return {"kind": "best", "stage": "", "persona": persona, "members": [_driver(each) for each in members]}

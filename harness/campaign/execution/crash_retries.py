@@ -1,4 +1,4 @@
-"""What follows from the deaths of workers: another try, a game that is given up, or a stage that has failed."""
+"""What follows from crashes of workers: another attempt, an abandoned game, or a failed stage."""
 
 from __future__ import annotations
 
@@ -9,76 +9,76 @@ from dataclasses import dataclass, field
 from harness.campaign.plan.stages import AssessmentStage, Stage
 
 OnProgress = Callable[[int, int], None]
-"""Told how much of a stage is done, and how much there is: steps or games."""
+"""Called with what is done of a stage, and with its total: steps, games or trials."""
 OnStart = Callable[[int], None]
-"""Told of each segment of a training, and of each game of an arm, before it is gone about: if the process dies, it is
-known what of."""
+"""Called with the number of each segment of a training, game of an arm or trial of a search before it starts: if the
+process crashes, the place is known."""
+
+MOST_CRASHES = 3
+"""Crashes of one segment or game after which it is not tried again."""
+MOST_ABANDONED = 20
+"""Games of an arm that may be abandoned in one run of the command. With more, the scene is at fault and not a game."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Attempt:
-    """What became of a stage so far, in this run of the command."""
+    """What earlier attempts at a stage, in this run of the command, leave to the next one."""
 
     first: bool = True
-    """Games of an earlier run that could not be played are played again: what was wrong may have been mended."""
+    """The first attempt plays again the games that could not be played in an earlier run of the command."""
     abandoned: Mapping[int, str] = field(default_factory=dict)
-    """Episodes that killed their worker too often, each with what is said of it."""
+    """Episodes that crashed their worker too often, each with the reason."""
 
 
 FIRST = Attempt()
 
-TRIES = 3
-"""So often one segment, or one game, may kill its worker."""
-MOST_ABANDONED = 20
-"""So many games of an arm may be given up in one run of the command: beyond it the scene is to blame, not a game."""
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CrashResponse:
-    """What a death means for its stage."""
+    """What a crash means for its stage."""
 
     message: str
     stage_fails: bool = False
 
 
 class Crashes:
-    """Counts the deaths in each place of each stage: a segment of a training, a game of an arm, or the way there.
+    """Counts crashes by place: a segment of a training, a game of an arm, or the way there (None).
 
-    Only those of this run of the command count: whoever kills the whole command accuses no game.
+    Only the crashes of this run of the command count: where the whole command was killed, no game is to blame.
     """
 
     def __init__(self) -> None:
-        self._begun: set[str] = set()
+        self._attempted: set[str] = set()
         self._place: dict[str, int] = {}
         self._farthest: dict[str, int] = {}
         self._counts: Counter[tuple[str, int | None]] = Counter()
-        self._given_up: dict[str, dict[int, str]] = {}
+        self._abandoned: dict[str, dict[int, str]] = {}
 
-    def attempt_at(self, stage: Stage) -> Attempt:
-        """What a worker has to know who is handed a stage."""
-        first = stage.id not in self._begun
-        self._begun.add(stage.id)
+    def next_attempt(self, stage: Stage) -> Attempt:
+        """What the worker that gets a stage has to know."""
+        first = stage.id not in self._attempted
+        self._attempted.add(stage.id)
         self._place.pop(stage.id, None)
-        return Attempt(first, dict(self._given_up.get(stage.id, {})))
+        return Attempt(first=first, abandoned=dict(self._abandoned.get(stage.id, {})))
 
-    def note_begin(self, stage: str, place: int) -> None:
-        """A worker goes about a segment or a game."""
+    def note_start(self, stage: str, place: int) -> None:
+        """A worker starts a segment, game or trial."""
         self._place[stage] = place
-        if place > self._farthest.get(stage, -1):  # it got on: deaths on the way there are forgotten
+        if place > self._farthest.get(stage, -1):  # it got farther: crashes on the way there no longer count
             self._farthest[stage] = place
             del self._counts[stage, None]
 
-    def note(self, stage: Stage, cause: str) -> CrashResponse:
-        """A worker has died of `cause`."""
+    def note_crash(self, stage: Stage, cause: str) -> CrashResponse:
+        """A worker crashed in a stage, of `cause`."""
         place = self._place.get(stage.id)
         self._counts[stage.id, place] += 1
-        if self._counts[stage.id, place] < TRIES:
-            return CrashResponse(cause)
-        often = f"{cause}, {TRIES} times over"
+        if self._counts[stage.id, place] < MOST_CRASHES:
+            return CrashResponse(message=cause)
+        often = f"{cause}, {MOST_CRASHES} times"
         if place is None or not isinstance(stage, AssessmentStage):
-            return CrashResponse(often, stage_fails=True)
-        abandoned = self._given_up.setdefault(stage.id, {})
+            return CrashResponse(message=often, stage_fails=True)
+        abandoned = self._abandoned.setdefault(stage.id, {})
         abandoned[place] = often
         if len(abandoned) > MOST_ABANDONED:
-            return CrashResponse(f"{len(abandoned)} games killed their worker; the last: {often}", stage_fails=True)
-        return CrashResponse(f"{often} in game {place}, which is given up")
+            return CrashResponse(message=f"{len(abandoned)} games crashed; the last: {often}", stage_fails=True)
+        return CrashResponse(message=f"{often} in game {place}, which is abandoned")

@@ -1,29 +1,36 @@
-"""Whether an exchange has settled: neither player's best response gains anything distinguishable from 0."""
+"""Whether an approximate equilibrium is reached: no player's best response gains anything distinguishable from 0."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import pandas as pd
 
-from harness.campaign.plan.stages import Gate, Stage
+from harness.campaign.plan.stages import EquilibriumGate, Stage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.game_theory.best_response_gap import gaps, nothing_to_gain
-from harness.evaluation.game_theory.records import Response
+from harness.evaluation.game_theory.records import Response, Role
 from harness.evaluation.tables import read_csv
 
 
-def settled(stage: Stage, folder: RunFolder, significance: float) -> Gate | None:
-    """The gate by which a stage has nothing to do; None if it has."""
-    return next((gate for gate in stage.unless if _has_settled(gate, stage, folder, significance)), None)
+def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> EquilibriumGate | None:
+    """The first gate of a stage whose pair is an approximate equilibrium; None if the stage has to be carried out."""
+    return next((gate for gate in stage.gates if _is_equilibrium(gate, stage, folder, significance)), None)
 
 
-def _has_settled(gate: Gate, stage: Stage, folder: RunFolder, significance: float) -> bool:
-    arms = (gate.pair, gate.ego_response, gate.non_ego_response)
-    episodes = pd.concat([read_csv(folder.work(arm) / "episodes.csv") for arm in arms], ignore_index=True)
+def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, significance: float) -> bool:
+    episodes = pd.concat([read_csv(folder.work(each) / "episodes.csv") for each in gate.stages], ignore_index=True)
     pair, *responses = (str(name) for name in episodes["arm"].unique())
-    asked: Sequence[Response] = [
-        Response(stage.seed, role, stage.persona, 0, pair, arm, "", "")  # type: ignore[arg-type]
-        for role, arm in zip(("ego", "non_ego"), responses, strict=True)
+    roles: tuple[Role, Role] = ("ego", "non_ego")
+    asked = [
+        Response(
+            seed=stage.seed,
+            role=role,
+            persona=stage.persona,
+            round=0,
+            pair_arm=pair,
+            response_arm=arm,
+            ego="",
+            non_ego="",
+        )
+        for role, arm in zip(roles, responses, strict=True)
     ]
     return nothing_to_gain(gaps(asked, episodes, significance))

@@ -1,4 +1,4 @@
-"""From who is planned to drive to drivers: policies are read, mixtures weighed, the best of several chosen."""
+"""Makes the drivers that a plan names: reads policies, weighs mixtures, chooses the best of several."""
 
 from __future__ import annotations
 
@@ -8,11 +8,26 @@ from pathlib import Path
 import numpy as np
 
 from harness.campaign.execution.run_context import RunContext
-from harness.campaign.plan.stages import AssessmentStage, Drives
+from harness.campaign.plan.planned_drivers import (
+    BestOf,
+    EquilibriumMixture,
+    External,
+    Mixture,
+    PlannedDriver,
+    PlannedMember,
+    Reconfigured,
+    SumoDriven,
+    Trained,
+    TrainedBefore,
+    description,
+    persona_of,
+)
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.drivers.car import car_of
-from harness.drivers.mixture import Member, Mixture, Player
+from harness.drivers.mixture import Member, Player
+from harness.drivers.mixture import Mixture as DriverMixture
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.protocol import Driver
@@ -24,98 +39,124 @@ from harness.evaluation.tables import read_csv
 from harness.game.state import EGO, ROLES
 from harness.traffic.scene import OpenScene
 
-_LEAST_SHARE = 1e-6  # of a mixture that is worth a driver
+_LEAST_SHARE = 1e-6  # members of a mixture with a smaller share are left out
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """Of several drivers the one that was chosen, and the mean payoff of each, in their order."""
+
+    stages: tuple[str, ...]
+    mean_payoffs: tuple[float, ...]
+
+    @property
+    def best(self) -> int:
+        """The place of the chosen one."""
+        return int(np.argmax(self.mean_payoffs))
+
+
+@dataclass(frozen=True, kw_only=True)
 class PlayerFactory:
-    """What drivers are made from."""
+    """Makes players from planned drivers."""
 
-    conditions: RunContext
+    context: RunContext
     folder: RunFolder
     scene: OpenScene
 
-    def player(self, drives: Drives | None) -> Player:
-        """Who drives; not for the best of several, who has to be chosen.
+    def player(self, planned: PlannedDriver | None) -> Player:
+        """The player of a planned driver; None for none. Not for `BestOf`, which has to be chosen first.
 
         Raises UsageError where a policy can't be read, DriverError where a driver can't be made, StageFailed where the
         arms that weigh a mixture have no equilibrium.
         """
-        if drives is None:
-            return None
-        if drives.kind != "mixture":
-            return self._driver(drives)
-        shares = drives.shares or equilibrium_of(drives, self.folder)
-        members = zip(drives.members, shares, strict=True)
-        return Mixture(
+        match planned:
+            case None:
+                return None
+            case Mixture(members=members, shares=shares):
+                return self._mixture(members, shares)
+            case EquilibriumMixture(members=members):
+                return self._mixture(members, equilibrium_of(planned, self.folder))
+            case BestOf():
+                raise TypeError("choose the best with `choose` first")
+            case _:
+                return self._driver(planned)
+
+    def choose(self, stage: AssessmentStage, personas: tuple[Persona, Persona], learner: int) -> tuple[Driver, Choice]:
+        """The best of the drivers planned for a player of an arm, by its mean payoff in games beside the arm's own.
+
+        Raises as `player` does, and StageFailed where none of these games could be played.
+        """
+        planned = stage.drivers[learner]
+        assert isinstance(planned, BestOf)
+        assert self.context.document.best_response is not None
+        other = self.player(stage.drivers[1 - learner])
+        first = self.context.document.assessment.episodes
+        games = range(first, first + self.context.document.best_response.choice_episodes)
+        candidates = [self._driver(each) for each in planned.members]
+        mean_payoffs = []
+        for candidate in candidates:
+            drivers = (candidate, other) if learner == EGO else (other, candidate)
+            arm = Arm(name=stage.name, scene=self.scene, drivers=drivers, personas=personas, seed=stage.seed)
+            payoffs = [game.record.get(f"{ROLES[learner]}_payoff") for game in assess(arm, games)]
+            measured = [payoff for payoff in payoffs if payoff is not None]
+            if not measured:
+                raise StageFailed(f"{stage.id}: none of the games that choose the best response could be played")
+            mean_payoffs.append(float(np.mean(measured)))
+        stages = tuple(each.stage for each in planned.members if isinstance(each, Trained))
+        choice = Choice(stages=stages, mean_payoffs=tuple(mean_payoffs))
+        return candidates[choice.best], choice
+
+    def policy_folder(self, planned: Trained | TrainedBefore) -> Path:
+        """The folder of a policy, of this run or of another."""
+        match planned:
+            case Trained(stage=stage):
+                return self.folder.policy(stage)
+            case TrainedBefore(stage=stage):
+                return self.context.policy_before(stage)
+
+    def _mixture(self, members: tuple[PlannedMember, ...], shares: tuple[float, ...]) -> DriverMixture:
+        return DriverMixture(
             tuple(
-                Member(self._driver(each), self.conditions.persona(each.persona), share)
-                for each, share in members
+                Member(driver=self._driver(each), persona=self.context.persona(persona_of(each)), share=share)
+                for each, share in zip(members, shares, strict=True)
                 if share > _LEAST_SHARE
             )
         )
 
-    def best(
-        self, stage: AssessmentStage, personas: tuple[Persona, Persona], learner: int
-    ) -> tuple[Player, list[float]]:
-        """Of the members of a player of an arm the one who earns most, in games beside the arm's own, and what each
-        of them earned on average. Raises as `player` does, StageFailed where no game could be played."""
-        planned = (stage.ego, stage.non_ego)[learner]
-        assert planned is not None
-        other = self.player((stage.non_ego, stage.ego)[learner])
-        candidates = [self._driver(each) for each in planned.members]
-        first = self.conditions.document.assessment.episodes
-        assert self.conditions.document.best_response is not None
-        games = range(first, first + self.conditions.document.best_response.choice_episodes)
-        earned = []
-        for each in candidates:
-            drivers = (each, other) if learner == EGO else (other, each)
-            arm = Arm(stage.arm, self.scene, drivers, personas, stage.seed)
-            payoffs = [game.record.get(f"{ROLES[learner]}_payoff") for game in assess(arm, games)]
-            measured = [payoff for payoff in payoffs if payoff is not None]
-            if not measured:
-                raise StageFailed(f"{stage.id}: none of the games could be played that decide which response is best")
-            earned.append(float(np.mean(measured)))
-        return candidates[int(np.argmax(earned))], earned
+    def _driver(self, planned: PlannedMember) -> Driver:
+        sampled = self.context.persona(persona_of(planned)).decisions == "sampled"
+        match planned:
+            case SumoDriven():
+                return SumoDriver()
+            case External(name=name):
+                return self.context.external_driver(name).make(car_of(self.scene.world, EGO), sampled)
+            case Reconfigured(stage=stage):
+                from harness.campaign.execution.search_output import read_found  # Optuna is slow to import
 
-    def _driver(self, drives: Drives) -> Driver:
-        if drives.kind == "sumo":
-            return SumoDriver()
-        sampled = self.conditions.persona(drives.persona).decisions == "sampled"
-        if drives.kind == "given":
-            return self.conditions.given(drives.stage).make(car_of(self.scene.world, EGO), sampled)
-        if drives.kind == "reconfigured":
-            from harness.campaign.execution.search_output import read_found  # Optuna is slow to import
-
-            found = read_found(self.conditions.given(""), self.folder.policy(drives.stage))
-            return found.make(car_of(self.scene.world, EGO), sampled)
-        return LearnedDriver(read_policy(self.policy(drives)), sampled)
-
-    def policy(self, drives: Drives) -> Path:
-        """The folder of the policy that drives."""
-        if drives.kind == "before":
-            return self.conditions.policy_before(drives.stage)
-        return self.folder.policy(drives.stage)
+                found = read_found(self.context.external_driver(), self.folder.policy(stage))
+                return found.make(car_of(self.scene.world, EGO), sampled)
+            case Trained() | TrainedBefore():
+                return LearnedDriver(read_policy(self.policy_folder(planned)), sampled)
 
 
-def equilibrium_of(drives: Drives, folder: RunFolder) -> list[float]:
-    """The shares of a mixture's members in the equilibrium of the arms between all strategies so far.
+def equilibrium_of(mixture: EquilibriumMixture, folder: RunFolder) -> tuple[float, ...]:
+    """The shares of a mixture's members in the equilibrium of its arms.
 
-    Raises StageFailed where there is none, or an arm of which no game could be played.
+    Raises StageFailed where there is none, or where no game of an arm could be played.
     """
-    of_players = [[_mean_payoffs(folder, arm) for arm in row] for row in drives.weighed_by]
-    payoffs = np.array(of_players, dtype=np.float64)  # [E, N, P]
+    cells = [[_mean_payoffs(folder, arm) for arm in row] for row in mixture.arms]
+    payoffs = np.array(cells, dtype=np.float64)  # [E, N, P]
     try:
-        of_ego, of_non_ego = equilibrium_shares(payoffs[..., 0], payoffs[..., 1])
+        ego_shares, non_ego_shares = equilibrium_shares(payoffs[..., 0], payoffs[..., 1])
     except NoEquilibrium as error:
-        raise StageFailed(f"the mixture of {drives.in_words} can't be weighed: {error}") from error
-    are_egos = not any(each.persona for each in drives.members)
-    return [float(share) for share in (of_ego if are_egos else of_non_ego)]
+        raise StageFailed(f"the mixture of {description(mixture)} can't be weighed: {error}") from error
+    are_egos = not any(persona_of(each) for each in mixture.members)
+    return tuple(float(share) for share in (ego_shares if are_egos else non_ego_shares))
 
 
 def _mean_payoffs(folder: RunFolder, arm: str) -> tuple[float, float]:
     episodes = read_csv(folder.work(arm) / "episodes.csv")
     played = episodes[episodes["error"] == ""]
     if played.empty:
-        raise StageFailed(f"{arm}: none of its games could be played, so that it can weigh no mixture")
+        raise StageFailed(f"{arm}: none of its games could be played, so that it can't weigh a mixture")
     return float(played["ego_payoff"].mean()), float(played["non_ego_payoff"].mean())

@@ -1,6 +1,8 @@
-"""Showing how far a run has come: a line per running stage with its rate and the time left, and one for the whole."""
+"""Shows the progress of a run: a line per running stage with its rate and time left, and one for the whole campaign."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 from rich.console import Console
 from rich.progress import (
@@ -16,10 +18,8 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from harness.campaign.execution.worker_pool import Event
-from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, Stage, TrainingStage
-
-_UNITS = {TrainingStage: "steps", AssessmentStage: "episodes", ReconfigurationStage: "trials"}
+from harness.campaign.execution.worker_process import Event
+from harness.campaign.plan.stages import Stage
 
 
 class _Rate(ProgressColumn):
@@ -31,11 +31,11 @@ class _Rate(ProgressColumn):
 
 
 class StageProgress:
-    """Shows events of a run; on a terminal as bars, elsewhere as lines."""
+    """Shows the events of a run; on a terminal as bars, elsewhere as lines."""
 
-    def __init__(self, stages: list[Stage], finished: int, console: Console) -> None:
+    def __init__(self, stages: Sequence[Stage], finished: int, console: Console) -> None:
         self._console = console
-        self._units = {stage.id: _UNITS[type(stage)] for stage in stages}
+        self._units = {stage.id: stage.unit for stage in stages}
         self._bars = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -58,14 +58,14 @@ class StageProgress:
     def __exit__(self, *exception: object) -> None:
         self._bars.stop()
 
-    def emit(self, event: Event) -> None:
+    def show(self, event: Event) -> None:
         """Show an event."""
         if event.kind == "progress":
             if event.stage not in self._rows:
                 self._rows[event.stage] = self._bars.add_task(event.stage, unit=self._units[event.stage])
             self._bars.update(self._rows[event.stage], completed=event.done, total=event.total)
             return
-        if event.kind in ("done", "failed", "died", "skipped") and event.stage in self._rows:
+        if event.kind in ("done", "failed", "crashed", "skipped") and event.stage in self._rows:
             self._bars.remove_task(self._rows.pop(event.stage))
         if event.kind in ("done", "failed", "skipped"):
             self._bars.advance(self._whole)
@@ -74,14 +74,20 @@ class StageProgress:
             self._bars.console.print(line, highlight=False, soft_wrap=True, markup=False)
 
     def _line(self, event: Event) -> str:
-        if event.kind == "started":
-            return "" if self._console.is_terminal else f"started  {event.stage}"
-        if event.kind == "done":
-            info = event.info
-            if "settled" in info:
-                return f"settled  {event.stage}: {info['message']}"
-            what = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else ""
-            what = what or next(f"{info[unit]} {unit}" for unit in ("episodes", "trials") if unit in info)
-            errors = f", {info['errors']} errors" if info.get("errors") else ""
-            return f"done     {event.stage}: {what}{errors} in {info['seconds']:.0f} s"
-        return f"{event.kind:8s} {event.stage}: {event.message}"
+        match event.kind:
+            case "started":
+                return "" if self._console.is_terminal else f"started  {event.stage}"
+            case "done":
+                return _done_line(event)
+            case _:
+                return f"{event.kind:8s} {event.stage}: {event.message}"
+
+
+def _done_line(event: Event) -> str:
+    info = event.info
+    if "settled" in info:
+        return f"skipped  {event.stage}: {info['message']}"
+    amount = f"{info['steps']:,} steps, {info['stopped']}" if "steps" in info else ""
+    amount = amount or next(f"{info[unit]} {unit}" for unit in ("episodes", "trials") if unit in info)
+    errors = f", {info['errors']} errors" if info.get("errors") else ""
+    return f"done     {event.stage}: {amount}{errors} in {info['seconds']:.0f} s"

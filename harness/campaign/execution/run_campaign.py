@@ -10,16 +10,16 @@ from rich.console import Console
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.progress import StageProgress
 from harness.campaign.execution.run_context import run_context_of
-from harness.campaign.execution.worker_pool import Event, run_stages
+from harness.campaign.execution.worker_pool import run_stages
+from harness.campaign.execution.worker_process import Event
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, Stage, TrainingStage
+from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import OpenCampaign
-from harness.campaign.results.results import FINISHED, RunResult, warn, write_results
+from harness.campaign.results.results import RunResult, warn, write_results
+from harness.campaign.storage.manifest import FINISHED
 from harness.campaign.storage.run_folder import FORMAT, RunFolder
 from harness.campaign.storage.versions import versions, versions_of_numbers
 from harness.reports.provenance import mixed_versions
-
-_KINDS = {TrainingStage: "training", AssessmentStage: "assessment", ReconfigurationStage: "reconfiguration"}
 
 
 def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: Console) -> RunResult:
@@ -31,24 +31,24 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
     with folder.held():
         stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
-        ledger = _Ledger(campaign, folder, stages, keys)
+        manifest = _ManifestKeeper(campaign, folder, stages, keys)
         scene = campaign.scene.document
         folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
-        finished = [stage.id for stage in stages if ledger.status(stage) in FINISHED]
+        finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
         if len(finished) < len(stages):
-            ledger.warn_of_versions(console)
+            manifest.warn_of_versions(console)
             with StageProgress(stages, len(finished), console) as progress:
 
                 def emit(event: Event) -> None:
-                    ledger.note(event)
-                    progress.emit(event)
+                    manifest.note(event)
+                    progress.show(event)
 
                 run_stages(stages, finished, run_context_of(campaign, folder, keys), jobs, emit)
         return write_results(folder, console)
 
 
-class _Ledger:
-    """Keeps the manifest true to what happens."""
+class _ManifestKeeper:
+    """Keeps the manifest in step with what happens."""
 
     def __init__(
         self, campaign: OpenCampaign, folder: RunFolder, stages: Sequence[Stage], keys: Mapping[str, str]
@@ -66,7 +66,7 @@ class _Ledger:
             "seeds": list(campaign.document.seeds),
             "hashes": dict(campaign.hashes),
             "versions": versions(),
-            "stages": {stage.id: self._entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages},
+            "stages": {stage.id: _entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages},
         }
         self._folder.write_manifest(self._manifest)
 
@@ -75,38 +75,38 @@ class _Ledger:
         return str(self._manifest["stages"][stage.id]["status"])
 
     def warn_of_versions(self, console: Console) -> None:
-        """Say if what is left is about to be made by other versions than what is done."""
+        """Warn if what is left will be made by other versions than what is done."""
         now = {"what is left": {"kind": "", "status": "done", "versions": [versions_of_numbers()]}}
         warn(mixed_versions(self._manifest["stages"] | now), console)
 
     def note(self, event: Event) -> None:
         """Write down what happened to a stage."""
         entry = self._manifest["stages"][event.stage]
-        if event.kind == "done":
-            entry.update({"message": "", **event.info}, status=_status(event.info))
-        elif event.kind == "failed":
-            entry.update(status="failed", message=event.message)
-        elif event.kind == "skipped":
-            entry.update(status="pending", message=event.message)
-        else:
-            return
+        match event.kind:
+            case "done":
+                entry.update({"message": "", **event.info}, status=_status(event.info))
+            case "failed":
+                entry.update(status="failed", message=event.message)
+            case "skipped":
+                entry.update(status="pending", message=event.message)
+            case _:
+                return
         self._folder.write_manifest(self._manifest)
 
-    @staticmethod
-    def _entry(stage: Stage, info: Mapping[str, Any] | None) -> dict[str, Any]:
-        kind = _KINDS[type(stage)]
-        name = stage.arm if isinstance(stage, AssessmentStage) else stage.name
-        entry = {
-            "kind": kind,
-            "name": name,
-            "persona": stage.persona,
-            "seed": stage.seed,
-            "status": "pending",
-            "message": "",
-        }
-        return {**entry, **info, "status": _status(info)} if info is not None else entry
+
+def _entry(stage: Stage, info: Mapping[str, Any] | None) -> dict[str, Any]:
+    """A stage's entry in the manifest; `info` is what it made, if it is finished."""
+    entry = {
+        "kind": stage.kind,
+        "name": stage.name,
+        "persona": stage.persona,
+        "seed": stage.seed,
+        "status": "pending",
+        "message": "",
+    }
+    return {**entry, **info, "status": _status(info)} if info is not None else entry
 
 
 def _status(info: Mapping[str, Any]) -> str:
-    """The status of a stage that came to its end: settled where there was nothing to do."""
+    """The status of a finished stage: `settled` where an approximate equilibrium left nothing to do."""
     return "settled" if info.get("settled") else "done"

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from harness.campaign.plan.stages import AssessmentStage, Stage
+from harness.campaign.plan.planned_drivers import External
+from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
@@ -14,7 +15,7 @@ from harness.config.persona import Persona
 from harness.drivers.external import ExternalDriver
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunContext:
     """What all stages of a run share; small enough to be sent to another process."""
 
@@ -26,48 +27,47 @@ class RunContext:
     ego_driver: ExternalDriver | None
     other_egos: Mapping[str, ExternalDriver]
     policies: Path | None
-    keys: Mapping[str, str]  # of every stage
+    keys: Mapping[str, str]
+    """The cache key of every stage."""
 
     def persona(self, name: str) -> Persona:
         """A persona of the campaign; the ego's own for the empty name."""
         return self.personas[name] if name else self.ego_persona
 
-    def persona_met(self, name: str) -> Persona:
-        """Of whom a player meets by this name in a training or a search; the ego's own for nobody, and for a
-        population, whose people have each their own."""
+    def opponent_persona(self, name: str) -> Persona:
+        """The persona of the other player in a training or search: a population, whose members have each their own, and
+        the empty name have the ego's."""
         return self.persona(name if name in self.personas else "")
 
-    def given(self, name: str) -> ExternalDriver:
-        """A driver that the campaign names: its ego, or another one by name."""
+    def external_driver(self, name: str = "") -> ExternalDriver:
+        """An external driver of the campaign: its ego, or another one by name."""
         driver = self.other_egos[name] if name else self.ego_driver
         assert driver is not None
         return driver
 
     def vehicle_type(self, stage: Stage) -> str | None:
-        """The vehicle type of the ego in a stage, where it is not the scene's."""
-        players = (stage.ego, stage.non_ego) if isinstance(stage, AssessmentStage) else (stage.opponent,)
-        named = [each.stage for each in players if each is not None and each.kind == "given" and each.stage]
-        if named:
-            return self.given(named[0]).vehicle_type
+        """The vehicle type of the ego in a stage; None: the scene's."""
+        for driver in stage.drivers:
+            if isinstance(driver, External) and driver.name:
+                return self.external_driver(driver.name).vehicle_type
         return self.ego_driver.vehicle_type if self.ego_driver is not None else None
 
     def policy_before(self, stage: str) -> Path:
-        """The folder of a policy that was trained before."""
+        """The folder of a policy that another run trained."""
         assert self.policies is not None
         return self.policies / stage
 
 
 def run_context_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str]) -> RunContext:
-    """The conditions of a run of a campaign: on the run folder's copy of the scene, which stays what it was."""
-    personas = {each.name: each for each in campaign.personas}
+    """The context of a run of a campaign. Its scene is the run folder's copy, which does not change."""
     return RunContext(
-        folder.path,
-        folder.scene,
-        campaign.document,
-        campaign.ego_persona,
-        personas,
-        campaign.ego_driver,
-        campaign.other_egos,
-        campaign.policies,
-        keys,
+        folder=folder.path,
+        scene_folder=folder.scene,
+        document=campaign.document,
+        ego_persona=campaign.ego_persona,
+        personas={each.name: each for each in campaign.personas},
+        ego_driver=campaign.ego_driver,
+        other_egos=campaign.other_egos,
+        policies=campaign.policies,
+        keys=keys,
     )

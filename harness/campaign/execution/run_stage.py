@@ -1,6 +1,6 @@
-"""Carrying out one stage of the plan: its inputs from the run folder, its outputs into it.
+"""Carrying out one stage: its inputs are read from the run folder, its outputs written into it.
 
-A stage is a function of its inputs alone, which `cache_keys` hashes: done once, it is skipped.
+A stage is a function of its inputs alone, which `cache_keys` hashes: a stage that is done is skipped.
 """
 
 from __future__ import annotations
@@ -8,114 +8,125 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import pandas as pd
 
 from harness.campaign.execution.crash_retries import FIRST, Attempt, OnProgress, OnStart
-from harness.campaign.execution.equilibrium_stop import settled
+from harness.campaign.execution.equilibrium_stop import equilibrium_before
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.run_context import RunContext
-from harness.campaign.plan.best_responses import settings_of
-from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, Stage, TrainingStage
+from harness.campaign.plan.budgets import training_settings
+from harness.campaign.plan.planned_drivers import BestOf, description, persona_of
+from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
 from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions_of_numbers
+from harness.config.campaign import Training
 from harness.drivers.mixture import Player
-from harness.drivers.policy_file import Policy, policy_files, read_policy, write_policy
+from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
+from harness.evaluation.strategies import BestResponse
 from harness.evaluation.tables import TRAINING_COLUMNS, typed, write_csv
 from harness.files import make_folder, write_atomically
 from harness.game.state import EGO, NON_EGO, ROLES
 from harness.traffic.scene import OpenScene, open_scene
 
+Made: TypeAlias = tuple[dict[str, Any], list[Path]]
+"""What a stage made: facts for the manifest, and the files that its numbers are read from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class StageRun:
+    """What a stage is carried out with."""
+
+    context: RunContext
+    folder: RunFolder
+    scene: OpenScene
+    on_progress: OnProgress
+    on_start: OnStart
+    attempt: Attempt
+
+    @property
+    def players(self) -> PlayerFactory:
+        """Makes the stage's players."""
+        return PlayerFactory(context=self.context, folder=self.folder, scene=self.scene)
+
 
 def carry_out(
     stage: Stage,
-    conditions: RunContext,
+    context: RunContext,
     on_progress: OnProgress,
     on_start: OnStart = lambda place: None,
     attempt: Attempt = FIRST,
 ) -> dict[str, Any]:
-    """Do a stage, seal what it made, say what came of it. What it wrote from other inputs is dropped."""
-    folder, key = RunFolder(conditions.folder), conditions.keys[stage.id]
+    """Carry out a stage and write the checksums of what it made. Returns the facts for the manifest.
+
+    What the stage wrote from other inputs is removed first.
+    """
+    folder, key = RunFolder(context.folder), context.keys[stage.id]
     folder.begin(stage.id, key)
-    began = time.monotonic()
-    gate = settled(stage, folder, conditions.document.assessment.significance)
+    started = time.monotonic()
+    gate = equilibrium_before(stage, folder, context.document.assessment.significance)
     if gate is not None:
-        info: dict[str, Any] = {"settled": gate.pair, "message": f"not needed: {gate.pair} has settled"}
+        message = f"not needed: {gate.pair} is an approximate equilibrium"
+        info: dict[str, Any] = {"settled": gate.pair, "message": message}
         folder.finish(stage.id, key, info)
         return info
-    scene = open_scene(conditions.scene_folder, conditions.vehicle_type(stage))
-    do: Any = {TrainingStage: _train, AssessmentStage: _assess, ReconfigurationStage: _reconfigure}[type(stage)]
-    info, files = do(stage, conditions, folder, scene, on_progress, on_start, attempt)
-    info["seconds"] = round(time.monotonic() - began, 1)
+    run = StageRun(
+        context=context,
+        folder=folder,
+        scene=open_scene(context.scene_folder, context.vehicle_type(stage)),
+        on_progress=on_progress,
+        on_start=on_start,
+        attempt=attempt,
+    )
+    match stage:
+        case TrainingStage():
+            info, files = _train(stage, run)
+        case AssessmentStage():
+            info, files = _assess(stage, run)
+        case SearchStage():
+            info, files = _search(stage, run)
+    info["seconds"] = round(time.monotonic() - started, 1)
     folder.finish(stage.id, key, info, files)
-    if not info.get("errors"):  # failures are not kept: the next run tries those games again, and only those segments
+    if not info.get("errors"):  # the segments of failed games are kept: the next run of the command plays those again
         folder.drop_segments(stage.id)
     return info
 
 
-def _made_by(checkpoint: Path, besides: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, str]]:
-    """The versions that a training or a search is made by: more than one, if it went on where others had stopped."""
-    file, now = checkpoint.with_name("versions.json"), {**versions_of_numbers(), **besides}
-    try:
-        before = json.loads(file.read_text(encoding="utf-8")) if checkpoint.is_file() else []
-    except (OSError, ValueError):
-        before = []
-    made_by = [*before, now] if isinstance(before, list) and now not in before else before or [now]
-    write_atomically(file, json.dumps(made_by).encode())
-    return made_by
+def _train(stage: TrainingStage, run: StageRun) -> Made:
+    from harness.training.early_stopping import RULE  # torch is slow to import, and assessment does without
+    from harness.training.ppo import TrainingSpec, train
 
-
-def _train(
-    stage: TrainingStage,
-    conditions: RunContext,
-    folder: RunFolder,
-    scene: OpenScene,
-    on_progress: OnProgress,
-    on_start: OnStart,
-    attempt: Attempt,
-) -> tuple[dict[str, Any], list[Path]]:
-    from harness.training.early_stopping import RULE
-    from harness.training.ppo import TrainingSpec, train  # torch is slow to import, and assessment does without
-
-    settings = settings_of(conditions.document, stage)
+    context, folder = run.context, run.folder
+    settings = training_settings(context.document, stage)
     spec = TrainingSpec(
-        scene,
-        stage.learner,
-        (conditions.ego_persona, conditions.persona_met(stage.persona)),
-        PlayerFactory(conditions, folder, scene).player(stage.opponent),
-        stage.alone_share,
-        stage.attentive_share,
-        _initial(stage, conditions, folder),
-        settings,
-        ("training", stage.seed, stage.name),
-        as_it_drives=bool(stage.responds_in),
+        scene=run.scene,
+        learner=stage.learner,
+        personas=(context.ego_persona, context.opponent_persona(stage.persona)),
+        opponent=run.players.player(stage.opponent),
+        alone_share=stage.alone_share,
+        attentive_share=stage.attentive_share,
+        initial=read_policy(run.players.policy_folder(stage.initial)) if stage.initial is not None else None,
+        settings=settings,
+        parts=("training", stage.seed, stage.name),
+        as_it_drives=isinstance(stage.strategy, BestResponse),
     )
-    learner = spec.personas[stage.learner]
-    card = {
-        "stage": stage.id,
-        "player": ROLES[stage.learner],
-        "persona": learner.name,
-        "scene": scene.document.name,
-        "against": stage.opponent.in_words if stage.opponent else None,
-        "began_from": stage.initial or next(iter(stage.begins_as), None),
-        "training": settings.model_dump(mode="json"),
-    }
-    key = conditions.keys[stage.id]
+    card = _policy_card(stage, spec, settings)
     checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
-    made_by = _made_by(checkpoint)
+    versions = _versions_since(checkpoint)
     try:
-        trained = train(spec, checkpoint, key, card, folder.tensorboard(stage.id), on_progress, on_start)
+        key, tensorboard = context.keys[stage.id], folder.tensorboard(stage.id)
+        trained = train(spec, checkpoint, key, card, tensorboard, run.on_progress, run.on_start)
     except (FloatingPointError, ValueError) as error:
         raise StageFailed(f"{stage.id}: {error}") from error
     make_folder(folder.policy(stage.id))
     write_policy(trained.policy, folder.policy(stage.id))
-    curve = pd.DataFrame([asdict(window) for window in trained.progress.curve])
+    curve = pd.DataFrame([asdict(point) for point in trained.progress.curve])
     curve = curve.assign(stage=stage.name, persona=stage.persona, seed=stage.seed)
     table = folder.work(stage.id) / "training.csv"
     write_csv(typed(curve.reindex(columns=list(TRAINING_COLUMNS))), table)
@@ -124,76 +135,90 @@ def _train(
         "budget_steps": settings.steps,
         "stopped": trained.stopped,
         "rule": RULE if settings.early_convergence else "",
-        "versions": made_by,
+        "versions": versions,
     }
     return info, [*policy_files(folder.policy(stage.id)), table]
 
 
-def _reconfigure(
-    stage: ReconfigurationStage,
-    conditions: RunContext,
-    folder: RunFolder,
-    scene: OpenScene,
-    on_progress: OnProgress,
-    on_start: OnStart,
-    attempt: Attempt,
-) -> tuple[dict[str, Any], list[Path]]:
+def _policy_card(stage: TrainingStage, spec: Any, settings: Training) -> dict[str, Any]:
+    """What `policy.json` says of how a policy came about."""
+    persona = spec.personas[stage.learner]
+    return {
+        "stage": stage.id,
+        "player": ROLES[stage.learner],
+        "persona": persona.name,
+        "persona_sha256": persona_hash(persona),
+        "scene": spec.scene.document.name,
+        "against": description(stage.opponent) if stage.opponent is not None else None,
+        "began_from": stage.initial.stage if stage.initial is not None else None,
+        "training": settings.model_dump(mode="json"),
+    }
+
+
+def _search(stage: SearchStage, run: StageRun) -> Made:
     from harness.campaign.execution.search_output import reconfigure  # Optuna is slow to import
     from harness.training.parameter_search import Search, version_of_search
 
-    opponent = PlayerFactory(conditions, folder, scene).player(stage.opponent)
+    context, folder = run.context, run.folder
+    opponent = run.players.player(stage.opponent)
     assert opponent is not None
-    other = conditions.persona_met(stage.persona)
-    personas, settings = (conditions.ego_persona, other), conditions.document.reconfiguration
-    named = ("reconfiguration", stage.seed, stage.name)
-    search = Search(scene, conditions.given(""), personas, opponent, settings, named)
-    kept = folder.work(stage.id) / "trials.json"
-    made_by = _made_by(kept, version_of_search())
+    search = Search(
+        scene=run.scene,
+        driver=context.external_driver(),
+        personas=(context.ego_persona, context.opponent_persona(stage.persona)),
+        opponent=opponent,
+        settings=context.document.reconfiguration,
+        parts=("reconfiguration", stage.seed, stage.name),
+    )
+    trials = folder.work(stage.id) / "trials.json"
+    versions = _versions_since(trials, version_of_search())
     labels = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed}
     try:
-        info, files = reconfigure(search, labels, kept, folder.policy(stage.id), on_progress, on_start)
+        info, files = reconfigure(search, labels, trials, folder.policy(stage.id), run.on_progress, run.on_start)
     except StageFailed as error:
         raise StageFailed(f"{stage.id}: {error}") from error
-    return {**info, "versions": made_by}, files
+    return {**info, "versions": versions}, files
 
 
-def _assess(
-    stage: AssessmentStage,
-    conditions: RunContext,
-    folder: RunFolder,
-    scene: OpenScene,
-    on_progress: OnProgress,
-    on_start: OnStart,
-    attempt: Attempt,
-) -> tuple[dict[str, Any], list[Path]]:
+def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     from harness.campaign.execution.arm_segments import join_segments, play_segments, segments_of
-    from harness.environments.rollout import Arm  # the parent, who plays nothing, does without
+    from harness.environments.rollout import Arm  # the parent process plays nothing and does without
 
-    casting = PlayerFactory(conditions, folder, scene)
-    personas = (conditions.ego_persona, conditions.persona(stage.non_ego.persona if stage.non_ego else ""))
-    players: list[Player] = []
-    chosen: dict[str, Any] = {}
-    for player, planned in enumerate((stage.ego, stage.non_ego)):
-        if planned is not None and planned.kind == "best":
-            best, earned = casting.best(stage, personas, player)
-            players.append(best)
-            names = [each.stage for each in planned.members]
-            chosen = {"chosen": names[earned.index(max(earned))], "earned": dict(zip(names, earned, strict=True))}
+    context, folder = run.context, run.folder
+    non_ego_persona = persona_of(stage.non_ego) if stage.non_ego is not None else ""
+    personas = (context.ego_persona, context.persona(non_ego_persona))
+    drivers: list[Player] = []
+    choice: dict[str, Any] = {}
+    for player, planned in enumerate(stage.drivers):
+        if isinstance(planned, BestOf):
+            best, made = run.players.choose(stage, personas, player)
+            drivers.append(best)
+            choice = {
+                "chosen": made.stages[made.best],
+                "earned": dict(zip(made.stages, made.mean_payoffs, strict=True)),
+            }
         else:
-            players.append(casting.player(planned))
-    arm = Arm(stage.arm, scene, (players[EGO], players[NON_EGO]), personas, stage.seed)
-    segments = segments_of(folder.segments(stage.id), conditions.document.assessment.episodes)
-    labels = {"arm": stage.arm, "persona": stage.persona, "seed": stage.seed}
-    errors = play_segments(arm, segments, labels, attempt, on_start, on_progress)
+            drivers.append(run.players.player(planned))
+    arm = Arm(
+        name=stage.name, scene=run.scene, drivers=(drivers[EGO], drivers[NON_EGO]), personas=personas, seed=stage.seed
+    )
+    segments = segments_of(folder.segments(stage.id), context.document.assessment.episodes)
+    labels = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
+    errors = play_segments(arm, segments, labels, run.attempt, run.on_start, run.on_progress)
     work = folder.work(stage.id)
     files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
     join_segments(segments, *files)
-    info = {"episodes": segments[-1].episodes.stop, "errors": errors, "versions": [versions_of_numbers()], **chosen}
-    return info, files
+    episodes = segments[-1].episodes.stop
+    return {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}, files
 
 
-def _initial(stage: TrainingStage, conditions: RunContext, folder: RunFolder) -> Policy | None:
-    """The policy that a training begins from."""
-    if stage.begins_as:
-        return read_policy(conditions.policy_before(stage.begins_as[0]))
-    return read_policy(folder.policy(stage.initial)) if stage.initial else None
+def _versions_since(checkpoint: Path, also: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, str]]:
+    """The versions that make a training or search: several, if it continues what other versions started."""
+    file, now = checkpoint.with_name("versions.json"), {**versions_of_numbers(), **also}
+    try:
+        before = json.loads(file.read_text(encoding="utf-8")) if checkpoint.is_file() else []
+    except (OSError, ValueError):
+        before = []
+    versions = [*before, now] if isinstance(before, list) and now not in before else before or [now]
+    write_atomically(file, json.dumps(versions).encode())
+    return versions

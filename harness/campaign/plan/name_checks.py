@@ -1,23 +1,26 @@
-"""Names in a campaign that mean other parts of it: personas of populations and retrainings, arms of best responses."""
+"""Checks the names in a campaign that refer to other parts of it: personas, drivers of the cross-play, arms."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from harness.campaign.plan.best_responses import is_pair
-from harness.campaign.plan.plan import name_of, plan
+from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
-from harness.config.campaign import LEARNED, ROBUST, SUMO, Campaign
+from harness.campaign.plan.strategy_drivers import crossplay_name
+from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError
+from harness.evaluation.strategies import NaiveEgo, RobustEgo, strategy_name
 
+_TAKEN = (strategy_name(NaiveEgo()), strategy_name(RobustEgo()), SUMO)
+"""Names of egos that a driver of the cross-play can't have."""
 Wrong = Callable[[str, str, str], None]
 """Notes a problem: key, what is wrong, remedy."""
 
 
 def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable: bool = False) -> None:
-    """Raises UsageError for every name that means nobody, or two at once; `tunable` as in `plan`."""
+    """Raises UsageError for every name that refers to nothing, or to two things; `tunable` as in `plan`."""
     problems: list[Problem] = []
 
     def wrong(key: str, message: str, remedy: str) -> None:
@@ -28,7 +31,11 @@ def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable
             if name not in personas:
                 wrong(f"population[{k}].shares", f"there is no persona {name!r}", nearest(name, personas))
         if each.name in personas or each.name in [other.name for other in document.population[:k]]:
-            wrong(f"population[{k}].name", f"{each.name!r} is called something else too", "give it a name of its own")
+            wrong(
+                f"population[{k}].name",
+                f"{each.name!r} is the name of a persona or of another population",
+                "give it another name",
+            )
     for key, names in (
         ("retraining.against", document.retraining.against),
         ("rounds.personas", document.rounds.personas),
@@ -37,7 +44,7 @@ def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable
             if name not in personas:
                 wrong(key, f"there is no persona {name!r}", nearest(name, personas))
     if len(set(document.retraining.against)) < len(document.retraining.against):
-        wrong("retraining.against", "a persona stands twice", "name each once")
+        wrong("retraining.against", "a persona is named twice", "name each once")
     _check_other_egos(document, wrong)
     if not problems and document.best_response is not None:
         _check_arms(document, personas, tunable, wrong)
@@ -47,22 +54,22 @@ def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable
 
 def _check_other_egos(document: Campaign, wrong: Wrong) -> None:
     written = document.crossplay.egos if document.crossplay is not None else []
-    names = [name_of(each) for each in written]
+    names = [crossplay_name(each) for each in written]
     for driver, name in zip(written, names, strict=True):
         if driver == LEARNED:
-            wrong("crossplay.egos", "the learned egos are there anyway", "leave it out")
+            wrong("crossplay.egos", "the learned egos always take part", "leave it out")
         elif driver == document.ego.driver:
-            wrong("crossplay.egos", f"{driver!r} is the campaign's ego, which is there anyway", "leave it out")
+            wrong("crossplay.egos", f"{driver!r} is the campaign's ego, which always takes part", "leave it out")
         elif names.count(name) > 1:
             wrong("crossplay.egos", f"two drivers are called {name!r}", "rename a file, or leave one out")
-        elif driver != SUMO and name in ("naive", ROBUST, SUMO):
+        elif driver != SUMO and name in _TAKEN:
             wrong("crossplay.egos", f"{driver!r} would be called {name!r}", "rename its file or folder")
 
 
 def _check_arms(document: Campaign, personas: Sequence[str], tunable: bool, wrong: Wrong) -> None:
     assert document.best_response is not None
-    arms = {stage.arm: stage for stage in plan(document, personas, tunable) if isinstance(stage, AssessmentStage)}
-    pairs = [name for name, stage in arms.items() if is_pair(stage)]
+    arms = {stage.name: stage for stage in plan(document, personas, tunable) if isinstance(stage, AssessmentStage)}
+    pairs = [name for name, stage in arms.items() if stage.is_pair]
     for name in document.best_response.arms:
         if name not in pairs:
             message = f"{name!r} is no arm of an ego and a persona" if name in arms else f"there is no arm {name!r}"

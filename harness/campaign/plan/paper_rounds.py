@@ -1,119 +1,163 @@
-"""The paper's rounds: which trainings and which arms follow from a campaign, and what each needs first.
+"""The paper's rounds 0 to 2: which trainings, searches and arms follow from a campaign, for one training seed.
 
-| round | stages of each seed |
+| round | stages |
 | --- | --- |
 | 0 | train `naive`; assess `naive_alone`, `naive_vs_sumo` |
 | 1 | for each persona: train `<persona>` against the naive ego; assess `<persona>_alone`, `naive_vs_<persona>` |
 | 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
 
-A population is met as a persona is, and nobody is trained for it: its members are. The ego that is retrained against
-several personas at once is `robust`. An ego that the campaign does not train is searched for better parameters in its
-round 2 (`search_rounds`), or has none. A campaign that names a folder of policies has the same arms and no
-trainings: what they would have made is read from there.
+A population is an opponent like a persona, but its members are trained as personas. `robust` is the ego retrained
+against several personas at once. Round 2 of an external ego is a parameter search (`search_rounds`), if it has tunable
+parameters. A campaign with a folder of policies has the same arms and no trainings.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from harness.campaign.plan.stages import AssessmentStage, Drives, Stage, TrainingStage, arm_of, stage_id
-from harness.config.campaign import LEARNED, ROBUST, SUMO, Campaign
+from harness.campaign.plan.planned_drivers import PlannedDriver
+from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
+from harness.campaign.plan.strategy_drivers import driver_of, ego_learns, learned_driver, population_driver
+from harness.config.campaign import Campaign
 from harness.evaluation.research_questions import Question
-from harness.game.state import EGO, NON_EGO
+from harness.evaluation.strategies import (
+    Arm,
+    EgoStrategy,
+    NaiveEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    RobustEgo,
+    SumoNonEgo,
+    strategy_name,
+)
 
 
-def learns(campaign: Campaign) -> bool:
-    """Whether the campaign's ego is one that learns, or has learned before."""
-    return campaign.ego.driver == LEARNED
-
-
-def ego_of(campaign: Campaign, seed: int) -> Drives:
-    """Who the naive ego is."""
-    if learns(campaign):
-        return learned(campaign, "naive", seed)
-    return Drives("sumo" if campaign.ego.driver == SUMO else "given")
-
-
-def learned(campaign: Campaign, name: str, seed: int, persona: str = "") -> Drives:
-    """The driver that a training of this name makes, or has made before."""
-    return Drives("policy" if campaign.policies is None else "before", stage_id(name, seed), persona)
-
-
-def population(campaign: Campaign, shares: Mapping[str, float], seed: int) -> Drives:
-    """People by their shares, one of whom a game has."""
-    members = tuple(learned(campaign, name, seed, name) for name in shares)
-    return Drives("mixture", members=members, shares=tuple(shares.values()))
-
-
-def plan_rounds(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
-    """The stages of rounds 0, 1 and 2 for one seed, each after what it needs."""
-    naive, ego = stage_id("naive", seed), ego_of(campaign, seed)
+def plan_paper_rounds(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
+    """The stages of rounds 0 to 2, each after those it needs."""
+    naive = driver_of(campaign, NaiveEgo(), seed)
     stages: list[Stage] = []
-    if learns(campaign):
-        stages.append(TrainingStage("naive", seed, "", EGO, None, None, 1.0))
-    for persona in personas:
-        initial = naive if learns(campaign) and campaign.non_ego_training.warm_start else None
-        how = campaign.non_ego_training
+    if ego_learns(campaign):
         stages.append(
-            TrainingStage(persona, seed, persona, NON_EGO, ego, initial, how.alone_share, how.attentive_share)
+            TrainingStage(seed=seed, persona="", strategy=NaiveEgo(), opponent=None, initial=None, alone_share=1.0)
         )
-    stages.append(AssessmentStage("naive_alone", seed, "", ego, None))
-    stages.append(AssessmentStage("naive_vs_sumo", seed, "", ego, Drives("sumo")))
+    stages += [_persona_training(campaign, persona, naive, seed) for persona in personas]
+    stages.append(AssessmentStage(seed=seed, persona="", arm=Arm(ego=NaiveEgo()), ego=naive, non_ego=None))
+    sumo = SumoNonEgo()
+    stages.append(
+        AssessmentStage(
+            seed=seed,
+            persona="",
+            arm=Arm(ego=NaiveEgo(), non_ego=sumo),
+            ego=naive,
+            non_ego=driver_of(campaign, sumo, seed),
+        )
+    )
     for persona in personas:
-        person = learned(campaign, persona, seed, persona)
-        retrained = _retraining(campaign, f"retrained_{persona}", persona, person, seed)
-        stages += retrained
-        stages.append(AssessmentStage(f"{persona}_alone", seed, persona, None, person))
-        stages += _arms_of(campaign, persona, person, bool(retrained), seed)
-    for each in campaign.population:
-        people = population(campaign, each.shares, seed)
-        retrained = _retraining(campaign, f"retrained_{each.name}", each.name, people, seed)
-        stages += [*retrained, *_arms_of(campaign, each.name, people, bool(retrained), seed)]
+        non_ego = PersonaNonEgo(persona=persona)
+        driver = driver_of(campaign, non_ego, seed)
+        stages += _retrainings(campaign, persona, driver, seed)
+        stages.append(AssessmentStage(seed=seed, persona=persona, arm=Arm(non_ego=non_ego), ego=None, non_ego=driver))
+        stages += _ego_arms(campaign, persona, driver, seed)
+    for population in campaign.population:
+        people = population_driver(campaign, population.shares, seed)
+        stages += _retrainings(campaign, population.name, people, seed)
+        stages += _ego_arms(campaign, population.name, people, seed)
     return stages
 
 
 def plan_robust(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
-    """One ego retrained against several personas at once, and its arms against them and those it never met."""
+    """The ego retrained against several personas at once, and its arms against all personas of the campaign."""
     against = campaign.retraining.against
-    if not against or not learns(campaign):
+    if not against or not ego_learns(campaign):
         return []
-    people = population(campaign, dict.fromkeys(against, 1.0), seed)
-    robust = learned(campaign, ROBUST, seed)
-    stages = _retraining(campaign, ROBUST, "", people, seed)
-    stages.append(AssessmentStage(f"{ROBUST}_alone", seed, "", robust, None))
+    people = population_driver(campaign, dict.fromkeys(against, 1.0), seed)
+    robust = driver_of(campaign, RobustEgo(), seed)
+    stages: list[Stage] = [_retraining(campaign, RobustEgo(), "", people, seed)]
+    stages.append(AssessmentStage(seed=seed, persona="", arm=Arm(ego=RobustEgo()), ego=robust, non_ego=None))
     for persona in personas:
-        person = learned(campaign, persona, seed, persona)
-        stages.append(AssessmentStage(arm_of(ROBUST, persona), seed, persona, robust, person))
+        non_ego = PersonaNonEgo(persona=persona)
+        stages.append(
+            AssessmentStage(
+                seed=seed,
+                persona=persona,
+                arm=Arm(ego=RobustEgo(), non_ego=non_ego),
+                ego=robust,
+                non_ego=driver_of(campaign, non_ego, seed),
+            )
+        )
     return stages
 
 
-def _retraining(campaign: Campaign, name: str, persona: str, opponent: Drives, seed: int) -> list[Stage]:
-    if not learns(campaign):
+def _persona_training(campaign: Campaign, persona: str, naive: PlannedDriver, seed: int) -> TrainingStage:
+    settings = campaign.non_ego_training
+    warm = ego_learns(campaign) and settings.warm_start
+    return TrainingStage(
+        seed=seed,
+        persona=persona,
+        strategy=PersonaNonEgo(persona=persona),
+        opponent=naive,
+        initial=learned_driver(campaign, stage_id(strategy_name(NaiveEgo()), seed)) if warm else None,
+        alone_share=settings.alone_share,
+        attentive_share=settings.attentive_share,
+    )
+
+
+def _retraining(
+    campaign: Campaign, strategy: EgoStrategy, persona: str, opponent: PlannedDriver, seed: int
+) -> TrainingStage:
+    settings = campaign.retraining
+    return TrainingStage(
+        seed=seed,
+        persona=persona,
+        strategy=strategy,
+        opponent=opponent,
+        initial=learned_driver(campaign, stage_id(strategy_name(NaiveEgo()), seed)) if settings.warm_start else None,
+        alone_share=settings.alone_share,
+    )
+
+
+def _retrainings(campaign: Campaign, name: str, opponent: PlannedDriver, seed: int) -> list[TrainingStage]:
+    """The retraining against a persona or population, if the ego learns."""
+    if not ego_learns(campaign):
         return []
-    begins = stage_id("naive", seed) if campaign.retraining.warm_start else None
-    return [TrainingStage(name, seed, persona, EGO, opponent, begins, campaign.retraining.alone_share)]
+    return [_retraining(campaign, RetrainedEgo(against=name), name, opponent, seed)]
 
 
-def _arms_of(campaign: Campaign, name: str, opponent: Drives, retrained: bool, seed: int) -> list[Stage]:
-    """The ego's arms against a persona or population, before and after it was retrained."""
-    stages: list[Stage] = [AssessmentStage(f"naive_vs_{name}", seed, name, ego_of(campaign, seed), opponent)]
-    if retrained:
-        ego = learned(campaign, f"retrained_{name}", seed)
-        stages.append(AssessmentStage(f"retrained_vs_{name}", seed, name, ego, opponent))
-        stages.append(AssessmentStage(f"retrained_alone_{name}", seed, name, ego, None))
-    return stages
+def _ego_arms(campaign: Campaign, name: str, opponent: PlannedDriver, seed: int) -> list[AssessmentStage]:
+    """The arms of the ego against a persona or population, before and after retraining."""
+    non_ego = PersonaNonEgo(persona=name)
+    naive = driver_of(campaign, NaiveEgo(), seed)
+    arm = Arm(ego=NaiveEgo(), non_ego=non_ego)
+    arms = [AssessmentStage(seed=seed, persona=name, arm=arm, ego=naive, non_ego=opponent)]
+    return arms + (round_2_arms(campaign, RetrainedEgo(against=name), opponent, seed) if ego_learns(campaign) else [])
+
+
+def round_2_arms(
+    campaign: Campaign, ego: RetrainedEgo | ReconfiguredEgo, opponent: PlannedDriver, seed: int
+) -> list[AssessmentStage]:
+    """The arms of the ego of round 2: against the persona or population of its round, and alone."""
+    driver, non_ego = driver_of(campaign, ego, seed), PersonaNonEgo(persona=ego.against)
+    against = Arm(ego=ego, non_ego=non_ego)
+    return [
+        AssessmentStage(seed=seed, persona=ego.against, arm=against, ego=driver, non_ego=opponent),
+        AssessmentStage(seed=seed, persona=ego.against, arm=Arm(ego=ego), ego=driver, non_ego=None),
+    ]
 
 
 def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Question]:
-    """The research questions of a campaign (paper, section 4.2), for each persona or population and seed; `tunable` as
-    in `harness.campaign.plan.plan`."""
+    """The research questions (paper, section 4.2) for each persona or population and seed; `tunable` as in `plan`."""
     asked = []
-    for persona in [*personas, *(each.name for each in campaign.population)]:
+    for name in [*personas, *(each.name for each in campaign.population)]:
+        non_ego = PersonaNonEgo(persona=name)
+        naive_alone, naive = Arm(ego=NaiveEgo()), Arm(ego=NaiveEgo(), non_ego=non_ego)
+        round_2: RetrainedEgo | ReconfiguredEgo | None = None
+        if ego_learns(campaign):
+            round_2 = RetrainedEgo(against=name)
+        elif tunable:
+            round_2 = ReconfiguredEgo(against=name)
         for seed in campaign.seeds:
-            against, retrained = f"naive_vs_{persona}", f"retrained_vs_{persona}"
-            asked.append(Question("RQ1", persona, seed, "naive_alone", against))
-            if campaign.ego.driver == LEARNED:
-                asked.append(Question("RQ2", persona, seed, against, retrained))
-            elif tunable:
-                asked.append(Question("RQ2", persona, seed, against, f"reconfigured_vs_{persona}"))
+            asked.append(Question("RQ1", name, seed, naive_alone.name, naive.name))
+            if round_2 is not None:
+                asked.append(Question("RQ2", name, seed, naive.name, Arm(ego=round_2, non_ego=non_ego).name))
     return asked

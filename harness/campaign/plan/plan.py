@@ -1,78 +1,71 @@
-"""The plan of a campaign: the paper's rounds, the rounds after them, best responses, and everyone against everyone."""
+"""The plan of a campaign: the paper's rounds, the rounds after them, best responses, and the cross-play.
+
+`plan` is the only entry: everything else in this package is a part of it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from pathlib import PurePath
 
-from harness.campaign.plan.best_responses import is_pair, plan_responses
-from harness.campaign.plan.iterated_rounds import Exchange, Strategy, arm, exchange
-from harness.campaign.plan.paper_rounds import learned, learns, plan_robust, plan_rounds
-from harness.campaign.plan.search_rounds import plan_searches, reconfigured
-from harness.campaign.plan.stages import AssessmentStage, Drives, Stage, TrainingStage, arm_of
-from harness.config.campaign import ROBUST, SUMO, Campaign
+from harness.campaign.plan.best_responses import plan_best_responses
+from harness.campaign.plan.iterated_rounds import Ego, PersonaRounds, pairing, persona_rounds
+from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust
+from harness.campaign.plan.search_rounds import plan_searches
+from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
+from harness.campaign.plan.strategy_drivers import crossplay_drivers, driver_of, ego_learns
+from harness.config.campaign import Campaign
+from harness.evaluation.strategies import BestResponse, OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
 
 
 def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Stage]:
-    """Every stage of a campaign against the personas named, each after what it needs. `tunable`: the ego is given,
-    and has something to tune."""
+    """Every stage of a campaign with these personas, each after those it needs.
+
+    `tunable`: the campaign's ego is external and has tunable parameters. A campaign with a folder of policies trains
+    nothing but best responses.
+    """
     stages = [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed, tunable)]
     if campaign.policies is None:
         return stages
-    return [stage for stage in stages if not isinstance(stage, TrainingStage) or stage.responds_in]
+    return [each for each in stages if not isinstance(each, TrainingStage) or isinstance(each.strategy, BestResponse)]
 
 
 def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int, tunable: bool) -> list[Stage]:
-    exchanges = {persona: exchange(campaign, persona, seed, tunable) for persona in personas}
-    stages = [*plan_rounds(campaign, personas, seed), *plan_robust(campaign, personas, seed)]
+    rounds = [persona_rounds(campaign, persona, seed, tunable) for persona in personas]
+    stages = [*plan_paper_rounds(campaign, personas, seed), *plan_robust(campaign, personas, seed)]
     stages += plan_searches(campaign, personas, seed) if tunable else []
-    for each in exchanges.values():
-        stages += each.stages
-    if campaign.crossplay is not None:
-        stages += _everyone(campaign, exchanges, seed)
-    stages += _responses(campaign, exchanges, stages)
+    stages += [stage for each in rounds for stage in each.stages]
+    stages += _plan_crossplay(campaign, rounds, seed) if campaign.crossplay is not None else []
+    stages += _plan_responses(campaign, rounds, stages, seed)
     return list(dict.fromkeys(stages))
 
 
-def _responses(campaign: Campaign, exchanges: dict[str, Exchange], stages: Iterable[Stage]) -> list[Stage]:
-    """Best responses in the last arm of every exchange, and in the arms that the campaign names."""
+def _plan_responses(
+    campaign: Campaign, rounds: Sequence[PersonaRounds], stages: Iterable[Stage], seed: int
+) -> list[Stage]:
+    """Best responses in the last pair of each persona's rounds, and in the arms that the campaign names."""
     if campaign.best_response is None:
         return []
-    last = [arm_of(each.egos[-1].name, each.non_egos[-1].name) for each in exchanges.values()]
-    arms = {stage.arm: stage for stage in stages if isinstance(stage, AssessmentStage)}
-    named = dict.fromkeys((*last, *campaign.best_response.arms))
-    pairs = [arms[name] for name in named if name in arms and is_pair(arms[name])]
-    return [stage for pair in pairs for stage in plan_responses(campaign, pair)]
+    last = [pairing(each.egos[-1], each.non_egos[-1], seed).name for each in rounds]
+    assessments = {stage.name: stage for stage in stages if isinstance(stage, AssessmentStage)}
+    names = dict.fromkeys((*last, *campaign.best_response.arms))
+    pairs = [assessments[name] for name in names if name in assessments and assessments[name].is_pair]
+    return [stage for pair in pairs for stage in plan_best_responses(campaign, pair)]
 
 
-def _everyone(campaign: Campaign, exchanges: dict[str, Exchange], seed: int) -> list[Stage]:
+def _plan_crossplay(campaign: Campaign, rounds: Sequence[PersonaRounds], seed: int) -> list[AssessmentStage]:
     """The arms of every ego against every non-ego."""
-    egos = {ego.name: ego for each in exchanges.values() for ego in each.egos}
-    for name, drives in _beside_exchanges(campaign, seed, bool(egos.keys() - {"naive"})).items():
-        egos[name] = Strategy(name, "", 0, drives)
-    non_egos = [non_ego for each in exchanges.values() for non_ego in each.non_egos]
-    return [arm(ego, non_ego, seed) for ego in egos.values() for non_ego in non_egos]
+    egos = {ego.strategy: ego for each in rounds for ego in each.egos}
+    egos |= {ego.strategy: ego for ego in _egos_of_no_persona(campaign, seed, has_round_2=len(egos) > 1)}
+    non_egos = [non_ego for each in rounds for non_ego in each.non_egos]
+    return [pairing(ego, non_ego, seed) for ego in egos.values() for non_ego in non_egos]
 
 
-def _beside_exchanges(campaign: Campaign, seed: int, has_round_2: bool) -> dict[str, Drives]:
-    """The egos of no one persona's exchange, by name: made against several, or brought along."""
-    egos: dict[str, Drives] = {}
-    for each in campaign.population if has_round_2 else ():
-        if learns(campaign):
-            egos[f"retrained_{each.name}"] = learned(campaign, f"retrained_{each.name}", seed)
-        else:
-            egos[f"reconfigured_{each.name}"] = reconfigured(each.name, seed)
-    if learns(campaign) and campaign.retraining.against:
-        egos[ROBUST] = learned(campaign, ROBUST, seed)
-    return egos | other_egos(campaign)
-
-
-def other_egos(campaign: Campaign) -> dict[str, Drives]:
-    """The drivers that meet every non-ego beside the campaign's own egos, by name."""
-    written = campaign.crossplay.egos if campaign.crossplay is not None else []
-    return {name_of(each): Drives("sumo") if each == SUMO else Drives("given", name_of(each)) for each in written}
-
-
-def name_of(written: str) -> str:
-    """What a driver is called in arms: as its document or folder is."""
-    return PurePath(written).stem if written.endswith(".toml") else PurePath(written).name
+def _egos_of_no_persona(campaign: Campaign, seed: int, has_round_2: bool) -> list[Ego]:
+    """The egos that belong to no single persona: of populations, of several personas, or from outside."""
+    round_2 = RetrainedEgo if ego_learns(campaign) else ReconfiguredEgo
+    strategies: list[RetrainedEgo | ReconfiguredEgo | RobustEgo] = []
+    strategies += [round_2(against=each.name) for each in campaign.population] if has_round_2 else []
+    strategies += [RobustEgo()] if ego_learns(campaign) and campaign.retraining.against else []
+    egos = [Ego(strategy=each, driver=driver_of(campaign, each, seed)) for each in strategies]
+    outside = crossplay_drivers(campaign).items()
+    return [*egos, *(Ego(strategy=OtherEgo(driver=name), driver=driver) for name, driver in outside)]

@@ -1,30 +1,25 @@
-"""Round 2 of an ego that is given and has something to tune: a search against each persona and population.
+"""Round 2 of an external ego with tunable parameters: a search against each persona and population.
 
-`reconfigured_<persona>` and its arms have the place that `retrained_<persona>` and its have for an ego that learns.
+`reconfigured_<persona>` and its arms replace `retrained_<persona>` and its arms of an ego that learns.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from harness.campaign.plan.paper_rounds import learned, population
-from harness.campaign.plan.stages import AssessmentStage, Drives, ReconfigurationStage, Stage, stage_id
+from harness.campaign.plan.paper_rounds import round_2_arms
+from harness.campaign.plan.stages import SearchStage, Stage
+from harness.campaign.plan.strategy_drivers import driver_of, population_driver
 from harness.config.campaign import Campaign
-
-
-def reconfigured(name: str, seed: int) -> Drives:
-    """The given ego as it was reconfigured against a persona or population of this name."""
-    return Drives("reconfigured", stage_id(f"reconfigured_{name}", seed))
+from harness.evaluation.strategies import PersonaNonEgo, ReconfiguredEgo
 
 
 def plan_searches(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
-    """The stages of round 2 for one seed, each after what it needs."""
-    people = {persona: learned(campaign, persona, seed, persona) for persona in personas}
-    people |= {each.name: population(campaign, each.shares, seed) for each in campaign.population}
+    """The stages of round 2 for one training seed, each after those it needs."""
+    opponents = {persona: driver_of(campaign, PersonaNonEgo(persona=persona), seed) for persona in personas}
+    populations = {each.name: population_driver(campaign, each.shares, seed) for each in campaign.population}
     stages: list[Stage] = []
-    for name, opponent in people.items():
-        ego = reconfigured(name, seed)
-        stages.append(ReconfigurationStage(f"reconfigured_{name}", seed, name, opponent))
-        stages.append(AssessmentStage(f"reconfigured_vs_{name}", seed, name, ego, opponent))
-        stages.append(AssessmentStage(f"reconfigured_alone_{name}", seed, name, ego, None))
+    for name, opponent in {**opponents, **populations}.items():
+        stages.append(SearchStage(seed=seed, persona=name, opponent=opponent))
+        stages += round_2_arms(campaign, ReconfiguredEgo(against=name), opponent, seed)
     return stages

@@ -1,149 +1,160 @@
-"""What a plan consists of: who drives, and stages that train, assess or search."""
+"""The stages of a plan: trainings, parameter searches and arms. Each is done once, stored, and skipped afterwards."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from abc import abstractmethod
+from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar
+
+from harness.campaign.plan.planned_drivers import (
+    PlannedDriver,
+    Trained,
+    TrainedBefore,
+    members_of,
+    policies_before,
+    stages_before,
+)
+from harness.evaluation.strategies import Arm, ReconfiguredEgo, Strategy, player_of, strategy_name
 
 
-@dataclass(frozen=True)
-class Drives:
-    """Who drives a player.
-
-    | kind | who |
-    | --- | --- |
-    | sumo | SUMO's own models |
-    | given | the campaign's given ego, or the other driver called `stage` |
-    | reconfigured | the given ego as the search `stage` reconfigured it |
-    | policy | the policy that the training `stage` made |
-    | before | the policy that such a stage made before, in another run |
-    | mixture | one of `members` in each game, by `shares` or, without, by the equilibrium of the arms in `weighed_by` |
-    | best | the one of `members` who earns most in games that are played for this choice alone |
-    """
-
-    kind: Literal["sumo", "given", "reconfigured", "policy", "before", "mixture", "best"]
-    stage: str = ""
-    persona: str = ""
-    """Whose human factors it has; empty: the ego's own."""
-    members: tuple[Drives, ...] = ()
-    shares: tuple[float, ...] = ()
-    weighed_by: tuple[tuple[str, ...], ...] = ()
-    """Stages of the arms of every ego (rows) against every non-ego (columns)."""
-
-    @property
-    def in_words(self) -> str:
-        """Who that is, for the card of a policy."""
-        if self.kind == "mixture":
-            return "one in each game of " + ", ".join(each.stage for each in self.members)
-        return self.stage or self.kind
-
-    @property
-    def everyone(self) -> tuple[Drives, ...]:
-        """Whoever may drive: the members, or this one."""
-        return self.members or (self,)
-
-
-@dataclass(frozen=True)
-class Gate:
-    """The arms by which an exchange may be found to have settled: a pair, and each player's best response in it."""
+@dataclass(frozen=True, kw_only=True)
+class EquilibriumGate:
+    """Three assessments that show whether a pair is an approximate equilibrium: the pair itself, and the pair with each
+    player replaced by its best response. Where it is one, the stages behind the gate have nothing to do."""
 
     pair: str
     ego_response: str
     non_ego_response: str
 
+    @property
+    def stages(self) -> tuple[str, str, str]:
+        """The ids of the three stages."""
+        return self.pair, self.ego_response, self.non_ego_response
 
-@dataclass(frozen=True)
-class TrainingStage:
-    """One training: who learns, against whom, beginning from what."""
 
-    name: str  # naive, <persona>, retrained_<persona>
+@dataclass(frozen=True, kw_only=True)
+class _Stage:
+    """What all stages have."""
+
     seed: int
     persona: str
-    learner: int
-    opponent: Drives | None
-    initial: str | None
+    """The persona or population that the stage belongs to; empty for the naive ego's own."""
+    gates: tuple[EquilibriumGate, ...] = ()
+
+    kind: ClassVar[str]
+    """What the manifest calls it."""
+    verb: ClassVar[str]
+    """What `harness check` says is done."""
+    unit: ClassVar[str]
+    """What its progress counts."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """The stage's name, the same for each seed."""
+
+    @property
+    @abstractmethod
+    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+        """The drivers that play in it and do not learn."""
+
+    @property
+    def id(self) -> str:
+        """The name of the stage, and of what it makes, in the run folder."""
+        return stage_id(self.name, self.seed)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The stages that have to be done before."""
+        before = [stage for driver in self.drivers for stage in stages_before(driver)]
+        return _unique([*before, *(stage for gate in self.gates for stage in gate.stages)])
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The policies of another run that it reads, each named after the stage that made it."""
+        return _unique(policy for driver in self.drivers for policy in policies_before(driver))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainingStage(_Stage):
+    """One training: which strategy is learned, against which driver, from which parameters."""
+
+    strategy: Strategy
+    opponent: PlannedDriver | None
+    initial: Trained | TrainedBefore | None
+    """The policy that it starts from; None: a new one."""
     alone_share: float
+    """The share of its games without the opponent."""
     attentive_share: float = 0.0
-    responds_in: tuple[str, ...] = ()
-    """Of a best response: the arm in which it replaces a player."""
-    begins_as: tuple[str, ...] = ()
-    """The policy, trained before, that it begins from."""
-    unless: tuple[Gate, ...] = ()
-    """There is nothing to do where one of them has settled."""
+    """The share of its budget in which the learner's attention does not lapse."""
+
+    kind, verb, unit = "training", "train", "steps"
 
     @property
-    def id(self) -> str:
-        """What the stage and its policy are called in the run folder."""
-        return stage_id(self.name, self.seed)
+    def name(self) -> str:
+        """The strategy's name."""
+        return strategy_name(self.strategy)
 
     @property
-    def needs(self) -> tuple[str, ...]:
-        """The stages that have to be done before."""
-        return _stages(self.unless, self.initial, self.opponent)
+    def learner(self) -> int:
+        """The player (index of `ROLES`) that learns."""
+        return player_of(self.strategy)
 
     @property
-    def reads(self) -> tuple[str, ...]:
-        """The policies trained before that it needs, each called after the stage that made it."""
-        return tuple(dict.fromkeys((*self.begins_as, *_before(self.opponent))))
+    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+        """The initial policy and the opponent."""
+        return self.initial, self.opponent
 
 
-@dataclass(frozen=True)
-class AssessmentStage:
-    """One arm: its pairing, assessed."""
+@dataclass(frozen=True, kw_only=True)
+class AssessmentStage(_Stage):
+    """The assessment of one arm."""
 
-    arm: str
-    seed: int
-    persona: str
-    ego: Drives | None
-    non_ego: Drives | None
-    unless: tuple[Gate, ...] = ()
-    """There is nothing to do where one of them has settled."""
+    arm: Arm
+    ego: PlannedDriver | None
+    non_ego: PlannedDriver | None
+
+    kind, verb, unit = "assessment", "assess", "episodes"
 
     @property
-    def id(self) -> str:
-        """What the stage and its files are called in the run folder."""
-        return stage_id(self.arm, self.seed)
+    def name(self) -> str:
+        """The arm's name."""
+        return self.arm.name
 
     @property
-    def needs(self) -> tuple[str, ...]:
-        """The stages that have to be done before."""
-        return _stages(self.unless, None, self.ego, self.non_ego)
+    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+        """Ego and non-ego, in the order of the players' axis."""
+        return self.ego, self.non_ego
 
     @property
-    def reads(self) -> tuple[str, ...]:
-        """The policies trained before that drive in it, each called after the stage that made it."""
-        return _before(self.ego, self.non_ego)
+    def is_pair(self) -> bool:
+        """Whether an ego meets a persona's non-ego, and both drive the same way in every game. A mixture has no payoff
+        of its own, SUMO's driver none at all."""
+        fixed = all(each is not None and members_of(each) == (each,) for each in self.drivers)
+        return fixed and bool(self.persona)
 
 
-@dataclass(frozen=True)
-class ReconfigurationStage:
-    """One search: the given ego's parameters, on its own payoff, against whom."""
+@dataclass(frozen=True, kw_only=True)
+class SearchStage(_Stage):
+    """One search: the external ego's parameters, on its own payoff, against one opponent."""
 
-    name: str  # reconfigured_<persona>
-    seed: int
-    persona: str
-    opponent: Drives
-    unless: tuple[Gate, ...] = ()
-    """There is nothing to do where one of them has settled."""
+    opponent: PlannedDriver
 
-    @property
-    def id(self) -> str:
-        """What the stage and the driver it finds are called in the run folder."""
-        return stage_id(self.name, self.seed)
+    kind, verb, unit = "reconfiguration", "tune", "trials"
 
     @property
-    def needs(self) -> tuple[str, ...]:
-        """The stages that have to be done before."""
-        return _stages(self.unless, None, self.opponent)
+    def name(self) -> str:
+        """The name of the strategy that the search finds."""
+        return strategy_name(ReconfiguredEgo(against=self.persona))
 
     @property
-    def reads(self) -> tuple[str, ...]:
-        """The policies trained before that drive in it, each called after the stage that made it."""
-        return _before(self.opponent)
+    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+        """The opponent."""
+        return (self.opponent,)
 
 
-Stage = TrainingStage | AssessmentStage | ReconfigurationStage
+Stage = TrainingStage | AssessmentStage | SearchStage
 
 
 def stage_id(name: str, seed: int) -> str:
@@ -151,23 +162,5 @@ def stage_id(name: str, seed: int) -> str:
     return f"{name}-seed{seed}"
 
 
-def arm_of(ego: str, non_ego: str) -> str:
-    """What the arm of two strategies is called."""
-    made = next((made for made in ("retrained", "reconfigured") if ego == f"{made}_{non_ego}"), ego)
-    return f"{made}_vs_{non_ego}"
-
-
-_MADE = ("policy", "reconfigured")  # by a stage of the plan
-
-
-def _stages(unless: Sequence[Gate], initial: str | None, *drivers: Drives | None) -> tuple[str, ...]:
-    players = [each for player in drivers if player is not None for each in player.everyone]
-    weighed = [arm for player in drivers if player is not None for row in player.weighed_by for arm in row]
-    gates = [stage for gate in unless for stage in (gate.pair, gate.ego_response, gate.non_ego_response)]
-    named = [initial or "", *(each.stage for each in players if each.kind in _MADE), *weighed, *gates]
-    return tuple(dict.fromkeys(name for name in named if name))
-
-
-def _before(*drivers: Drives | None) -> tuple[str, ...]:
-    players = [each for player in drivers if player is not None for each in player.everyone]
-    return tuple(dict.fromkeys(each.stage for each in players if each.kind == "before"))
+def _unique(names: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(names))

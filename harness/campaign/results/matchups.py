@@ -1,70 +1,96 @@
-"""Who met whom in the arms of a plan: what the game's findings are made from."""
+"""Which strategy meets which in the arms of a plan: what the findings of game theory are made from."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from harness.campaign.plan.best_responses import arm_responded_in, is_pair
-from harness.campaign.plan.iterated_rounds import PAPER_ROUNDS, exchange
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import AssessmentStage, Drives, stage_id
-from harness.config.campaign import ROBUST, Campaign
+from harness.campaign.plan.stages import AssessmentStage
+from harness.config.campaign import Campaign
 from harness.evaluation.game_theory.records import Pairing, Response
+from harness.evaluation.strategies import (
+    PAPER_ROUNDS,
+    Arm,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    RobustEgo,
+    round_of,
+    strategy_name,
+)
 from harness.game.state import ROLES
 
-_MADE = ("retrained", "reconfigured")
 
-
-@dataclass(frozen=True)
-class Met:
+@dataclass(frozen=True, kw_only=True)
+class Matchups:
     """The arms of a campaign as a game between strategies."""
 
     pairings: Sequence[Pairing]
     responses: Sequence[Response]
-    personas_of: Mapping[str, Collection[str]]
-    """Of each ego that was retrained or reconfigured the personas against whom it was."""
+    training_personas: Mapping[str, Collection[str]]
+    """By ego of round 2 or later: the personas against which it was retrained or reconfigured."""
 
 
-def who_met(campaign: Campaign, personas: Sequence[str], done: Collection[str], tunable: bool = False) -> Met | None:
-    """What of a campaign is a game between strategies, among the stages that are done; None where it plays the paper's
-    rounds and nothing more. `tunable` as in `plan`."""
-    asks = (campaign.crossplay, campaign.best_response, campaign.retraining.against or None)
-    if all(each is None for each in asks) and campaign.rounds.count == PAPER_ROUNDS:
+def matchups_of(
+    campaign: Campaign, personas: Sequence[str], done: Collection[str], tunable: bool = False
+) -> Matchups | None:
+    """The game between strategies, of the stages that are done. `tunable` as in `plan`.
+
+    None for a campaign that plays the paper's rounds and nothing more.
+    """
+    extras = (campaign.crossplay, campaign.best_response, campaign.retraining.against or None)
+    if all(each is None for each in extras) and campaign.rounds.count == PAPER_ROUNDS:
         return None
-    arms = [each for each in plan(campaign, personas, tunable) if isinstance(each, AssessmentStage) and each.id in done]
-    exchanges = {persona: exchange(campaign, persona, 0, tunable) for persona in personas}
-    rounds = {each.name: each.round for found in exchanges.values() for each in (*found.egos, *found.non_egos)}
-    return Met(
-        [_pairing(arm) for arm in arms if is_pair(arm)],
-        [response for arm in arms for response in _responses(arm, arms, rounds)],
-        {ROBUST: campaign.retraining.against}
-        | {f"{made}_{each.name}": list(each.shares) for made in _MADE for each in campaign.population}
-        | {ego.name: [persona] for persona, found in exchanges.items() for ego in found.egos if ego.round},
+    stages = plan(campaign, personas, tunable)
+    arms = [each for each in stages if isinstance(each, AssessmentStage) and each.id in done]
+    return Matchups(
+        pairings=[_pairing(arm) for arm in arms if arm.is_pair],
+        responses=_responses(arms),
+        training_personas=_training_personas(campaign, arms),
     )
 
 
-def _name(drives: Drives, seed: int) -> str:
-    if drives.kind == "given":
-        return drives.stage or "naive"
-    return drives.kind if drives.kind == "sumo" else drives.stage.removesuffix(stage_id("", seed))
+def _pairing(stage: AssessmentStage) -> Pairing:
+    ego, non_ego = _names(stage.arm)
+    return Pairing(arm=stage.name, seed=stage.seed, ego=ego, non_ego=non_ego, persona=stage.persona)
 
 
-def _pairing(arm: AssessmentStage) -> Pairing:
+def _names(arm: Arm) -> tuple[str, str]:
     assert arm.ego is not None
     assert arm.non_ego is not None
-    ego = "naive" if arm.arm.startswith("naive_vs_") else _name(arm.ego, arm.seed)
-    return Pairing(arm.arm, arm.seed, ego, _name(arm.non_ego, arm.seed), arm.persona)
+    return strategy_name(arm.ego), strategy_name(arm.non_ego)
 
 
-def _responses(arm: AssessmentStage, arms: Sequence[AssessmentStage], rounds: Mapping[str, int]) -> list[Response]:
-    for role, player in zip(ROLES, (arm.ego, arm.non_ego), strict=True):
-        if player is not None and player.kind == "best":
-            name = arm_responded_in(arm.arm)
-            pair = next((_pairing(each) for each in arms if (each.arm, each.seed) == (name, arm.seed)), None)
-            if pair is None:
-                return []
-            last = max(rounds.get(pair.ego, 0), rounds.get(pair.non_ego, 0))
-            who = (pair.ego, pair.non_ego)
-            return [Response(arm.seed, role, arm.persona, last, pair.arm, arm.arm, *who)]  # type: ignore[arg-type]
-    return []
+def _responses(stages: Sequence[AssessmentStage]) -> list[Response]:
+    """The arms in which a best response replaces a player, of pairs that are done too."""
+    done = {(stage.arm, stage.seed) for stage in stages}
+    found = []
+    for stage in stages:
+        arm = stage.arm
+        if arm.best_response_of is None or (arm.pair, stage.seed) not in done:
+            continue
+        assert arm.ego is not None
+        assert arm.non_ego is not None
+        ego, non_ego = _names(arm)
+        found.append(
+            Response(
+                seed=stage.seed,
+                role=ROLES[arm.best_response_of],  # type: ignore[arg-type]
+                persona=stage.persona,
+                round=max(round_of(arm.ego), round_of(arm.non_ego)),
+                pair_arm=arm.pair.name,
+                response_arm=stage.name,
+                ego=ego,
+                non_ego=non_ego,
+            )
+        )
+    return found
+
+
+def _training_personas(campaign: Campaign, stages: Sequence[AssessmentStage]) -> dict[str, list[str]]:
+    members = {each.name: list(each.shares) for each in campaign.population}
+    found = {strategy_name(RobustEgo()): list(campaign.retraining.against)}
+    for stage in stages:
+        if isinstance(ego := stage.arm.ego, RetrainedEgo | ReconfiguredEgo):
+            found[strategy_name(ego)] = members.get(ego.against, [ego.against])
+    return found

@@ -16,6 +16,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import ConfigDict, Field, ValidationError
 
 from harness.campaign.plan.plan import plan
+from harness.campaign.plan.planned_drivers import Trained
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.manifest import is_tuned
 from harness.campaign.storage.run_folder import RunFolder
@@ -214,11 +215,11 @@ def _figures(
     campaign = Campaign.model_validate(manifest["campaign"], strict=False)
     rows = {row["arm"]: row for row in summary[summary["seed"] == seed].to_dict("records")}
     for arm in plan(campaign, manifest["personas"], is_tuned(manifest)):
-        if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.arm not in rows:
+        if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.name not in rows:
             continue
         player = arm.ego if is_ego else arm.non_ego
-        if player is not None and player.stage == stage:
-            yield arm.arm, _of_ego(rows[arm.arm]) if is_ego else _of_non_ego(rows[arm.arm])
+        if isinstance(player, Trained) and player.stage == stage:
+            yield arm.name, _of_ego(rows[arm.name]) if is_ego else _of_non_ego(rows[arm.name])
 
 
 def _of_ego(row: Mapping[Any, Any]) -> Sequence[str]:

@@ -8,6 +8,7 @@ import pandas as pd
 
 from harness.config.campaign import Campaign, Population
 from harness.environments.rollout import parts_of
+from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, ReconfiguredEgo, RetrainedEgo
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import POPULATION_COLUMNS, typed
 from harness.game.initial_state import draw_member
@@ -26,10 +27,12 @@ def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def _arms_of(population: Population, episodes: pd.DataFrame) -> Iterable[tuple[str, pd.DataFrame]]:
-    for ego in ("naive", "retrained", "reconfigured"):
-        games = episodes[episodes["arm"] == f"{ego}_vs_{population.name}"]
+    name = population.name
+    for ego in (NaiveEgo(), RetrainedEgo(against=name), ReconfiguredEgo(against=name)):
+        arm = Arm(ego=ego, non_ego=PersonaNonEgo(persona=name)).name
+        games = episodes[episodes["arm"] == arm]
         if len(games):
-            yield f"{ego}_vs_{population.name}", games
+            yield arm, games
 
 
 def _of(population: Population, arm: str, games: pd.DataFrame) -> pd.DataFrame:

@@ -15,11 +15,11 @@ from rich.progress import track
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.stages import stage_id
-from harness.campaign.results.matchups import who_met
+from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
-from harness.campaign.storage.manifest import is_tuned
+from harness.campaign.storage.manifest import FINISHED, is_tuned
 from harness.campaign.storage.manoeuvre_table import manoeuvres_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.config.campaign import Campaign
@@ -49,9 +49,6 @@ from harness.reports.results import results
 from harness.reports.treatment import ARMS
 from harness.reports.wording import Conclusion
 from harness.traffic.scene import OpenScene, open_scene
-
-FINISHED = ("done", "settled")
-"""Statuses of a stage that came to its end."""
 
 
 @dataclass(frozen=True)
@@ -135,10 +132,10 @@ def _questions(campaign: Campaign, manifest: Mapping[str, Any]) -> list[Question
 
 def _game(campaign: Campaign, manifest: Mapping[str, Any], episodes: pd.DataFrame) -> GameFindings | None:
     """What the finished arms of a run say of the game between strategies; None where it is not asked."""
-    met = who_met(campaign, manifest["personas"], _done(manifest), is_tuned(manifest))
-    if met is None:
+    game = matchups_of(campaign, manifest["personas"], _done(manifest), is_tuned(manifest))
+    if game is None:
         return None
-    return find(met.pairings, met.responses, met.personas_of, episodes, campaign.assessment.significance)
+    return find(game.pairings, game.responses, game.training_personas, episodes, campaign.assessment.significance)
 
 
 def _campaign(manifest: Mapping[str, Any]) -> Campaign:

@@ -1,7 +1,7 @@
-"""Seals: which files somebody finished, each with its size and SHA-256, as a JSON file that is written last.
+"""Checksums of finished work: a JSON file, written last, with size and SHA-256 of every file that the work made.
 
-Where a seal holds, everything it vouches for is on the disk as it was written. A file that is gone, torn by a power
-cut or changed since breaks it: then the work is done again, and never taken for done.
+Where all files match, the work is on the disk as it was written. A file that is missing, torn by a power cut or changed
+since is a mismatch: the work is done again.
 """
 
 from __future__ import annotations
@@ -17,41 +17,41 @@ from harness.files import content_of, sync_file, sync_folder, write_atomically
 _MOST_BYTES = 50_000_000
 
 
-def write_checksums(seal: Path, top: Path, files: Iterable[Path], facts: Mapping[str, Any]) -> None:
-    """Vouch for files below `top`, and say `facts` of them."""
-    vouched = {}
+def write_checksums(path: Path, top: Path, files: Iterable[Path], facts: Mapping[str, Any]) -> None:
+    """Write the checksums of files below `top`, beside `facts` about them, once the files are safely on the disk."""
+    checksums = {}
     for file in files:
         sync_file(file)
         sync_folder(file.parent)
-        vouched[file.relative_to(top).as_posix()] = _print_of(file)
-    write_atomically(seal, (json.dumps({**facts, "files": vouched}, indent=2) + "\n").encode())
+        checksums[file.relative_to(top).as_posix()] = _checksum(file)
+    write_atomically(path, (json.dumps({**facts, "files": checksums}, indent=2) + "\n").encode())
 
 
-def read_checksums(seal: Path) -> dict[str, Any] | None:
-    """What a seal says; None where there is none that can be read."""
+def read_checksums(path: Path) -> dict[str, Any] | None:
+    """The facts and checksums of a file; None where there is none that can be read."""
     try:
-        said = json.loads(content_of(seal, _MOST_BYTES))
+        record = json.loads(content_of(path, _MOST_BYTES))
     except (OSError, ValueError, RecursionError):
         return None
-    return said if isinstance(said, dict) else None
+    return record if isinstance(record, dict) else None
 
 
-def broken(said: Mapping[str, Any], top: Path) -> list[Path]:
-    """The files that are not as a seal says."""
-    vouched = said.get("files", {})
-    if not isinstance(vouched, dict):
+def mismatches(record: Mapping[str, Any], top: Path) -> list[Path]:
+    """The files below `top` that are not as their checksums say."""
+    checksums = record.get("files", {})
+    if not isinstance(checksums, dict):
         return [top]
-    return [top / name for name, expected in vouched.items() if not _is(top / name, expected)]
+    return [top / name for name, expected in checksums.items() if not _matches(top / name, expected)]
 
 
-def _is(file: Path, expected: Any) -> bool:
+def _matches(file: Path, expected: Any) -> bool:
     try:
-        return file.stat().st_size == expected["bytes"] and _print_of(file) == expected
+        return file.stat().st_size == expected["bytes"] and _checksum(file) == expected
     except (OSError, LookupError, TypeError, ValueError):
         return False
 
 
-def _print_of(file: Path) -> dict[str, Any]:
+def _checksum(file: Path) -> dict[str, Any]:
     with file.open("rb") as content:
         digest, size = hashlib.sha256(), 0
         while piece := content.read(1 << 20):

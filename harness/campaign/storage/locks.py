@@ -1,64 +1,62 @@
-"""One command at a time in a run folder. The system gives a lock back when its process ends, however it ends."""
+"""One command at a time in a run folder. The system releases a lock when its process ends, however it ends."""
 
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
-try:
-    import fcntl
-except ImportError:  # Windows: nobody is kept out
-    fcntl = None  # type: ignore[assignment]
+from filelock import FileLock, Timeout
 
-_TAKEN = (errno.EWOULDBLOCK, errno.EACCES)
+_LOCK = "*.lock"
 
 
 class InUse(Exception):
-    """Somebody else has the lock; the message says who, as far as is known."""
+    """Another process has the lock; the message names it, as far as it is known."""
 
 
 @contextlib.contextmanager
 def only_one(file: Path) -> Iterator[None]:
-    """Be the only one who is in this block, of all processes. Raises InUse, at once, if somebody is in it."""
-    with file.open("a+b") as lock:
-        if not _locked(lock.fileno(), exclusive=True):
-            lock.seek(0)
-            raise InUse(lock.read(200).decode(errors="replace").strip() or "another process")
-        lock.truncate(0)
-        lock.write(f"process {os.getpid()}\n".encode())
-        lock.flush()
+    """Hold a lock during the block. Raises InUse, at once, if another process holds it."""
+    lock, owner = FileLock(file), file.with_name(f"{file.name}.owner")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise InUse(_text_of(owner) or "another process") from None
+    try:
+        owner.write_text(f"process {os.getpid()}", encoding="utf-8")
+        yield
+    finally:
+        owner.unlink(missing_ok=True)
+        lock.release()
+
+
+def register_worker(folder: Path) -> None:
+    """Register this process in a folder until it ends: `wait_for_workers` waits for that."""
+    folder.mkdir(exist_ok=True)
+    lock = FileLock(folder / f"{os.getpid()}.lock")
+    lock.acquire()
+    _registered.append(lock)
+
+
+_registered: list[FileLock] = []  # a lock is released when its object is gone
+
+
+def wait_for_workers(folder: Path, timeout_s: float) -> None:
+    """Wait until no process is registered in a folder. Raises InUse if one still is after `timeout_s`."""
+    until = time.monotonic() + timeout_s
+    for file in sorted(folder.glob(_LOCK)):
         try:
-            yield
-        finally:
-            lock.truncate(0)
+            with FileLock(file).acquire(timeout=max(until - time.monotonic(), 0.0)):
+                file.unlink(missing_ok=True)
+        except Timeout:
+            raise InUse("a worker of an earlier command") from None
 
 
-def share(file: Path) -> int:
-    """Be one of many, until this process ends: `wait_for_all` of another process waits for that. The descriptor."""
-    descriptor = os.open(file, os.O_RDWR | os.O_CREAT, 0o644)
-    _locked(descriptor, exclusive=False)
-    return descriptor
-
-
-def wait_for_all(file: Path, patience_s: float) -> None:
-    """Wait until nobody shares a file. Raises InUse if somebody still does after a while."""
-    with file.open("a+b") as lock:
-        until = time.monotonic() + patience_s
-        while not _locked(lock.fileno(), exclusive=True):
-            if time.monotonic() > until:
-                raise InUse("a worker of an earlier command")
-            time.sleep(0.05)
-
-
-def _locked(descriptor: int, exclusive: bool) -> bool:
-    """Whether the lock is ours now. On a file system that has no locks it always is."""
-    if fcntl is not None:
-        try:
-            fcntl.flock(descriptor, (fcntl.LOCK_EX if exclusive else fcntl.LOCK_SH) | fcntl.LOCK_NB)
-        except OSError as error:
-            return error.errno not in _TAKEN
-    return True
+def _text_of(file: Path) -> str:
+    try:
+        return file.read_text(encoding="utf-8")[:200].strip()
+    except (OSError, UnicodeDecodeError):
+        return ""

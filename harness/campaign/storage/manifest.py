@@ -15,6 +15,8 @@ from harness.config.toml_reading import Document
 Count = Annotated[int, Field(ge=0, le=10**15)]
 Text = Annotated[str, Field(max_length=10_000)]
 _SAID = 3
+FINISHED = ("done", "settled")
+"""Statuses of a finished stage; `settled`: an approximate equilibrium left nothing to do."""
 
 
 class _Record(Document):

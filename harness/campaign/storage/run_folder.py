@@ -7,11 +7,12 @@
     scene/                   a copy of the scene's files
     .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, trials, segments, tables,
                              done.json
-    .stages/{lock,workers}   whose the folder is at the moment: one command's and its workers'
+    .stages/lock             held by the command that is running; lock.owner names its process
+    .stages/worker_locks/    a lock per running worker
     .stages/scratch/         temporary files of the workers
 
-A stage is done when `done.json` is there, the seal (`checksums`) of all that its numbers are read from, with the
-key of its inputs; it is written last. A folder is a run folder from its manifest on.
+A stage is done when `done.json` is there: the checksums of all files that its numbers are read from, with the key of
+its inputs, written last. A folder is a run folder once it has a manifest.
 """
 
 from __future__ import annotations
@@ -22,21 +23,21 @@ import os
 import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from harness.campaign.plan.stages import stage_id
-from harness.campaign.storage.checksums import broken, read_checksums, write_checksums
-from harness.campaign.storage.locks import InUse, only_one, wait_for_all
+from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
+from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
 from harness.campaign.storage.manifest import StageEntry, check_manifest, problems_for_report
 from harness.errors import Problem, UsageError
 from harness.files import content_of, drop_scratch, leads_out, make_folder, write_atomically
 
 FORMAT = 1
 MANIFEST = "manifest.json"
-_PATIENCE_S = 10.0  # how long workers of a command that was killed may take to notice
+_PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
 _MOST_SCENE_BYTES = 1_000_000_000
 _ANY_STAGE = {"kind": "training", "name": "", "seed": 0, "status": "done"}
@@ -52,11 +53,10 @@ def _check(content: bytes) -> dict[str, Any]:
     return dict(json.loads(content))
 
 
-def _only_begun(folder: Path) -> bool:
-    """Whether all that there is in a folder are other folders, and locks: as a command leaves it that was killed in
-    its first moment."""
-    begun = ("lock", "workers")
-    return all(name in begun or name.startswith(f".{MANIFEST}.") for _, _, files in os.walk(folder) for name in files)
+def _has_only_locks(folder: Path) -> bool:
+    """Whether a folder holds nothing but folders and locks, as a command leaves it that was killed at once."""
+    names = [name for _, _, files in os.walk(folder) for name in files]
+    return all(name.startswith(("lock", f".{MANIFEST}.")) or name.endswith(".lock") for name in names)
 
 
 def _is_one_of(file: Path, hashes: Mapping[str, str]) -> bool:
@@ -106,9 +106,9 @@ class RunFolder:
         return self.path / ".stages" / "scratch"
 
     @property
-    def workers_lock(self) -> Path:
-        """What every worker shares as long as it lives."""
-        return self.path / ".stages" / "workers"
+    def workers(self) -> Path:
+        """Where every worker registers as long as it lives."""
+        return self.path / ".stages" / "worker_locks"
 
     def segments(self, stage: str) -> Path:
         """The segments of an arm that is not done."""
@@ -117,28 +117,28 @@ class RunFolder:
     # --- stages --------------------------------------------------------------------------------------------------
 
     def done(self, stage: str) -> dict[str, Any] | None:
-        """What the seal of a stage says, whether it holds or not; None if there is none."""
-        said = read_checksums(self.work(stage) / "done.json")
+        """The content of a stage's `done.json`, whether its checksums match or not; None if there is none."""
+        record = read_checksums(self.work(stage) / "done.json")
         try:
-            StageEntry.model_validate({**_ANY_STAGE, **(said or {})["info"]})
+            StageEntry.model_validate({**_ANY_STAGE, **(record or {})["info"]})
         except (ValueError, LookupError, TypeError):
             return None
-        return said
+        return record
 
     def finished(self, stage: str, key: str) -> dict[str, Any] | None:
-        """What came of a stage when it was done from these very inputs, without an error; None if it is not done, or
-        its work is gone or damaged."""
-        said = self.done(stage)
+        """The facts of a stage that was done from these very inputs, without an error; None if it is not done, or if
+        its files are missing or damaged."""
+        record = self.done(stage)
         made = any((self.policy(stage) / name).is_file() for name in ("policy.safetensors", "driver.toml"))
         made = made or self.traces(stage).is_file()
-        if said is None or said.get("key") != key or said["info"].get("errors"):
+        if record is None or record.get("key") != key or record["info"].get("errors"):
             return None
-        if not made and not said["info"].get("settled"):
+        if not made and not record["info"].get("settled"):
             return None
-        return None if broken(said, self.path) else dict(said["info"])
+        return None if mismatches(record, self.path) else dict(record["info"])
 
     def begin(self, stage: str, key: str) -> None:
-        """A stage is begun, or gone on with: it is not done any more. What it wrote from other inputs is dropped."""
+        """Mark a stage as not done, because it starts or continues. What it wrote from other inputs is removed."""
         work = self.work(stage)
         (work / "done.json").unlink(missing_ok=True)
         if not (work / "key").is_file() or (work / "key").read_bytes() != key.encode():
@@ -147,11 +147,11 @@ class RunFolder:
             write_atomically(work / "key", key.encode())
 
     def finish(self, stage: str, key: str, info: Mapping[str, Any], files: Sequence[Path] = ()) -> None:
-        """A stage is done: everything it wrote is there, and `files` are what its numbers are read from."""
+        """Mark a stage as done. Everything it wrote is there; `files` are those that its numbers are read from."""
         write_checksums(self.work(stage) / "done.json", self.path, files, {"key": key, "info": dict(info)})
 
     def drop_segments(self, stage: str) -> None:
-        """Drop the segments of an arm that is done: its files hold them."""
+        """Remove the segments of an arm that is done: its files hold them."""
         shutil.rmtree(self.segments(stage), ignore_errors=True)
 
     # --- the manifest --------------------------------------------------------------------------------------------
@@ -173,8 +173,7 @@ class RunFolder:
         return manifest
 
     def _check_links(self) -> None:
-        """Raises UsageError where the folder has a link that leads out of it: what is behind it is not the run's, to
-        be read or to be written over."""
+        """Raises UsageError where the folder has a link that leads out of it: what it points to is not the run's."""
         for folder, folders, files in os.walk(self.path):
             for name in (*folders, *files):
                 place = Path(folder) / name
@@ -183,14 +182,14 @@ class RunFolder:
                     raise UsageError.of(place, "", message, "put there what it points to")
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
-        """Raises UsageError where what the stages wrote is gone, as in a folder that was published without it, or is
-        not what they wrote, or the manifest says what no campaign can be."""
+        """Raises UsageError where files of the stages are missing, as in a folder that was published without them, or
+        are not what the stages wrote, or where the manifest describes no possible campaign."""
         done = [name for name, entry in manifest["stages"].items() if entry["status"] == "done"]
         if done and not any(self.work(name).is_dir() for name in done):
             raise UsageError.of(
                 self.path,
                 "",
-                "holds a report and its tables, but not what they are made of",
+                "holds a report and its tables, but not the files that they are made from",
                 f"read its report.html, or play the games: run campaign {manifest['name']!r} again",
             )
         remedy = "run the campaign again"
@@ -201,23 +200,23 @@ class RunFolder:
         damaged = [file for name in done for file in self._damaged(name, manifest["stages"][name])]
         if isinstance(hashes := manifest.get("hashes"), dict):
             damaged += [file for file in sorted(self.scene.glob("*")) if not _is_one_of(file, hashes)]
-        found += [Problem(str(file), "", "is gone, or is not what the campaign wrote", remedy) for file in damaged]
+        found += [Problem(str(file), "", "is missing, or is not what the campaign wrote", remedy) for file in damaged]
         if found:
             raise UsageError(found)
 
     def _damaged(self, stage: str, entry: Mapping[str, Any]) -> list[Path]:
-        said = self.done(stage)
-        if said is None:  # a manifest that names no versions is of before stages with errors had a seal
+        record = self.done(stage)
+        if record is None:  # manifests without versions are older than the checksums of stages with errors
             return [self.work(stage) / "done.json"] if "versions" in entry else []
-        return broken(said, self.path)
+        return mismatches(record, self.path)
 
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
         """Replace the manifest."""
         write_atomically(self.manifest_file, (json.dumps(manifest, indent=2) + "\n").encode())
 
     def claim(self, campaign: str, quick: bool = False) -> None:
-        """Make the folder this campaign's. Raises UsageError if it is another's, holds its full run and this is a
-        quick one (or the other way round), or is no run folder and not empty."""
+        """Make the folder this campaign's. Raises UsageError if it belongs to another campaign, if it holds a full run
+        and this is a quick one (or the reverse), or if it is not a run folder and not empty."""
         try:
             self._check_owner(campaign, quick)
             for name in ("policies", "traces", "tensorboard", ".stages"):
@@ -240,41 +239,43 @@ class RunFolder:
                 wrong = f"holds {kinds[not quick]} would overwrite"
             if wrong:
                 raise UsageError.of(self.path, "", wrong, "choose another folder with --out")
-        elif self.path.is_dir() and not _only_begun(self.path):
+        elif self.path.is_dir() and not _has_only_locks(self.path):
             raise UsageError.of(self.path, "", "is not empty and not a run folder", "choose another folder with --out")
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """Nobody else writes into the folder meanwhile. What killed commands left half written is taken away.
+        """Keep other commands out of the folder during the block. What killed commands left half written is removed.
 
-        Raises UsageError if another command is at it.
+        Raises UsageError if another command holds it.
         """
         lock = self.path / ".stages" / "lock"
-        if not lock.parent.is_dir():  # a folder that was published: there is nothing in it to write from
+        if not lock.parent.is_dir():  # a published folder: it holds nothing to write from
             yield
             return
         try:
             with only_one(lock):
-                wait_for_all(self.workers_lock, _PATIENCE_S)
+                wait_for_workers(self.workers, _PATIENCE_S)
                 drop_scratch(self.path)
                 shutil.rmtree(self.scratch, ignore_errors=True)
                 try:
                     yield
                 finally:
                     shutil.rmtree(self.scratch, ignore_errors=True)
-        except InUse as who:
+                    with suppress(InUse):  # the locks of this command's own workers
+                        wait_for_workers(self.workers, 0.0)
+        except InUse as holder:
             raise UsageError.of(
-                self.path, "", f"is in use by {who}", "wait until it has ended, or choose another folder with --out"
+                self.path, "", f"is in use by {holder}", "wait until it has ended, or choose another folder with --out"
             ) from None
 
     def keep_scene(self, folder: Path, files: tuple[str, ...]) -> None:
-        """Copy a scene's files, so that the run can be looked at when the scene has changed."""
+        """Copy a scene's files, so that the run can be replayed after the scene has changed."""
         make_folder(self.scene)
         for name in files:
             write_atomically(self.scene / name, (folder / name).read_bytes())
 
     def forget(self, stage: str) -> None:
-        """Drop what a stage wrote from other inputs."""
+        """Remove what a stage wrote from other inputs."""
         shutil.rmtree(self.work(stage), ignore_errors=True)
         shutil.rmtree(self.policy(stage), ignore_errors=True)
         shutil.rmtree(self.tensorboard(stage), ignore_errors=True)

@@ -33,13 +33,13 @@ def three_games(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def play(
-    assessed: Arm, folder: Path, attempt: Attempt = FIRST, begin: Callable[[int], None] = lambda episode: None
+    assessed: Arm, folder: Path, attempt: Attempt = FIRST, on_start: Callable[[int], None] = lambda episode: None
 ) -> tuple[int, list[int]]:
     """Errors, and the episodes that were played."""
     played: list[int] = []
 
     def note(episode: int) -> None:
-        begin(episode)
+        on_start(episode)
         played.append(episode)
 
     segments = segments_of(folder / "segments", EPISODES)

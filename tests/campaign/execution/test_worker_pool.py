@@ -11,13 +11,16 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.execution.crash_retries import TRIES, Attempt, OnProgress, OnStart
+from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
 from harness.campaign.execution.run_context import RunContext
-from harness.campaign.execution.worker_pool import Event, run_stages
-from harness.campaign.plan.stages import Drives, Stage, TrainingStage
+from harness.campaign.execution.worker_pool import run_stages
+from harness.campaign.execution.worker_process import Event
+from harness.campaign.plan.planned_drivers import Trained
+from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.errors import StageFailed
+from harness.evaluation.strategies import PersonaNonEgo
 from tests.support.tiny import (
     BY_SUMO,
     begin,
@@ -34,16 +37,26 @@ from tests.support.tiny import (
 
 def stage(name: str, *needs: str) -> Stage:
     """A training that needs others: as its initial policy and as its opponent."""
-    first, second = (*needs, None, None)[:2]
-    opponent = Drives("policy", f"{second}-seed1") if second else None
-    return TrainingStage(name, 1, "", 0, opponent, f"{first}-seed1" if first else None, 0.0, 0.0)
+    initial, opponent, *_ = [*(Trained(stage=f"{each}-seed1") for each in needs), None, None]
+    strategy = PersonaNonEgo(persona=name)
+    return TrainingStage(seed=1, persona="", strategy=strategy, opponent=opponent, initial=initial, alone_share=0.0)
 
 
 def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2, finished: tuple[str, ...] = ()) -> list[Event]:
     nobody = Persona.model_construct(name="nobody")
-    conditions = RunContext(folder, folder, Campaign.model_construct(), nobody, {}, None, {}, None, {})
+    context = RunContext(
+        folder=folder,
+        scene_folder=folder,
+        document=Campaign.model_construct(),
+        ego_persona=nobody,
+        personas={},
+        ego_driver=None,
+        other_egos={},
+        policies=None,
+        keys={},
+    )
     events: list[Event] = []
-    run_stages(stages, [f"{name}-seed1" for name in finished], conditions, jobs, events.append, work)
+    run_stages(stages, [f"{name}-seed1" for name in finished], context, jobs, events.append, work)
     return events
 
 
@@ -54,14 +67,14 @@ def told(events: list[Event], kind: str) -> list[str]:
 # What the workers do here. They are in the processes that run_stages starts, which import this module.
 
 
-def note(stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt) -> dict[str, Any]:
-    with (conditions.folder / "done").open("a") as file:
+def note(stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt) -> dict[str, Any]:
+    with (context.folder / "done").open("a") as file:
         file.write(f"{stage.id}\n")
     return {"pid": os.getpid(), "deaf": signal.getsignal(signal.SIGINT) == signal.SIG_IGN}
 
 
 def report_much(
-    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
 ) -> dict[str, Any]:
     for done in range(1, 1001):
         report(done, 1000)
@@ -69,7 +82,7 @@ def report_much(
 
 
 def raise_in_b(
-    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
 ) -> dict[str, Any]:
     if stage.id == "b-seed1":
         raise StageFailed("b-seed1: a payoff is not finite")
@@ -78,18 +91,14 @@ def raise_in_b(
     return {}
 
 
-def die_in_b(
-    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
-) -> dict[str, Any]:
+def die_in_b(stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt) -> dict[str, Any]:
     if stage.id == "b-seed1":
         os.kill(os.getpid(), signal.SIGSEGV)
     return {}
 
 
-def die_once(
-    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
-) -> dict[str, Any]:
-    mark = conditions.folder / stage.id
+def die_once(stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt) -> dict[str, Any]:
+    mark = context.folder / stage.id
     if not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
@@ -97,7 +106,7 @@ def die_once(
 
 
 def die_when_idle(
-    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
 ) -> dict[str, Any]:
     """Kill whoever else works for the same parent: it has nothing to do."""
     if stage.id == "a-seed1":
@@ -153,19 +162,19 @@ def test_run_stages__a_stage_that_fails_is_named_and_the_rest_goes_on(tmp_path: 
 def test_run_stages__a_stage_that_always_kills_its_worker_fails_by_name(tmp_path: Path) -> None:
     events = run(tmp_path, [stage("a"), stage("b"), stage("c", "b"), stage("e", "a")], die_in_b, jobs=1)
     assert sorted(told(events, "done")) == ["a", "e"]
-    assert told(events, "started").count("b") == TRIES
-    assert told(events, "died") == ["b"] * (TRIES - 1)
+    assert told(events, "started").count("b") == MOST_CRASHES
+    assert told(events, "crashed") == ["b"] * (MOST_CRASHES - 1)
     (failed,) = (event for event in events if event.kind == "failed")
     assert failed.stage == "b-seed1"
-    assert failed.message == f"the worker died of SIGSEGV, {TRIES} times over"
+    assert failed.message == f"the worker died of SIGSEGV, {MOST_CRASHES} times"
     assert told(events, "skipped") == ["c"]
 
 
 def test_run_stages__a_stage_whose_worker_was_killed_is_done_again(tmp_path: Path) -> None:
     events = run(tmp_path, [stage("a"), stage("b", "a")], die_once)
     assert told(events, "done") == ["a", "b"]
-    assert told(events, "died") == ["a", "b"]
-    assert all("SIGKILL" in event.message for event in events if event.kind == "died")
+    assert told(events, "crashed") == ["a", "b"]
+    assert all("SIGKILL" in event.message for event in events if event.kind == "crashed")
 
 
 def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path: Path) -> None:
@@ -174,7 +183,7 @@ def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path:
 
 
 def need_too_much(
-    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
 ) -> dict[str, Any]:
     """Ask the system itself for more memory than it may give, by NumPy and by torch."""
     import resource
@@ -227,7 +236,7 @@ def test_campaign__a_worker_that_is_killed_costs_nothing_but_time(tmp_path: Path
     os.kill(worker, signal.SIGSEGV)
     printed = end(process)
     assert process.returncode == 0, printed
-    assert "died     speedy-seed1: the worker died of SIGSEGV" in printed
+    assert "crashed  speedy-seed1: the worker died of SIGSEGV" in printed
     assert tables(run_folder) == tables(sumo_run())
     wait_for(lambda: not in_session(process.pid), "no process of it is left", 5.0)
 

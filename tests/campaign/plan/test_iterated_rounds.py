@@ -1,4 +1,4 @@
-"""The plan after the paper's rounds: who answers whom, how best responses are searched, who meets whom."""
+"""The plan after the paper's rounds: opponents, best responses, the cross-play, and the matchups that follow."""
 
 from __future__ import annotations
 
@@ -7,12 +7,22 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.plan.best_responses import arm_responded_in, response_arm, settings_of
-from harness.campaign.plan.paper_rounds import plan_rounds
+from harness.campaign.plan.budgets import training_settings
+from harness.campaign.plan.paper_rounds import plan_paper_rounds
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import AssessmentStage, Drives, Gate, Stage, TrainingStage
+from harness.campaign.plan.planned_drivers import (
+    BestOf,
+    EquilibriumMixture,
+    Mixture,
+    PlannedDriver,
+    Trained,
+    TrainedBefore,
+    description,
+    members_of,
+)
+from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage
 from harness.campaign.preflight import QUICK_RESPONSE_STEPS, open_campaign
-from harness.campaign.results.matchups import who_met
+from harness.campaign.results.matchups import matchups_of
 from harness.drivers.policy_file import Policy, write_policy
 from harness.errors import UsageError
 from harness.game.state import EGO, NON_EGO
@@ -46,9 +56,8 @@ def arm(stages: dict[str, Stage], name: str) -> AssessmentStage:
     return stage
 
 
-def names_of(drives: Drives | None) -> list[str]:
-    assert drives is not None
-    return [each.stage.removesuffix("-seed1") for each in drives.everyone]
+def names_of(driver: PlannedDriver | None) -> list[str]:
+    return [description(each).removesuffix("-seed1") for each in members_of(driver)]
 
 
 # --- rounds ---------------------------------------------------------------
@@ -57,7 +66,7 @@ def names_of(drives: Drives | None) -> list[str]:
 def test_plan__two_rounds_are_the_papers(tmp_path: Path, both: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=both)
     campaign = open_campaign(tmp_path / "tiny.toml")
-    assert list(stages.values()) == plan_rounds(campaign.document, ["anna", "bert"], 1)
+    assert list(stages.values()) == plan_paper_rounds(campaign.document, ["anna", "bert"], 1)
 
 
 def test_plan__in_odd_rounds_the_non_ego_answers_and_in_even_ones_the_ego(tmp_path: Path, anna: list[str]) -> None:
@@ -93,23 +102,24 @@ def test_plan__a_player_answers_whom_the_campaign_says(
     against: str, round3: list[str], round4: list[str], round5: list[str], tmp_path: Path, anna: list[str]
 ) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 5, "against": against})
-    met = [training(stages, name).opponent for name in ("anna_round3", "retrained_anna_round4", "anna_round5")]
-    assert [names_of(each) for each in met] == [round3, round4, round5]
-    for each in met:
-        assert each is not None
-        assert each.shares == ((1.0,) * len(each.members) if against == "all" else ())
-        assert bool(each.weighed_by) == (against == "equilibrium")
+    opponents = [training(stages, name).opponent for name in ("anna_round3", "retrained_anna_round4", "anna_round5")]
+    assert [names_of(each) for each in opponents] == [round3, round4, round5]
+    kinds = {"latest": Trained, "all": Mixture, "equilibrium": EquilibriumMixture}
+    for opponent in opponents:
+        assert isinstance(opponent, kinds[against])
+        if isinstance(opponent, Mixture):
+            assert opponent.shares == (1.0,) * len(opponent.members)
 
 
 def test_plan__an_equilibrium_is_of_all_strategies_before_the_round(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 4, "against": "equilibrium"})
     opponent = training(stages, "retrained_anna_round4").opponent
-    assert opponent is not None
-    assert opponent.weighed_by == (
+    assert isinstance(opponent, EquilibriumMixture)
+    assert opponent.arms == (
         ("naive_vs_anna-seed1", "naive_vs_anna_round3-seed1"),
         ("retrained_vs_anna-seed1", "retrained_anna_vs_anna_round3-seed1"),
     )
-    assert {arm for row in opponent.weighed_by for arm in row} <= set(training(stages, "retrained_anna_round4").needs)
+    assert {arm for row in opponent.arms for arm in row} <= set(training(stages, "retrained_anna_round4").needs)
 
 
 def test_plan__an_exchange_may_go_on_with_some_people_only(tmp_path: Path, both: list[str]) -> None:
@@ -117,7 +127,7 @@ def test_plan__an_exchange_may_go_on_with_some_people_only(tmp_path: Path, both:
     later = {name for name, stage in stages.items() if "_round" in name}
     assert later
     assert {stages[name].persona for name in later} == {"bert"}
-    assert not any(stage.unless for stage in stages.values() if stage.persona == "anna")
+    assert not any(stage.gates for stage in stages.values() if stage.persona == "anna")
     assert "retrained_vs_anna_ego_response-seed1" in stages  # what could still be gained is measured of both
 
 
@@ -143,19 +153,18 @@ def test_plan__what_a_stage_needs_stands_before_it(against: str, tmp_path: Path,
 def test_plan__a_best_response_learns_from_its_own_policy_and_from_nothing(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, best_response=RESPONSE)
     first, second = (training(stages, f"retrained_vs_anna_non_ego_response{k}") for k in (1, 2))
-    assert (first.initial, second.initial) == ("anna-seed1", None)
+    assert (first.initial, second.initial) == (Trained(stage="anna-seed1", persona="anna"), None)
     assert first.learner == second.learner == NON_EGO
     assert first.alone_share == 0.0  # the pair's game is the one in which both take part
     assert names_of(first.opponent) == ["retrained_anna"]
     ego = training(stages, "retrained_vs_anna_ego_response1")
-    assert (ego.learner, ego.initial, names_of(ego.opponent)) == (EGO, "retrained_anna-seed1", ["anna"])
+    assert (ego.learner, ego.initial, names_of(ego.opponent)) == (EGO, Trained(stage="retrained_anna-seed1"), ["anna"])
 
 
 def test_plan__the_best_of_the_starts_replaces_its_player(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, best_response=RESPONSE)
     response = arm(stages, "retrained_vs_anna_non_ego_response")
-    assert response.non_ego is not None
-    assert response.non_ego.kind == "best"
+    assert isinstance(response.non_ego, BestOf)
     assert names_of(response.non_ego) == [f"retrained_vs_anna_non_ego_response{k}" for k in (1, 2)]
     assert response.non_ego.persona == "anna"
     assert names_of(response.ego) == ["retrained_anna"]
@@ -169,10 +178,10 @@ def test_plan__further_arms_are_measured_by_name(tmp_path: Path, anna: list[str]
 def test_settings__a_best_response_has_its_own_budget(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, best_response={**RESPONSE, "steps": 4096})
     campaign = open_campaign(tmp_path / "tiny.toml").document
-    assert settings_of(campaign, training(stages, "retrained_vs_anna_ego_response1")).steps == 4096
-    assert settings_of(campaign, training(stages, "naive")).steps == campaign.training.steps
+    assert training_settings(campaign, training(stages, "retrained_vs_anna_ego_response1")).steps == 4096
+    assert training_settings(campaign, training(stages, "naive")).steps == campaign.training.steps
     quick = open_campaign(write_campaign(tmp_path, personas=anna, best_response={"steps": 10**6}), quick=True).document
-    assert settings_of(quick, training(stages, "retrained_vs_anna_ego_response1")).steps == QUICK_RESPONSE_STEPS
+    assert training_settings(quick, training(stages, "retrained_vs_anna_ego_response1")).steps == QUICK_RESPONSE_STEPS
 
 
 def test_settings__who_meets_several_people_has_the_budget_of_as_many_trainings(
@@ -189,40 +198,34 @@ def test_settings__who_meets_several_people_has_the_budget_of_as_many_trainings(
     campaign = open_campaign(tmp_path / "tiny.toml").document
     once = campaign.training
     for name in ("robust", "retrained_town"):
-        settings = settings_of(campaign, training(stages, name))
+        settings = training_settings(campaign, training(stages, name))
         assert (settings.steps, settings.segment_steps) == (2 * once.steps, 2 * once.segment_steps)
     for name in ("naive", "anna", "retrained_anna", "retrained_anna_round4"):  # of one person's strategies it meets one
-        assert settings_of(campaign, training(stages, name)) == once
-
-
-@pytest.mark.parametrize("learner", [EGO, NON_EGO])
-@pytest.mark.parametrize("pair", ["naive_vs_anna", "retrained_vs_ego_response"])
-def test_responses__are_called_after_their_arm(pair: str, learner: int) -> None:
-    assert arm_responded_in(response_arm(pair, learner)) == pair
+        assert training_settings(campaign, training(stages, name)) == once
 
 
 def test_plan__an_exchange_may_end_after_each_answer_of_the_ego(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 6}, best_response=RESPONSE)
-    second = Gate(
-        "retrained_vs_anna-seed1",
-        "retrained_vs_anna_ego_response-seed1",
-        "retrained_vs_anna_non_ego_response-seed1",
+    second = EquilibriumGate(
+        pair="retrained_vs_anna-seed1",
+        ego_response="retrained_vs_anna_ego_response-seed1",
+        non_ego_response="retrained_vs_anna_non_ego_response-seed1",
     )
-    assert training(stages, "retrained_anna").unless == ()
-    assert training(stages, "anna_round3").unless == (second,)
-    assert training(stages, "anna_round5").unless[0] == second
-    assert [gate.pair for gate in training(stages, "anna_round5").unless] == [
+    assert training(stages, "retrained_anna").gates == ()
+    assert training(stages, "anna_round3").gates == (second,)
+    assert training(stages, "anna_round5").gates[0] == second
+    assert [gate.pair for gate in training(stages, "anna_round5").gates] == [
         "retrained_vs_anna-seed1",
         "retrained_anna_round4_vs_anna_round3-seed1",
     ]
     assert (
-        arm(stages, "retrained_anna_round6_vs_anna_round5_ego_response").unless[-1].pair.startswith("retrained_anna_r")
+        arm(stages, "retrained_anna_round6_vs_anna_round5_ego_response").gates[-1].pair.startswith("retrained_anna_r")
     )
 
 
 def test_plan__rounds_are_played_to_the_end_where_that_is_asked(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 6, "stop_early": False}, best_response=RESPONSE)
-    assert not any(stage.unless for stage in stages.values())
+    assert not any(stage.gates for stage in stages.values())
     assert "retrained_vs_anna_ego_response-seed1" not in stages  # only the last arm is measured
 
 
@@ -234,14 +237,16 @@ def test_plan__everyone_meets_everyone(tmp_path: Path, both: list[str]) -> None:
     changes = {"crossplay": {"egos": ["sumo", str(adas)]}, "retraining": {"against": ["anna"]}}
     stages, _ = planned(tmp_path, personas=both, rounds={"count": 4}, **changes)
     campaign = open_campaign(tmp_path / "tiny.toml")
-    met = who_met(campaign.document, ["anna", "bert"], set(stages))
-    assert met is not None
+    matchups = matchups_of(campaign.document, ["anna", "bert"], set(stages))
+    assert matchups is not None
     egos = {"naive", "robust", "sumo", "adas"}
     egos |= {f"retrained_{who}{round_}" for who in ("anna", "bert") for round_ in ("", "_round4")}
     non_egos = {f"{who}{round_}" for who in ("anna", "bert") for round_ in ("", "_round3")}
-    assert {(each.ego, each.non_ego) for each in met.pairings} == {(ego, other) for ego in egos for other in non_egos}
-    assert met.personas_of["robust"] == ["anna"]
-    assert met.personas_of["retrained_bert_round4"] == ["bert"]
+    assert {(each.ego, each.non_ego) for each in matchups.pairings} == {
+        (ego, other) for ego in egos for other in non_egos
+    }
+    assert matchups.training_personas["robust"] == ["anna"]
+    assert matchups.training_personas["retrained_bert_round4"] == ["bert"]
 
 
 @pytest.mark.parametrize(
@@ -258,10 +263,10 @@ def test_plan__an_ego_that_is_given_meets_everyone_as_it_is_and_as_it_was_tuned(
     changes = {"ego": {"driver": driver, "persona": str(CAREFUL)}, "crossplay": {"egos": [other]}}
     campaign = open_campaign(write_campaign(tmp_path, personas=anna, best_response=RESPONSE, **changes))
     stages = {stage.id: stage for stage in plan(campaign.document, ["anna"], campaign.tunable)}
-    met = who_met(campaign.document, ["anna"], set(stages), campaign.tunable)
-    assert met is not None
-    assert {each.ego for each in met.pairings} == egos
-    assert {each.pair_arm for each in met.responses} == {measured}
+    matchups = matchups_of(campaign.document, ["anna"], set(stages), campaign.tunable)
+    assert matchups is not None
+    assert {each.ego for each in matchups.pairings} == egos
+    assert {each.pair_arm for each in matchups.responses} == {measured}
     assert {name for stage in stages.values() for name in stage.needs} <= set(stages)
 
 
@@ -276,7 +281,7 @@ def test_plan__a_population_is_met_as_a_persona_is(tmp_path: Path, both: list[st
     town = {"name": "town", "shares": {"anna": 1.0, "bert": 3.0}}
     stages, keys = planned(tmp_path, personas=both, population=[town])
     opponent = training(stages, "retrained_town").opponent
-    assert opponent is not None
+    assert isinstance(opponent, Mixture)
     assert (names_of(opponent), opponent.shares) == (["anna", "bert"], (1.0, 3.0))
     assert "town-seed1" not in stages
     assert {"naive_vs_town-seed1", "retrained_vs_town-seed1", "retrained_alone_town-seed1"} <= set(stages)
@@ -287,16 +292,16 @@ def test_plan__a_population_is_met_as_a_persona_is(tmp_path: Path, both: list[st
     }
 
 
-def test_who_met__is_not_asked_of_the_papers_rounds(tmp_path: Path, both: list[str]) -> None:
+def test_matchups__there_are_none_of_the_papers_rounds(tmp_path: Path, both: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=both)
-    assert who_met(open_campaign(tmp_path / "tiny.toml").document, ["anna", "bert"], set(stages)) is None
+    assert matchups_of(open_campaign(tmp_path / "tiny.toml").document, ["anna", "bert"], set(stages)) is None
 
 
-def test_who_met__knows_whose_response_an_arm_is(tmp_path: Path, anna: list[str]) -> None:
+def test_matchups__a_response_has_the_pair_and_round_that_it_belongs_to(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 3}, best_response=RESPONSE)
-    met = who_met(open_campaign(tmp_path / "tiny.toml").document, ["anna"], set(stages))
-    assert met is not None
-    found = {(each.role, each.round, each.pair_arm, each.ego, each.non_ego) for each in met.responses}
+    matchups = matchups_of(open_campaign(tmp_path / "tiny.toml").document, ["anna"], set(stages))
+    assert matchups is not None
+    found = {(each.role, each.round, each.pair_arm, each.ego, each.non_ego) for each in matchups.responses}
     assert found == {
         (role, last, pair, "retrained_anna", non_ego)
         for role in ("ego", "non_ego")
@@ -325,9 +330,13 @@ def test_who_met__knows_whose_response_an_arm_is(tmp_path: Path, anna: list[str]
         ({"best_response": {"arms": ["naive_alone"]}}, "best_response.arms", "no arm of an ego and a persona"),
         ({"crossplay": {"egos": ["nobody.toml"]}}, "crossplay.egos", "nobody.toml"),
         ({"crossplay": {"egos": ["sumo", "sumo"]}}, "crossplay.egos", "two drivers"),
-        ({"crossplay": {"egos": ["learned"]}}, "crossplay.egos", "there anyway"),
+        ({"crossplay": {"egos": ["learned"]}}, "crossplay.egos", "always take part"),
         ({"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "rounds": {"count": 4}}, "rounds.count", "not learn"),
-        ({"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "crossplay": {"egos": ["sumo"]}}, "crossplay", "anyway"),
+        (
+            {"ego": {"driver": "sumo", "persona": str(CAREFUL)}, "crossplay": {"egos": ["sumo"]}},
+            "crossplay",
+            "always takes part",
+        ),
     ],
 )
 def test_campaign__names_that_mean_nobody_are_named(
@@ -348,5 +357,5 @@ def test_campaign__best_responses_learn_where_the_players_were_trained_before(tm
     trainings = {name.removesuffix("-seed1") for name, stage in stages.items() if isinstance(stage, TrainingStage)}
     assert trainings == {f"retrained_vs_anna_{role}_response{k}" for role in ("ego", "non_ego") for k in (1, 2)}
     first = training(stages, "retrained_vs_anna_ego_response1")
-    assert (first.initial, first.begins_as) == (None, ("retrained_anna-seed1",))
+    assert first.initial == TrainedBefore(stage="retrained_anna-seed1")
     assert set(first.reads) == {"retrained_anna-seed1", "anna-seed1"}

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.paper_rounds import questions
+from harness.campaign.plan.planned_drivers import Trained, description
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.drivers.policy_file import write_policy
@@ -40,7 +41,7 @@ def test_plan__pairings_of_a_learned_ego(tmp_path: Path, personas: list[str]) ->
 
     def who(stage: Stage) -> tuple[Any, Any]:
         assert isinstance(stage, AssessmentStage)
-        return tuple(drives and (drives.stage or drives.kind) for drives in (stage.ego, stage.non_ego))  # type: ignore[return-value]
+        return tuple(driver and description(driver) for driver in stage.drivers)  # type: ignore[return-value]
 
     assert {id: who(stage) for id, stage in stages.items() if isinstance(stage, AssessmentStage)} == {
         "naive_alone-seed1": ("naive-seed1", None),
@@ -63,12 +64,10 @@ def test_plan__trainings_of_a_learned_ego(tmp_path: Path, personas: list[str]) -
     assert isinstance(anna, TrainingStage)
     assert isinstance(retrained, TrainingStage)
     assert (naive.learner, naive.opponent, naive.initial, naive.alone_share) == (EGO, None, None, 1.0)
-    assert (anna.learner, anna.initial, anna.alone_share) == (NON_EGO, "naive-seed1", 0.125)
-    assert anna.opponent is not None
-    assert (anna.opponent.stage, anna.opponent.persona) == ("naive-seed1", "")
-    assert (retrained.learner, retrained.initial, retrained.alone_share) == (EGO, "naive-seed1", 0.5)
-    assert retrained.opponent is not None
-    assert (retrained.opponent.stage, retrained.opponent.persona) == ("anna-seed1", "anna")
+    assert (anna.learner, anna.initial, anna.alone_share) == (NON_EGO, Trained(stage="naive-seed1"), 0.125)
+    assert anna.opponent == Trained(stage="naive-seed1")
+    assert (retrained.learner, retrained.initial, retrained.alone_share) == (EGO, Trained(stage="naive-seed1"), 0.5)
+    assert retrained.opponent == Trained(stage="anna-seed1", persona="anna")
 
 
 def test_plan__without_a_warm_start_everyone_begins_from_nothing_but_still_needs_the_opponent(

@@ -1,0 +1,96 @@
+"""Which stage is carried out next. Pure: it knows stages and their needs, no processes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from graphlib import CycleError, TopologicalSorter
+
+from harness.campaign.plan.stages import Stage
+from harness.errors import HarnessError
+
+
+class PlanError(HarnessError):
+    """A plan that can't be carried out: a stage needs one that nobody plans, or needs run in a circle."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Skipped:
+    """A stage that can't be carried out, because stages that it needs failed."""
+
+    stage: str
+    failed: tuple[str, ...]
+
+
+class Schedule:
+    """The stages that are left, each handed out when everything that it needs is done.
+
+    Of the stages that are ready, those of the campaign's first seeds come first, so that a seed's results are there
+    early; within a seed the one with the longest chain of stages behind it, so that the chain is not what ends last.
+    """
+
+    def __init__(self, stages: Sequence[Stage], finished: Iterable[str]) -> None:
+        """Raises PlanError where a stage needs an id that is neither planned nor finished, or needs are circular."""
+        finished = set(finished)
+        self._stages = {stage.id: stage for stage in stages if stage.id not in finished}
+        _check_needs(stages, finished)
+        needs = {name: [each for each in stage.needs if each not in finished] for name, stage in self._stages.items()}
+        self._needed_by: dict[str, list[str]] = {name: [] for name in needs}
+        for name, each in needs.items():
+            for needed in each:
+                self._needed_by[needed].append(name)
+        self._sorter = TopologicalSorter(needs)
+        try:
+            self._sorter.prepare()
+        except CycleError as error:
+            raise PlanError(f"stages need one another in a circle: {', '.join(error.args[1])}") from None
+        self._priorities = _priorities(list(self._stages.values()), self._needed_by)
+        self._ready: list[str] = []
+        self._failed: set[str] = set()
+        self._collect_ready()
+
+    def take(self) -> Stage | None:
+        """The next stage to carry out; None if none is ready."""
+        return self._stages[self._ready.pop(0)] if self._ready else None
+
+    def put_back(self, stage: Stage) -> None:
+        """A stage that was taken is to be carried out again, before any other."""
+        self._ready.insert(0, stage.id)
+
+    def done(self, stage: str) -> None:
+        """A stage that was taken is done: others may be ready now."""
+        self._sorter.done(stage)
+        self._collect_ready()
+
+    def fail(self, stage: str) -> list[Skipped]:
+        """A stage that was taken has failed. Returns the stages that are skipped because of it."""
+        self._failed.add(stage)
+        skipped: list[Skipped] = []
+        for name in self._needed_by[stage]:
+            if name not in self._failed:
+                failed = tuple(each for each in self._stages[name].needs if each in self._failed)
+                skipped += [Skipped(stage=name, failed=failed), *self.fail(name)]
+        return skipped
+
+    def _collect_ready(self) -> None:
+        self._ready += self._sorter.get_ready()
+        self._ready.sort(key=self._priorities.__getitem__)
+
+
+def _check_needs(stages: Sequence[Stage], finished: set[str]) -> None:
+    known = {stage.id for stage in stages} | finished
+    missing = [f"{stage.id} needs {name}" for stage in stages for name in stage.needs if name not in known]
+    if missing:
+        raise PlanError(f"{'; '.join(missing)}: neither planned nor finished")
+
+
+def _priorities(stages: Sequence[Stage], needed_by: Mapping[str, Sequence[str]]) -> dict[str, tuple[int, int, int]]:
+    """Of each stage: the place of its seed, the length of the chain behind it (longer first), its place in the plan."""
+
+    @cache
+    def chain(name: str) -> int:
+        return 1 + max(map(chain, needed_by[name]), default=0)
+
+    seeds = list(dict.fromkeys(stage.seed for stage in stages))
+    return {stage.id: (seeds.index(stage.seed), -chain(stage.id), place) for place, stage in enumerate(stages)}

@@ -1,0 +1,25 @@
+"""How much a training may learn: the campaign's budget, that of a best response, or that against several personas."""
+
+from __future__ import annotations
+
+from harness.campaign.plan.planned_drivers import members_of, persona_of
+from harness.campaign.plan.stages import TrainingStage
+from harness.config.campaign import Campaign, Training
+from harness.evaluation.strategies import BestResponse
+
+
+def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
+    """The settings of one training.
+
+    A best response has a budget of its own. A training against several personas has the budget, and the segment length
+    by which its learning curve is judged, times their number.
+    """
+    settings = campaign.training
+    if isinstance(stage.strategy, BestResponse):
+        assert campaign.best_response is not None
+        return settings.model_copy(update={"steps": campaign.best_response.steps})
+    personas = len({persona_of(each) for each in members_of(stage.opponent)})
+    if personas <= 1:
+        return settings
+    more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
+    return settings.model_copy(update=more)

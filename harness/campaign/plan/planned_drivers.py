@@ -1,0 +1,126 @@
+"""Which driver plays a player in a stage: a closed union, of which `execution.player_factory` makes drivers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, kw_only=True)
+class SumoDriven:
+    """SUMO's own models."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class External:
+    """The campaign's external ego, or another driver of its cross-play by name."""
+
+    name: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reconfigured:
+    """The external ego with the parameters that a search of this plan found."""
+
+    stage: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trained:
+    """The policy that a training of this plan makes."""
+
+    stage: str
+    persona: str = ""
+    """The persona with which it drives; empty: the ego's own."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrainedBefore:
+    """The policy that a training of this name made in another run, read from the campaign's folder of policies."""
+
+    stage: str
+    persona: str = ""
+    """The persona with which it drives; empty: the ego's own."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mixture:
+    """One of several drivers in each game, drawn by fixed shares."""
+
+    members: tuple[PlannedMember, ...]
+    shares: tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class EquilibriumMixture:
+    """One of several drivers in each game, drawn by the shares of an equilibrium."""
+
+    members: tuple[PlannedMember, ...]
+    arms: tuple[tuple[str, ...], ...]
+    """The assessments whose mean payoffs make the game: a row per ego, a column per non-ego."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestOf:
+    """Of several drivers the one with the highest mean payoff in games played for this choice alone."""
+
+    members: tuple[PlannedMember, ...]
+    persona: str = ""
+
+
+PlannedMember = SumoDriven | External | Reconfigured | Trained | TrainedBefore
+"""One driver, the same in every game."""
+PlannedDriver = PlannedMember | Mixture | EquilibriumMixture | BestOf
+
+
+def members_of(driver: PlannedDriver | None) -> tuple[PlannedMember, ...]:
+    """The drivers that may play: the members of a mixture or choice, or the driver itself."""
+    match driver:
+        case None:
+            return ()
+        case Mixture(members=members) | EquilibriumMixture(members=members) | BestOf(members=members):
+            return members
+        case _:
+            return (driver,)
+
+
+def persona_of(driver: PlannedDriver) -> str:
+    """The name of the persona with which a driver drives; empty: the ego's own."""
+    match driver:
+        case Trained(persona=persona) | TrainedBefore(persona=persona) | BestOf(persona=persona):
+            return persona
+        case _:
+            return ""
+
+
+def stages_before(driver: PlannedDriver | None) -> Iterable[str]:
+    """The stages of this plan that have to be done before a driver can play."""
+    for member in members_of(driver):
+        match member:
+            case Trained(stage=stage) | Reconfigured(stage=stage):
+                yield stage
+    if isinstance(driver, EquilibriumMixture):
+        for row in driver.arms:
+            yield from row
+
+
+def policies_before(driver: PlannedDriver | None) -> Iterable[str]:
+    """The policies of another run that a driver reads, each named after the stage that made it."""
+    for member in members_of(driver):
+        if isinstance(member, TrainedBefore):
+            yield member.stage
+
+
+def description(driver: PlannedDriver) -> str:
+    """The driver as the card of a policy names its opponent."""
+    match driver:
+        case SumoDriven():
+            return "sumo"
+        case External(name=name):
+            return name or "given"
+        case Reconfigured(stage=stage) | Trained(stage=stage) | TrainedBefore(stage=stage):
+            return stage
+        case BestOf():
+            return "best"
+        case Mixture(members=members) | EquilibriumMixture(members=members):
+            return "one in each game of " + ", ".join(description(each) for each in members)

@@ -1,0 +1,75 @@
+"""The driver that plays a strategy in a campaign: trained in it, trained before, searched, or external."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import PurePath
+
+from harness.campaign.plan.planned_drivers import (
+    External,
+    Mixture,
+    PlannedDriver,
+    PlannedMember,
+    Reconfigured,
+    SumoDriven,
+    Trained,
+    TrainedBefore,
+)
+from harness.campaign.plan.stages import stage_id
+from harness.config.campaign import LEARNED, SUMO, Campaign
+from harness.evaluation.strategies import (
+    NaiveEgo,
+    OtherEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    Strategy,
+    SumoNonEgo,
+    strategy_name,
+)
+
+
+def ego_learns(campaign: Campaign) -> bool:
+    """Whether the campaign's ego is a learned policy, trained in it or before."""
+    return campaign.ego.driver == LEARNED
+
+
+def driver_of(campaign: Campaign, strategy: Strategy, seed: int) -> PlannedMember:
+    """The driver that plays a strategy, for one training seed. A population has none: see `population_driver`."""
+    stage = stage_id(strategy_name(strategy), seed)
+    match strategy:
+        case SumoNonEgo() | OtherEgo(driver="sumo"):
+            return SumoDriven()
+        case OtherEgo(driver=name):
+            return External(name=name)
+        case ReconfiguredEgo():
+            return Reconfigured(stage=stage)
+        case NaiveEgo() if not ego_learns(campaign):
+            return SumoDriven() if campaign.ego.driver == SUMO else External()
+        case PersonaNonEgo(persona=persona):
+            return learned_driver(campaign, stage, persona)
+        case _:
+            return learned_driver(campaign, stage)
+
+
+def learned_driver(campaign: Campaign, stage: str, persona: str = "") -> Trained | TrainedBefore:
+    """The policy of a training stage: made by this plan, or read from the campaign's folder of policies."""
+    if campaign.policies is None:
+        return Trained(stage=stage, persona=persona)
+    return TrainedBefore(stage=stage, persona=persona)
+
+
+def population_driver(campaign: Campaign, shares: Mapping[str, float], seed: int) -> PlannedDriver:
+    """Personas by their shares, one of which is drawn for each game."""
+    members = tuple(driver_of(campaign, PersonaNonEgo(persona=name), seed) for name in shares)
+    return Mixture(members=members, shares=tuple(shares.values()))
+
+
+def crossplay_drivers(campaign: Campaign) -> dict[str, PlannedMember]:
+    """The drivers of the cross-play beside the campaign's own egos, by name."""
+    written = campaign.crossplay.egos if campaign.crossplay is not None else []
+    return {name: driver_of(campaign, OtherEgo(driver=name), 0) for name in map(crossplay_name, written)}
+
+
+def crossplay_name(written: str) -> str:
+    """The name of a driver in arms: that of its document or folder."""
+    return PurePath(written).stem if written.endswith(".toml") else PurePath(written).name

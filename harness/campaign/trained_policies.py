@@ -1,0 +1,80 @@
+"""The policies of another run that a campaign reads instead of training: found, and checked against its personas."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from harness.campaign.plan.plan import plan
+from harness.config.campaign import Campaign, resolve
+from harness.config.persona import Persona
+from harness.config.toml_reading import nearest
+from harness.drivers.policy_file import Policy, check_no_archive, persona_hash, policy_files, read_policy
+from harness.errors import Problem, UsageError, collect
+from harness.game.state import EGO, ROLES
+
+
+def find_policies(file: Path, written: str | None) -> Path | None:
+    """The folder of policies that a campaign names. Raises UsageError if there is none."""
+    if written is None:
+        return None
+    folder = resolve(file, written)
+    check_no_archive(file, "policies", written, folder)
+    if not os.path.isdir(folder):
+        remedy = f"name one laid out as <run>/policies/; {_folders_beside(folder)}"
+        raise UsageError.of(file, "policies", f"{written!r}: there is no such folder", remedy)
+    return folder
+
+
+def check_policies(
+    file: Path, document: Campaign, ego_persona: Persona, personas: Sequence[Persona], folder: Path
+) -> list[Path]:
+    """The files of every policy that a campaign reads. Raises UsageError for each that is missing or does not fit."""
+    available = {each.name for each in folder.iterdir() if each.is_dir()}
+    by_name = {each.name: each for each in personas}
+    problems: list[Problem] = []
+    files: list[Path] = []
+    for name in dict.fromkeys(name for stage in plan(document, list(by_name)) for name in stage.reads):
+        if name not in available:
+            message = f"{document.policies!r} holds no policy {name!r}"
+            problems.append(Problem(str(file), "policies", message, _alternatives(name, available)))
+            continue
+        policy = collect(problems, lambda name=name: read_policy(folder / name))  # type: ignore[misc]
+        if policy is not None:
+            problems += _problems_of(policy, folder / name, ego_persona, by_name)
+        files += policy_files(folder / name)
+    if problems:
+        raise UsageError(problems)
+    return files
+
+
+def _problems_of(
+    policy: Policy, folder: Path, ego_persona: Persona, personas: Mapping[str, Persona]
+) -> Iterable[Problem]:
+    card = policy.card
+    if (stage := card.get("stage")) != folder.name:
+        message = f"was learned as {stage!r}, but is called {folder.name!r}"
+        yield Problem(str(folder), "stage", message, "give the folder its policy's name")
+    name = card.get("persona")
+    persona = ego_persona if card.get("player") == ROLES[EGO] else personas.get(str(name))
+    learned_by = card.get("persona_sha256")  # policies of earlier versions have none
+    if persona is not None and learned_by is not None and learned_by != persona_hash(persona):
+        message = f"was learned by {name!r} with another payoff or limits than the campaign's {persona.name!r} has"
+        yield Problem(str(folder), "persona_sha256", message, "train it again, or use the persona it was trained with")
+
+
+def _folders_beside(folder: Path) -> str:
+    """The folders that exist where one is missing."""
+    if not os.path.isdir(folder.parent):
+        return f"there is no folder {folder.parent}"
+    return nearest(folder.name, [each.name for each in folder.parent.iterdir() if each.is_dir()] or ["(no folder)"])
+
+
+def _alternatives(missing: str, available: Iterable[str]) -> str:
+    """A remedy for a missing policy: the seeds that its stage has, or the stages that exist."""
+    stage = missing.rpartition("-seed")[0]
+    parts = [each.rpartition("-seed") for each in available]
+    if seeds := sorted(int(seed) for name, _, seed in parts if name == stage and seed.isdecimal()):
+        return f"there is {stage!r} of seed {', '.join(map(str, seeds))}"
+    return nearest(stage, {name for name, _, _ in parts if name} or ["(no policy at all)"])

@@ -1,0 +1,175 @@
+"""Strategies and arms as records. Their names in tables, files and stages are derived here and nowhere else.
+
+| strategy | name |
+| --- | --- |
+| the ego as it is before round 2 | `naive` |
+| the ego retrained against a persona or population | `retrained_speedy`, from round 4 on `retrained_speedy_round4` |
+| the external ego with parameters searched against a persona or population | `reconfigured_speedy` |
+| the ego retrained against several personas at once | `robust` |
+| another driver in the cross-play | the name of its document or folder |
+| a persona's non-ego, or a population | `speedy`, from round 3 on `speedy_round3` |
+| SUMO's own driver as non-ego | `sumo` |
+| the k-th training of a player's best response | `naive_vs_speedy_ego_response1` |
+
+| arm | name |
+| --- | --- |
+| the ego alone | `naive_alone`; of round 2 `retrained_alone_speedy` |
+| the non-ego alone | `speedy_alone` |
+| both | `naive_vs_speedy`; the retrained ego against the persona of its training `retrained_vs_speedy` |
+| with one player replaced by its best response | `naive_vs_speedy_ego_response` |
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from harness.game.state import EGO, NON_EGO, ROLES
+
+PAPER_ROUNDS = 2
+"""The rounds of the paper: strategies of later rounds carry their round in their name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NaiveEgo:
+    """The ego of round 0: trained alone, or an external driver as it is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RetrainedEgo:
+    """The ego retrained against a persona or population, in an even round."""
+
+    against: str
+    round: int = PAPER_ROUNDS
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReconfiguredEgo:
+    """The external ego with the parameters that a search against a persona or population found."""
+
+    against: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobustEgo:
+    """The ego retrained against several personas at once."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class OtherEgo:
+    """A driver that takes part in the cross-play beside the campaign's own egos."""
+
+    driver: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class SumoNonEgo:
+    """SUMO's own law-abiding driver as non-ego."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PersonaNonEgo:
+    """The non-ego of a persona, in an odd round; or a population, of which each game has one persona."""
+
+    persona: str
+    round: int = 1
+
+
+@dataclass(frozen=True, kw_only=True)
+class BestResponse:
+    """One training of a player's best response to the other player of an arm."""
+
+    arm: Arm
+    """The arm in which the best response replaces the player."""
+    start: int
+
+
+EgoStrategy = NaiveEgo | RetrainedEgo | ReconfiguredEgo | RobustEgo | OtherEgo
+NonEgoStrategy = SumoNonEgo | PersonaNonEgo
+Strategy = EgoStrategy | NonEgoStrategy | BestResponse
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arm:
+    """A pairing that is assessed. A player of None does not take part."""
+
+    ego: EgoStrategy | None = None
+    non_ego: NonEgoStrategy | None = None
+    best_response_of: int | None = None
+    """The player (index of `ROLES`) that a best response replaces."""
+
+    @property
+    def pair(self) -> Arm:
+        """The arm without a best response."""
+        return replace(self, best_response_of=None)
+
+    @property
+    def name(self) -> str:
+        """The arm's name in tables and stages."""
+        pair = _pair_name(self.ego, self.non_ego)
+        return pair if self.best_response_of is None else f"{pair}_{ROLES[self.best_response_of]}_response"
+
+
+def strategy_name(strategy: Strategy) -> str:
+    """The strategy's name in tables, stages and policy folders."""
+    match strategy:
+        case NaiveEgo():
+            return "naive"
+        case RetrainedEgo(against=against, round=round_):
+            return f"retrained_{against}" + (f"_round{round_}" if round_ > PAPER_ROUNDS else "")
+        case ReconfiguredEgo(against=against):
+            return f"reconfigured_{against}"
+        case RobustEgo():
+            return "robust"
+        case OtherEgo(driver=driver):
+            return driver
+        case SumoNonEgo():
+            return "sumo"
+        case PersonaNonEgo(persona=persona, round=round_):
+            return persona + (f"_round{round_}" if round_ > 1 else "")
+        case BestResponse(arm=arm, start=start):
+            return f"{arm.name}{start}"
+
+
+def player_of(strategy: Strategy) -> int:
+    """The player (index of `ROLES`) that plays a strategy."""
+    match strategy:
+        case BestResponse(arm=arm):
+            assert arm.best_response_of is not None
+            return arm.best_response_of
+        case SumoNonEgo() | PersonaNonEgo():
+            return NON_EGO
+        case _:
+            return EGO
+
+
+def round_of(strategy: Strategy) -> int:
+    """The round that made a strategy; 0 for one that no round made."""
+    match strategy:
+        case RetrainedEgo(round=round_) | PersonaNonEgo(round=round_):
+            return round_
+        case ReconfiguredEgo():
+            return PAPER_ROUNDS
+        case _:
+            return 0
+
+
+def _pair_name(ego: EgoStrategy | None, non_ego: NonEgoStrategy | None) -> str:
+    if ego is None:
+        assert non_ego is not None, "an arm has at least one player"
+        return f"{strategy_name(non_ego)}_alone"
+    if non_ego is None:
+        match ego:
+            case RetrainedEgo(against=against, round=2):
+                return f"retrained_alone_{against}"
+            case ReconfiguredEgo(against=against):
+                return f"reconfigured_alone_{against}"
+            case _:
+                return f"{strategy_name(ego)}_alone"
+    opponent = strategy_name(non_ego)
+    match ego:
+        case RetrainedEgo(against=against, round=2) if against == opponent:
+            return f"retrained_vs_{opponent}"
+        case ReconfiguredEgo(against=against) if against == opponent:
+            return f"reconfigured_vs_{opponent}"
+        case _:
+            return f"{strategy_name(ego)}_vs_{opponent}"

@@ -1,0 +1,78 @@
+"""Names of strategies and arms: derived from records, each as the tables have always had it."""
+
+from __future__ import annotations
+
+import pytest
+
+from harness.evaluation.strategies import (
+    Arm,
+    BestResponse,
+    NaiveEgo,
+    NonEgoStrategy,
+    OtherEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    RobustEgo,
+    Strategy,
+    SumoNonEgo,
+    player_of,
+    round_of,
+    strategy_name,
+)
+from harness.game.state import EGO, NON_EGO
+
+SPEEDY = PersonaNonEgo(persona="speedy")
+RETRAINED = RetrainedEgo(against="speedy")
+LATER = RetrainedEgo(against="speedy", round=4)
+RESPONSE = Arm(ego=NaiveEgo(), non_ego=SPEEDY, best_response_of=NON_EGO)
+
+
+@pytest.mark.parametrize(
+    ("strategy", "name", "player", "round_"),
+    [
+        (NaiveEgo(), "naive", EGO, 0),
+        (RETRAINED, "retrained_speedy", EGO, 2),
+        (LATER, "retrained_speedy_round4", EGO, 4),
+        (ReconfiguredEgo(against="speedy"), "reconfigured_speedy", EGO, 2),
+        (RobustEgo(), "robust", EGO, 0),
+        (OtherEgo(driver="adas"), "adas", EGO, 0),
+        (SumoNonEgo(), "sumo", NON_EGO, 0),
+        (SPEEDY, "speedy", NON_EGO, 1),
+        (PersonaNonEgo(persona="speedy", round=3), "speedy_round3", NON_EGO, 3),
+        (BestResponse(arm=RESPONSE, start=2), "naive_vs_speedy_non_ego_response2", NON_EGO, 0),
+    ],
+)
+def test_strategy__name_player_and_round(strategy: Strategy, name: str, player: int, round_: int) -> None:
+    assert (strategy_name(strategy), player_of(strategy), round_of(strategy)) == (name, player, round_)
+
+
+@pytest.mark.parametrize(
+    ("arm", "name"),
+    [
+        (Arm(ego=NaiveEgo()), "naive_alone"),
+        (Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()), "naive_vs_sumo"),
+        (Arm(ego=NaiveEgo(), non_ego=SPEEDY), "naive_vs_speedy"),
+        (Arm(non_ego=SPEEDY), "speedy_alone"),
+        (Arm(non_ego=PersonaNonEgo(persona="speedy", round=3)), "speedy_round3_alone"),
+        (Arm(ego=RETRAINED), "retrained_alone_speedy"),
+        (Arm(ego=LATER), "retrained_speedy_round4_alone"),
+        (Arm(ego=ReconfiguredEgo(against="speedy")), "reconfigured_alone_speedy"),
+        (Arm(ego=RobustEgo()), "robust_alone"),
+        (Arm(ego=RETRAINED, non_ego=SPEEDY), "retrained_vs_speedy"),
+        (Arm(ego=ReconfiguredEgo(against="speedy"), non_ego=SPEEDY), "reconfigured_vs_speedy"),
+        (Arm(ego=RETRAINED, non_ego=PersonaNonEgo(persona="distracted")), "retrained_speedy_vs_distracted"),
+        (Arm(ego=RETRAINED, non_ego=PersonaNonEgo(persona="speedy", round=3)), "retrained_speedy_vs_speedy_round3"),
+        (Arm(ego=LATER, non_ego=SPEEDY), "retrained_speedy_round4_vs_speedy"),
+        (Arm(ego=OtherEgo(driver="adas"), non_ego=SPEEDY), "adas_vs_speedy"),
+        (RESPONSE, "naive_vs_speedy_non_ego_response"),
+    ],
+)
+def test_arm__name(arm: Arm, name: str) -> None:
+    assert arm.name == name
+
+
+@pytest.mark.parametrize("non_ego", [SPEEDY, SumoNonEgo()])
+def test_arm__a_best_response_belongs_to_its_pair(non_ego: NonEgoStrategy) -> None:
+    pair = Arm(ego=NaiveEgo(), non_ego=non_ego)
+    assert Arm(ego=NaiveEgo(), non_ego=non_ego, best_response_of=EGO).pair == pair.pair == pair
