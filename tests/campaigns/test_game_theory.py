@@ -14,7 +14,7 @@ from harness.campaign.execution.player_factory import equilibrium_of
 from harness.campaign.plan.planned_drivers import EquilibriumMixture, Trained
 from harness.campaign.storage.run_folder import RunFolder
 from tests.support.repository import REPOSITORY
-from tests.support.tiny import DISTRACTED, SPEEDY, finished, harness
+from tests.support.tiny import DISTRACTED, SPEEDY, TRAINING, finished, harness
 
 pytestmark = pytest.mark.slow
 
@@ -27,6 +27,7 @@ def arms_race() -> Path:
     return finished(
         name="arms_race",
         personas=[str(SPEEDY), str(DISTRACTED)],
+        training={**TRAINING, "steps": 1024},
         rounds={"count": 4, "against": "equilibrium", "stop_early": False},
         best_response=RESPONSE,
         crossplay={"egos": ["sumo", str(REPOSITORY / "egos/adas.toml")]},
@@ -39,6 +40,7 @@ def at_equilibrium() -> Path:
     """Of players who have learned nothing in a game of two episodes no gain can be told from 0."""
     return finished(
         name="equilibrium",
+        training={**TRAINING, "steps": 1024},
         rounds={"count": 4},
         best_response=RESPONSE,
         assessment={"episodes": 2},
@@ -79,7 +81,7 @@ def test_arms_race__the_same_bytes_when_some_of_it_is_done_again(tmp_path: Path)
     for name in names:
         shutil.rmtree(run / ".stages" / f"{name}-seed1")
     campaign = arms_race().with_suffix(".toml")
-    done = harness("campaign", campaign, "--out", run, timeout_s=600.0)
+    done = harness("campaign", campaign, "--out", run)
     assert done.returncode == 0, done.stdout + done.stderr
     assert {name: (run / name).read_bytes() for name in TABLES} == before
 

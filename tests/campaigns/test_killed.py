@@ -81,7 +81,7 @@ def test_campaign__killed_at_25_random_moments_is_uninterrupted(tmp_path: Path) 
         printed = end(process)
         assert "Traceback" not in printed, printed
         assert process.returncode in (0, -signal.SIGKILL), printed
-        wait_for(lambda leader=process.pid: not in_session(leader), "no process of it is left", 10.0)
+        wait_for(lambda leader=process.pid: not in_session(leader), "no process of it is left")
         if process.returncode == 0:
             assert numbers(run) == expected
             shutil.rmtree(run)

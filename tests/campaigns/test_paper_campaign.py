@@ -27,6 +27,7 @@ from harness.traffic.scene import open_scene
 from tests.support.tiny import (
     BY_SUMO,
     CAREFUL,
+    PATIENCE_S,
     SPEEDY,
     harness,
     learned_run,
@@ -230,7 +231,7 @@ def test_campaign__sumo_plays_a_replay_as_it_was_recorded(arm: str, run: Path, t
     command = [Path(sumo.SUMO_HOME) / "bin" / "sumo", "-c", folder / "scene.sumocfg", "--precision", "6"]
     command += ["--fcd-output", tmp_path / "played.xml", "--fcd-output.attributes", "id,x,y,angle,speed"]
     environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 0, done.stderr
 
     scene = open_scene(run / "scene")

@@ -104,7 +104,7 @@ def test_process__a_late_answer_is_not_waited_for(change: str, tmp_path: Path, c
     began = time.monotonic()
     with pytest.raises(DriverError, match=r"did not answer within 0.3 s \(asked: decide\)"):
         mine.decide(GAMES, SEEN, NOISE)
-    assert time.monotonic() - began < 5.0
+    assert time.monotonic() - began < 60.0  # it would sleep for 600
 
 
 def test_process__who_never_reads_is_late_however_much_there_is_to_say(tmp_path: Path, car: Car) -> None:
@@ -139,7 +139,7 @@ def test_process__ends_with_its_driver(tmp_path: Path, car: Car) -> None:
     assert is_running(pid)
     del mine
     gc.collect()
-    wait_for(lambda: not is_running(pid), "the end of the program", 5.0)
+    wait_for(lambda: not is_running(pid), "the end of the program")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="what kills it with its parent is Linux's")
@@ -159,13 +159,13 @@ time.sleep(600)
 
     parent = subprocess.Popen([sys.executable, "-c", script])
     try:
-        wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text(), "the program's start", 30.0)
+        wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text(), "the program's start")
         pid = int((tmp_path / "pid").read_text())
         assert is_running(pid)
     finally:
         parent.send_signal(signal.SIGKILL)
         parent.wait()
-    wait_for(lambda: not is_running(pid), "the end of the program", 5.0)
+    wait_for(lambda: not is_running(pid), "the end of the program")
 
 
 def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car: Car) -> None:

@@ -14,7 +14,7 @@ from harness.replay.selection import choose_games, replay_name, worst_first
 from harness.reports import page as page_module
 from harness.reports.page import duration, render_page
 from harness.reports.wording import effect, number, p_number, p_text, percent, verdicts
-from tests.support.pages import Page, campaign, recomputed, recordings, with_errors
+from tests.support.pages import Page, blank_figures, campaign, recomputed, recordings, with_errors
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +65,8 @@ def test_page__each_table_links_its_file(page):
 
 def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatch):
     monkeypatch.setattr(page_module, "MOST_ROWS", 10)
-    page = Page(render_page(**small))
+    with blank_figures():
+        page = Page(render_page(**small))
     assert "episodes" not in page.tables
     assert f"{len(small['episodes'])} games are too many for a page" in page.text
 
@@ -79,7 +80,8 @@ def text_of(arguments):
 
 
 def without_curves(arguments):
-    return render_page(**arguments | {"training": arguments["training"][:0]})
+    with blank_figures():
+        return render_page(**arguments | {"training": arguments["training"][:0]})
 
 
 def verdict_texts(arguments):

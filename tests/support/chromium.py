@@ -76,7 +76,7 @@ def opener(browser, report):
         context.close()
 
 
-def until(page, expression, argument=None, seconds=20.0):
+def until(page, expression, argument=None, seconds=300.0):
     """Wait until a function of JavaScript is true; Playwright's own way of waiting breaks the page's policy."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression, argument):

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
+from contextlib import contextmanager
 from html.parser import HTMLParser
 
 import numpy as np
 import pandas as pd
+import pytest
+from matplotlib.figure import Figure
 
 from harness.evaluation.comparison import compare
 from harness.evaluation.research_questions import Question
@@ -121,6 +124,14 @@ def _windows(stage, seed, random):
             "games": 900,
             "mean_duration_s": 11.5,
         }
+
+
+@contextmanager
+def blank_figures():
+    """Figures are laid out, but drawn blank: to draw them takes most of a page's time, and its text needs none."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", lambda figure, file, **_: file.write('<svg viewBox="0 0 1 1"></svg>'))
+        yield
 
 
 def recordings(arguments, others=2):

@@ -22,6 +22,7 @@ MERGE = REPOSITORY / "networks" / "merge"
 CAREFUL, SPEEDY, DISTRACTED = (REPOSITORY / "personas" / f"{name}.toml" for name in ("careful", "speedy", "distracted"))
 HARNESS = Path(sys.executable).with_name("harness")
 TABLES = ("episodes.csv", "summary.csv", "comparisons.csv")
+PATIENCE_S = 600.0  # a bound on waiting: on a busy machine a second of work takes many; only a hang takes this long
 ALL_TABLES = (*TABLES, "training.csv", "manoeuvres.csv")
 
 TRAINING: dict[str, Any] = {
@@ -90,7 +91,7 @@ def _inline(value: Any) -> str:
     return f"[{', '.join(map(_inline, value))}]" if isinstance(value, list | tuple) else json.dumps(value)
 
 
-def harness(*arguments: object, timeout_s: float = 200.0, **options: Any) -> subprocess.CompletedProcess[str]:
+def harness(*arguments: object, timeout_s: float = PATIENCE_S, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run the command to its end."""
     command = [HARNESS, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False, **options)
@@ -117,7 +118,7 @@ def _heed_all() -> None:
 def end(process: subprocess.Popen[str]) -> str:
     """Wait for the command; what it printed. Whatever is left of it is killed, so that a failed test leaves nothing."""
     try:
-        return process.communicate(timeout=120)[0]
+        return process.communicate(timeout=PATIENCE_S)[0]
     finally:
         if left := in_session(process.pid):
             for each in left:
@@ -150,7 +151,7 @@ def _read(path: str) -> bytes:
         return b""
 
 
-def wait_for(condition: Callable[[], object], what: str, seconds: float = 60.0) -> None:
+def wait_for(condition: Callable[[], object], what: str, seconds: float = PATIENCE_S) -> None:
     """Wait until the condition holds; fails, naming it, if it does not in time."""
     until = time.monotonic() + seconds
     while not condition():
@@ -181,7 +182,7 @@ def finished(*options: object, **changes: Any) -> Path:
 
     def build(folder: Path) -> None:
         campaign = write_campaign(folder, **changes)
-        done = harness("campaign", campaign, "--out", campaign.with_suffix(""), *options, timeout_s=900.0)
+        done = harness("campaign", campaign, "--out", campaign.with_suffix(""), *options)
         assert done.returncode == 0, done.stdout + done.stderr
         (folder / "printed").write_text(done.stdout, encoding="utf-8")
 
