@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html.parser import HTMLParser
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -22,13 +24,20 @@ GAMES = 60
 FAILING = {"alone": 0.0, "sumo": 0.03, "naive": 0.3, "retrained": 0.03}
 
 
-def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=GAMES, quick=False, retrained=True):
+def campaign(
+    personas: Sequence[str] = ("speedy", "distracted"),
+    seeds: Sequence[int] = (1,),
+    failing: Mapping[str, float] | None = None,
+    games: int = GAMES,
+    quick: bool = False,
+    retrained: bool = True,
+) -> dict[str, Any]:
     """The arguments of render_page for a made-up campaign, its tables computed as those of a real one.
 
     `failing` overrides FAILING: the share of games the ego fails, by kind of arm.
     """
-    rates = FAILING | (failing or {})
-    arms = [("naive_alone", "", "alone"), ("naive_vs_sumo", "", "sumo")]
+    rates = {**FAILING, **(failing or {})}
+    arms: list[tuple[str, str, str | None]] = [("naive_alone", "", "alone"), ("naive_vs_sumo", "", "sumo")]
     stages = ["naive"]
     for persona in personas:
         arms += [(f"{persona}_alone", persona, None), (f"naive_vs_{persona}", persona, "naive")]
@@ -41,22 +50,14 @@ def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=
             stages.append(f"retrained_{persona}")
     random = np.random.default_rng(7)
     rows = [
-        _game(arm, persona, seed, episode, rates.get(kind), random)
+        _game(arm, persona, seed, episode, rates.get(kind) if kind else None, random)
         for arm, persona, kind in arms
         for seed in seeds
         for episode in range(games)
     ]
     episodes = typed(pd.DataFrame(rows, columns=list(TABLES["episodes"])))
-    questions = [
-        Question(question, persona, seed, before, after)
-        for persona in personas
-        for seed in seeds
-        for question, before, after in (
-            ("RQ1", "naive_alone", f"naive_vs_{persona}"),
-            ("RQ2", f"naive_vs_{persona}", f"retrained_vs_{persona}"),
-        )
-        if question == "RQ1" or retrained
-    ]
+    asked: tuple[Literal["RQ1", "RQ2"], ...] = ("RQ1", "RQ2") if retrained else ("RQ1",)
+    questions = [_question(question, persona, seed) for persona in personas for seed in seeds for question in asked]
     training = pd.DataFrame([row for stage in stages for seed in seeds for row in _windows(stage, seed, random)])
     manifest = {
         "format": 1,
@@ -88,8 +89,21 @@ def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=
     }
 
 
-def _game(arm, persona, seed, episode, failing, random):
-    row = {"arm": arm, "persona": persona, "seed": seed, "episode": episode, "duration_s": random.uniform(9, 14)}
+def _question(question: Literal["RQ1", "RQ2"], persona: str, seed: int) -> Question:
+    baseline = "naive_alone" if question == "RQ1" else f"naive_vs_{persona}"
+    return Question(question, persona, seed, baseline, f"{'naive' if question == 'RQ1' else 'retrained'}_vs_{persona}")
+
+
+def _game(
+    arm: str, persona: str, seed: int, episode: int, failing: float | None, random: np.random.Generator
+) -> dict[str, object]:
+    row: dict[str, object] = {
+        "arm": arm,
+        "persona": persona,
+        "seed": seed,
+        "episode": episode,
+        "duration_s": random.uniform(9, 14),
+    }
     row |= {"ego_outcome": "", "non_ego_outcome": "", "error": ""}
     if failing is not None:
         failed = episode < failing * GAMES
@@ -111,7 +125,7 @@ def _game(arm, persona, seed, episode, failing, random):
     return row
 
 
-def _windows(stage, seed, random):
+def _windows(stage: str, seed: int, random: np.random.Generator) -> Iterator[dict[str, object]]:
     persona = stage.removeprefix("retrained_") if stage != "naive" else ""
     for window in range(1, 10):
         yield {
@@ -127,24 +141,24 @@ def _windows(stage, seed, random):
 
 
 @contextmanager
-def blank_figures():
+def blank_figures() -> Iterator[None]:
     """Figures are laid out, but drawn blank: to draw them takes most of a page's time, and its text needs none."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", lambda figure, file, **_: file.write('<svg viewBox="0 0 1 1"></svg>'))
         yield
 
 
-def recordings(arguments, others=2):
+def recordings(arguments: Mapping[str, Any], others: int = 2) -> dict[str, Any]:
     """What render_page takes beside a campaign, of games drawn to fit it."""
     games = recorded(arguments["episodes"], others)
     return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
 
 
-def _done(seed):
+def _done(seed: int) -> dict[str, object]:
     return {"kind": "assessment", "seed": seed, "status": "done", "seconds": 12.34, "message": ""}
 
 
-def _training_stage(seed):
+def _training_stage(seed: int) -> dict[str, object]:
     trained = {"steps": 1_179_648, "budget_steps": 3_000_000, "stopped": "converged", "rule": "the curve is flat"}
     return {"kind": "training", "seed": seed, "status": "done", "seconds": 3725.0, "message": ""} | trained
 
@@ -152,43 +166,46 @@ def _training_stage(seed):
 class Page(HTMLParser):
     """What a test asks of a page: its text, its tables by id, every tag with its attributes."""
 
-    def __init__(self, html):
+    def __init__(self, html: str) -> None:
         super().__init__()
-        self.tags, self.pieces, self.tables = [], [], {}
-        self._table = self._cell = None
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.pieces: list[str] = []
+        self.tables: dict[str, list[list[dict[str, Any]]]] = {}
+        self._table: list[list[dict[str, Any]]] = []
+        self._cell: dict[str, Any] | None = None
         self._silent = 0
         self.feed(html)
         self.text = " ".join("".join(self.pieces).split())
 
-    def handle_starttag(self, tag, attributes):
-        attributes = dict(attributes)
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        attributes = dict(attrs)
         self.tags.append((tag, attributes))
         self._silent += tag in ("style", "script")
         if tag == "table":
-            self._table = self.tables.setdefault(attributes.get("id", f"table {len(self.tables)}"), [])
+            self._table = self.tables.setdefault(attributes.get("id") or f"table {len(self.tables)}", [])
         elif tag == "tr":
             self._table.append([])
         elif tag in ("td", "th"):
             self._cell = {"exact": attributes.get("data-value", attributes.get("data-column")), "text": ""}
             self._table[-1].append(self._cell)
 
-    def handle_endtag(self, tag):
+    def handle_endtag(self, tag: str) -> None:
         self._silent -= tag in ("style", "script")
         if tag in ("td", "th"):
             self._cell = None
 
-    def handle_data(self, data):
+    def handle_data(self, data: str) -> None:
         if not self._silent:
             self.pieces.append(data)
         if self._cell is not None:
             self._cell["text"] += data
 
-    def cells(self, name):
+    def cells(self, name: str) -> list[list[str]]:
         """A table of the page as the CSV file should have it, its header first."""
         return [[cell["text"] if cell["exact"] is None else cell["exact"] for cell in row] for row in self.tables[name]]
 
 
-def with_errors(arguments, games):
+def with_errors(arguments: dict[str, Any], games: pd.Series) -> dict[str, Any]:
     """The campaign with `games`, a mask over its episodes, that could not be played."""
     frame = arguments["episodes"]
     frame.loc[games, "ego_outcome"] = "error"
@@ -215,17 +232,11 @@ CONTRAST = """element => {
 """WCAG's contrast ratio of an element's text with the first ground behind it that is not transparent."""
 
 
-def recomputed(arguments):
+def recomputed(arguments: dict[str, Any]) -> dict[str, Any]:
     """The campaign with tables that fit its changed episodes."""
     old = arguments["comparisons"]
     questions = [
-        Question(
-            row["question"],
-            row["persona"],
-            row["seed"],
-            "naive_alone" if row["question"] == "RQ1" else f"naive_vs_{row['persona']}",
-            f"{'naive' if row['question'] == 'RQ1' else 'retrained'}_vs_{row['persona']}",
-        )
+        _question(row["question"], row["persona"], row["seed"])
         for row in old[old["metric"] == "failure"].to_dict("records")
     ]
     arguments["summary"] = summarise(arguments["episodes"])
