@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from tests.support.chromium import launched, opener
-from tests.reports.test_page import campaign, recordings, with_errors
 
-from harness.reports.page import render_page
+from tests.reports.test_page import campaign, recordings, rendered, with_errors
+from tests.support.chromium import launched, opener
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +24,7 @@ def report(tmp_path_factory):
 
 def write(folder, arguments):
     path = folder / "report.html"
-    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    path.write_text(rendered(**arguments, **recordings(arguments)), encoding="utf-8")
     return path
 
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from tests.support.chromium import launched, opener, until
-from tests.reports.test_page import campaign, recordings, with_errors
 
-from harness.reports.page import render_page
 from harness.evaluation.tables import write_csv
+from tests.reports.test_page import campaign, recordings, rendered, with_errors
+from tests.support.chromium import launched, opener, until
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +27,7 @@ def arguments():
 @pytest.fixture(scope="module")
 def report(arguments, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    path.write_text(rendered(**arguments, **recordings(arguments)), encoding="utf-8")
     return path
 
 

@@ -6,11 +6,11 @@ import zlib
 
 import numpy as np
 import pytest
-from tests.support.recorded import SCENE, recorded
-from tests.reports.test_page import campaign
 
 from harness.reports.embedding import NOTHING, SCALES, Embedded, columns_of, pack
 from harness.reports.player_data import key
+from tests.reports.test_page import campaign
+from tests.support.recorded import SCENE, recorded
 
 
 @pytest.fixture(scope="module")

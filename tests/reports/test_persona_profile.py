@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.support.chromium import launched, opener
 from rich.console import Console
-from tests.game.test_bicycle import advance, state_of
-from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY, harness
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
@@ -35,6 +32,9 @@ from harness.reports.persona.profile import (
 )
 from harness.reports.persona.terminal import show
 from harness.reports.persona.worth import EXAMPLES, LIMITED
+from tests.game.test_bicycle import advance, state_of
+from tests.support.chromium import launched, opener
+from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY, harness
 
 TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), crown_rad=0.005, bumps_rad=0.001)
 
