@@ -9,8 +9,9 @@ class Change(NamedTuple):
     """What round 2 makes of the ego."""
 
     made: str
-    """What the ego is afterwards; its arms are called so."""
+    """The name of the ego afterwards, with which the names of its arms begin."""
     doing: str
+    """The treatment, as a noun."""
 
 
 RETRAINED = Change("retrained", "retraining")
@@ -20,4 +21,4 @@ ARMS = {
     "RQ1": lambda persona, change: ("naive_alone", f"naive_vs_{persona}"),
     "RQ2": lambda persona, change: (f"naive_vs_{persona}", f"{change.made}_vs_{persona}"),
 }
-"""Baseline and treatment of each question, of a persona and what round 2 does."""
+"""Baseline and treatment arm of each question, by persona and change."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from harness.reports.page import render_page
+from tests.support.pages import campaign, recordings, rendered, with_errors
 from tests.support.chromium import launched, opener
 from tests.support.pages import CONTRAST, campaign, recordings, with_errors
 
@@ -25,7 +25,7 @@ def report(tmp_path_factory):
 
 def write(folder, arguments):
     path = folder / "report.html"
-    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    path.write_text(rendered(**arguments, **recordings(arguments)), encoding="utf-8")
     return path
 
 

@@ -7,14 +7,29 @@ import re
 import pandas as pd
 import pytest
 
-from harness.evaluation.comparison import Verdict
+from harness.evaluation.comparison import Verdict, compare
+from harness.evaluation.research_questions import Question
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import TABLES, typed, write_csv
 from harness.replay.selection import choose_games, replay_name, worst_first
 from harness.reports import page as page_module
-from harness.reports.page import duration, render_page
-from harness.reports.wording import effect, number, p_number, p_text, percent, verdicts
-from tests.support.pages import Page, campaign, recomputed, recordings, with_errors
+from harness.reports.numbers import duration, number, p_number, p_text, percent
+from harness.reports.page import render_page
+from harness.reports.page_wording import FAILS_ALONE, QUICK, as_many_failures
+from harness.reports.run_tables import RunTables
+from harness.reports.wording import (
+    BEFORE_HOLM_ONLY,
+    NO_DIFFERENCE,
+    NO_ROUND_2,
+    NO_T_STATISTIC,
+    arms_not_played,
+    effect,
+    left_out,
+    too_few,
+    verdicts,
+)
+from tests.support.recorded import SCENE, manoeuvres, recorded
+from tests.support.pages import Page, rendered, campaign, recomputed, recordings, with_errors
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +39,7 @@ def small():
 
 @pytest.fixture(scope="module")
 def html(small):
-    return render_page(**small)
+    return rendered(**small)
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +80,7 @@ def test_page__each_table_links_its_file(page):
 
 def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatch):
     monkeypatch.setattr(page_module, "MOST_ROWS", 10)
-    page = Page(render_page(**small))
+    page = Page(rendered(**small))
     assert "episodes" not in page.tables
     assert f"{len(small['episodes'])} games are too many for a page" in page.text
 
@@ -79,7 +94,7 @@ def text_of(arguments):
 
 
 def without_curves(arguments):
-    return render_page(**arguments | {"training": arguments["training"][:0]})
+    return rendered(**arguments | {"training": arguments["training"][:0]})
 
 
 def verdict_texts(arguments):
@@ -99,7 +114,7 @@ def test_words__significant_is_a_yes_with_counts_and_p_values():
     assert rq1[1].endswith("also after Holm's correction).")
     assert rq2[0] == "RQ2: yes"
     assert rq2[1].startswith(
-        "Retraining brings the ego's failures against the speedy driver down to 2 of 60 games from 18 of 60 (p"
+        "Retraining reduces the ego's failures against the speedy driver from 18 of 60 games to 2 of 60 (p"
     )
 
 
@@ -119,7 +134,7 @@ def test_words__significant_before_holm_only_is_not_a_yes():
     arguments["comparisons"].loc[failure, "verdict"] = Verdict.BEFORE_HOLM_ONLY.value
     rq1, _ = verdict_texts(arguments)
     assert rq1[0] == "RQ1: only before Holm's correction"
-    assert "significantly more often by itself, but not after Holm's correction (p = 0.0" in rq1[1]
+    assert f"significantly more often {BEFORE_HOLM_ONLY} (p = 0.0" in rq1[1]
     assert "p = 0.025 after Holm's correction" in rq1[1]
 
 
@@ -127,14 +142,14 @@ def test_words__no_difference():
     rq1, rq2 = verdict_texts(campaign(personas=["speedy"], failing={"naive": 0, "retrained": 0}))
     for label, sentence in (rq1, rq2):
         assert label.endswith("no difference")
-        assert "In each of the 60 pairs both games ended alike, so there is nothing to test." in sentence
+        assert NO_DIFFERENCE.format(pairs=60) in sentence
 
 
 def test_words__all_differences_equal_names_mcnemars_p_and_never_says_significant():
     rq1, _ = verdict_texts(campaign(personas=["speedy"], failing={"naive": 1}))
     assert rq1[0] == "RQ1: no t statistic"
-    assert "All 60 pairs differ alike, so the t-test does not exist" in rq1[1]
-    assert "McNemar's exact test, which does, gives p < 0.0001. That is below the campaign's significance" in rq1[1]
+    assert NO_T_STATISTIC.format(pairs=60) in rq1[1]
+    assert "McNemar's exact test gives p < 0.0001. This is below the campaign's significance" in rq1[1]
     assert "significantly" not in rq1[1]
 
 
@@ -143,23 +158,23 @@ def test_words__not_enough_pairs():
     lost = (arguments["episodes"]["arm"] == "naive_vs_speedy") & (arguments["episodes"]["episode"] > 0)
     rq1, _ = verdict_texts(with_errors(arguments, lost))
     assert rq1[0] == "RQ1: not answered"
-    assert "but only one pair of games could be compared: too few for a test." in rq1[1]
-    assert "59 of 60 pairs are left out: not played or not measured." in rq1[1]
+    assert too_few(1) in rq1[1]
+    assert left_out({"pairs": 1, "pairs_left_out": 59}) in rq1[1]
 
 
 def test_words__an_arm_that_was_not_played_is_named():
     arguments = campaign(personas=["speedy"])
     rq1, rq2 = verdict_texts(with_errors(arguments, arguments["episodes"]["arm"] == "retrained_vs_speedy"))
     assert rq1[0] == "RQ1: yes"
-    assert rq2 == ("RQ2: not answered", "The arm retrained_vs_speedy was not played.")
+    assert rq2 == ("RQ2: not answered", arms_not_played(["retrained_vs_speedy"]))
 
 
 def test_words__a_stage_that_is_not_done_leaves_its_question_open_not_unasked():
     arguments = without_arm(campaign(personas=["speedy"]), "retrained_vs_speedy", seeds=[1])
-    assert verdict_texts(arguments)[1] == ("RQ2: not answered", "The arm retrained_vs_speedy was not played.")
+    assert verdict_texts(arguments)[1] == ("RQ2: not answered", arms_not_played(["retrained_vs_speedy"]))
     arguments = without_arm(campaign(personas=["speedy"], seeds=(1, 2)), "retrained_vs_speedy", seeds=[2])
     assert verdict_texts(arguments)[1][0] == "RQ2: yes in 1 of 2 seeds"
-    assert "Seed 2: not answered. The arm retrained_vs_speedy was not played." in text_of(arguments)
+    assert f"Seed 2: not answered. {arms_not_played(['retrained_vs_speedy'])}" in text_of(arguments)
 
 
 def without_arm(arguments, arm, seeds):
@@ -178,7 +193,7 @@ def test_words__without_retraining_round_2_was_not_played():
     arguments = campaign(personas=["speedy"], retrained=False)
     rq1, rq2 = verdict_texts(arguments)
     assert rq1[0] == "RQ1: yes"
-    assert rq2[1] == "Round 2 was not played: there is nothing to train or to tune in this ego."
+    assert rq2[1] == NO_ROUND_2
     assert "retrained vs" not in without_curves(arguments)
 
 
@@ -198,14 +213,14 @@ def test_words__several_seeds_are_counted_and_shown_each():
 
 
 def test_words__an_ordinary_driver_that_does_as_much_harm_is_pointed_out(page):
-    assert "an ordinary driver does it too" not in page.text
-    worse = text_of(campaign(personas=["speedy"], failing={"sumo": 0.4}))
-    assert "That is no less often than against speedy: an ordinary driver does it too." in worse
+    sentence = as_many_failures("speedy", seeds=[1], several=False)
+    assert sentence not in page.text
+    assert sentence in text_of(campaign(personas=["speedy"], failing={"sumo": 0.4}))
 
 
 def test_words__an_ego_that_fails_alone_is_pointed_out(page):
     assert "Caution" not in page.text
-    assert "The naive ego fails alone as well" in text_of(campaign(personas=["speedy"], failing={"alone": 0.1}))
+    assert FAILS_ALONE in text_of(campaign(personas=["speedy"], failing={"alone": 0.1}))
 
 
 @pytest.mark.parametrize("question", ["RQ1", "RQ2"])
@@ -215,7 +230,7 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
     row |= {"p_value": 0.004, "p_holm": 0.02, "mcnemar_p": 0.004}
     rows = [row | {"metric": metric} for metric in ("failure", "mean_speed")]
     arms = {(arm["arm"], arm["seed"]): arm for arm in small["summary"].to_dict("records")}
-    answer = verdicts(question, "speedy", [1], rows, arms, 0.01)
+    answer = verdicts(question, "speedy", seeds=[1], rows=rows, arms=arms, significance=0.01)
     yes = verdict is Verdict.SIGNIFICANT
     assert (answer.label == "yes") == yes
     assert (answer.tone != "open") == yes
@@ -225,7 +240,7 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
         if verdict in (Verdict.NO_DIFFERENCE, Verdict.ALL_EQUAL, Verdict.NOT_ENOUGH_PAIRS):
             assert "significantly" not in text
         if verdict is Verdict.BEFORE_HOLM_ONLY:
-            assert "by itself, but not after Holm's correction" in text
+            assert BEFORE_HOLM_ONLY in text
         if verdict is Verdict.NOT_SIGNIFICANT:
             assert "not significantly" in text
 
@@ -236,8 +251,9 @@ def test_words__one_seed_of_several_is_harm_enough_but_not_mended():
     for question, tone in (("RQ1", "harm"), ("RQ2", "open")):
         rows = [row for row in arguments["comparisons"].to_dict("records") if row["question"] == question]
         rows = [row | {"verdict": Verdict.NOT_SIGNIFICANT.value} if row["seed"] == 2 else row for row in rows]
-        assert verdicts(question, "speedy", [1, 2], rows, arms, 0.01).label == "yes in 1 of 2 seeds"
-        assert verdicts(question, "speedy", [1, 2], rows, arms, 0.01).tone == tone
+        answer = verdicts(question, "speedy", seeds=[1, 2], rows=rows, arms=arms, significance=0.01)
+        assert answer.label == "yes in 1 of 2 seeds"
+        assert answer.tone == tone
 
 
 def test_p_values__are_never_rounded_to_nothing_or_certainty():
@@ -278,9 +294,8 @@ def test_effect__names_the_direction_it_has(question, metric, mean, words):
 
 
 def test_banner__a_quick_run_says_so(page):
-    warning = "Quick run: fewer training steps than table 1; not for conclusions."
-    assert warning in text_of(campaign(personas=["speedy"], quick=True))
-    assert warning not in page.text
+    assert QUICK in text_of(campaign(personas=["speedy"], quick=True))
+    assert QUICK not in page.text
 
 
 def test_banner__stages_that_are_not_done_are_named_with_their_message(page):
@@ -346,7 +361,7 @@ def test_page__names_from_documents_stay_text():
     arguments["manifest"]["name"] = hostile
     arguments["manifest"]["versions"] |= {hostile: hostile}
     with_errors(arguments, arguments["episodes"]["episode"] == 0)
-    html = render_page(**arguments, **recordings(arguments))
+    html = rendered(**arguments, **recordings(arguments))
     page = Page(html)
     assert hostile in page.text
     assert {tag for tag, _ in page.tags}.isdisjoint({"img", "iframe", "object", "link", "base"})
@@ -393,9 +408,7 @@ def test_page__every_table_has_a_caption_and_scoped_headings(html, page):
 
 
 def test_page__an_empty_run_is_a_page_too():
-    tables = ("episodes", "summary", "comparisons", "training", "manoeuvres")
-    empty = {name: typed(pd.DataFrame(columns=list(TABLES[name]))) for name in tables}
-    page = Page(render_page({"name": "merge", "stages": {}}, **empty, replays=[]))
+    page = Page(rendered(manifest={"name": "merge", "stages": {}}))
     assert "No persona has been assessed yet." in page.text
 
 
@@ -403,7 +416,7 @@ def test_page__draws_without_touching_matplotlibs_global_state(small):
     import matplotlib
 
     before = dict(matplotlib.rcParams)
-    render_page(**small)
+    rendered(**small)
     assert dict(matplotlib.rcParams) == before
 
 
@@ -411,7 +424,7 @@ def test_page__takes_nothing_from_the_users_matplotlib_settings(small, html):
     import matplotlib
 
     with matplotlib.rc_context({"font.size": 30, "text.usetex": True, "axes.facecolor": "red"}):
-        assert render_page(**small) == html
+        assert rendered(**small) == html
 
 
 # --- manoeuvres ---

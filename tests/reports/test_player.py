@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from harness.reports.page import GAMES_BYTES, PAGE_BYTES, render_page
+from harness.reports.page import GAMES_BYTES, PAGE_BYTES
 from harness.reports.player_data import key
+from tests.support.pages import campaign, recordings, rendered
 from tests.support.chromium import launched, opener, until
-from tests.support.pages import campaign, recordings
 from tests.support.recorded import STEP_S, recorded
 
 GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and what retraining made of it
@@ -36,7 +36,7 @@ def games(arguments):
 @pytest.fixture(scope="module")
 def report(arguments, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    path.write_text(rendered(**arguments, **recordings(arguments)), encoding="utf-8")
     return path
 
 
@@ -360,7 +360,7 @@ def test_player__hostile_names_are_inert(browser, tmp_path):
     found = recordings(arguments)
     found["manoeuvres"]["text"] = hostile
     path = tmp_path / "report.html"
-    path.write_text(render_page(**arguments, **found), encoding="utf-8")
+    path.write_text(rendered(**arguments, **found), encoding="utf-8")
     with opener(browser, path) as open_page:
         page = open_page()
         page.wait_for_selector(".player[data-ready]")
@@ -375,7 +375,7 @@ def test_player__hostile_names_are_inert(browser, tmp_path):
 
 def test_page__of_a_default_campaign_is_small_and_soon_interactive(browser, tmp_path):
     arguments = campaign(games=100)
-    html = render_page(**arguments, **recordings(arguments, others=6))
+    html = rendered(**arguments, **recordings(arguments, others=6))
     assert len(html.encode()) <= PAGE_BYTES
     assert "more games are too many" not in html
     path = tmp_path / "report.html"
@@ -390,7 +390,7 @@ def test_page__of_a_default_campaign_is_small_and_soon_interactive(browser, tmp_
 def test_page__what_is_too_much_is_left_to_the_run_folder(arguments, monkeypatch):
     monkeypatch.setattr("harness.reports.page.GAMES_BYTES", 50_000)
     assert GAMES_BYTES > 50_000
-    html = render_page(**arguments, **recordings(arguments))
+    html = rendered(**arguments, **recordings(arguments))
     shown = len(re.findall(r'"packed"', html))
     assert 0 < shown < len(arguments["episodes"])
     assert f"{shown} recorded games" in html

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from harness.reports.page_wording import MIXED_VERSIONS
 from harness.reports.provenance import mixed_versions
 from tests.support.tiny import harness, sumo_run
 
@@ -26,7 +27,7 @@ def test_mixed_versions__of_one_there_is_nothing_to_say() -> None:
 
 def test_mixed_versions__names_what_differs_and_nothing_else() -> None:
     assert mixed_versions(stages(a=[NEW], b=[OLD], c=[NEW])) == [
-        "This run mixes versions: its numbers are not promised to be those of one version.",
+        MIXED_VERSIONS,
         "  by numpy 2.2.6: a, c",
         "  by numpy 2.1.0: b",
     ]

@@ -1,4 +1,4 @@
-"""Reports of made-up campaigns: what render_page takes, and what a page holds."""
+"""Reports of made-up campaigns: their tables, the rendered page, and what it holds."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from harness.evaluation.research_questions import Question
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import TABLES, typed
 from harness.replay.selection import choose_games, replay_name
+from harness.reports.page import render_page
+from harness.reports.run_tables import RunTables
 from tests.support.recorded import SCENE, manoeuvres, recorded
 
 GAMES = 60
@@ -20,7 +22,7 @@ FAILING = {"alone": 0.0, "sumo": 0.03, "naive": 0.3, "retrained": 0.03}
 
 
 def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=GAMES, quick=False, retrained=True):
-    """The arguments of render_page for a made-up campaign, its tables computed as those of a real one.
+    """The fields of RunTables for a made-up campaign, its tables computed as those of a real one.
 
     `failing` overrides FAILING: the share of games the ego fails, by kind of arm.
     """
@@ -123,8 +125,13 @@ def _windows(stage, seed, random):
         }
 
 
+def rendered(games=(), scene=None, **tables):
+    """The report of these tables, as `campaign` makes them."""
+    return render_page(RunTables(**tables), games, scene)
+
+
 def recordings(arguments, others=2):
-    """What render_page takes beside a campaign, of games drawn to fit it."""
+    """What `rendered` takes beside a campaign: recorded games that fit it, and their manoeuvres."""
     games = recorded(arguments["episodes"], others)
     return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
 

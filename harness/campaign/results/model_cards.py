@@ -29,7 +29,7 @@ from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.game.payoff import GROUPS, TERMS
 from harness.game.state import NON_EGO, ROLES
-from harness.reports.wording import interval, number, percent
+from harness.reports.numbers import interval, number, percent
 
 CARD = "README.md"
 _PROGRAMS = ("python", "eclipse-sumo", "torch", "stable-baselines3", "numpy")

@@ -42,7 +42,9 @@ def sample(persona: Persona) -> list[SampleDrive]:
             lapses = draw_lapses(
                 human_factors.attention, steps, STEP_S, generator_of("portrait", persona.name, "attention", k)
             )
-        ahead_m = unseen_behind_m(human_factors.no_blind_spot_check, generator_of("portrait", persona.name, "start", k).random())
+        ahead_m = unseen_behind_m(
+            human_factors.no_blind_spot_check, generator_of("portrait", persona.name, "start", k).random()
+        )
         changes = np.flatnonzero(np.diff(np.concatenate(([0], lapses.lapsed.astype(int), [0])))).reshape(-1, 2) * STEP_S
         found.append(SampleDrive(tuple((float(begin), float(end)) for begin, end in changes), math.isfinite(ahead_m)))
     return found

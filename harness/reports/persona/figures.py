@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
+from harness.reports.figures import GRID, INK, SERIES, figure_of, svg
 from harness.reports.persona.drives import DRIVE_S, SampleDrive
 from harness.reports.persona.profile import number
 from harness.reports.persona.worth import Drawn
-from harness.reports.figures import GRID, INK, SERIES, figure_of, svg
 
 _COLOURS = [SERIES[name] for name in ("alone", "persona", "retrained", "sumo")]
 _LINES = ("-", "--", ":", "-.")

@@ -4,13 +4,22 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-
 from harness.errors import UsageError
 from harness.files import write_atomically
+from harness.reports.page_template import environment_of
 from harness.reports.persona.drives import DRIVE_S
 from harness.reports.persona.figures import drives_figure, function_figure
-from harness.reports.persona.profile import FORMULA, PersonaProfile, attends, body, decides, function_in_words, number, sees, wants
+from harness.reports.persona.profile import (
+    FORMULA,
+    PersonaProfile,
+    attends,
+    body,
+    decides,
+    function_in_words,
+    number,
+    sees,
+    wants,
+)
 
 
 def write_profile(portrait: PersonaProfile, file: Path) -> None:
@@ -24,13 +33,6 @@ def write_profile(portrait: PersonaProfile, file: Path) -> None:
 
 def render_profile(portrait: PersonaProfile) -> str:
     """The page as text. Equal portraits give equal pages."""
-    environment = Environment(
-        loader=ChoiceLoader([PackageLoader("harness", "reports/persona"), PackageLoader("harness", "reports")]),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
     functions = []
     for k, each in enumerate(portrait.functions, 1):
         words = function_in_words(each)
@@ -39,15 +41,19 @@ def render_profile(portrait: PersonaProfile) -> str:
     if portrait.persona.human_factors.attention is not None:
         words = f"When attention lapses in {len(portrait.drives)} drives of {DRIVE_S:g} s"
         lapses = drives_figure(portrait.drives, "drives", words)
-    page = environment.get_template("profile.html.jinja").render(
-        persona=portrait.persona,
-        formula=FORMULA,
-        terms=portrait.terms,
-        wants=list(wants(portrait)),
-        functions=functions,
-        attends=[*attends(portrait), *sees(portrait), *body(portrait)],
-        drives_figure=lapses,
-        decides=decides(portrait),
-        number=number,
+    page = (
+        environment_of("reports/persona", "reports")
+        .get_template("profile.html.jinja")
+        .render(
+            persona=portrait.persona,
+            formula=FORMULA,
+            terms=portrait.terms,
+            wants=list(wants(portrait)),
+            functions=functions,
+            attends=[*attends(portrait), *sees(portrait), *body(portrait)],
+            drives_figure=lapses,
+            decides=decides(portrait),
+            number=number,
+        )
     )
     return page.strip() + "\n"

@@ -12,7 +12,17 @@ from rich.text import Text
 
 from harness.reports.persona.drives import DRIVE_S
 from harness.reports.persona.plotting import area, axis, curve, stretches, ticks
-from harness.reports.persona.profile import FORMULA, PersonaProfile, attends, body, decides, function_in_words, number, sees, wants
+from harness.reports.persona.profile import (
+    FORMULA,
+    PersonaProfile,
+    attends,
+    body,
+    decides,
+    function_in_words,
+    number,
+    sees,
+    wants,
+)
 from harness.reports.persona.worth import Drawn
 
 ROWS, SET_ROWS = 10, 2

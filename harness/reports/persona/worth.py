@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.config.persona import Persona
 from harness.config.json_schema import unit_of
+from harness.config.persona import Persona
 from harness.game.arrays import FloatArray
 from harness.game.payoff import FUZZY_QUANTITIES, TERMS, Payoff, Weighted
 from harness.game.state import Outcome
