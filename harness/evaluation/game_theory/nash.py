@@ -50,7 +50,7 @@ _DIGITS = 6
 
 
 class NoEquilibrium(HarnessError):
-    """No candidate verified. Every finite game has an equilibrium (Nash 1950): the accuracy did not suffice."""
+    """No candidate verified. Every finite game has an equilibrium (Nash 1950): the numerical accuracy is too low."""
 
 
 @dataclass(frozen=True, kw_only=True)
