@@ -228,14 +228,14 @@ def test_persona__without_limits_is_written_as_before_there_were_any(write: Writ
     plain = read_document(write(PERSONA), Persona).model_dump(mode="json")
     assert {"reaction", "actuators"}.isdisjoint(plain)
     assert plain["perception"] is None
-    perceives = "[perception]\noverlooks_share = 0.5\n"
+    perceives = "[perception]\nno_blind_spot_check_share = 0.5\n"
     written = read_document(write(PERSONA + perceives), Persona).model_dump(mode="json")
-    assert written["perception"] == {"overlooks_share": 0.5, "overlooked_up_to_m": 0.0}
+    assert written["perception"] == {"no_blind_spot_check_share": 0.5, "unseen_behind_m": 0.0}
 
 
 def test_persona__limits_are_written_and_read_again(write: Write) -> None:
     limits = (
-        "[perception]\nrange_m = 50.0\ndistance_error = 0.1\nerror_s = 5.0\n"
+        "[perception]\nrange_m = 50.0\ndistance_error = 0.1\nerror_correlation_time_s = 5.0\n"
         "[reaction]\ndelay_s = [0.2, 0.3]\n[actuators]\nbraking_share = 0.5\n"
     )
     person = read_document(write(PERSONA + limits), Persona)

@@ -143,15 +143,15 @@ PERSONAS = [
     *bombs(PERSONA),
     *no_numbers(PERSONA, "progress = 1.0", "operational.terms.progress"),
     *no_numbers(PERSONA, "mean_attentive_s = 5.0", "attention.mean_attentive_s"),
-    *no_numbers(PERSONA, "overlooks_share = 0.5", "perception.overlooks_share"),
+    *no_numbers(PERSONA, "no_blind_spot_check_share = 0.5", "perception.no_blind_spot_check_share"),
     *changed(
         PERSONA,
         *(
-            (f"a perception of {line}", "overlooks_share = 0.5", line, said)
+            (f"a perception of {line}", "no_blind_spot_check_share = 0.5", line, said)
             for line, said in {
-                "misses_share = 0.5": ("perception", "noticed_within_m"),
-                "noticed_within_m = 5.0": ("perception", "misses_share"),
-                "error_s = 5.0": ("perception", "distance_error"),
+                "looked_but_failed_to_see_share = 0.5": ("perception", "noticed_within_m"),
+                "noticed_within_m = 5.0": ("perception", "looked_but_failed_to_see_share"),
+                "error_correlation_time_s = 5.0": ("perception", "distance_error"),
                 "range_m = 0.0": ("perception.range_m",),
                 "rnge_m = 5.0": ("perception.rnge_m", "'range_m'"),
                 "distance_error = -0.1": ("perception.distance_error",),

@@ -168,7 +168,7 @@ def test_sees__in_words() -> None:
     count = sum(each.overlooks for each in of.drives)
     assert next(sees(of)).startswith("In 85 % of the drives, others whose centre is not at least 4 m ahead of its own")
     assert f"in {count} of the 8 drawn here" in next(sees(of))
-    behind = made(perception={"overlooks_share": 1.0, "overlooked_up_to_m": -5.0})
+    behind = made(perception={"no_blind_spot_check_share": 1.0, "unseen_behind_m": -5.0})
     assert "others whose centre is more than 5 m behind its own are not seen: in 8 of the 8" in next(sees(behind))
     assert list(sees(portrait(CAREFUL))) == ["Nobody is overlooked."]
 
@@ -177,7 +177,7 @@ def test_body__in_words() -> None:
     assert list(body(portrait(CAREFUL))) == []
     of = made(
         perception={
-            "misses_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
+            "looked_but_failed_to_see_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
             "distance_error": 0.1, "closing_error_per_s": 0.02,
         },
         reaction={"delay_s": [0.2, 0.6]},

@@ -30,7 +30,7 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
             "format": NUMBERS_FORMAT,
             "stage": _without_unused(asdict(stage)),
             "scene": rests_on,
-            "personas": [personas[name].model_dump(mode="json") for name in dict.fromkeys(names)],
+            "personas": [personas[name].identity() for name in dict.fromkeys(names)],
             "needs": [keys[name] for name in stage.needs],
             "given": given,
         }

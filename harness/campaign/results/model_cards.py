@@ -85,7 +85,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
     entry = manifest["stages"][stage]
     is_ego = policy["player"] != ROLES[NON_EGO]
     document = manifest["ego_persona"] if is_ego else manifest["persona_documents"][entry["persona"]]
-    persona = Persona.model_validate(document, strict=False)
+    persona = Persona.from_record(document)
     versions = manifest["versions"]
     environment = Environment(
         loader=PackageLoader("harness", "campaign/results"),
@@ -157,8 +157,8 @@ def _facts(
         if policy["player"] == ROLES[NON_EGO]:
             yield "no lapses in", f"the first {percent(campaign.non_ego_training.attentive_share)} of the budget"
     if persona.perception is not None:
-        share, up_to_m = percent(persona.perception.overlooks_share), persona.perception.overlooked_up_to_m
-        if persona.perception.overlooks_share:
+        share, up_to_m = percent(persona.perception.no_blind_spot_check_share), persona.perception.unseen_behind_m
+        if persona.perception.no_blind_spot_check_share:
             yield "overlooks", f"in {share} of drives, others whose centre is less than {up_to_m:g} m ahead of its own"
         yield from _sight(persona.perception)
     if persona.reaction is not None:
@@ -171,14 +171,15 @@ def _facts(
 
 
 def _sight(perception: Perception) -> Iterator[tuple[str, str]]:
-    if perception.misses_share:
-        share, within_m = percent(perception.misses_share), perception.noticed_within_m
+    if perception.looked_but_failed_to_see_share:
+        share, within_m = percent(perception.looked_but_failed_to_see_share), perception.noticed_within_m
         yield "misses", f"in {share} of drives, others that are more than {within_m:g} m away"
     if perception.range_m is not None:
         yield "sees", f"others up to {perception.range_m:g} m away"
     if perception.distance_error or perception.closing_error_per_s:
         closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance a second"
-        yield "misjudges", f"distances by {percent(perception.distance_error)}, {closing}, for {perception.error_s:g} s"
+        lasts_s = perception.error_correlation_time_s
+        yield "misjudges", f"distances by {percent(perception.distance_error)}, {closing}, for {lasts_s:g} s"
 
 
 def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
