@@ -59,7 +59,7 @@ class Group(Document):
     """One of the three groups of terms in equation 1. A term that is left out has the weight 0."""
 
     weight: Weight = 1.0
-    """Its coefficient alpha in equation 1."""
+    """Coefficient alpha of the group in equation 1."""
     terms: dict[str, WeightOrTable] = Field(default_factory=dict)
     """Each term's weight, or its weight and limit."""
 

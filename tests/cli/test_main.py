@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from harness.cli.main import main as cli
+from harness.cli import main as cli
 from harness.errors import SimulationError
 from tests.support.tiny import CAREFUL, MERGE, TABLES, harness, learned_run, tables, write_campaign, write_persona
 

@@ -97,7 +97,7 @@ def test_template__teaches_what_keys_mean_with_units_and_bounds() -> None:
     for words in (
         "Mean time between lapses (exponential). Unit: s. Above 0.1, at most 3600.",
         "Share of the drives in which the person does not look into the mirrors and over the shoulder. 0 to 1.",
-        'One of "mode", "sampled". Left out: "mode".',
+        'One of "mode", "sampled". Default: "mode".',
         "Letters, digits and _, a letter first; 1 to 40 characters.",
         *FUZZY_QUANTITIES.values(),
         *(term.meaning for term in TERMS.values()),

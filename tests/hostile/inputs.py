@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.cli.main import main as cli
+from harness.cli import main as cli
 from harness.drivers.policy_file import write_policy
 from tests.drivers.test_policy_file import some_policy
 from tests.support.repository import REPOSITORY
