@@ -17,6 +17,8 @@ from harness.cli.documents import AllowCode, check_driver, persona_app, schema
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from harness.campaign.results.results import RunResult
+
 MACHINE_ERRORS = (
     errno.ENOSPC,
     errno.EDQUOT,
@@ -55,30 +57,33 @@ CampaignFile = Annotated[
 RunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
 ]
+Quick = Annotated[
+    bool,
+    typer.Option(
+        "--quick",
+        help="Run the same stages with fewer training steps: about 3 minutes on two cores. Not for conclusions.",
+    ),
+]
+RunOut = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]", show_default=False
+    ),
+]
+Jobs = Annotated[
+    int | None,
+    typer.Option(
+        min=1, metavar="N", help="Number of stages run in parallel.  [default: one per core]", show_default=False
+    ),
+]
 
 
 @app.command()
 def campaign(
     file: CampaignFile,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Run the same stages with fewer training steps: about 3 minutes on two cores. Not for conclusions.",
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]", show_default=False
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None,
-        typer.Option(
-            min=1, metavar="N", help="Number of stages run in parallel.  [default: one per core]", show_default=False
-        ),
-    ] = None,
+    quick: Quick = False,
+    out: RunOut = None,
+    jobs: Jobs = None,
     allow_code: AllowCode = False,
 ) -> None:
     """Run a campaign: train, assess, retrain and compare.
@@ -106,12 +111,7 @@ def campaign(
         console.print(wording.INTERRUPTED)
         raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
     _show(outcome.verdicts, folder.path, console)
-    if outcome.failed_stages:
-        console.print(wording.failed_stages(outcome.failed_stages), style="red", highlight=False)
-    if outcome.error_games:
-        console.print(wording.error_games(outcome.error_games), style="red")
-    if outcome.failed_stages or outcome.error_games:
-        raise typer.Exit(FAILED)
+    _exit_if_failed(outcome, console)
 
 
 @app.command()
@@ -221,6 +221,15 @@ def _show(verdicts: Any, run: Path, console: Console) -> None:
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
     _print_plain([wording.report_written(run)], console)
+
+
+def _exit_if_failed(outcome: RunResult, console: Console) -> None:
+    if outcome.failed_stages:
+        console.print(wording.failed_stages(outcome.failed_stages), style="red", highlight=False)
+    if outcome.error_games:
+        console.print(wording.error_games(outcome.error_games), style="red")
+    if outcome.failed_stages or outcome.error_games:
+        raise typer.Exit(FAILED)
 
 
 def _print_plain(lines: Iterable[str], console: Console) -> None:

@@ -25,12 +25,17 @@ LANE_0_M, LANE_1_M = -4.8, -1.6  # lane 0 ends at x = 100, lane 1 goes on; cars 
 
 
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("personas_table", REPOSITORY / "docs" / "personas" / "table.py")
+    folder = REPOSITORY / "docs" / "personas"
+    spec = importlib.util.spec_from_file_location("personas_table", folder / "table.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules["personas_table"] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
+    sys.path.insert(0, str(folder))  # as for a script: the folder has the module `measures`
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(folder))
     return module
 
 
