@@ -56,9 +56,9 @@ class Document(BaseModel):
 class Mistakes(ValueError):
     """Several mistakes found by the validator of a record: key below the record, message and remedy of each."""
 
-    def __init__(self, found: list[tuple[str, str, str]]) -> None:
-        self.found = found
-        super().__init__("; ".join(f"{key}: {message}" for key, message, _ in found))
+    def __init__(self, mistakes: list[tuple[str, str, str]]) -> None:
+        self.mistakes = mistakes
+        super().__init__("; ".join(f"{key}: {message}" for key, message, _ in mistakes))
 
 
 _MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
@@ -98,7 +98,7 @@ def _validated(path: Path, table: dict[str, Any], model: type[D]) -> D:
         return model.model_validate_json(json.dumps(table, default=str))
     except ValidationError as error:
         first = error.errors(include_url=False)[:_MOST_MISTAKES]
-        raise UsageError(found for each in first for found in _problems(path, model, each)) from None
+        raise UsageError(problem for each in first for problem in _problems(path, model, each)) from None
     except RecursionError:
         raise UsageError.of(path, "", *_NESTED_TOO_DEEP) from None
     except ValueError as error:  # JSON has no NaN and no infinity
@@ -124,7 +124,7 @@ def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Proble
     elif error["type"] == "missing":
         yield Problem(str(path), key, "is missing", "add it")
     elif isinstance(cause, Mistakes):
-        for below, message, remedy in cause.found:
+        for below, message, remedy in cause.mistakes:
             yield Problem(str(path), f"{key}.{below}" if key else below, message, remedy)
     elif cause is not None:
         yield Problem(str(path), key, str(cause))
@@ -132,10 +132,10 @@ def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Proble
         yield Problem(str(path), key, f"{_shown(error['input'])} is not possible", _lower(error["msg"]))
 
 
-def _shown(given: Any) -> str:
-    if isinstance(given, dict | list):
-        return "this table" if isinstance(given, dict) else "this list"
-    return repr(given)[:60]
+def _shown(value: Any) -> str:
+    if isinstance(value, dict | list):
+        return "this table" if isinstance(value, dict) else "this list"
+    return repr(value)[:60]
 
 
 def _lower(message: str) -> str:
@@ -151,13 +151,13 @@ def _unknown_key(path: Path, key: str, name: str, model: type[BaseModel] | None)
 
 def _model_at(model: type[BaseModel], location: list[Any]) -> type[BaseModel] | None:
     """The model of the table at a location; None where there is none."""
-    here: Any = model
+    table: Any = model
     for part in location:
-        if isinstance(part, int) or not hasattr(here, "model_fields"):
+        if isinstance(part, int) or not hasattr(table, "model_fields"):
             continue
-        field = here.model_fields.get(part)
-        here = _model_in(field.annotation) if field else here  # no field: a key of a table with free keys
-    return here if hasattr(here, "model_fields") else None
+        field = table.model_fields.get(part)
+        table = _model_in(field.annotation) if field else table  # no field: a key of a table with free keys
+    return table if hasattr(table, "model_fields") else None
 
 
 def _with_present_keys(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
@@ -179,7 +179,7 @@ def _with_present_keys(model: type[BaseModel], table: Mapping[str, Any]) -> dict
 def _model_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for each in get_args(annotation) if (found := _model_in(each))), None)
+    return next((model for each in get_args(annotation) if (model := _model_in(each))), None)
 
 
 def _similar_file(path: Path) -> str:

@@ -41,34 +41,34 @@ def keys_of(document: Any, at: str = "") -> set[str]:
     """Every key in a document by its path, through lists."""
     if isinstance(document, dict):
         return {f"{at}{key}" for key in document} | {
-            found for key, each in document.items() for found in keys_of(each, f"{at}{key}.")
+            path for key, each in document.items() for path in keys_of(each, f"{at}{key}.")
         }
     if isinstance(document, list):
-        return {found for each in document for found in keys_of(each, at)}
+        return {path for each in document for path in keys_of(each, at)}
     return set()
 
 
 def keys_of_model(model: type[BaseModel], at: str = "") -> set[str]:
     """Every key of a persona by its path, from the models and the list of terms."""
-    found: set[str] = set()
+    keys: set[str] = set()
     for name, field in model.model_fields.items():
         here = f"{at}{name}"
-        found.add(here)
+        keys.add(here)
         if name == "terms":
             for term, of in TERMS.items():
                 if at == f"{of.group}.":
-                    found |= {f"{here}.{term}"} | (
+                    keys |= {f"{here}.{term}"} | (
                         {f"{here}.{term}.weight", f"{here}.{term}.{of.parameter}"} if of.parameter else set()
                     )
         elif (inner := model_in(field.annotation)) is not None:
-            found |= keys_of_model(inner, f"{here}.")
-    return found
+            keys |= keys_of_model(inner, f"{here}.")
+    return keys
 
 
 def model_in(annotation: Any) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for each in get_args(annotation) if (found := model_in(each))), None)
+    return next((model for each in get_args(annotation) if (model := model_in(each))), None)
 
 
 def message_of(error: UsageError) -> tuple[str, str]:

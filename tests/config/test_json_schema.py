@@ -36,7 +36,7 @@ SHIPPED = [
 each_shipped = pytest.mark.parametrize(
     ("kind", "path"), SHIPPED, ids=[path.relative_to(REPOSITORY).as_posix() for _, path in SHIPPED]
 )
-NAMED_BY_ITS_AUTHOR = {"start", "inputs", "parameters"}  # tables whose keys are names in an FMU or a program
+TABLES_WITH_FREE_KEYS = {"start", "inputs", "parameters"}  # tables whose keys are names in an FMU or a program
 each_kind = pytest.mark.parametrize("kind", DOCUMENTS)
 
 Keys = tuple[str | int, ...]
@@ -128,9 +128,9 @@ def test_schema__is_valid_in_its_dialect(kind: str) -> None:
 
 @each_kind
 def test_schema__every_key_is_described_with_its_unit(kind: str) -> None:
-    found = list(described(schema_of(kind)))
-    assert len(found) > 10
-    for name, node in found:
+    keys = list(described(schema_of(kind)))
+    assert len(keys) > 10
+    for name, node in keys:
         assert len(node.get("description", "")) > 10, f"{name} has no description: give its field a docstring"
         assert "\n" not in node["description"]
         ending = name.rpartition("_")[2]
@@ -187,7 +187,7 @@ def test_shipped_document__is_valid(kind: str, path: Path) -> None:
 @each_shipped
 def test_shipped_document__with_a_misspelt_key_is_not_valid(kind: str, path: Path) -> None:
     document, validator = read(path), Draft202012Validator(schema_of(kind))
-    keys = [at for at in nodes(document) if isinstance(at[-1], str) and not NAMED_BY_ITS_AUTHOR & set(at[:-1])]
+    keys = [at for at in nodes(document) if isinstance(at[-1], str) and not TABLES_WITH_FREE_KEYS & set(at[:-1])]
     assert keys
     for at in keys:
         misspelt = with_changed(document, at, lambda table, key: table.update({f"{key}x": table.pop(key)}))

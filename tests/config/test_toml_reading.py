@@ -89,8 +89,8 @@ def test_documents__of_this_repository_are_valid(repository: Path) -> None:
 
 def test_campaign__defaults_are_the_papers_table_1(write: Write) -> None:
     training = read_document(write(CAMPAIGN), Campaign).training
-    given = (training.steps, training.early_convergence, training.discount, training.clip)
-    assert given == (3_000_000, True, 0.99, 0.1)
+    values = (training.steps, training.early_convergence, training.discount, training.clip)
+    assert values == (3_000_000, True, 0.99, 0.1)
     assert (training.entropy_coefficient, training.learning_rate, training.buffer) == (0.02, 1e-4, 2048)
 
 
@@ -169,9 +169,9 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
 def test_mistake__is_reported_with_key_and_remedy(
     write: Write, model: type[Document], text: str, key: str, message: str
 ) -> None:
-    found_key, found = only(write(text), model)
-    assert found_key == key
-    assert message in found
+    reported_key, reported = only(write(text), model)
+    assert reported_key == key
+    assert message in reported
 
 
 def test_mistakes__are_reported_together(write: Write) -> None:
