@@ -28,6 +28,7 @@ from harness.game.arrays import FloatArray
 from harness.game.observation import LAYOUT
 
 FORMAT = 1
+_NOT_LEARNED_BY = ("name", "description", "sources")  # keys of a persona
 ACTIONS = 2
 ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
 _MOST_TENSOR_BYTES, _MOST_CARD_BYTES = 100_000_000, 1_000_000
@@ -63,7 +64,7 @@ def write_policy(policy: Policy, folder: Path) -> None:
 
 def persona_hash(persona: Persona) -> str:
     """SHA-256 of what a policy learns by: the persona's document without its name, description and sources."""
-    learned_by = persona.model_dump(mode="json", exclude={"name", "description", "sources"})
+    learned_by = {key: value for key, value in persona.identity().items() if key not in _NOT_LEARNED_BY}
     return hashlib.sha256(json.dumps(learned_by, sort_keys=True).encode()).hexdigest()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
@@ -118,7 +118,8 @@ def _player(tables: RunTables, embedded: Embedded) -> dict[str, Any]:
 
 
 def _manoeuvres(tables: RunTables) -> dict[str, Any]:
-    arms, pairs = [], None
+    arms: Sequence[str] = []
+    pairs = None
     if tables.manoeuvres is not None:
         arms, pairs = failures_by_pair(tables.manoeuvres, tables.episodes)
     return {"pairs": pairs, "pair_arms": arms, "most_listed": MOST_LISTED}

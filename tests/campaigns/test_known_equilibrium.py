@@ -90,7 +90,7 @@ citation = "nobody, nowhere"
 [safety.terms]
 vehicle_clearance = {{ weight = {weight}, within_m = 10.0 }}
 """
-BLIND = "[perception]\noverlooks_share = 1.0\noverlooked_up_to_m = 100.0\n"
+BLIND = "[perception]\nno_blind_spot_check_share = 1.0\nunseen_behind_m = 100.0\n"
 TRAINING: dict[str, Any] = {
     "steps": 16_384,
     "segment_steps": 16_384,

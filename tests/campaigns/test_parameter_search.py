@@ -149,7 +149,7 @@ def test_check__a_persona_may_not_be_called_as_a_search_is(tmp_path: Path) -> No
 
 def test_check__says_what_will_be_searched(tmp_path: Path) -> None:
     told = harness("check", write(tmp_path)).stdout
-    assert "Round 2 searches it in 8 trials of 16 games: cruise.speed_share from 0.7 to 1, " in told
+    assert "Round 2 searches its parameters in 8 trials of 16 games: cruise.speed_share from 0.7 to 1, " in told
     assert f"  tune   {STAGE}  with speedy-seed1" in told
     assert "nothing is trained, 6 arms of 4 episodes" in told
 

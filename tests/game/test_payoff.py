@@ -260,19 +260,19 @@ GOAL = "[operational.terms]\ngoal = 1.0\n"
         ("[human.terms]\nrail = 1.0\n", "human.terms.rail: belongs to the safety terms (move it to [safety.terms])"),
         (
             "[safety.terms]\nclearance = 1.0\n",
-            "safety.terms.clearance: its weight is not given as it has to be (give { weight = ..., within_m = ... })",
+            "safety.terms.clearance: has the wrong form (give { weight = ..., within_m = ... })",
         ),
         (
             "[safety.terms]\nclearance = { weight = 1.0, within_s = 1.0 }\n",
-            "safety.terms.clearance: its weight is not given as it has to be (give { weight = ..., within_m = ... })",
+            "safety.terms.clearance: has the wrong form (give { weight = ..., within_m = ... })",
         ),
         (
             "[safety.terms]\ntime_gap = { weight = 1.0, within_m = 1.0, within_s = 1.0 }\n",
-            "safety.terms.time_gap: its weight is not given as it has to be (give { weight = ..., within_s = ... })",
+            "safety.terms.time_gap: has the wrong form (give { weight = ..., within_s = ... })",
         ),
         (
             "[safety.terms]\ncollision = { weight = 1.0, within_m = 1.0 }\n",
-            "safety.terms.collision: its weight is not given as it has to be (give a plain weight)",
+            "safety.terms.collision: has the wrong form (give a plain weight)",
         ),
         (
             "[safety.terms]\nclearance = { weight = 1.0, within_m = 0.0 }\n",
@@ -334,7 +334,7 @@ def test_harm__a_fuzzy_term_knows_no_such_quantity(read: Callable[[str], Persona
     ],
 )
 def test_harm__a_fuzzy_term_may_not_pay_for_contact(read: Callable[[str], Persona], quantity: str, sets: str) -> None:
-    assert "nobody may be paid for a crash" in problems(read, fuzzy(quantity, sets))[0]
+    assert "a crash must not be rewarded" in problems(read, fuzzy(quantity, sets))[0]
 
 
 def test_fuzzy__of_the_lane_that_ends(read: Callable[[str], Persona], moment: Moment, merge: OpenScene) -> None:

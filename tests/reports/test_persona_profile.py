@@ -182,7 +182,7 @@ def test_sees__in_words() -> None:
     sentence = next(sees(of))
     assert sentence.startswith(f"No blind-spot check in 85 % of the drives ({count} of the 8 sample drives)")
     assert "its centre is not at least 4 m ahead of the person's own" in sentence
-    behind = invented(perception={"overlooks_share": 1.0, "overlooked_up_to_m": -5.0})
+    behind = invented(perception={"no_blind_spot_check_share": 1.0, "unseen_behind_m": -5.0})
     assert "8 of the 8 sample drives" in next(sees(behind))
     assert "its centre is more than 5 m behind the person's own" in next(sees(behind))
     assert list(sees(profile_of(CAREFUL))) == [ALWAYS_CHECKS]
@@ -192,7 +192,7 @@ def test_body__in_words() -> None:
     assert list(body(profile_of(CAREFUL))) == []
     of = invented(
         perception={
-            "misses_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
+            "looked_but_failed_to_see_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
             "distance_error": 0.1, "closing_error_per_s": 0.02,
         },
         reaction={"delay_s": [0.2, 0.6]},

@@ -86,7 +86,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
     entry = manifest["stages"][stage]
     is_ego = policy["player"] != ROLES[NON_EGO]
     document = manifest["ego_persona"] if is_ego else manifest["persona_documents"][entry["persona"]]
-    persona = Persona.model_validate(document, strict=False)
+    persona = Persona.from_record(document)
     versions = manifest["versions"]
     environment = Environment(
         loader=PackageLoader("harness", "campaign/results"),
@@ -158,8 +158,8 @@ def _facts(
         if policy["player"] == ROLES[NON_EGO]:
             yield "no lapses in", f"the first {percent(campaign.non_ego_training.attentive_share)} of the budget"
     if persona.perception is not None:
-        share, up_to_m = percent(persona.perception.overlooks_share), persona.perception.overlooked_up_to_m
-        if persona.perception.overlooks_share:
+        share, up_to_m = percent(persona.perception.no_blind_spot_check_share), persona.perception.unseen_behind_m
+        if persona.perception.no_blind_spot_check_share:
             yield (
                 "no blind-spot check",
                 f"in {share} of drives: vehicles less than {up_to_m:g} m ahead (centres) are not seen",
@@ -175,17 +175,15 @@ def _facts(
 
 
 def _sight(perception: Perception) -> Iterator[tuple[str, str]]:
-    if perception.misses_share:
-        share, within_m = percent(perception.misses_share), perception.noticed_within_m
+    if perception.looked_but_failed_to_see_share:
+        share, within_m = percent(perception.looked_but_failed_to_see_share), perception.noticed_within_m
         yield "looked but failed to see", f"in {share} of drives: vehicles more than {within_m:g} m away"
     if perception.range_m is not None:
         yield "range of sight", f"{perception.range_m:g} m"
     if perception.distance_error or perception.closing_error_per_s:
+        distances = f"distances by {percent(perception.distance_error)}"
         closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance per second"
-        yield (
-            "errors of perception",
-            f"distances by {percent(perception.distance_error)}, {closing}, for {perception.error_s:g} s",
-        )
+        yield "errors of perception", f"{distances}, {closing}, for {perception.error_correlation_time_s:g} s"
 
 
 def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
