@@ -10,7 +10,14 @@ from pydantic import Field, SerializerFunctionWrapHandler, field_validator, mode
 from harness.config.scene import Interval
 from harness.config.toml_reading import Document
 from harness.game.attention import Attention, NoBlindSpotCheck
-from harness.game.human_limits import NOBODY, PERSISTENCE_S, LookedButFailedToSee, Reaction, Sight, Uses
+from harness.game.human_limits import (
+    ALL_NOTICED,
+    PERSISTENCE_S,
+    ActuatorShares,
+    LookedButFailedToSee,
+    Reaction,
+    Sight,
+)
 
 LONGEST_DELAY_S = 5.0
 LATER = ("misses_share", "noticed_within_m", "range_m", "distance_error", "closing_error_per_s", "error_s")
@@ -39,7 +46,12 @@ class AttentionLapses(Document):
     @property
     def attention(self) -> Attention:
         """When attention lapses, as the game knows it."""
-        return Attention(self.mean_attentive_s, self.lapse_s, self.crown_rad, self.bumps_rad)
+        return Attention(
+            mean_attentive_s=self.mean_attentive_s,
+            lapse_s=self.lapse_s,
+            crown_rad=self.crown_rad,
+            bumps_rad=self.bumps_rad,
+        )
 
 
 class ReactionTime(Document):
@@ -104,20 +116,24 @@ class Perception(Document):
     @property
     def no_blind_spot_check(self) -> NoBlindSpotCheck:
         """Whom the person overlooks."""
-        return NoBlindSpotCheck(self.overlooks_share, self.overlooked_up_to_m)
+        return NoBlindSpotCheck(share=self.overlooks_share, ahead_m=self.overlooked_up_to_m)
 
     @property
     def looked_but_failed_to_see(self) -> LookedButFailedToSee:
         """Whom the person looks at and fails to see."""
-        return (
-            NOBODY if self.noticed_within_m is None else LookedButFailedToSee(self.misses_share, self.noticed_within_m)
-        )
+        if self.noticed_within_m is None:
+            return ALL_NOTICED
+        return LookedButFailedToSee(share=self.misses_share, within_m=self.noticed_within_m)
 
     @property
     def sight(self) -> Sight:
         """How far and how exactly the person sees."""
-        far = np.inf if self.range_m is None else self.range_m
-        return Sight(far, self.distance_error, self.closing_error_per_s, self.error_s)
+        return Sight(
+            range_m=np.inf if self.range_m is None else self.range_m,
+            distance_error=self.distance_error,
+            closing_error_per_s=self.closing_error_per_s,
+            error_s=self.error_s,
+        )
 
 
 class CarUse(Document):
@@ -132,6 +148,6 @@ class CarUse(Document):
     """Share of the steering angle that is of use at the speed."""
 
     @property
-    def uses(self) -> Uses:
+    def uses(self) -> ActuatorShares:
         """What the person uses of the car, as the game knows it."""
-        return Uses(self.throttle_share, self.braking_share, self.steering_share)
+        return ActuatorShares(throttle=self.throttle_share, braking=self.braking_share, steering=self.steering_share)

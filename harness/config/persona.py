@@ -20,7 +20,7 @@ from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest
 from harness.game.attention import HumanFactors
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
-from harness.game.human_limits import ALL, AT_ONCE, EXACT, NOBODY
+from harness.game.human_limits import ALL_NOTICED, EXACT_SIGHT, FULL_SHARES, NO_DELAY
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -87,7 +87,7 @@ class MembershipFunction(Document):
     def fuzzy_set(self) -> FuzzySet:
         """The set as the game knows it."""
         inputs, memberships = zip(*self.points, strict=True)
-        return FuzzySet(self.name, inputs, memberships, self.value)
+        return FuzzySet(name=self.name, inputs=inputs, memberships=memberships, value=self.value)
 
 
 class FuzzyTerm(Document):
@@ -210,26 +210,27 @@ class Persona(Document):
         for group in (self.safety, self.operational, self.human):
             for name, given in group.terms.items():
                 if isinstance(given, Parametrised):
-                    terms.append(Weighted(name, given.weight, given.within_m or given.within_s))
+                    parameter = given.within_m or given.within_s
+                    terms.append(Weighted(name=name, weight=given.weight, parameter=parameter))
                 else:
-                    terms.append(Weighted(name, given))
+                    terms.append(Weighted(name=name, weight=given))
         fuzzy = {each.name: (each.weight, each.function) for each in self.human.fuzzy}
         alpha = {
             "safety": self.safety.weight,
             "operational": self.operational.weight,
             "human": self.human.weight,
         }
-        return Payoff(alpha, tuple(terms), fuzzy)
+        return Payoff(alpha=alpha, terms=tuple(terms), fuzzy=fuzzy)
 
     @property
     def human_factors(self) -> HumanFactors:
         """How this person attends to the road."""
         perception = self.perception
         return HumanFactors(
-            self.attention.attention if self.attention else None,
-            perception.no_blind_spot_check if perception else HumanFactors.no_blind_spot_check,
-            perception.looked_but_failed_to_see if perception else NOBODY,
-            self.reaction.reaction if self.reaction else AT_ONCE,
-            perception.sight if perception else EXACT,
-            self.actuators.uses if self.actuators else ALL,
+            attention=self.attention.attention if self.attention else None,
+            no_blind_spot_check=perception.no_blind_spot_check if perception else HumanFactors.no_blind_spot_check,
+            looked_but_failed_to_see=perception.looked_but_failed_to_see if perception else ALL_NOTICED,
+            reaction=self.reaction.reaction if self.reaction else NO_DELAY,
+            sight=perception.sight if perception else EXACT_SIGHT,
+            actuator_shares=self.actuators.uses if self.actuators else FULL_SHARES,
         )

@@ -13,7 +13,7 @@ from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import Document, nearest, read_document
 from harness.errors import Problem, UsageError
-from harness.game.human_limits import Reaction, Sight, Uses
+from harness.game.human_limits import ActuatorShares, Reaction, Sight
 
 Write = Callable[[str], Path]
 
@@ -241,9 +241,9 @@ def test_persona__limits_are_written_and_read_again(write: Write) -> None:
     person = read_document(write(PERSONA + limits), Persona)
     written = person.model_dump(mode="json")
     assert Persona.model_validate(written, strict=False) == person
-    assert person.human_factors.sight == Sight(50.0, 0.1, 0.0, 5.0)
+    assert person.human_factors.sight == Sight(range_m=50.0, distance_error=0.1, error_s=5.0)
     assert person.human_factors.reaction == Reaction((0.2, 0.3))
-    assert person.human_factors.uses == Uses(braking=0.5)
+    assert person.human_factors.actuator_shares == ActuatorShares(braking=0.5)
     assert (
         person.human_factors.looked_but_failed_to_see
         is read_document(write(PERSONA), Persona).human_factors.looked_but_failed_to_see

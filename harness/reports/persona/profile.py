@@ -173,7 +173,7 @@ def body(portrait: PersonaProfile) -> Iterator[str]:
     if sight.distance_error or sight.closing_error_per_s:
         yield f"What is misjudged stays so for {sight.error_s:g} s or so."
     yield from _slowly(human_factors.reaction.delay_s, human_factors.attention is not None)
-    uses = human_factors.uses
+    uses = human_factors.actuator_shares
     shares = {"acceleration": uses.throttle, "braking": uses.braking, "steering": uses.steering}
     if used := [f"{percent(share)} of its {name}" for name, share in shares.items() if share < 1.0]:
         yield f"Of what the car can do it uses {', '.join(used)}."
