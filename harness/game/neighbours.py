@@ -25,9 +25,9 @@ def near_players(
     step: int,
     step_s: float,
     longest_wait: int,
-    everyone: bool,
+    all_vehicles: bool,
 ) -> IntArray:
-    """[m] indices into `due` of the vehicles near a player of their game; all indices if `everyone`.
+    """[m] indices into `due` of the vehicles near a player of their game; all indices with `all_vehicles`.
 
     due [n] are flat positions in a table [G, N], fronts_m [n, 2] the vehicles' front bumpers; length_m and
     max_speed_mps [G, N] are the table's columns, offsets_m [G] the y offsets of the games' tiles; players_x_m,
@@ -48,7 +48,7 @@ def near_players(
                 distance_m = min(distance_m, np.hypot(dx, dy))
         # distances count from a vehicle's centre, which is behind its front by less than its length
         spare_m = distance_m - NOTICED_M - length_m[game, place]
-        if everyone or spare_m <= 0.0:
+        if all_vehicles or spare_m <= 0.0:
             near[count] = k
             count += 1
         closing_mps = max_speed_mps[game, place] + fastest_player_mps

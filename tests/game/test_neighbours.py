@@ -17,7 +17,7 @@ def look(
     length_m: float = 4.0,
     speed_mps: float = 60.0,
     present: bool = True,
-    everyone: bool = False,
+    all_vehicles: bool = False,
 ) -> tuple[list[int], list[int]]:
     """Indices of the near vehicles, and the steps in which all are due again.
 
@@ -29,7 +29,7 @@ def look(
     table = (np.full((2, count), length_m), np.full((2, count), speed_mps), np.array([0.0, 500.0]))
     players = (np.zeros((2, 2)), np.zeros((2, 2)), np.array([[True, True], [present, False]]))
     near = near_players(
-        np.arange(count, 2 * count), fronts, due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, everyone
+        np.arange(count, 2 * count), fronts, due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, all_vehicles
     )
     assert (fronts[:, 1] == 0.0).all()  # without the offset of the tile
     assert (due_in[0] == 100).all()  # the other game is unchanged
@@ -52,7 +52,7 @@ def test_near__no_vehicle_waits_longer_than_the_longest_wait() -> None:
 
 
 def test_near__all_vehicles_if_games_are_recorded() -> None:
-    near, due = look([0.0, 1e6], everyone=True)
+    near, due = look([0.0, 1e6], all_vehicles=True)
     assert near == [0, 1]
     assert due[0] == 101
 

@@ -227,9 +227,9 @@ def test_motion__a_training_fails_if_sumo_displaces_a_player(
         in_one_go(spec, tmp_path)
 
 
-@pytest.mark.parametrize(("farther_m", "wrong"), [(50.0, True), (0.01, True), (1e-4, False)])
+@pytest.mark.parametrize(("farther_m", "faulty"), [(50.0, True), (0.01, True), (1e-4, False)])
 def test_motion__a_car_that_the_harness_moves_follows_its_speed_to_a_millimetre(
-    farther_m: float, wrong: bool, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
+    farther_m: float, faulty: bool, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drive = harness.environments.arena.move
 
@@ -240,7 +240,7 @@ def test_motion__a_car_that_the_harness_moves_follows_its_speed_to_a_millimetre(
 
     monkeypatch.setattr(harness.environments.arena, "move", drive_too_far)
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
-    if wrong:
+    if faulty:
         assert re.match(rf"ImpossibleNumber: ego moved [\d.]+ m in step {STEP}, ", game.record["error"])
     else:
         assert not game.record["error"]

@@ -283,8 +283,8 @@ def test_background__is_not_read_after_its_arrival(busy: OpenScene, opened: Open
 
 def test_background__a_refused_vehicle_is_an_error_with_the_message_of_sumo(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
-    with pytest.raises(SimulationError, match=r"reset game 0.*departLane.*wrong"):
-        simulation.reset(0, placed(busy, (40, LEFT_Y, 0, 0), None), [other("wrong", lane="7")])
+    with pytest.raises(SimulationError, match=r"reset game 0.*departLane.*refused"):
+        simulation.reset(0, placed(busy, (40, LEFT_Y, 0, 0), None), [other("refused", lane="7")])
 
 
 def test_reload__the_same_seed_gives_the_same_traffic(tmp_path: Path, opened: Open) -> None:

@@ -100,9 +100,9 @@ def test_both__give_the_same_numbers(scene: OpenScene) -> None:
 def test_refusal__in_the_child_is_an_error_and_the_child_continues(scene: OpenScene, far: SubprocessSimulation) -> None:
     start = placed(scene, (40, LEFT_Y, 0, 0), None)
     refused = Departure(
-        name="wrong", vehicle_type="van", edges=("road",), depart_s=0.0, lane="7", position="base", speed="0"
+        name="refused", vehicle_type="van", edges=("road",), depart_s=0.0, lane="7", position="base", speed="0"
     )
-    with pytest.raises(SimulationError, match=r"reset game 0.*departLane.*wrong"):
+    with pytest.raises(SimulationError, match=r"reset game 0.*departLane.*refused"):
         far.reset(0, start, [refused])
     far.reload(1)
     far.reset(0, start, [])
