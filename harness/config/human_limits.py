@@ -10,7 +10,14 @@ from pydantic import Field, SerializerFunctionWrapHandler, field_validator, mode
 from harness.config.scene import Interval
 from harness.config.toml_reading import Document
 from harness.game.attention import Attention, NoBlindSpotCheck
-from harness.game.human_limits import NOBODY, PERSISTENCE_S, LookedButFailedToSee, Reaction, Sight, Uses
+from harness.game.human_limits import (
+    ALL_NOTICED,
+    PERSISTENCE_S,
+    ActuatorShares,
+    LookedButFailedToSee,
+    Reaction,
+    Sight,
+)
 
 LONGEST_DELAY_S = 5.0
 LATER = (
@@ -131,7 +138,7 @@ class Perception(Document):
     def looked_but_failed_to_see(self) -> LookedButFailedToSee:
         """Looking but failing to see, as the game uses it."""
         if self.noticed_within_m is None:
-            return NOBODY
+            return ALL_NOTICED
         return LookedButFailedToSee(share=self.looked_but_failed_to_see_share, within_m=self.noticed_within_m)
 
     @property
@@ -157,6 +164,6 @@ class CarUse(Document):
     """Share of the useful steering angle at the current speed."""
 
     @property
-    def uses(self) -> Uses:
+    def uses(self) -> ActuatorShares:
         """The shares as the game uses them."""
-        return Uses(throttle=self.throttle_share, braking=self.braking_share, steering=self.steering_share)
+        return ActuatorShares(throttle=self.throttle_share, braking=self.braking_share, steering=self.steering_share)

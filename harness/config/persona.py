@@ -21,7 +21,7 @@ from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest
 from harness.game.attention import HumanFactors
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
-from harness.game.human_limits import ALL, AT_ONCE, EXACT, NOBODY
+from harness.game.human_limits import ALL_NOTICED, EXACT_SIGHT, FULL_SHARES, NO_DELAY
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -225,8 +225,8 @@ class Persona(Document):
         return HumanFactors(
             attention=self.attention.attention if self.attention else None,
             no_blind_spot_check=perception.no_blind_spot_check if perception else HumanFactors.no_blind_spot_check,
-            looked_but_failed_to_see=perception.looked_but_failed_to_see if perception else NOBODY,
-            reaction=self.reaction.reaction if self.reaction else AT_ONCE,
-            sight=perception.sight if perception else EXACT,
-            uses=self.actuators.uses if self.actuators else ALL,
+            looked_but_failed_to_see=perception.looked_but_failed_to_see if perception else ALL_NOTICED,
+            reaction=self.reaction.reaction if self.reaction else NO_DELAY,
+            sight=perception.sight if perception else EXACT_SIGHT,
+            actuator_shares=self.actuators.uses if self.actuators else FULL_SHARES,
         )

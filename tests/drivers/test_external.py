@@ -139,7 +139,7 @@ def test_open_campaign__names_the_egos_problems_beside_all_others(tmp_path: Path
 def test_open_campaign__an_unknown_vehicle_type_is_named(tmp_path: Path) -> None:
     driver = document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_cra"')
     (said,) = problems(write_campaign(tmp_path, ego=ego(driver)))
-    assert "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego to be of (did you mean 'ego_car'?)" in said
+    assert "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego (did you mean 'ego_car'?)" in said
 
 
 def test_open_campaign__its_files_are_in_the_manifests_hashes(tmp_path: Path) -> None:

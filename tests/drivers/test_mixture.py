@@ -22,7 +22,7 @@ from harness.game.attention import Attention, HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.traffic.scene import OpenScene, open_scene
 
-TEXTING = HumanFactors(Attention(2.0, (1.0, 2.0), 0.02))
+TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_rad=0.02))
 
 
 class Steady:

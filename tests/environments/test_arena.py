@@ -275,7 +275,15 @@ def test_others__are_seen_where_sumo_has_them(straight: OpenScene, opened: Open)
     arena = begun(
         opened(straight),
         placed(straight, (100, RIGHT_Y, 0, 10), None),
-        Departure("van", "van", ("road",), 0.0, "1", "123", "10"),
+        Departure(
+            name="van",
+            vehicle_type="van",
+            edges=("road",),
+            depart_s=0.0,
+            lane="1",
+            position="123",
+            speed="10",
+        ),
     )
     seen = {name: arena.observation[0, 0, k] for k, name in enumerate(LAYOUT)}
     assert seen["other0_seen"] == 0.0  # not in the traffic yet
@@ -291,7 +299,15 @@ def test_others__contact_with_one_is_a_collision(straight: OpenScene, opened: Op
     arena = begun(
         opened(straight),
         placed(straight, (100, RIGHT_Y, 0, 12), None),
-        Departure("van", "van", ("road",), 0.0, "0", "120", "1"),
+        Departure(
+            name="van",
+            vehicle_type="van",
+            edges=("road",),
+            depart_s=0.0,
+            lane="0",
+            position="120",
+            speed="1",
+        ),
     )
     *before, last = played_out(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
     assert outcomes(arena) == ["collision", ""]
@@ -303,7 +319,15 @@ def test_others__contact_with_one_is_a_collision(straight: OpenScene, opened: Op
 
 def test_others__start_again_with_their_game(straight: OpenScene, opened: Open) -> None:
     arena, start = opened(straight), placed(straight, (150, RIGHT_Y, 0, 0), None)
-    van = Departure("van", "van", ("road",), 0.3, "1", "50", "8")
+    van = Departure(
+        name="van",
+        vehicle_type="van",
+        edges=("road",),
+        depart_s=0.3,
+        lane="1",
+        position="50",
+        speed="8",
+    )
     for _ in range(2):
         begun(arena, start, van)
         where = []

@@ -196,7 +196,7 @@ def body(profile: PersonaProfile) -> Iterator[str]:
     if sight.distance_error or sight.closing_error_per_s:
         yield f"An error of perception lasts for about {sight.error_s:g} s."
     yield from _reaction(human_factors.reaction.delay_s, human_factors.attention is not None)
-    uses = human_factors.uses
+    uses = human_factors.actuator_shares
     shares = {"acceleration": uses.throttle, "braking": uses.braking, "steering": uses.steering}
     if used := [f"{percent(share)} of the {name}" for name, share in shares.items() if share < 1.0]:
         yield f"The person uses {', '.join(used)} of the car."

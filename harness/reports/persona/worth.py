@@ -180,4 +180,4 @@ def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]
         lateral_acceleration_mps2=array("lateral_acceleration_mps2", 0.0),
         **far,
     )
-    return float(Payoff(payoff.alpha, (term,), {}).evaluate(moment, 0)[term.name][0])
+    return float(Payoff(alpha=payoff.alpha, terms=(term,), fuzzy={}).evaluate(moment, 0)[term.name][0])

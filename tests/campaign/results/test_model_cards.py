@@ -142,7 +142,8 @@ def test_card__of_a_persona_with_a_body() -> None:
         "reaction": {"delay_s": [0.2, 0.4]},
         "actuators": {"throttle_share": 0.5},
         "perception": {
-            "looked_but_failed_to_see_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0, "distance_error": 0.1, "error_correlation_time_s": 10.0,
+            "looked_but_failed_to_see_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
+            "distance_error": 0.1, "error_correlation_time_s": 10.0,
         },
     }  # fmt: skip
     manifest = {**MANIFEST, "persona_documents": {"distracted": document}}
