@@ -150,7 +150,7 @@ def test_emergency__leaves_alone_who_stays_beside() -> None:
 
 def test_react__takes_its_time_and_builds_up() -> None:
     """0.75 s of coasting, then 12.65 m/s^3 up to 0.774 g: full after 0.6 s."""
-    alert, manner = Alert(*np.zeros((3, 1))), Manner(0.75, 12.65, 0.4)
+    alert, manner = Alert(*np.zeros((3, 1))), Manner(reaction_s=0.75, jerk_mps3=12.65, coasting_mps2=0.4)
     seen = []
     for _ in range(16):
         alert, reacting, braking = react(alert, np.array([True]), np.array([7.59]), manner, STEP_S)
@@ -161,7 +161,7 @@ def test_react__takes_its_time_and_builds_up() -> None:
 
 
 def test_react__is_surprised_anew_after_a_calm_second() -> None:
-    manner, alert = Manner(0.2, 10.0), Alert(*np.zeros((3, 2)))
+    manner, alert = Manner(reaction_s=0.2, jerk_mps3=10.0), Alert(*np.zeros((3, 2)))
     for danger in [True] * 4 + [False] * 9:
         alert, _, braking = react(alert, np.array([danger, danger]), np.full(2, 8.0), manner, STEP_S)
     assert braking.tolist() == [0.0, 0.0]
@@ -242,11 +242,17 @@ def crashes(
 PERSON = CarefulAndCompetent(lane_width_m=LANE_M, wrapped_braking_g=0.774)
 REACTIONS: dict[str, tuple[Manner, React]] = {
     "careful_and_competent": (
-        Manner(0.75, 12.65, 0.4),
+        Manner(reaction_s=0.75, jerk_mps3=12.65, coasting_mps2=0.4),
         lambda met, own, a, began: emergency_braking.careful_and_competent(met, own, began > 0.4, PERSON),
     ),
-    "rss": (Manner(0.75, 12.65), lambda met, own, a, began: emergency_braking.rss(met, own, Rss())),
-    "fuzzy": (Manner(0.75, 12.65), lambda met, own, a, began: emergency_braking.fuzzy(met, own, a, FuzzySafety())),
+    "rss": (
+        Manner(reaction_s=0.75, jerk_mps3=12.65),
+        lambda met, own, a, began: emergency_braking.rss(met, own, Rss()),
+    ),
+    "fuzzy": (
+        Manner(reaction_s=0.75, jerk_mps3=12.65),
+        lambda met, own, a, began: emergency_braking.fuzzy(met, own, a, FuzzySafety()),
+    ),
 }
 
 # driver, lateral speed (m/s), own speed and the other's (km/h), greatest gap (m) at the start of the cut-in from which
@@ -337,7 +343,9 @@ def test_emergency__hits_a_standing_car_no_faster_than_r152_allows(own_kmh: int,
     gap, own, alert, began = 60.0, own_kmh * KMH, Alert(*np.zeros((3, 1))), np.array([[False]])
     for _ in range(300):
         danger, demand = emergency_braking.emergency(meet(gap), np.array([[own]]), began, law)
-        alert, _, braking = react(alert, danger[:, 0], demand[:, 0], Manner(0.0, law.build_up_mps3), STEP_S)
+        alert, _, braking = react(
+            alert, danger[:, 0], demand[:, 0], Manner(reaction_s=0.0, jerk_mps3=law.build_up_mps3), STEP_S
+        )
         began = alert.braking_mps2[:, None] > law.warning_braking_mps2
         own = max(own - STEP_S * min(float(braking[0]), 8.0), 0.0)
         gap -= STEP_S * own

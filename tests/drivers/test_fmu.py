@@ -74,7 +74,13 @@ def problems(given: Fmu, file: Path) -> str:
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_fmu__reaches_its_goal_by_a_twin(fmi: int, twins: dict[int, Path], merge: OpenScene, car: Car) -> None:
     careful = read_document(CAREFUL, Persona)
-    arm = Arm("naive_alone", merge, (fmu_driver(document(), twins[fmi], car), None), (careful, careful), 1)
+    arm = Arm(
+        name="naive_alone",
+        scene=merge,
+        drivers=(fmu_driver(document(), twins[fmi], car), None),
+        personas=(careful, careful),
+        seed=1,
+    )
     games = [game.record for game in assess(arm, 3)]
     assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 3
 

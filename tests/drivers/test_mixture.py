@@ -112,10 +112,26 @@ def records(games: list[Game]) -> list[dict[str, Any]]:
 def test_assess__plays_each_episode_as_its_member_alone_would(merge: OpenScene, people: dict[str, Persona]) -> None:
     """Driver, habits and payoff are the member's: the game is that of the arm in which it has the seat alone."""
     careful, speedy = people["careful"], people["speedy"]
-    members = (Member(Steady(0.1), careful, 1.0), Member(Steady(0.4), speedy, 1.0))
-    mixed = Arm("mixed", merge, (Steady(0.0), Mixture(members)), (careful, careful), 1)
+    members = (
+        Member(driver=Steady(0.1), persona=careful, share=1.0),
+        Member(driver=Steady(0.4), persona=speedy, share=1.0),
+    )
+    mixed = Arm(name="mixed", scene=merge, drivers=(Steady(0.0), Mixture(members)), personas=(careful, careful), seed=1)
     alone = [
-        records(list(assess(Arm("alone", merge, (Steady(0.0), each.driver), (careful, each.persona), 1), 6)))
+        records(
+            list(
+                assess(
+                    Arm(
+                        name="alone",
+                        scene=merge,
+                        drivers=(Steady(0.0), each.driver),
+                        personas=(careful, each.persona),
+                        seed=1,
+                    ),
+                    6,
+                )
+            )
+        )
         for each in members
     ]
     start_distribution = merge.start_distribution(
@@ -128,7 +144,9 @@ def test_assess__plays_each_episode_as_its_member_alone_would(merge: OpenScene, 
 
 def test_mixture__of_one_is_the_driver(people: dict[str, Persona]) -> None:
     driver = Steady(0.0)
-    assert mixture_of(driver, people["careful"]).members == (Member(driver, people["careful"], 1.0),)
+    assert mixture_of(driver, people["careful"]).members == (
+        Member(driver=driver, persona=people["careful"], share=1.0),
+    )
 
 
 def test_mixture__is_of_drivers_that_a_game_can_have(people: dict[str, Persona]) -> None:
@@ -136,16 +154,22 @@ def test_mixture__is_of_drivers_that_a_game_can_have(people: dict[str, Persona])
     with pytest.raises(ValueError, match="needs members"):
         Mixture(())
     with pytest.raises(ValueError, match="share above 0"):
-        Mixture((Member(Steady(0.0), careful, 0.0),))
+        Mixture((Member(driver=Steady(0.0), persona=careful, share=0.0),))
     with pytest.raises(ValueError, match="SUMO can't drive a player in some games"):
-        Mixture((Member(Steady(0.0), careful), Member(SumoDriver(), careful)))
+        Mixture((Member(driver=Steady(0.0), persona=careful), Member(driver=SumoDriver(), persona=careful)))
 
 
 def test_by_who_drove__is_who_did(merge: OpenScene, people: dict[str, Persona]) -> None:
     """The table says of each game what the draw of its start said, with the failures of those games alone."""
     shares = {"careful": 1.0, "speedy": 1.0}
-    members = tuple(Member(Steady(0.2), people[name], share) for name, share in shares.items())
-    arm = Arm("naive_vs_town", merge, (Steady(0.0), Mixture(members)), (people["careful"], people["careful"]), 3)
+    members = tuple(Member(driver=Steady(0.2), persona=people[name], share=share) for name, share in shares.items())
+    arm = Arm(
+        name="naive_vs_town",
+        scene=merge,
+        drivers=(Steady(0.0), Mixture(members)),
+        personas=(people["careful"], people["careful"]),
+        seed=3,
+    )
     played = pd.DataFrame([{"arm": arm.name, "persona": "town", "seed": 3, **game.record} for game in assess(arm, 8)])
     episodes = typed(played.reindex(columns=list(EPISODE_COLUMNS)))
     campaign = Campaign(name="any", scene="any", personas=["any"], population=[Population(name="town", shares=shares)])

@@ -209,7 +209,7 @@ def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car:
         "n == 2 and message['type'] == 'decide' and steps == 4 and sys.exit('flat tyre')"
     )
     mine, careful = driver(tmp_path, car, counts), read_document(CAREFUL, Persona)
-    arm = Arm("naive_alone", merge, (mine, None), (careful, careful), 1)
+    arm = Arm(name="naive_alone", scene=merge, drivers=(mine, None), personas=(careful, careful), seed=1)
     games = [game.record for game in assess(arm, 4)]
     assert [game["ego_outcome"] == "error" for game in games] == [False, True, False, False]
     assert "DriverError" in games[1]["error"]
@@ -220,5 +220,10 @@ def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car:
 def test_process__the_example_in_perl_reaches_its_goal(merge: OpenScene, car: Car) -> None:
     folder, careful = REPOSITORY / "egos" / "examples" / "process", read_document(CAREFUL, Persona)
     mine = ProcessDriver(["perl", "drive.pl"], folder, car, "si", 5.0, 20.0)
-    games = [game.record for game in assess(Arm("naive_alone", merge, (mine, None), (careful, careful), 1), 4)]
+    games = [
+        game.record
+        for game in assess(
+            Arm(name="naive_alone", scene=merge, drivers=(mine, None), personas=(careful, careful), seed=1), 4
+        )
+    ]
     assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 4

@@ -328,7 +328,7 @@ def play(repository: Path, scene: OpenScene, ego: str, other: Driver | None, gam
     assert isinstance(document, Rules)
     careful = read_document(repository / "personas" / "careful.toml", Persona)
     driver = RulesDriver(document, car_of(scene.world, EGO))
-    arm = Arm("arm", scene, (driver, other), (careful, careful), 1)
+    arm = Arm(name="arm", scene=scene, drivers=(driver, other), personas=(careful, careful), seed=1)
     return [game.record for game in assess(arm, games)]
 
 

@@ -101,7 +101,9 @@ def test_saved__a_policy_that_does_not_vary_is_not_sampled(saved: dict[str, Path
 def test_saved__plays_games(name: str, saved: dict[str, Path], merge: OpenScene) -> None:
     careful = read_document(CAREFUL, Persona)
     driver = Sb3Driver(document(name), saved[name], sampled=False)
-    (game,) = assess(Arm("naive_alone", merge, (driver, None), (careful, careful), 1), 1)
+    (game,) = assess(
+        Arm(name="naive_alone", scene=merge, drivers=(driver, None), personas=(careful, careful), seed=1), 1
+    )
     assert game.record["error"] == ""
 
 

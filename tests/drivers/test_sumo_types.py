@@ -44,7 +44,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def play(scene: OpenScene, non_ego: Driver | None, episodes: int) -> list[Game]:
     careful = read_document(CAREFUL, Persona)
-    return list(assess(Arm("naive_alone", scene, (SumoDriver(), non_ego), (careful, careful), 1), episodes))
+    return list(
+        assess(
+            Arm(name="naive_alone", scene=scene, drivers=(SumoDriver(), non_ego), personas=(careful, careful), seed=1),
+            episodes,
+        )
+    )
 
 
 def across_m(game: Game) -> float:

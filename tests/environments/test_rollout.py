@@ -58,7 +58,7 @@ class Failing(Steady):
 
 def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: int = 1) -> Arm:
     careful, other = (read_document(file, Persona) for file in (CAREFUL, persona))
-    return Arm("naive_vs_someone", merge, drivers, (careful, other), seed)  # type: ignore[arg-type]
+    return Arm(name="naive_vs_someone", scene=merge, drivers=drivers, personas=(careful, other), seed=seed)  # type: ignore[arg-type]
 
 
 def play(assessed: Arm, episodes: int = 3) -> list[Game]:

@@ -53,7 +53,14 @@ def personas() -> tuple[Persona, Persona]:
 def search_of(scene: OpenScene, folder: Path, text: str, **settings: Any) -> Search:
     given = find(document(folder, text), folder)
     few = {"trials": 5, "games": 6, "games_at_once": 6, **settings}
-    return Search(scene, given, personas(), opponent(), Reconfiguration(**few), ("reconfiguration", 1, "test"))
+    return Search(
+        scene=scene,
+        driver=given,
+        personas=personas(),
+        opponent=opponent(),
+        settings=Reconfiguration(**few),
+        parts=("reconfiguration", 1, "test"),
+    )
 
 
 # --- the games ---
@@ -82,7 +89,7 @@ class Watched:
 
 def play(scene: OpenScene, driver: Driver, other: Driver | Mixture | None = None, **changes: Any) -> Any:
     given = {"games": 7, "at_once": 3, "alone_share": 0.3, "parts": ("test", 1)} | changes
-    games = PairedRollouts(scene, personas(), other or opponent(), **given)
+    games = PairedRollouts(scene, personas=personas(), opponent=other or opponent(), **given)
     try:
         return games.play(driver), games.play(driver)
     finally:
@@ -129,7 +136,13 @@ class _Counting:
 def test_games__may_be_against_several_who_take_turns(scene: OpenScene) -> None:
     _, speedy = personas()
     both = _Counting(), _Counting()
-    play(scene, Watched(scene), Mixture(tuple(Member(each, speedy) for each in both)), games=20, at_once=20)
+    play(
+        scene,
+        Watched(scene),
+        Mixture(tuple(Member(driver=each, persona=speedy) for each in both)),
+        games=20,
+        at_once=20,
+    )
     assert both[0].games
     assert both[1].games
     assert not both[0].games & both[1].games
@@ -148,7 +161,9 @@ def test_propose__is_told_by_the_trials_so_far_and_nothing_else() -> None:
         assert values != propose(TUNABLE, trials, "test", 2)
         assert all(low <= values[key] <= high for key, low, high in TUNABLE)
         assert list(values) == ["a", "b"]
-        trials.append(Trial(values, None if number == 3 else -abs(values["a"] - 0.25), 0.0))
+        trials.append(
+            Trial(values=values, mean_payoff=None if number == 3 else -abs(values["a"] - 0.25), failure_rate=0.0)
+        )
     assert len({trial.values["a"] for trial in trials}) == 15
 
 
@@ -156,14 +171,16 @@ def test_propose__goes_where_it_was_good() -> None:
     trials: list[Trial] = []
     for _ in range(40):
         values = propose(TUNABLE, trials, "test", 1)
-        trials.append(Trial(values, -abs(values["a"] - 0.25) - 0.1 * abs(values["b"] + 9.0), 0.0))
+        trials.append(
+            Trial(values=values, mean_payoff=-abs(values["a"] - 0.25) - 0.1 * abs(values["b"] + 9.0), failure_rate=0.0)
+        )
     first, last = (np.mean([each.mean_payoff for each in some]) for some in (trials[:10], trials[30:]))
     assert last > first
     assert abs(trials[best(trials)].values["a"] - 0.25) < 0.1
 
 
 def test_best__is_the_first_of_equals_and_never_one_that_was_not_played() -> None:
-    trials = [Trial({}, payoff, 0.0) for payoff in (1.0, None, 3.0, 3.0, 2.0)]
+    trials = [Trial(values={}, mean_payoff=payoff, failure_rate=0.0) for payoff in (1.0, None, 3.0, 3.0, 2.0)]
     assert best(trials) == 2
     assert best(trials[:2]) == 0
 
@@ -214,7 +231,10 @@ def test_search__that_is_finished_plays_nothing(
 
 
 def test_kept__is_read_back_bit_for_bit_or_not_at_all(tmp_path: Path) -> None:
-    trials = [Trial({"a": 0.1 + 0.2}, 1 / 3, 0.0), Trial({"a": 1e-300}, None, None, "ValueError: “no”")]
+    trials = [
+        Trial(values={"a": 0.1 + 0.2}, mean_payoff=1 / 3, failure_rate=0.0),
+        Trial(values={"a": 1e-300}, mean_payoff=None, failure_rate=None, error="ValueError: “no”"),
+    ]
     kept = tmp_path / "kept.json"
     assert read_trials(kept) == []
     write_trials(trials, kept)

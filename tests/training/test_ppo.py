@@ -58,7 +58,7 @@ def trained(alone: TrainingSpec, tmp_path_factory: pytest.TempPathFactory) -> Tr
 
 
 def in_one_go(spec: TrainingSpec, folder: Path, **options: Any) -> Trained:
-    return train(spec, folder / "checkpoint.safetensors", "key", {}, **options)
+    return train(spec, checkpoint=folder / "checkpoint.safetensors", key="key", card={}, **options)
 
 
 def stop_after(segments: int) -> Callable[[int, int], None]:
@@ -124,7 +124,7 @@ def test_train__a_converged_training_that_is_taken_up_again_stays_converged(
     assert (converged.stopped, converged.progress.steps) == ("converged", 2048)
     assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), converged, tmp_path)
     patient = replace(alone, settings=settings(steps=3072, early_convergence=False))
-    trained = train(patient, tmp_path / "patient.safetensors", "key", {})
+    trained = train(patient, checkpoint=tmp_path / "patient.safetensors", key="key", card={})
     assert (trained.stopped, trained.progress.steps) == ("budget", 3072)
 
 
@@ -143,7 +143,7 @@ def test_train__a_checkpoint_that_is_not_ours_counts_for_nothing(
 ) -> None:
     checkpoint = tmp_path / "checkpoint.safetensors"
     short = replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive"))
-    train(short, checkpoint, "another key", {})
+    train(short, checkpoint=checkpoint, key="another key", card={})
     spoil(checkpoint)
     assert same(in_one_go(alone, tmp_path), trained, tmp_path)
 
@@ -213,7 +213,9 @@ def test_train__who_met_others_heeds_them(alone: TrainingSpec, trained: Trained,
 def test_train__warm_start_begins_from_the_given_networks(
     alone: TrainingSpec, trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(harness.training.ppo, "_segment", lambda *_: Progress(1, 10**9, [0.0], []))
+    monkeypatch.setattr(
+        harness.training.ppo, "_segment", lambda *_: Progress(segments=1, steps=10**9, segment_payoffs=[0.0], curve=[])
+    )
     warm = in_one_go(replace(alone, initial=trained.policy), tmp_path)
     for name, tensor in trained.policy.tensors.items():
         if name != "log_deviation":

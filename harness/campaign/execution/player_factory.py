@@ -49,7 +49,7 @@ class PlayerFactory:
         members = zip(drives.members, shares, strict=True)
         return Mixture(
             tuple(
-                Member(self._driver(each), self.conditions.persona(each.persona), share)
+                Member(driver=self._driver(each), persona=self.conditions.persona(each.persona), share=share)
                 for each, share in members
                 if share > _LEAST_SHARE
             )
@@ -70,7 +70,7 @@ class PlayerFactory:
         earned = []
         for each in candidates:
             drivers = (each, other) if learner == EGO else (other, each)
-            arm = Arm(stage.arm, self.scene, drivers, personas, stage.seed)
+            arm = Arm(name=stage.arm, scene=self.scene, drivers=drivers, personas=personas, seed=stage.seed)
             payoffs = [game.record.get(f"{ROLES[learner]}_payoff") for game in assess(arm, games)]
             measured = [payoff for payoff in payoffs if payoff is not None]
             if not measured:

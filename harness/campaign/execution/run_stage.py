@@ -85,15 +85,15 @@ def _train(
 
     settings = settings_of(conditions.document, stage)
     spec = TrainingSpec(
-        scene,
-        stage.learner,
-        (conditions.ego_persona, conditions.persona_met(stage.persona)),
-        PlayerFactory(conditions, folder, scene).player(stage.opponent),
-        stage.alone_share,
-        stage.attentive_share,
-        _initial(stage, conditions, folder),
-        settings,
-        ("training", stage.seed, stage.name),
+        scene=scene,
+        learner=stage.learner,
+        personas=(conditions.ego_persona, conditions.persona_met(stage.persona)),
+        opponent=PlayerFactory(conditions, folder, scene).player(stage.opponent),
+        alone_share=stage.alone_share,
+        attentive_share=stage.attentive_share,
+        initial=_initial(stage, conditions, folder),
+        settings=settings,
+        parts=("training", stage.seed, stage.name),
         as_it_drives=bool(stage.responds_in),
     )
     learner = spec.personas[stage.learner]
@@ -110,7 +110,15 @@ def _train(
     checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
     made_by = _made_by(checkpoint)
     try:
-        trained = train(spec, checkpoint, key, card, folder.tensorboard(stage.id), on_progress, on_start)
+        trained = train(
+            spec,
+            checkpoint=checkpoint,
+            key=key,
+            card=card,
+            tensorboard=folder.tensorboard(stage.id),
+            on_progress=on_progress,
+            on_start=on_start,
+        )
     except (FloatingPointError, ValueError) as error:
         raise StageFailed(f"{stage.id}: {error}") from error
     make_folder(folder.policy(stage.id))
@@ -146,7 +154,9 @@ def _reconfigure(
     other = conditions.persona_met(stage.persona)
     personas, settings = (conditions.ego_persona, other), conditions.document.reconfiguration
     named = ("reconfiguration", stage.seed, stage.name)
-    search = Search(scene, conditions.given(""), personas, opponent, settings, named)
+    search = Search(
+        scene=scene, driver=conditions.given(""), personas=personas, opponent=opponent, settings=settings, parts=named
+    )
     kept = folder.work(stage.id) / "trials.json"
     made_by = _made_by(kept, version_of_search())
     labels = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed}
@@ -181,7 +191,7 @@ def _assess(
             chosen = {"chosen": names[earned.index(max(earned))], "earned": dict(zip(names, earned, strict=True))}
         else:
             players.append(casting.player(planned))
-    arm = Arm(stage.arm, scene, (players[EGO], players[NON_EGO]), personas, stage.seed)
+    arm = Arm(name=stage.arm, scene=scene, drivers=(players[EGO], players[NON_EGO]), personas=personas, seed=stage.seed)
     segments = segments_of(folder.segments(stage.id), conditions.document.assessment.episodes)
     labels = {"arm": stage.arm, "persona": stage.persona, "seed": stage.seed}
     errors = play_segments(arm, segments, labels, attempt, on_start, on_progress)
