@@ -82,7 +82,7 @@ def wiring(document: Fmu, file: Path) -> Wiring:
         Problem(str(file), key, message, remedy)
         for key, message, remedy in (
             *_missing(document, variables, entries, outputs),
-            *_unsuitable(document, variables, entries, outputs, description),
+            *_unsuitable(document, variables, entries=entries, outputs=outputs, description=description),
         )
     ]
     if problems:
@@ -133,6 +133,7 @@ def _missing(
 def _unsuitable(
     document: Fmu,
     variables: Mapping[str, Any],
+    *,
     entries: Mapping[str, str],
     outputs: Mapping[str, str],
     description: Any,

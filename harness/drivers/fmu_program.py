@@ -77,7 +77,7 @@ def main() -> None:
         instances: dict[int, _Instance] = {}
         for line in sys.stdin:
             try:
-                answer = _answer(json.loads(line), spec, description, folder, instances)
+                answer = _answer(json.loads(line), spec, description=description, folder=folder, instances=instances)
             except Exception as error:  # FMPy and ctypes may raise any exception
                 answer = {"error": f"{type(error).__name__}: {error}"}
             answers.write(json.dumps(answer) + "\n")

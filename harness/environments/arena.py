@@ -90,7 +90,9 @@ class Arena:
         first_drivers = [of_player[0].driver for of_player in self.seats]
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
         self._slack_m = slack_m(self._taken_over)
-        self.simulation = open_simulation(scene, games, self._taken_over.tolist(), seed, recorded)
+        self.simulation = open_simulation(
+            scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
+        )
         players = len(self.seats)
         self.state = State.empty(games, players)
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
@@ -151,7 +153,7 @@ class Arena:
             self._limits.look(state)
         self._terminations(quantities, drove)
         payoff = self._payoffs(quantities, drove)
-        check_step(before, quantities, drove, payoff, self._slack_m)
+        check_step(before, quantities, drove=drove, payoff=payoff, slack=self._slack_m)
         self._finish(quantities, drove)
         check_observation(self.observation, self._all_games, state.step)
         return Step(payoff=payoff, drove=drove, quantities=quantities)
@@ -176,7 +178,9 @@ class Arena:
                 if seat.driver.takes_over and len(games):
                     noise = self._noise[games, player, now[games]]
                     decided = seat.driver.decide(games, self.observation[games, player], noise)
-                    chosen[games, player] = checked_decisions(decided, seat.driver, player, games, state.step)
+                    chosen[games, player] = checked_decisions(
+                        decided, seat.driver, player=player, games=games, steps=state.step
+                    )
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)
         acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)

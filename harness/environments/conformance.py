@@ -144,7 +144,7 @@ def check_named(written: str, scene: Path, games: int, *, allow_code: bool) -> F
         raise UsageError.of(
             "DRIVER", "", message, "name the folder of a trained policy, such as RUN/policies/naive-seed1"
         )
-    external = None if written == SUMO else find_driver(written, Path("DRIVER"), "", allow_code)
+    external = None if written == SUMO else find_driver(written, Path("DRIVER"), key="", allow_code=allow_code)
     folder = scene if scene.exists() else _CHECKOUT / scene
     opened = open_scene(folder, external.vehicle_type if external else None)
     if external is None:
@@ -164,8 +164,8 @@ def check_conformance(driver: Driver, scene: OpenScene, games: int) -> Findings:
     """
     findings = Findings()
     try:
-        first = _play(driver, scene, games, findings, "playing")
-        again = _play(driver, scene, games, findings, "playing the same games again")
+        first = _play(driver, scene, games, findings=findings, activity="playing")
+        again = _play(driver, scene, games, findings=findings, activity="playing the same games again")
         if not driver.takes_over:
             _check_motion(first, again, findings)
             return findings
@@ -177,7 +177,7 @@ def check_conformance(driver: Driver, scene: OpenScene, games: int) -> Findings:
     return findings
 
 
-def _play(driver: Driver, scene: OpenScene, games: int, findings: Findings, activity: str) -> list[_PlayedGame]:
+def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, activity: str) -> list[_PlayedGame]:
     start_distribution = scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0])
     checked, played, outcomes = _CheckedDriver(driver, findings.seconds), list[_PlayedGame](), list[str]()
     arena = Arena(scene, 1, [Seat(checked), Seat(SumoDriver())])

@@ -96,7 +96,7 @@ def train(
         )
         while (stopped := _stop_reason(spec, progress)) is None:
             on_start(progress.segments)
-            progress = _segment(spec, model, environment, progress, on_progress)
+            progress = _segment(spec, model, environment, progress=progress, on_progress=on_progress)
             write_checkpoint(model, progress, key, checkpoint)
         return Trained(policy=policy_of(model, card), progress=progress, stopped=stopped)
     finally:
@@ -201,6 +201,7 @@ def _segment(
     spec: TrainingSpec,
     model: PPO,
     environment: ArenaVecEnv,
+    *,
     progress: Progress,
     on_progress: Callable[[int, int], None],
 ) -> Progress:

@@ -215,7 +215,14 @@ def _cruise(gap_m: float, own_mps: float, other_mps: float, before_mps2: float |
     columns = (gap_m + 4.6, gap_m, 0.0, -1.8, other_mps, 0.0, 4.6)
     encounters = Encounters(np.array([[True]]), *(nothing + column for column in columns))
     own = np.array([own_mps])
-    view = OwnMotion(own, np.array([13.89]), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, len(AHEAD_M))))
+    view = OwnMotion(
+        speed_mps=own,
+        limit_mps=np.array([13.89]),
+        acceleration_mps2=np.zeros(1),
+        steering_rad=np.zeros(1),
+        path_left_m=np.zeros(1),
+        path_turned_rad=np.zeros((1, len(AHEAD_M))),
+    )
     step_s = 1000.0 if before_mps2 is None else 0.1
     return float(
         cruise_mps2(
@@ -238,7 +245,14 @@ def test_steering__by_hand() -> None:
     law = LaneKeeping(max_lateral_mps2=6.0, max_lateral_jerk_mps3=20.0)
     for turned, expected in ((0.0, 0.0299910), (0.1, 0.05 + np.arctan(0.03 * (1.0 + 1.35 * np.sin(0.1))))):
         along = np.full((1, len(AHEAD_M)), turned)
-        view = OwnMotion(np.array([9.0]), np.array([13.9]), np.zeros(1), np.array([expected]), np.ones(1), along)
+        view = OwnMotion(
+            speed_mps=np.array([9.0]),
+            limit_mps=np.array([13.9]),
+            acceleration_mps2=np.zeros(1),
+            steering_rad=np.array([expected]),
+            path_left_m=np.ones(1),
+            path_turned_rad=along,
+        )
         assert steering_rad(view, law=law, wheelbase_m=2.7, step_s=0.1)[0] == pytest.approx(expected, abs=1e-6)
 
 
@@ -334,7 +348,7 @@ def test_driver__starts_from_standing_without_knowing_the_limit(car: Car) -> Non
 # --- whole games ---------------------------------------------------------------------------------------------------
 
 
-def play(repository: Path, scene: OpenScene, ego: str, other: Driver | None, games: int) -> list[dict[str, Any]]:
+def play(repository: Path, scene: OpenScene, *, ego: str, other: Driver | None, games: int) -> list[dict[str, Any]]:
     document = read_driver(repository / "egos" / f"{ego}.toml")
     assert isinstance(document, Rules)
     careful = read_document(repository / "personas" / "careful.toml", Persona)
@@ -348,7 +362,7 @@ def play(repository: Path, scene: OpenScene, ego: str, other: Driver | None, gam
 def test_games__every_ego_reaches_its_goal_in_comfort(
     repository: Path, scene: OpenScene, ego: str, other: Driver | None
 ) -> None:
-    for record in play(repository, scene, ego, other, 10):
+    for record in play(repository, scene, ego=ego, other=other, games=10):
         assert (record["ego_outcome"], record["error"]) == ("goal", "")
         assert record["ego_max_lateral_acceleration_mps2"] < 0.1
         assert record["ego_max_deceleration_mps2"] < 1.0
@@ -369,7 +383,7 @@ def test_games__a_bend_is_driven_slower_and_in_the_lane(repository: Path, tmp_pa
     """A radius of about 110 m means 2.5 m/s^2 of lateral acceleration at the limit of 16.67 m/s: the car slows down."""
     places: dict[str, object] = {"ego": ("ab bc", "ab_0"), "non_ego": ("ab bc", "ab_1"), "goal": "bc"}
     bent = build_scene(tmp_path / "bent", BENDS, BENT, places, goal_m=140.0, time_limit_s=40.0)
-    for record in play(repository, bent, "adas", None, 3):
+    for record in play(repository, bent, ego="adas", other=None, games=3):
         assert (record["ego_outcome"], record["error"]) == ("goal", "")
         assert 1.0 < record["ego_max_lateral_acceleration_mps2"] <= 3.1
         assert record["ego_max_deceleration_mps2"] <= 3.5

@@ -273,7 +273,7 @@ def test_background__is_observed_at_its_position_in_sumo(straight: OpenScene, op
     arena = after_reset(
         opened(straight),
         placed(straight, (100, RIGHT_Y, 0, 10), None),
-        Departure("van", "van", ("road",), 0.0, "1", "123", "10"),
+        Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.0, lane="1", position="123", speed="10"),
     )
     seen = {name: arena.observation[0, 0, k] for k, name in enumerate(LAYOUT)}
     assert seen["other0_seen"] == 0.0  # not departed yet
@@ -289,7 +289,7 @@ def test_background__contact_is_a_collision(straight: OpenScene, opened: Open) -
     arena = after_reset(
         opened(straight),
         placed(straight, (100, RIGHT_Y, 0, 12), None),
-        Departure("van", "van", ("road",), 0.0, "0", "120", "1"),
+        Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.0, lane="0", position="120", speed="1"),
     )
     *before, last = play_to_the_end(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
     assert outcomes(arena) == ["collision", ""]
@@ -301,7 +301,7 @@ def test_background__contact_is_a_collision(straight: OpenScene, opened: Open) -
 
 def test_background__is_reset_with_its_game(straight: OpenScene, opened: Open) -> None:
     arena, start = opened(straight), placed(straight, (150, RIGHT_Y, 0, 0), None)
-    van = Departure("van", "van", ("road",), 0.3, "1", "50", "8")
+    van = Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.3, lane="1", position="50", speed="8")
     for _ in range(2):
         after_reset(arena, start, van)
         where = []

@@ -216,7 +216,9 @@ def test_train__starts_from_the_initial_policy(
     alone: TrainingSpec, trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        harness.training.ppo, "_segment", lambda *_: Progress(segments=1, steps=10**9, segment_payoffs=[0.0], curve=[])
+        harness.training.ppo,
+        "_segment",
+        lambda *_, **__: Progress(segments=1, steps=10**9, segment_payoffs=[0.0], curve=[]),
     )
     warm = train_in(replace(alone, initial=trained.policy), tmp_path)
     for name, tensor in trained.policy.tensors.items():
