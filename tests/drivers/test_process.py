@@ -30,7 +30,7 @@ from tests.support.tiny import CAREFUL, wait_for
 GAMES = np.array([3, 7])
 SEEN = np.linspace(-1.0, 1.0, 2 * SIZE, dtype=np.float32).reshape(2, SIZE)
 NOISE = np.array([[0.5, -0.5], [1.0, 2.0]])
-PROGRAM = """
+OBEDIENT = """
 import json, os, sys, time
 for number, line in enumerate(sys.stdin):
     message = json.loads(line)
@@ -51,7 +51,7 @@ def driver(
     folder: Path, car: Car, change: str = "pass", units: str = "si", deadline_s: float = 5.0, **options: Any
 ) -> ProcessDriver:
     """A driver by a Python program with valid answers, except for `change`."""
-    (folder / "program.py").write_text(PROGRAM.format(change=change))
+    (folder / "program.py").write_text(OBEDIENT.format(change=change))
     command = [sys.executable, "program.py"]
     return ProcessDriver(command, folder, car, units=units, deadline_s=deadline_s, start_deadline_s=20.0, **options)
 

@@ -54,10 +54,10 @@ def alone(merge: OpenScene) -> TrainingSpec:
 @pytest.fixture(scope="session")
 def trained(alone: TrainingSpec, tmp_path_factory: pytest.TempPathFactory) -> Trained:
     """The result of a training without interruption."""
-    return train_in(alone, tmp_path_factory.mktemp("training"))
+    return in_one_go(alone, tmp_path_factory.mktemp("training"))
 
 
-def train_in(spec: TrainingSpec, folder: Path, **options: Any) -> Trained:
+def in_one_go(spec: TrainingSpec, folder: Path, **options: Any) -> Trained:
     return train(spec, checkpoint=folder / "checkpoint.safetensors", key="key", card={}, **options)
 
 
@@ -91,7 +91,7 @@ def test_train__has_a_complete_curve(alone: TrainingSpec, trained: Trained) -> N
 
 
 def test_train__again_is_the_same(alone: TrainingSpec, trained: Trained, tmp_path: Path) -> None:
-    assert same(train_in(alone, tmp_path, tensorboard=tmp_path / "events"), trained, tmp_path)
+    assert same(in_one_go(alone, tmp_path, tensorboard=tmp_path / "events"), trained, tmp_path)
     assert list((tmp_path / "events").glob("events.out.tfevents*"))
 
 
@@ -100,10 +100,10 @@ def test_train__an_interruption_does_not_change_the_policy(
     segments: int, alone: TrainingSpec, trained: Trained, tmp_path: Path
 ) -> None:
     with pytest.raises(KeyboardInterrupt):
-        train_in(alone, tmp_path, on_progress=stop_after(segments))
+        in_one_go(alone, tmp_path, on_progress=stop_after(segments))
     assert (tmp_path / "checkpoint.safetensors").exists() == (segments > 0)
     reports: list[tuple[int, int]] = []
-    resumed = train_in(alone, tmp_path, on_progress=lambda *counts: reports.append(counts))
+    resumed = in_one_go(alone, tmp_path, on_progress=lambda *counts: reports.append(counts))
     assert same(resumed, trained, tmp_path)
     assert reports[0] == (segments * 1024 + 512, 3072)  # it continued from the checkpoint
     assert reports[-1] == (3072, 3072)
@@ -112,17 +112,17 @@ def test_train__an_interruption_does_not_change_the_policy(
 def test_train__continuing_a_finished_training_changes_nothing(
     alone: TrainingSpec, trained: Trained, tmp_path: Path
 ) -> None:
-    train_in(alone, tmp_path)
-    assert same(train_in(alone, tmp_path, on_progress=stop_after(0)), trained, tmp_path)
+    in_one_go(alone, tmp_path)
+    assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), trained, tmp_path)
 
 
 def test_train__a_continued_converged_training_stays_converged(
     alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(harness.training.ppo, "has_converged", lambda payoffs: len(payoffs) >= 2)
-    converged = train_in(alone, tmp_path)
+    converged = in_one_go(alone, tmp_path)
     assert (converged.stopped, converged.progress.steps) == ("converged", 2048)
-    assert same(train_in(alone, tmp_path, on_progress=stop_after(0)), converged, tmp_path)
+    assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), converged, tmp_path)
     patient = replace(alone, settings=settings(steps=3072, early_convergence=False))
     trained = train(patient, checkpoint=tmp_path / "patient.safetensors", key="key", card={})
     assert (trained.stopped, trained.progress.steps) == ("budget", 3072)
@@ -145,7 +145,7 @@ def test_train__ignores_a_damaged_checkpoint_or_one_with_another_key(
     short = replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive"))
     train(short, checkpoint=checkpoint, key="another key", card={})
     damage(checkpoint)
-    assert same(train_in(alone, tmp_path), trained, tmp_path)
+    assert same(in_one_go(alone, tmp_path), trained, tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -175,17 +175,17 @@ def test_train__ignores_a_checkpoint_of_another_learner(
     change: Callable[[dict[str, Any], dict[str, str]], object], alone: TrainingSpec, trained: Trained, tmp_path: Path
 ) -> None:
     checkpoint = tmp_path / "checkpoint.safetensors"
-    train_in(replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive")), tmp_path)
+    in_one_go(replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive")), tmp_path)
     with safe_open(checkpoint, framework="np") as file:
         metadata = {name: text for name, text in file.metadata().items() if name != "digest"}
     tensors = load_file(checkpoint)
     change(tensors, metadata)
     save_file(tensors, checkpoint, metadata)
-    assert same(train_in(alone, tmp_path), trained, tmp_path)
+    assert same(in_one_go(alone, tmp_path), trained, tmp_path)
 
 
 def test_train__another_seed_gives_another_policy(alone: TrainingSpec, trained: Trained, tmp_path: Path) -> None:
-    other = train_in(replace(alone, parts=("training", 2, "naive")), tmp_path)
+    other = in_one_go(replace(alone, parts=("training", 2, "naive")), tmp_path)
     assert not same(other, trained, tmp_path)
     assert other.progress.segment_payoffs != trained.progress.segment_payoffs
 
@@ -208,7 +208,7 @@ def test_train__a_policy_trained_with_an_opponent_observes_it(
 ) -> None:
     ego = LearnedDriver(trained.policy, sampled=False)
     spec = replace(alone, learner=NON_EGO, opponent=ego, alone_share=0.25, settings=settings(steps=1024))
-    with_opponent = train_in(spec, tmp_path)
+    with_opponent = in_one_go(spec, tmp_path)
     assert np.abs(with_opponent.policy.tensors["actor.0.weight"][:, OTHERS]).max() > 0.0
 
 
@@ -220,7 +220,7 @@ def test_train__starts_from_the_initial_policy(
         "_segment",
         lambda *_, **__: Progress(segments=1, steps=10**9, segment_payoffs=[0.0], curve=[]),
     )
-    warm = train_in(replace(alone, initial=trained.policy), tmp_path)
+    warm = in_one_go(replace(alone, initial=trained.policy), tmp_path)
     for name, tensor in trained.policy.tensors.items():
         if name != "log_deviation":
             np.testing.assert_array_equal(warm.policy.tensors[name], tensor)
@@ -232,7 +232,7 @@ def test_train__an_initial_policy_of_another_network_is_refused(
 ) -> None:
     larger = replace(alone, initial=trained.policy, settings=settings(network=[9]))
     with pytest.raises(ValueError, match="other layer sizes"):
-        train_in(larger, tmp_path)
+        in_one_go(larger, tmp_path)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
@@ -249,7 +249,7 @@ def test_train__alone_share_is_the_share_of_games_without_opponent(
 
     monkeypatch.setattr(harness.environments.vector_env.Arena, "reset", recording)
     spec = replace(alone, opponent=SumoDriver(), alone_share=share)
-    train_in(spec, tmp_path)
+    in_one_go(spec, tmp_path)
     assert len(present) > 60
     assert 1.0 - np.mean(present) == pytest.approx(share, abs=0.15 if 0.0 < share < 1.0 else 0.0)
 
@@ -270,7 +270,7 @@ def test_train__lapses_of_attention_start_after_the_attentive_share(
 
     monkeypatch.setattr(ArenaVecEnv, "sample_from", recording)
     careful, distracted = alone.personas[0], read_document(DISTRACTED, Persona)
-    train_in(replace(alone, personas=(careful, distracted), attentive_share=share), tmp_path)
+    in_one_go(replace(alone, personas=(careful, distracted), attentive_share=share), tmp_path)
     assert seen == lapsing
 
 
@@ -289,7 +289,7 @@ def test_train__the_learner_checks_its_blind_spot_and_the_opponent_does_not(
     speedy = alone.personas[1]
     share = speedy.human_factors.no_blind_spot_check.share
     assert share > 0.0
-    train_in(replace(alone, learner=learner, personas=(speedy, speedy)), tmp_path)
+    in_one_go(replace(alone, learner=learner, personas=(speedy, speedy)), tmp_path)
     assert seen
     assert all(shares[learner] == 0.0 and shares[1 - learner] == share for shares in seen)
 
@@ -299,7 +299,7 @@ def test_train__the_deviation_of_actions_is_bounded(alone: TrainingSpec, tmp_pat
         rewarded = settings(steps=1024, learning_rate=0.01, entropy_coefficient=1.0, max_deviation=bound)
         folder = tmp_path / f"{bound}"
         folder.mkdir()
-        return np.exp(train_in(replace(alone, settings=rewarded), folder).policy.tensors["log_deviation"])
+        return np.exp(in_one_go(replace(alone, settings=rewarded), folder).policy.tensors["log_deviation"])
 
     assert (deviations(2.0) > 0.55).all()  # the entropy term raises it from 0.5
     assert (deviations(0.5) <= 0.5 + 1e-6).all()
@@ -324,7 +324,7 @@ def test_train__ppo_sees_scaled_payoffs_and_the_curve_does_not(
         folder.mkdir()
         # one update at the end: both play the same games
         spec = replace(alone, settings=settings(steps=1024, buffer=1024, payoff_scale=scale))
-        curves[scale] = train_in(spec, folder).progress.curve[0].mean_payoff
+        curves[scale] = in_one_go(spec, folder).progress.curve[0].mean_payoff
         seen[scale] = np.concatenate(rewards)
     np.testing.assert_allclose(seen[0.25], 0.25 * seen[1.0], rtol=1e-6)
     assert curves[0.25] == pytest.approx(curves[1.0])
@@ -340,7 +340,7 @@ def test_train__a_payoff_that_is_not_finite_ends_it_with_its_place(
     monkeypatch.setattr(Quantities, "broken", property(broken), raising=False)
     monkeypatch.setitem(TERMS, "progress", replace(TERMS["progress"], quantity="broken"))  # type: ignore[index]
     with pytest.raises(FloatingPointError, match=r"payoff of ego is (nan|inf) in step 17 of game \d+, after \d+ steps"):
-        train_in(alone, tmp_path)
+        in_one_go(alone, tmp_path)
     assert not (tmp_path / "checkpoint.safetensors").exists()
 
 
@@ -349,12 +349,12 @@ def test_train__closes_the_simulation(alone: TrainingSpec, tmp_path: Path, monke
     close = ArenaVecEnv.close
     monkeypatch.setattr(ArenaVecEnv, "close", lambda self: (closed.append(self), close(self)))
     with pytest.raises(KeyboardInterrupt):
-        train_in(alone, tmp_path, on_progress=stop_after(0))
+        in_one_go(alone, tmp_path, on_progress=stop_after(0))
     assert len(closed) == 1
 
 
 def test_checkpoint__is_a_safetensors_file(alone: TrainingSpec, tmp_path: Path) -> None:
-    train_in(replace(alone, settings=settings(steps=1024)), tmp_path)
+    in_one_go(replace(alone, settings=settings(steps=1024)), tmp_path)
     content = (tmp_path / "checkpoint.safetensors").read_bytes()
     header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])  # safetensors: a JSON header, numbers
     assert header["__metadata__"]["key"] == "key"
@@ -367,7 +367,7 @@ def test_train__an_ego_alone_learns_to_drive(alone: TrainingSpec, tmp_path: Path
         steps=262_144, segment_steps=131_072, games=64, buffer=2048, minibatch=512, epochs=10, network=[64, 64]
     )
     began = time.monotonic()
-    learned = train_in(replace(alone, settings=budget), tmp_path)
+    learned = in_one_go(replace(alone, settings=budget), tmp_path)
     curve = learned.progress.curve
     assert len(curve) == 16
     assert curve[-1].mean_payoff > curve[0].mean_payoff + 5.0
