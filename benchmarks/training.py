@@ -41,7 +41,15 @@ def lesson(settings: Training) -> TrainingSpec:
     opponent = LearnedDriver(coasting_policy(), people[1].decisions == "sampled")
     alone_share = Retraining().alone_share
     return TrainingSpec(
-        merge(), EGO, people, opponent, alone_share, 0.0, coasting_policy(), settings, ("benchmarks", 1)
+        scene=merge(),
+        learner=EGO,
+        personas=people,
+        opponent=opponent,
+        alone_share=alone_share,
+        attentive_share=0.0,
+        initial=coasting_policy(),
+        settings=settings,
+        parts=("benchmarks", 1),
     )
 
 
@@ -64,7 +72,14 @@ def train_in_laps(pace: Pace, settings: Training, values: Callable[[], dict[str,
             pace.lap(so_many, **values())
 
     with tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
-        train(lesson(settings), Path(folder) / "checkpoint", "benchmark", {}, Path(folder) / "tensorboard", report)
+        train(
+            lesson(settings),
+            checkpoint=Path(folder) / "checkpoint",
+            key="benchmark",
+            card={},
+            tensorboard=Path(folder) / "tensorboard",
+            on_progress=report,
+        )
 
 
 def arena_side(pace: Pace) -> None:

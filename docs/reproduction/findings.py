@@ -186,7 +186,7 @@ def _lawful(run: Path, seed: int, episodes: int) -> tuple[float, float]:
     scene = open_scene(ROOT / "networks" / "merge")
     careful, speedy = (read_document(ROOT / "personas" / f"{n}.toml", Persona) for n in ("careful", "speedy"))
     naive = LearnedDriver(read_policy(run / "policies" / f"naive-seed{seed}"), careful.decisions == "sampled")
-    arm = Arm("lawful", scene, (naive, SumoDriver()), (careful, speedy), seed)
+    arm = Arm(name="lawful", scene=scene, drivers=(naive, SumoDriver()), personas=(careful, speedy), seed=seed)
     payoffs = [game.record["non_ego_payoff"] for game in assess(arm, episodes)]
     routes = scene.world.road.routes
     return float(np.mean(payoffs)), float(routes.speed_limit_mps[routes.first_row[1]])

@@ -105,26 +105,28 @@ def check_driver(
     driver: Annotated[
         str,
         typer.Argument(
-            metavar="DRIVER", help="A driver document, a policy's folder, or an installed driver.", show_default=False
+            metavar="DRIVER",
+            help="A driver document, a policy's folder, an installed driver, or sumo.",
+            show_default=False,
         ),
     ],
     scene: Annotated[
-        Path, typer.Option(metavar="DIR", help="The scene it drives on.  [default: networks/merge]", show_default=False)
+        Path, typer.Option(metavar="DIR", help="The scene of the games.  [default: networks/merge]", show_default=False)
     ] = Path("networks/merge"),
     games: Annotated[int, typer.Option(min=2, max=1000, metavar="N", help="Games to play.")] = 3,
     allow_code: AllowCode = False,
 ) -> None:
-    """Check that a driver keeps to the protocol, and say in words where it does not.
+    """Check that a driver conforms to the driver protocol, and list every violation.
 
-    Plays seeded games twice, and shows them again all at once. Exit code 1: it does not keep to it.
+    Plays seeded games twice, then replays their observations with all games at once. Exit code 1: it does not conform.
     """
     from rich.console import Console
 
     from harness.environments.conformance import check_named
 
-    found = check_named(driver, scene, games, allow_code)
+    findings = check_named(driver, scene, games, allow_code=allow_code)
     console = Console()
-    for line in found.lines():
+    for line in findings.lines():
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    if found.wrong:
+    if findings.violations:
         raise typer.Exit(NOT_CONFORMANT)

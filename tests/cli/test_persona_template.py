@@ -200,5 +200,5 @@ def test_new__can_be_trained(tmp_path: Path, merge: OpenScene) -> None:
         settings=settings(steps=1024),
         parts=("training", 1, "anna"),
     )
-    trained = train(spec, tmp_path / "checkpoint.safetensors", "key", {})
+    trained = train(spec, checkpoint=tmp_path / "checkpoint.safetensors", key="key", card={})
     assert trained.progress.steps >= 1024

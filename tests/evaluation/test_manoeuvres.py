@@ -509,7 +509,7 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path,
         read_document(repository / "personas" / f"{name}.toml", Persona) for name in ("careful", "distracted")
     )
     drivers = (Scripted([0.0] * 30 + [0.9] * 10), Scripted([0.0]))
-    arm = Arm("naive_vs_distracted", merge, drivers, (careful, distracted), 1)
+    arm = Arm(name="naive_vs_distracted", scene=merge, drivers=drivers, personas=(careful, distracted), seed=1)
     stories = {}
     for game in assess(arm, 12):
         assert game.trace is not None

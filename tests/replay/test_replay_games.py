@@ -63,7 +63,7 @@ def played(
     scene: OpenScene, persona: Persona, drivers: tuple[Driver, Driver], outcome: str, episodes: int = 8
 ) -> pd.DataFrame:
     """The trace of the first game with such an outcome of the ego."""
-    for game in assess(Arm("arm", scene, drivers, (persona, persona), 1), episodes):
+    for game in assess(Arm(name="arm", scene=scene, drivers=drivers, personas=(persona, persona), seed=1), episodes):
         if game.record["ego_outcome"] == outcome:
             assert game.trace is not None
             return pd.DataFrame(dict(game.trace))

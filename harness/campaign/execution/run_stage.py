@@ -120,8 +120,15 @@ def _train(stage: TrainingStage, run: StageRun) -> Made:
     checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
     versions = _versions_since(checkpoint)
     try:
-        key, tensorboard = context.keys[stage.id], folder.tensorboard(stage.id)
-        trained = train(spec, checkpoint, key, card, tensorboard, run.on_progress, run.on_start)
+        trained = train(
+            spec,
+            checkpoint=checkpoint,
+            key=context.keys[stage.id],
+            card=card,
+            tensorboard=folder.tensorboard(stage.id),
+            on_progress=run.on_progress,
+            on_start=run.on_start,
+        )
     except (FloatingPointError, ValueError) as error:
         raise StageFailed(f"{stage.id}: {error}") from error
     make_folder(folder.policy(stage.id))
