@@ -15,14 +15,14 @@ from typing import Any
 from benchmarks.bare import Placement, place_and_step, record
 from benchmarks.games import GAMES, Played, merge
 from benchmarks.traffic import write_scene
-from harness.environments.gymnasium_env import arena as stepping
+from harness.environments import arena as stepping
 from harness.traffic.background_traffic import BackgroundTraffic
 from harness.traffic.scene import open_scene
 
 _ALONE_STEPS, _AMONG_OTHERS_STEPS = 300, 100
 _PARTS = (
     ("drivers, attention, requests", "decide", stepping.Arena, "_decide"),
-    ("the players' cars move", "drive", stepping, "drive"),
+    ("the players' cars move", "drive", stepping, "move"),
     ("others near the players read", "read", BackgroundTraffic, "read"),
     ("where each is along its route", "locate", stepping.Arena, "_locate"),
     ("contact, goal, time", "terminations", stepping.Arena, "_terminations"),

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import save
 
+from harness.game.arrays import FloatArray
 from tests.drivers.test_policy_file import some_policy
 from tests.hostile.inputs import (
     CAMPAIGN,
@@ -260,11 +261,12 @@ SCENES = [
 # --- policies ---------------------------------------------------------------------------------------------------------
 
 
-def tensors(**changes: object) -> Spoil:
+def tensors(**changes: FloatArray | None) -> Spoil:
     """A policy with parameters replaced, left out (None) or added; `__` in a name is a dot."""
 
     def spoil(project: Path) -> None:
-        given = {**some_policy().tensors, **{name.replace("__", "."): value for name, value in changes.items()}}
+        named = {name.replace("__", "."): value for name, value in changes.items()}
+        given = {**some_policy().tensors, **named}
         (project / TENSORS).write_bytes(save({name: value for name, value in given.items() if value is not None}))
 
     return spoil

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 import pandas as pd
 
+from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games, worst_first
 from harness.reports.player_data import PlayerTrack, RecordedGame, SceneDrawing, Touch, Track
 
@@ -18,7 +22,7 @@ SCENE = SceneDrawing(
 )
 
 
-def recorded(episodes, others=2):
+def recorded(episodes: pd.DataFrame, others: int = 2) -> Iterator[RecordedGame]:
     """A game for each row of `episodes` that was played, the ones to watch first on top."""
     played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
     chosen = worst_first(choose_games(played))
@@ -28,7 +32,7 @@ def recorded(episodes, others=2):
             yield recorded_game(row, others)
 
 
-def recorded_game(row, others=2):
+def recorded_game(row: Any, others: int = 2) -> RecordedGame:
     """One game that ends as its row says."""
     outcome = row.ego_outcome or row.non_ego_outcome
     random = np.random.default_rng([row.seed, row.episode])
@@ -46,7 +50,8 @@ def recorded_game(row, others=2):
     touches = []
     if outcome in ("collision", "rail"):
         place = (players[0].x_m[-1], players[0].y_m[-1] - 0.9 if outcome == "collision" else 0.0)
-        touches.append(Touch(float(time[-1]), *map(float, place), f"{outcome} at {time[-1]:.1f} s"))
+        x_m, y_m = map(float, place)
+        touches.append(Touch(float(time[-1]), x_m, y_m, f"{outcome} at {time[-1]:.1f} s"))
     along = [
         Track(f"car {n}", 5.0, 1.8, 0, 80 + 30 * n + 9.0 * time, np.full(len(time), -1.6), 0 * time, 0 * time + 9.0)
         for n in range(others)
@@ -54,7 +59,15 @@ def recorded_game(row, others=2):
     return RecordedGame(row.arm, row.persona, row.seed, row.episode, STEP_S, ends, outcome, players, along, touches)
 
 
-def _player(name, time, x_m, y_m, speed_mps, random, outcome):
+def _player(
+    name: str,
+    time: FloatArray,
+    x_m: float,
+    y_m: float,
+    speed_mps: float,
+    random: np.random.Generator,
+    outcome: str,
+) -> PlayerTrack:
     ego = name == "ego"
     wave = random.uniform(0.6, 1.4)
     acceleration = (-0.6 if ego else 0.5) * np.sin(wave * time) + random.normal(0, 0.08, len(time))
@@ -62,7 +75,7 @@ def _player(name, time, x_m, y_m, speed_mps, random, outcome):
         acceleration = np.where(time > time[-1] - 1.2, -4.0, acceleration)
     speed = np.maximum(speed_mps + np.cumsum(acceleration) * STEP_S, 0.0)
     x = x_m + np.concatenate(([0.0], np.cumsum(speed)[:-1] * STEP_S))
-    y = np.full(len(time), y_m)
+    y: FloatArray = np.full(len(time), y_m)
     if not ego:
         y = y_m + 3.2 * np.clip((x - 85) / 40, 0, 1) ** 2
     elif outcome == "rail":
@@ -77,7 +90,7 @@ def _player(name, time, x_m, y_m, speed_mps, random, outcome):
     )  # fmt: skip
 
 
-def manoeuvres(episodes):
+def manoeuvres(episodes: pd.DataFrame) -> pd.DataFrame:
     """A frame of manoeuvres as `harness.evaluation.manoeuvres` writes it: two in each game against a persona."""
     names = (("cut_in", "swerve"), ("drift", "hard_brake"), ("tailgate", "overtake"))
     rows = []
