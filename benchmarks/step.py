@@ -92,7 +92,7 @@ def _table(coasting: CoastingGames, seconds: float, steps_per_pass: int, reset_e
     rows.insert(3, ("around SUMO: poses in, readings out", microseconds["simulation"] - bare_us))
     rows.append(("the rest", microseconds["rest"]))
     whole_us = sum(part_us for _, part_us in rows)
-    lines = ["| part | µs a game-step | share |", "| --- | ---: | ---: |"]
+    lines = ["| part | µs per game-step | share |", "| --- | ---: | ---: |"]
     lines += [f"| {words} | {part_us:.2f} | {part_us / whole_us:.0%} |" for words, part_us in rows]
     return "\n".join([*lines, f"| all | {whole_us:.2f} | {1e6 / whole_us:,.0f} game-steps/s |"])
 
