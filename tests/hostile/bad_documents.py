@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 from safetensors.numpy import save
 
-from harness.game.arrays import FloatArray
 from tests.drivers.test_policy_file import some_policy
 from tests.hostile.inputs import (
     CAMPAIGN,
@@ -261,7 +260,7 @@ SCENES = [
 # --- policies ---------------------------------------------------------------------------------------------------------
 
 
-def tensors(**changes: FloatArray | None) -> Spoil:
+def tensors(**changes: np.ndarray | None) -> Spoil:
     """A policy with parameters replaced, left out (None) or added; `__` in a name is a dot."""
 
     def spoil(project: Path) -> None:
