@@ -260,11 +260,12 @@ SCENES = [
 # --- policies ---------------------------------------------------------------------------------------------------------
 
 
-def tensors(**changes: object) -> Spoil:
+def tensors(**changes: np.ndarray | None) -> Spoil:
     """A policy with parameters replaced, left out (None) or added; `__` in a name is a dot."""
 
     def spoil(project: Path) -> None:
-        given = {**some_policy().tensors, **{name.replace("__", "."): value for name, value in changes.items()}}
+        named = {name.replace("__", "."): value for name, value in changes.items()}
+        given = {**some_policy().tensors, **named}
         (project / TENSORS).write_bytes(save({name: value for name, value in given.items() if value is not None}))
 
     return spoil

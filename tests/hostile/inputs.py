@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.cli import main as cli
+from harness.cli.main import main
 from harness.drivers.policy_file import write_policy
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
@@ -335,7 +335,7 @@ class Desk:
         self._capsys.readouterr()
         began, worked = time.monotonic(), sum(os.times()[:4])
         with pytest.raises(SystemExit) as stopped:
-            cli.main()
+            main()
         code = stopped.value.code
         took_s, cpu_s = time.monotonic() - began, sum(os.times()[:4]) - worked
         return Said(0 if code is None else int(code), *self._capsys.readouterr(), took_s, cpu_s)

@@ -8,7 +8,10 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
 
@@ -24,14 +27,14 @@ ARGUMENTS = [
 ]
 
 
-def missing(what):
+def missing(what: str) -> NoReturn:
     if os.environ.get("HARNESS_REQUIRE_BROWSER") == "1":
         pytest.fail(f"{what}, and HARNESS_REQUIRE_BROWSER=1 asks for it")
     pytest.skip(what)
 
 
 @contextmanager
-def launched():
+def launched() -> Iterator[Any]:
     """The browser."""
     try:
         from playwright.sync_api import sync_playwright
@@ -47,11 +50,13 @@ def launched():
 
 
 @contextmanager
-def opener(browser, report):
+def opener(browser: Any, report: Path) -> Iterator[Callable[..., Any]]:
     """Opens a report in a window of its own; what the browser complained of or asked for is in `seen`."""
-    contexts = []
+    contexts: list[Any] = []
 
-    def open_page(path=report, width=1280, height=900, fragment="", **settings):
+    def open_page(
+        path: Path = report, width: int = 1280, height: int = 900, fragment: str = "", **settings: Any
+    ) -> Any:
         context = browser.new_context(viewport={"width": width, "height": height}, **settings)
         contexts.append(context)
         page = context.new_page()
@@ -76,7 +81,7 @@ def opener(browser, report):
         context.close()
 
 
-def until(page, expression, argument=None, seconds=20.0):
+def until(page: Any, expression: str, argument: Any = None, seconds: float = 20.0) -> None:
     """Wait until a function of JavaScript is true; Playwright's own way of waiting breaks the page's policy."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression, argument):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -12,7 +14,16 @@ from harness.evaluation.game_theory.records import Pairing, Response
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 
 
-def arm(name, seed=1, ego_failed=(), ego_payoff=None, non_ego_payoff=None, persona="", speed=13.0, first_episode=0):
+def arm(
+    name: str,
+    seed: int = 1,
+    ego_failed: Sequence[int | None] = (),
+    ego_payoff: Sequence[float] | None = None,
+    non_ego_payoff: Sequence[float] | None = None,
+    persona: str = "",
+    speed: float = 13.0,
+    first_episode: int = 0,
+) -> pd.DataFrame:
     """Games of one arm, an episode each; None in `ego_failed` is a game that errored."""
     count = len(ego_failed)
     ego = [10.0] * count if ego_payoff is None else ego_payoff
@@ -37,7 +48,7 @@ def arm(name, seed=1, ego_failed=(), ego_payoff=None, non_ego_payoff=None, perso
     return pd.DataFrame(rows, columns=list(EPISODE_COLUMNS))
 
 
-def table(*arms):
+def table(*arms: pd.DataFrame) -> pd.DataFrame:
     """Arms under one another, as episodes.csv holds them."""
     return typed(pd.concat(arms, ignore_index=True))
 
@@ -66,7 +77,8 @@ MET = {
     "retrained_distracted": ("distracted",),
     "robust": ("speedy", "distracted"),
 }
-GAINS = {
+Gains = Mapping[tuple[Literal["ego", "non_ego"], str], float]
+GAINS: Gains = {
     ("ego", "speedy"): 0.1,
     ("non_ego", "speedy"): 6.0,
     ("ego", "distracted"): -0.3,
@@ -75,10 +87,12 @@ GAINS = {
 """What the best response earns more, by role and persona."""
 
 
-def a_campaign(seeds=(1,), games=50, gains=None):
+def a_campaign(
+    seeds: Sequence[int] = (1,), games: int = 50, gains: Gains | None = None
+) -> tuple[pd.DataFrame, list[Pairing], list[Response]]:
     """Episodes, pairings and responses of a whole made-up campaign: every cell of FAILING, a best response of both
     sides of each persona's last pair."""
-    gains, random = GAINS | (gains or {}), np.random.default_rng(5)
+    gains, random = {**GAINS, **(gains or {})}, np.random.default_rng(5)
     arms, pairings, responses = [], [], []
     for seed in seeds:
         for (ego, non_ego), rate in FAILING.items():
@@ -102,13 +116,18 @@ def a_campaign(seeds=(1,), games=50, gains=None):
     return table(*arms), pairings, responses
 
 
-def _noisy(name, seed, failed, persona, random):
+def _noisy(name: str, seed: int, failed: Sequence[int], persona: str, random: np.random.Generator) -> pd.DataFrame:
     ego = [float(random.normal(8, 1) - 12 * each) for each in failed]
     non_ego = [float(random.normal(15, 2) + 3 * each) if persona else math.nan for each in failed]
     return arm(name, seed, failed, ego, non_ego, persona, speed=float(random.normal(13, 0.5)))
 
 
-def findings(seeds=(1,), games=50, gains=None, significance=0.01):
+def findings(
+    seeds: Sequence[int] = (1,),
+    games: int = 50,
+    gains: Gains | None = None,
+    significance: float = 0.01,
+) -> Any:
     """What is found in such a campaign."""
     episodes, pairings, responses = a_campaign(seeds, games, gains)
     return find(pairings, responses, MET, episodes, significance)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from html.parser import HTMLParser
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparison import compare
-from harness.evaluation.research_questions import Question
+from harness.evaluation.research_questions import Question, ResearchQuestion
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import TABLES, typed
 from harness.replay.selection import choose_games, replay_name
 from harness.reports.page import render_page
+from harness.reports.player_data import RecordedGame, SceneDrawing
 from harness.reports.run_tables import RunTables
 from tests.support.recorded import SCENE, manoeuvres, recorded
 
@@ -21,13 +24,20 @@ GAMES = 60
 FAILING = {"alone": 0.0, "sumo": 0.03, "naive": 0.3, "retrained": 0.03}
 
 
-def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=GAMES, quick=False, retrained=True):
+def campaign(
+    personas: Sequence[str] = ("speedy", "distracted"),
+    seeds: Sequence[int] = (1,),
+    failing: dict[str, float] | None = None,
+    games: int = GAMES,
+    quick: bool = False,
+    retrained: bool = True,
+) -> dict[str, Any]:
     """The fields of RunTables for a made-up campaign, its tables computed as those of a real one.
 
     `failing` overrides FAILING: the share of games the ego fails, by kind of arm.
     """
     rates = FAILING | (failing or {})
-    arms = [("naive_alone", "", "alone"), ("naive_vs_sumo", "", "sumo")]
+    arms: list[tuple[str, str, str | None]] = [("naive_alone", "", "alone"), ("naive_vs_sumo", "", "sumo")]
     stages = ["naive"]
     for persona in personas:
         arms += [(f"{persona}_alone", persona, None), (f"naive_vs_{persona}", persona, "naive")]
@@ -40,7 +50,7 @@ def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=
             stages.append(f"retrained_{persona}")
     random = np.random.default_rng(7)
     rows = [
-        _game(arm, persona, seed, episode, rates.get(kind), random)
+        _game(arm, persona, seed, episode, rates.get(kind or ""), random)
         for arm, persona, kind in arms
         for seed in seeds
         for episode in range(games)
@@ -50,10 +60,7 @@ def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=
         Question(question, persona, seed, before, after)
         for persona in personas
         for seed in seeds
-        for question, before, after in (
-            ("RQ1", "naive_alone", f"naive_vs_{persona}"),
-            ("RQ2", f"naive_vs_{persona}", f"retrained_vs_{persona}"),
-        )
+        for question, before, after in _asked(persona)
         if question == "RQ1" or retrained
     ]
     training = pd.DataFrame([row for stage in stages for seed in seeds for row in _windows(stage, seed, random)])
@@ -87,8 +94,23 @@ def campaign(personas=("speedy", "distracted"), seeds=(1,), failing=None, games=
     }
 
 
-def _game(arm, persona, seed, episode, failing, random):
-    row = {"arm": arm, "persona": persona, "seed": seed, "episode": episode, "duration_s": random.uniform(9, 14)}
+def _asked(persona: str) -> list[tuple[ResearchQuestion, str, str]]:
+    return [
+        ("RQ1", "naive_alone", f"naive_vs_{persona}"),
+        ("RQ2", f"naive_vs_{persona}", f"retrained_vs_{persona}"),
+    ]
+
+
+def _game(
+    arm: str, persona: str, seed: int, episode: int, failing: float | None, random: np.random.Generator
+) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "arm": arm,
+        "persona": persona,
+        "seed": seed,
+        "episode": episode,
+        "duration_s": random.uniform(9, 14),
+    }
     row |= {"ego_outcome": "", "non_ego_outcome": "", "error": ""}
     if failing is not None:
         failed = episode < failing * GAMES
@@ -110,7 +132,7 @@ def _game(arm, persona, seed, episode, failing, random):
     return row
 
 
-def _windows(stage, seed, random):
+def _windows(stage: str, seed: int, random: np.random.Generator) -> Iterator[dict[str, Any]]:
     persona = stage.removeprefix("retrained_") if stage != "naive" else ""
     for window in range(1, 10):
         yield {
@@ -125,22 +147,22 @@ def _windows(stage, seed, random):
         }
 
 
-def rendered(games=(), scene=None, **tables):
+def rendered(games: Sequence[RecordedGame] = (), scene: SceneDrawing | None = None, **tables: Any) -> str:
     """The report of these tables, as `campaign` makes them."""
     return render_page(RunTables(**tables), games, scene)
 
 
-def recordings(arguments, others=2):
+def recordings(arguments: Mapping[str, Any], others: int = 2) -> dict[str, Any]:
     """What `rendered` takes beside a campaign: recorded games that fit it, and their manoeuvres."""
     games = recorded(arguments["episodes"], others)
     return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
 
 
-def _done(seed):
+def _done(seed: int) -> dict[str, Any]:
     return {"kind": "assessment", "seed": seed, "status": "done", "seconds": 12.34, "message": ""}
 
 
-def _training_stage(seed):
+def _training_stage(seed: int) -> dict[str, Any]:
     trained = {"steps": 1_179_648, "budget_steps": 3_000_000, "stopped": "converged", "rule": "the curve is flat"}
     return {"kind": "training", "seed": seed, "status": "done", "seconds": 3725.0, "message": ""} | trained
 
@@ -148,16 +170,19 @@ def _training_stage(seed):
 class Page(HTMLParser):
     """What a test asks of a page: its text, its tables by id, every tag with its attributes."""
 
-    def __init__(self, html):
+    def __init__(self, html: str) -> None:
         super().__init__()
-        self.tags, self.pieces, self.tables = [], [], {}
-        self._table = self._cell = None
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.pieces: list[str] = []
+        self.tables: dict[str | None, list[list[dict[str, Any]]]] = {}
+        self._table: list[list[dict[str, Any]]] = []
+        self._cell: dict[str, Any] | None = None
         self._silent = 0
         self.feed(html)
         self.text = " ".join("".join(self.pieces).split())
 
-    def handle_starttag(self, tag, attributes):
-        attributes = dict(attributes)
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        attributes = dict(attrs)
         self.tags.append((tag, attributes))
         self._silent += tag in ("style", "script")
         if tag == "table":
@@ -168,23 +193,23 @@ class Page(HTMLParser):
             self._cell = {"exact": attributes.get("data-value", attributes.get("data-column")), "text": ""}
             self._table[-1].append(self._cell)
 
-    def handle_endtag(self, tag):
+    def handle_endtag(self, tag: str) -> None:
         self._silent -= tag in ("style", "script")
         if tag in ("td", "th"):
             self._cell = None
 
-    def handle_data(self, data):
+    def handle_data(self, data: str) -> None:
         if not self._silent:
             self.pieces.append(data)
         if self._cell is not None:
             self._cell["text"] += data
 
-    def cells(self, name):
+    def cells(self, name: str) -> list[list[str | None]]:
         """A table of the page as the CSV file should have it, its header first."""
         return [[cell["text"] if cell["exact"] is None else cell["exact"] for cell in row] for row in self.tables[name]]
 
 
-def with_errors(arguments, games):
+def with_errors(arguments: dict[str, Any], games: Any) -> dict[str, Any]:
     """The campaign with `games`, a mask over its episodes, that could not be played."""
     frame = arguments["episodes"]
     frame.loc[games, "ego_outcome"] = "error"
@@ -211,7 +236,7 @@ CONTRAST = """element => {
 """WCAG's contrast ratio of an element's text with the first ground behind it that is not transparent."""
 
 
-def recomputed(arguments):
+def recomputed(arguments: dict[str, Any]) -> dict[str, Any]:
     """The campaign with tables that fit its changed episodes."""
     old = arguments["comparisons"]
     questions = [

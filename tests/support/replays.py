@@ -139,11 +139,11 @@ def play(folder: Path) -> tuple[pd.DataFrame, str]:
     """What SUMO reports of a replay, one row per vehicle and step, and what it printed."""
     output = folder.parent / "played.xml"
     command = [
-        sumo_program("sumo"),
+        str(sumo_program("sumo")),
         "-c",
-        folder / "scene.sumocfg",
+        str(folder / "scene.sumocfg"),
         "--fcd-output",
-        output,
+        str(output),
         "--precision",
         "6",
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,7 +48,7 @@ def build_scene(
     folder: Path,
     nodes: str = STRAIGHT_NODES,
     edges: str = STRAIGHT_EDGES,
-    places: dict[str, object] = STRAIGHT,
+    places: Mapping[str, Sequence[str]] = STRAIGHT,
     others: str = "",
     cars: str = CARS,
     goal_m: float = 250.0,

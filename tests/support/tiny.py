@@ -95,13 +95,13 @@ def _inline(value: Any) -> str:
 
 def harness(*arguments: object, timeout_s: float = 200.0, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run the command to its end."""
-    command = [HARNESS, *map(str, arguments)]
+    command = [str(HARNESS), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False, **options)
 
 
 def begin(*arguments: object) -> subprocess.Popen[str]:
     """Start the command as the leader of a process group, as a shell does, whatever is ignored where the tests run."""
-    command = [HARNESS, *map(str, arguments)]
+    command = [str(HARNESS), *map(str, arguments)]
     return subprocess.Popen(
         command,
         stdout=subprocess.PIPE,
