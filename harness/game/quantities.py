@@ -18,9 +18,8 @@ from harness.game.jit import compiled
 from harness.game.road import MARGIN_M, SPACING_M, Along, Road, Routes, row_at
 from harness.game.state import Bodies, Outcome, State
 
-PATH_M = np.array(
-    [-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0]
-)  # distances ahead of a player at which its route is sampled
+# distances ahead of a player at which its route is sampled
+PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])
 SIGHT_M = 60.0  # a body farther ahead than this is not a leader
 REACH_M = 10.0  # largest clearance that is computed
 _PATH_ROWS = np.rint(PATH_M / SPACING_M).astype(np.int64)
