@@ -445,7 +445,9 @@ def test_table__holds_the_manoeuvres_whole(merge: OpenScene) -> None:
 
 
 def done(player: str, name: str, time_s: float, until_s: float) -> Manoeuvre:
-    return Manoeuvre(player, name, time_s, until_s, np.nan, np.nan, "")
+    return Manoeuvre(
+        player=player, manoeuvre=name, time_s=time_s, until_s=until_s, gap_m=np.nan, ttc_s=np.nan, text=""
+    )
 
 
 DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4.5)

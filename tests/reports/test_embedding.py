@@ -44,7 +44,7 @@ def test_columns__are_the_trace_to_half_a_unit(games):
         measured = np.isfinite(values)
         assert np.abs(column[measured] * scale - values[measured]).max() <= 0.5 * scale + 1e-9
         assert (column[~measured] == NOTHING).all()
-    assert len(columns) == len(SCALES) * len(game.players) + 4 * len(game.others)
+    assert len(columns) == len(SCALES) * len(game.players) + 4 * len(game.background)
 
 
 def test_embedded__as_many_as_fit_and_the_first_ones(games):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -262,7 +263,7 @@ def test_words__only_the_last_round_is_the_headline(found):
 def test_words__pairs_of_earlier_rounds_are_said_beneath(found):
     earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value, ego="naive")
     both = pd.concat([earlier, found.gaps], ignore_index=True)
-    section = game_section(GameFindings(both, found.crossplay, found.equilibria, found.generalisation))
+    section = game_section(replace(found, gaps=both))
     assert len(section.gaps) == 8
     assert [(persona, pair, answer.seed) for persona, pair, answer in section.others] == [
         ("speedy", "naive against speedy_round2", 1),
@@ -270,7 +271,7 @@ def test_words__pairs_of_earlier_rounds_are_said_beneath(found):
         ("distracted", "naive against distracted", 1),
         ("distracted", "naive against distracted", 2),
     ]
-    text = Page(page_of(GameFindings(both, found.crossplay, found.equilibria, found.generalisation), (1, 2))).text
+    text = Page(page_of(replace(found, gaps=both), (1, 2))).text
     assert "naive against distracted, seed 2: For the ego nothing better was found" in text
 
 
@@ -414,7 +415,7 @@ def test_browser__hostile_names_are_inert(opened, found, tmp_path):
     response = Response(1, "ego", hostile, 1, "pair", "best_ego", hostile, hostile)
     episodes = table(arm("pair", ego_failed=[0, 0]), arm("best_ego", ego_failed=[0, 0], ego_payoff=[11, 12]))
     crossplay = found.crossplay.assign(ego=hostile)[:1]
-    game = GameFindings(gaps([response], episodes, 0.01), crossplay, found.equilibria, found.generalisation)
+    game = replace(found, gaps=gaps([response], episodes, 0.01), crossplay=crossplay)
     (tmp_path / "hostile.html").write_text(page_of(game), encoding="utf-8")
     page = opened(tmp_path / "hostile.html")
     page.wait_for_timeout(100)

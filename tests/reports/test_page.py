@@ -145,9 +145,9 @@ def rendered(games=(), scene=None, **tables):
     return render_page(RunTables(**tables), games, scene)
 
 
-def recordings(arguments, others=2):
+def recordings(arguments, background=2):
     """What `rendered` takes beside a campaign: recorded games that fit it, and their manoeuvres."""
-    games = recorded(arguments["episodes"], others)
+    games = recorded(arguments["episodes"], background)
     return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
 
 

@@ -213,7 +213,7 @@ def test_road__between_two_steps_a_car_is_between_its_places(opened, games):
 def test_road__others_are_drawn_too(opened, games):
     page = opened("#game=naive_vs_speedy,1,6&t=4")
     press(page, "f")
-    other = games[GAME].others[0]
+    other = games[GAME].background[0]
     assert pixel(page, 0, other.x_m[40] - 0.4, other.y_m[40]) == colour(page, "--other")
 
 
@@ -375,7 +375,7 @@ def test_player__hostile_names_are_inert(browser, tmp_path):
 
 def test_page__of_a_default_campaign_is_small_and_soon_interactive(browser, tmp_path):
     arguments = campaign(games=100)
-    html = rendered(**arguments, **recordings(arguments, others=6))
+    html = rendered(**arguments, **recordings(arguments, background=6))
     assert len(html.encode()) <= PAGE_BYTES
     assert "more games are too many" not in html
     path = tmp_path / "report.html"

@@ -109,7 +109,7 @@ def test_searches__in_words() -> None:
 def test_searches__each_seed_has_its_own() -> None:
     both = pd.concat([trials(1), trials(2, (1.0, 2.0))])
     assert [each.stage for each in searches(both)] == ["reconfigured_speedy, seed 1", "reconfigured_speedy, seed 2"]
-    assert "2 trials; best in trial 1" in str(searches(both)[1].figure)
+    assert "2 trials; the best is trial 1" in str(searches(both)[1].figure)
     assert searches(trials()[:0]) == []
 
 

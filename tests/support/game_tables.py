@@ -1,4 +1,4 @@
-"""Made-up games of a campaign that goes on: arms of egos against non-egos, and best responses to pairs of them."""
+"""Made-up games of a campaign with cross-play: arms of egos against non-egos, and best responses to their pairs."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def arm(name, seed=1, ego_failed=(), ego_payoff=None, non_ego_payoff=None, perso
 
 
 def table(*arms):
-    """Arms under one another, as episodes.csv holds them."""
+    """Arms one below the other, as in episodes.csv."""
     return typed(pd.concat(arms, ignore_index=True))
 
 
@@ -61,7 +61,7 @@ FAILING = {
     ("robust", "sumo"): 0.02,
 }
 """Share of games the ego fails."""
-MET = {
+TRAINED_AGAINST = {
     "retrained_speedy": ("speedy",),
     "retrained_distracted": ("distracted",),
     "robust": ("speedy", "distracted"),
@@ -72,12 +72,12 @@ GAINS = {
     ("ego", "distracted"): -0.3,
     ("non_ego", "distracted"): 0.1,
 }
-"""What the best response earns more, by role and persona."""
+"""The gain of the best response, by role and persona."""
 
 
 def a_campaign(seeds=(1,), games=50, gains=None):
-    """Episodes, pairings and responses of a whole made-up campaign: every cell of FAILING, a best response of both
-    sides of each persona's last pair."""
+    """Episodes, pairings and responses of a made-up campaign: every cell of FAILING, and best responses of both sides of
+    each persona's last pair."""
     gains, random = GAINS | (gains or {}), np.random.default_rng(5)
     arms, pairings, responses = [], [], []
     for seed in seeds:
@@ -109,6 +109,6 @@ def _noisy(name, seed, failed, persona, random):
 
 
 def findings(seeds=(1,), games=50, gains=None, significance=0.01):
-    """What is found in such a campaign."""
+    """The findings of such a campaign."""
     episodes, pairings, responses = a_campaign(seeds, games, gains)
-    return find(pairings, responses, MET, episodes, significance)
+    return find(pairings, responses, TRAINED_AGAINST, episodes, significance)

@@ -85,7 +85,7 @@ def test_game__is_its_trace(merge, row):
 
 def test_game__another_road_user_that_comes_and_goes_is_in_pieces(merge, row):
     game = recorded_game(trace(ego=(range(6), -1.6, {}), van=([1, 2, 4, 5], -4.8, {})), merge, row)
-    assert [(each.name, each.first_step, len(each.x_m)) for each in game.others] == [("van", 1, 2), ("van", 4, 2)]
+    assert [(each.name, each.first_step, len(each.x_m)) for each in game.background] == [("van", 1, 2), ("van", 4, 2)]
 
 
 def test_drawing__of_the_merge(merge):

@@ -9,7 +9,7 @@ from harness.evaluation.game_theory.findings import find
 from harness.evaluation.game_theory.generalisation import generalisation
 from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
-from tests.support.game_tables import MET, a_campaign, arm, findings, table
+from tests.support.game_tables import TRAINED_AGAINST, a_campaign, arm, findings, table
 
 NAIVE = Pairing("naive_vs_distracted", 1, "naive", "distracted", "distracted")
 RETRAINED = Pairing("retrained_vs_distracted", 1, "retrained_speedy", "distracted", "distracted")
@@ -86,6 +86,6 @@ def test_find__nothing_where_nothing_was_asked():
 
 def test_find__gives_every_table():
     episodes, pairings, responses = a_campaign(seeds=(1, 2), games=20)
-    found = find(pairings, responses, MET, episodes, 0.01)
+    found = find(pairings, responses, TRAINED_AGAINST, episodes, 0.01)
     assert (len(found.gaps), len(found.crossplay), len(found.generalisation)) == (8, 32, 6)
     assert set(found.equilibria["game"]) == {"speedy", "distracted", "all"}
