@@ -1,4 +1,4 @@
-"""Replays on the real SUMO: what it plays is what was recorded, to the millimetre."""
+"""Replays in the real SUMO: it plays the recording, to the millimetre."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def rail_game() -> pd.DataFrame:
 
 
 def busy_game() -> pd.DataFrame:
-    """Others appear in the middle of the game: at the start, close behind, and inside the junction."""
+    """Background vehicles appear in the middle of the game: at the start, close behind, and inside the junction."""
     return game(
         drive("ego", straight(30.0, -1.6, 10.0, 80), outcome="timeout"),
         drive("flow.0", straight(2.4, -1.6, 13.0, 60), vehicle_type="van", first_step=15),
@@ -198,7 +198,7 @@ def assert_plays(folder: Path, trace: pd.DataFrame, lengths_m: Mapping[str, floa
     assert np.abs(both["y"] - front_y).max() <= 1e-3
     compass = 90.0 - np.degrees(both["heading_rad"])
     assert np.abs((both["angle"] - compass + 180.0) % 360.0 - 180.0).max() <= 0.1
-    # who leaves early does so with a jump that SUMO needs and nobody sees
+    # a vehicle that leaves early does so with an invisible jump that SUMO needs
     last_step = both.groupby("player")["step"].transform("max")
     stays = (both["step"] < last_step) | (last_step == both["step"].max())
     assert np.abs(both["speed"] - both["speed_mps"])[stays].max() <= 1e-3

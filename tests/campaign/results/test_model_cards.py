@@ -1,4 +1,4 @@
-"""Model cards: a README.md beside each policy, from the run's own data and nothing else."""
+"""Model cards: a README.md beside each policy, from the run's own data only."""
 
 from __future__ import annotations
 
@@ -54,7 +54,13 @@ POLICY: dict[str, Any] = {
     "began_from": None,
     "training": {"steps": 3_000_000, "early_convergence": True, "learning_rate": 1e-4, "network": [64, 64]},
 }
-NON_EGO_POLICY = {**POLICY, "stage": "distracted-seed1", "player": "non_ego", "persona": "distracted", "against": "naive-seed1"}
+NON_EGO_POLICY = {
+    **POLICY,
+    "stage": "distracted-seed1",
+    "player": "non_ego",
+    "persona": "distracted",
+    "against": "naive-seed1",
+}
 SUMMARY = typed(
     pd.DataFrame(
         [

@@ -39,7 +39,7 @@ def test_generalisation__agrees_with_the_arithmetic_on_paper():
     assert row["verdict"] == Verdict.NOT_SIGNIFICANT.value
 
 
-def test_generalisation__is_asked_of_personas_an_ego_did_not_meet_and_of_no_others():
+def test_generalisation__has_only_personas_an_ego_was_not_trained_against():
     found = findings(games=20).generalisation
     assert [tuple(row) for row in found[["ego", "met", "non_ego"]].to_numpy()] == [
         ("retrained_speedy", "speedy", "distracted"),
@@ -48,7 +48,7 @@ def test_generalisation__is_asked_of_personas_an_ego_did_not_meet_and_of_no_othe
     ]
 
 
-def test_generalisation__without_the_naive_ego_or_its_games_there_is_no_base_line_and_no_number():
+def test_generalisation__without_the_naive_egos_games_has_no_numbers():
     played = table(arm("retrained_vs_distracted", ego_failed=[0, 1]))
     for pairings in ([RETRAINED], [NAIVE, RETRAINED]):
         (row,) = generalisation({"retrained_speedy": ("speedy",)}, pairings, played, 0.01).to_dict("records")
@@ -64,7 +64,7 @@ def test_generalisation__a_naive_ego_that_never_fails_has_no_share():
     assert row["fewer_failures"] == -0.5
 
 
-def test_generalisation__an_ego_that_met_them_all_has_no_row():
+def test_generalisation__an_ego_trained_against_all_has_no_row():
     found = generalisation({"retrained_speedy": ("speedy",)}, [ITS_OWN], table(arm("x", ego_failed=[0])), 0.01)
     assert list(found.columns) == list(TABLES["generalisation"])
     assert not len(found)
@@ -79,7 +79,7 @@ def test_generalisation__is_written_and_read_as_a_table_of_the_run(tmp_path):
 # --- all four tables at once ---
 
 
-def test_find__nothing_where_nothing_was_asked():
+def test_find__returns_none_without_pairings_and_responses():
     episodes, _, _ = a_campaign(games=4)
     assert find([], [], {}, episodes, 0.01) is None
 
