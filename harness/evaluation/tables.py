@@ -228,7 +228,7 @@ def read_csv(path: Path) -> pd.DataFrame:
 
     Raises UsageError when the file is missing or is not such a table.
     """
-    remedy = "run the campaign again: it writes its tables anew"
+    remedy = "run the campaign again: it rewrites its tables"
     try:
         text = content_of(path, _MOST_BYTES).decode("utf-8")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)

@@ -62,12 +62,12 @@ def write_film(
     *,
     title: str,
     step_length_s: float,
-    report: Callable[[int, int], None] = lambda done, total: None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
     """Film a replay folder with its game's trace into a `.gif` or `.mp4`; returns the number of pictures.
 
-    `report` is called after each picture with the number done and the total. The file appears only when it is complete.
-    Raises UsageError for the problems that `film_problems` lists, HarnessError if an installed program fails.
+    `on_progress` is called after each picture with the number done and the total. The file appears only when it is
+    complete. Raises UsageError for the problems that `film_problems` lists, HarnessError if an installed program fails.
     """
     if problems := film_problems(file):
         raise UsageError(problems)
@@ -87,17 +87,19 @@ def write_film(
                 work=work,
                 display=display,
             )
-            encode(_reported(pictures, len(shown), report), scratch, SIZE_PX, step_length_s * shown.step)
+            encode(_reported(pictures, len(shown), on_progress), scratch, SIZE_PX, step_length_s * shown.step)
         os.replace(scratch, file)
     finally:
         scratch.unlink(missing_ok=True)
     return len(shown)
 
 
-def _reported(pictures: Iterator[Image.Image], total: int, report: Callable[[int, int], None]) -> Iterator[Image.Image]:
+def _reported(
+    pictures: Iterator[Image.Image], total: int, on_progress: Callable[[int, int], None]
+) -> Iterator[Image.Image]:
     for done, picture in enumerate(pictures, 1):
         yield picture
-        report(done, total)
+        on_progress(done, total)
 
 
 def _pictures(

@@ -3,7 +3,7 @@
 function control(root) {
   const part = name => root.querySelector(`[data-is="${name}"]`);
   const button = name => root.querySelector(`[data-do="${name}"]`);
-  const [choice, beside, slider, clock, speed, said] = ["game", "with", "time", "time-text", "speed", "said"].map(part);
+  const [choice, beside, slider, clock, speed, status] = ["game", "with", "time", "time-text", "speed", "status"].map(part);
   const order = [...games.keys()];
   const player = new Player(root.querySelector(".screens"), show);
 
@@ -21,8 +21,8 @@ function control(root) {
     button("view").setAttribute("aria-pressed", player.follows);
   }
 
-  function say(text) {
-    said.textContent = text;
+  function report(text) {
+    status.textContent = text;
   }
 
   /** Write the address of this moment to the address bar, so that reloading returns to it. */
@@ -36,7 +36,7 @@ function control(root) {
     offer(player.game);
     beside.value = player.beside ? keyOf(player.beside) : "";
     root.dataset.ready ??= Math.round(performance.now()); // milliseconds since the page was requested
-    say("");
+    report("");
     return true;
   }
 
@@ -62,9 +62,9 @@ function control(root) {
     remember();
     try {
       await navigator.clipboard.writeText(location.href);
-      say("The link to this moment is copied.");
+      report("The link to this moment is copied.");
     } catch {
-      say("The link to this moment is in the address bar.");
+      report("The link to this moment is in the address bar.");
     }
   }
 
@@ -95,7 +95,7 @@ function control(root) {
     earlier: () => to(order[order.indexOf(choice.value) - 1]),
     beside: () => {
       const other = player.beside ? undefined : counterpartOf(player.game);
-      if (!other && !player.beside) say("This page does not contain this episode of the other ego.");
+      if (!other && !player.beside) report("This page does not contain this episode of the other ego.");
       else open(choice.value, other && keyOf(other), player.time).then(remember);
     },
     contact: nextTouch,
@@ -133,7 +133,7 @@ function control(root) {
     const found = wanted && await open(wanted.key, wanted.beside, wanted.time);
     if (!found && !player.game) await open(order[0]);
     if (!wanted) return;
-    if (!found) say("This page does not contain that game. It is in the run folder: harness replay opens it.");
+    if (!found) report("This page does not contain that game. It is in the run folder: harness replay opens it.");
     root.scrollIntoView({ behavior: moved && !stillMotion.matches ? "smooth" : "auto" });
     root.focus({ preventScroll: true });
     if (found && moved && wanted.time === undefined && !stillMotion.matches) {

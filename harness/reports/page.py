@@ -118,10 +118,9 @@ def _player(tables: RunTables, embedded: Embedded) -> dict[str, Any]:
 
 
 def _manoeuvres(tables: RunTables) -> dict[str, Any]:
-    arms: Sequence[str] = []
-    pairs = None
-    if tables.manoeuvres is not None:
-        arms, pairs = failures_by_pair(tables.manoeuvres, tables.episodes)
+    if tables.manoeuvres is None:
+        return {"pairs": None, "pair_arms": [], "most_listed": MOST_LISTED}
+    arms, pairs = failures_by_pair(tables.manoeuvres, tables.episodes)
     return {"pairs": pairs, "pair_arms": arms, "most_listed": MOST_LISTED}
 
 

@@ -1,4 +1,4 @@
-"""Manoeuvres in hand-drawn games: every rule where it just holds, and where it just doesn't."""
+"""Manoeuvres in made-up games: each rule just above and just below its threshold."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, buil
 
 STEP_S = 0.1
 LENGTH_M, WIDTH_M, WHEELBASE_M = 4.6, 1.8, 2.7
-ENDING_Y, THROUGH_Y = -4.8, -1.6  # lanes of the merge, whose right one ends at x 100
+ENDING_Y, THROUGH_Y = -4.8, -1.6  # lanes of the merge; the right one ends at x 100
 SIZES = {"car": (LENGTH_M, WIDTH_M), "van": (6.0, 2.0)}
 
 
 @pytest.fixture(scope="module")
 def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """Two lanes that go on for 300 m."""
+    """Two lanes of 300 m."""
     return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
 
 
@@ -110,7 +110,7 @@ def cutting_in(gap_m: float, speed_mps: float = 12.0, **changes: Any) -> list[pd
     ]
 
 
-def test_cut_in__says_when_how_near_and_how_soon(merge: OpenScene) -> None:
+def test_cut_in__has_its_time_gap_and_time_to_collision(merge: OpenScene) -> None:
     (found,) = only(named(merge, *cutting_in(10.0, 8.0)), "non_ego", "cut_in")
     assert found.time_s == 2.4  # from then on their middles are less than 1.8 m apart across the road
     assert found.gap_m == pytest.approx(10.0, abs=0.3)
@@ -134,14 +134,14 @@ def test_cut_in__only_within_the_stated_gap_or_time_to_collision(
     assert bool(only(named(merge, *cutting_in(gap_m, speed_mps)), "non_ego", "cut_in")) == cuts_in
 
 
-def test_cut_in__of_the_ego_too(merge: OpenScene) -> None:
+def test_cut_in__also_by_the_ego(merge: OpenScene) -> None:
     ego, non_ego = (each.assign(player=name) for each, name in zip(cutting_in(8.0), ("non_ego", "ego"), strict=True))
     found = named(merge, ego, non_ego)
     assert len(only(found, "ego", "cut_in")) == 1
     assert not only(found, "non_ego", "cut_in")
 
 
-def test_cut_in__not_by_who_is_ahead_while_the_other_comes_over(merge: OpenScene) -> None:
+def test_cut_in__not_by_a_leader_while_the_other_moves_over(merge: OpenScene) -> None:
     cars = [car("ego", 5.0, across(ENDING_Y, THROUGH_Y, 15, 35)), car("non_ego", 18.0)]
     found = named(merge, *cars)
     assert not only(found, "non_ego", "cut_in")
@@ -149,7 +149,7 @@ def test_cut_in__not_by_who_is_ahead_while_the_other_comes_over(merge: OpenScene
 
 
 @pytest.mark.parametrize("ahead_m", [0.5, 30.0])
-def test_cut_in__not_by_who_is_there_from_the_start(ahead_m: float, merge: OpenScene) -> None:
+def test_cut_in__not_by_a_player_in_the_path_from_the_start(ahead_m: float, merge: OpenScene) -> None:
     assert not only(named(merge, car("ego", 5.0), car("non_ego", 5.0 + LENGTH_M + ahead_m)), "non_ego", "cut_in")
 
 
@@ -188,7 +188,7 @@ def test_hard_brake__a_normal_stop_has_no_name(straight: OpenScene) -> None:
     assert named(straight, car("ego", 20.0, RIGHT_Y, braking(3.0, 5, 60))) == []
 
 
-def test_hard_brake__a_short_pause_makes_no_second_one(straight: OpenScene) -> None:
+def test_hard_brake__a_short_pause_does_not_split_it(straight: OpenScene) -> None:
     speed = 14.0 - 0.5 * np.cumsum(np.isin(np.arange(60), [10, 11, 12, 16, 17, 18, 40, 41, 42]))
     found = only(named(straight, car("ego", 20.0, RIGHT_Y, speed)), "ego", "hard_brake")
     assert [(each.time_s, each.until_s) for each in found] == [(1.0, 1.8), (4.0, 4.2)]
@@ -220,14 +220,14 @@ def test_swerve__by_lateral_acceleration_and_heading(
         assert ("left" if side > 0 else "right") in found[0].text
 
 
-def test_swerve__straightening_up_is_none(straight: OpenScene) -> None:
+def test_swerve__straightening_is_not_one(straight: OpenScene) -> None:
     """Turned to the right, it steers to the left until it follows the road."""
     heading = np.radians(-8.0) * (1.0 - np.clip((np.arange(60) - 19) / 5, 0, 1))
     wheel = np.where((np.arange(60) >= 20) & (np.arange(60) < 25), 0.08, 0.0)
     assert not only(named(straight, car("ego", 20.0, heading_rad=heading, steering_rad=wheel)), "ego", "swerve")
 
 
-def test_swerve__following_a_bend_is_none(tmp_path: Path) -> None:
+def test_swerve__following_a_bend_is_not_one(tmp_path: Path) -> None:
     """A quarter circle of radius 30 m at 10 m/s takes 3.3 m/s2."""
     angles = np.linspace(0.0, 0.5 * np.pi, 30)
     points = [(0.0, 0.0), *zip(150 + 30 * np.sin(angles), 30 - 30 * np.cos(angles), strict=True), (180.0, 180.0)]
@@ -270,7 +270,7 @@ def test_drift__over_into_the_next_lane_is_one_movement(straight: OpenScene) -> 
     assert "1.2 m to the left" in found.text
 
 
-def test_drift__what_a_driver_steers_is_none(straight: OpenScene) -> None:
+def test_drift__steered_movement_is_not_one(straight: OpenScene) -> None:
     wheel = 0.01 * np.sin(np.arange(60))
     y = across(RIGHT_Y, LEFT_Y, 10, 40)
     assert not only(named(straight, car("non_ego", 20.0, y, steering_rad=wheel)), "non_ego", "drift")
@@ -285,7 +285,7 @@ def test_drift__what_a_driver_steers_is_none(straight: OpenScene) -> None:
         (21, 0.6, 0.4, False),  # hardly moves
     ],
 )
-def test_drift__the_wheel_held_still_out_of_the_lane(
+def test_drift__a_still_wheel_out_of_the_lane(
     still_steps: int, begin_m: float, moved_m: float, drifts: bool, straight: OpenScene
 ) -> None:
     wheel = 0.01 * np.sin(np.arange(60))
@@ -296,8 +296,8 @@ def test_drift__the_wheel_held_still_out_of_the_lane(
     assert len(found) == drifts
 
 
-def test_drift__a_lane_change_of_sumos_is_none(straight: OpenScene) -> None:
-    """SUMO has no wheel: its drivers' is recorded as 0."""
+def test_drift__a_lane_change_by_sumo_is_not_one(straight: OpenScene) -> None:
+    """SUMO has no steering: its drivers' steering is recorded as 0."""
     assert named(straight, car("non_ego", 20.0, across(RIGHT_Y, LEFT_Y, 10, 40))) == []
 
 
@@ -321,14 +321,14 @@ def overtaking(behind_m: float, ahead_m: float, steps: int = 50) -> list[pd.Data
         (6.0, -0.5, False),
     ],
 )
-def test_overtake__from_behind_until_wholly_ahead(
+def test_overtake__from_behind_until_completely_ahead(
     behind_m: float, ahead_m: float, overtakes: bool, merge: OpenScene
 ) -> None:
     found = only(named(merge, *overtaking(behind_m, ahead_m)), "non_ego", "overtake")
     assert len(found) == overtakes
 
 
-def test_overtake__says_from_when_to_when(merge: OpenScene) -> None:
+def test_overtake__has_its_begin_and_end(merge: OpenScene) -> None:
     (found,) = only(named(merge, *overtaking(6.0, 6.0)), "non_ego", "overtake")
     assert found.time_s == pytest.approx((6.0 - LENGTH_M) / 12.0 * 4.9, abs=0.11)
     assert found.until_s == pytest.approx((6.0 + LENGTH_M) / 12.0 * 4.9, abs=0.11)
@@ -364,7 +364,7 @@ def test_tailgate__by_time_gap_duration_and_speed(
         assert found[0].text == f"follows as close as {time_gap_s:.1f} s" or time_gap_s == 0.95
 
 
-def test_tailgate__of_anyone(straight: OpenScene) -> None:
+def test_tailgate__behind_any_road_user(straight: OpenScene) -> None:
     cars = [car("flow.0", 31.0, RIGHT_Y, kind="van"), car("ego", 20.0, RIGHT_Y)]
     (found,) = only(named(straight, *cars), "ego", "tailgate")
     assert found.gap_m == pytest.approx(11.0 - 3.0 - 2.3, abs=0.3)
@@ -400,7 +400,7 @@ def test_forced_stop__behind_another(gap_m: float, forced: bool, straight: OpenS
         assert found[0].gap_m <= 9.1
 
 
-def test_forced_stop__not_on_an_open_road_nor_slowly_nor_for_who_never_drove(straight: OpenScene) -> None:
+def test_forced_stop__not_on_an_open_road_nor_slowly_nor_without_earlier_speed(straight: OpenScene) -> None:
     x, speed = stopping(100.0)
     assert named(straight, car("ego", x, RIGHT_Y, speed)) == []
     ahead = car("non_ego", 108.0, RIGHT_Y, 0.0)
@@ -419,13 +419,13 @@ def test_find__ends_with_the_egos_game(straight: OpenScene) -> None:
     assert named(straight, brakes, fails) == []
 
 
-def test_find__a_wreck_does_nothing(straight: OpenScene) -> None:
+def test_find__a_player_after_its_end_has_no_manoeuvres(straight: OpenScene) -> None:
     driving, wreck = car("non_ego", 20.0, RIGHT_Y, steps=30, outcome="rail"), car("non_ego", 60.0, RIGHT_Y, 0.0, 60)
     wreck = wreck.assign(acceleration_mps2=-9.0, outcome="rail").iloc[30:]
     assert named(straight, driving, wreck) == []
 
 
-def test_find__by_the_time_it_begins(merge: OpenScene) -> None:
+def test_find__in_order_of_begin(merge: OpenScene) -> None:
     cars = cutting_in(3.0)
     cars[0]["acceleration_mps2"] = np.where(np.arange(60) >= 30, -6.0, 0.0)
     found = named(merge, *cars)
@@ -433,7 +433,7 @@ def test_find__by_the_time_it_begins(merge: OpenScene) -> None:
     assert {"cut_in", "hard_brake"} <= {each.manoeuvre for each in found}
 
 
-def test_table__holds_the_manoeuvres_whole(merge: OpenScene) -> None:
+def test_table__keeps_every_value(merge: OpenScene) -> None:
     found = named(merge, *cutting_in(10.0, 8.0))
     rows = rows_of(found, arm="naive_vs_x", persona="x", seed=1, episode=7)
     table = typed(pd.DataFrame(rows, columns=list(MANOEUVRE_COLUMNS)))
@@ -445,7 +445,7 @@ def test_table__holds_the_manoeuvres_whole(merge: OpenScene) -> None:
 
 
 def done(player: str, name: str, time_s: float, until_s: float) -> Manoeuvre:
-    return Manoeuvre(player, name, time_s, until_s, np.nan, np.nan, "")
+    return Manoeuvre(player=player, manoeuvre=name, time_s=time_s, until_s=until_s, gap_m=np.nan, ttc_s=np.nan, text="")
 
 
 DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4.5)
@@ -474,7 +474,7 @@ DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4
         ([done("non_ego", "overtake", 0.0, 1.0), done("ego", "swerve", 6.5, 7.0)], "- -> swerve -> rail"),
     ],
 )
-def test_pair__what_the_non_ego_did_and_how_the_ego_answered(found: list[Manoeuvre], expected: str) -> None:
+def test_pair__cause_and_response(found: list[Manoeuvre], expected: str) -> None:
     assert f"{pair_of(found).words} -> rail" == expected
 
 

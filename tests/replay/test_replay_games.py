@@ -1,4 +1,4 @@
-"""Games that the harness really played, replayed on the real SUMO: every frame is the trace."""
+"""Games played by the harness and replayed in the real SUMO: every frame is the trace."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A replay in SUMO-GUI under a virtual screen: what a person sees is where the trace has it."""
+"""A replay in SUMO-GUI on a virtual screen: the players are at their places of the trace."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_gui__shows_both_cars_where_the_trace_has_them(
         assert abs(y_m - expected.loc[player, "y_m"]) < 1.0
 
 
-def test_gui__who_left_is_gone_and_who_is_there_at_the_end_stays(screen: str, merge_net: Path, tmp_path: Path) -> None:
+def test_gui__a_vehicle_that_left_is_gone_and_the_others_stay(screen: str, merge_net: Path, tmp_path: Path) -> None:
     trace = GAMES["clean"]()
     leaving, gone, last = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [153, 154, 169])
     assert blue(leaving).any()

@@ -57,7 +57,7 @@ def test_page__the_numbers_are_those_of_the_csv_file(name, small, page, tmp_path
         assert page.cells(name) == list(csv.reader(file))
 
 
-def test_page__every_number_that_is_read_is_the_exact_one_rounded(page):
+def test_page__every_shown_number_is_the_exact_one_rounded(page):
     checked = 0
     for name in ("summary", "episodes", "training"):
         headings = [cell["exact"] for cell in page.tables[name][0]]
@@ -89,7 +89,7 @@ def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatc
 
 
 def text_of(arguments):
-    """The page's text, sooner: without the learning curves."""
+    """The page's text without the learning curves, which take long."""
     return Page(without_curves(arguments)).text
 
 
@@ -169,7 +169,7 @@ def test_words__an_arm_that_was_not_played_is_named():
     assert rq2 == ("RQ2: not answered", arms_not_played(["retrained_vs_speedy"]))
 
 
-def test_words__a_stage_that_is_not_done_leaves_its_question_open_not_unasked():
+def test_words__a_stage_that_is_not_done_leaves_its_question_not_answered():
     arguments = without_arm(campaign(personas=["speedy"]), "retrained_vs_speedy", seeds=[1])
     assert verdict_texts(arguments)[1] == ("RQ2: not answered", arms_not_played(["retrained_vs_speedy"]))
     arguments = without_arm(campaign(personas=["speedy"], seeds=(1, 2)), "retrained_vs_speedy", seeds=[2])
@@ -178,7 +178,7 @@ def test_words__a_stage_that_is_not_done_leaves_its_question_open_not_unasked():
 
 
 def without_arm(arguments, arm, seeds):
-    """The campaign of which an arm has failed, as the run folder has it: neither games nor comparisons."""
+    """The campaign with a failed arm: it has neither games nor comparisons."""
     rows, compared = arguments["episodes"], arguments["comparisons"]
     lost = (compared["question"] == "RQ2") & compared["seed"].isin(seeds)
     arguments["episodes"] = rows[~((rows["arm"] == arm) & rows["seed"].isin(seeds))]
@@ -212,13 +212,13 @@ def test_words__several_seeds_are_counted_and_shown_each():
     assert "Seed 2: no difference." in text
 
 
-def test_words__an_ordinary_driver_that_does_as_much_harm_is_pointed_out(page):
+def test_words__as_many_failures_against_an_ordinary_driver_are_stated(page):
     sentence = as_many_failures("speedy", seeds=[1], several=False)
     assert sentence not in page.text
     assert sentence in text_of(campaign(personas=["speedy"], failing={"sumo": 0.4}))
 
 
-def test_words__an_ego_that_fails_alone_is_pointed_out(page):
+def test_words__failures_alone_are_stated(page):
     assert "Caution" not in page.text
     assert FAILS_ALONE in text_of(campaign(personas=["speedy"], failing={"alone": 0.1}))
 
@@ -245,7 +245,7 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
             assert "not significantly" in text
 
 
-def test_words__one_seed_of_several_is_harm_enough_but_not_mended():
+def test_words__one_seed_of_several_is_enough_for_harm_but_not_for_mended():
     arguments = campaign(personas=["speedy"], seeds=(1, 2))
     arms = {(arm["arm"], arm["seed"]): arm for arm in arguments["summary"].to_dict("records")}
     for question, tone in (("RQ1", "harm"), ("RQ2", "open")):
@@ -256,14 +256,14 @@ def test_words__one_seed_of_several_is_harm_enough_but_not_mended():
         assert answer.tone == tone
 
 
-def test_p_values__are_never_rounded_to_nothing_or_certainty():
+def test_p_values__are_never_rounded_to_0_or_1():
     assert [p_number(p) for p in (0.00031, 0.0123, 0.5, 1.0)] == ["0.0003", "0.0123", "0.5", "1"]
     assert p_text(1e-30) == "p\N{NO-BREAK SPACE}<\N{NO-BREAK SPACE}0.0001"
     assert p_number(0.99999) == ">\N{NO-BREAK SPACE}0.999"
     assert (p_number(math.nan), p_text(math.nan)) == ("–", "no p-value")
 
 
-def test_numbers__read_as_a_person_writes_them():
+def test_numbers__have_a_typographic_form():
     assert (number(-1.5, 1), number(-0.001, 2), number(math.nan, 1)) == ("\N{MINUS SIGN}1.5", "0.00", "–")
     assert [percent(share) for share in (0.25, 0.0362, 1)] == [
         f"{text}\N{NO-BREAK SPACE}%" for text in ("25", "3.6", "100")
@@ -343,7 +343,7 @@ def test_replays__those_that_the_page_can_play_are_links(small):
     assert 'href="#game=' not in without_curves(small)
 
 
-def test_replays__none_is_said_plainly(small):
+def test_replays__without_any_the_page_states_it(small):
     assert "No game was recorded for replay." in text_of(small | {"replays": []})
 
 
@@ -420,7 +420,7 @@ def test_page__draws_without_touching_matplotlibs_global_state(small):
     assert dict(matplotlib.rcParams) == before
 
 
-def test_page__takes_nothing_from_the_users_matplotlib_settings(small, html):
+def test_page__ignores_the_users_matplotlib_settings(small, html):
     import matplotlib
 
     with matplotlib.rc_context({"font.size": 30, "text.usetex": True, "axes.facecolor": "red"}):
@@ -447,7 +447,7 @@ def test_manoeuvres__each_pair_opens_its_games_shortly_before_the_manoeuvre(smal
     assert '<a href="#game=naive_vs_speedy,1,6&amp;t=2.5">naive_vs_speedy, game 6</a>: collision (gap 3.1 m' in html
 
 
-def test_manoeuvres__a_failure_without_any_is_counted_last(small):
+def test_manoeuvres__failures_without_a_manoeuvre_are_last(small):
     found = recordings(small)["manoeuvres"]
     page = Page(without_curves(small | recordings(small) | {"manoeuvres": found[found["episode"] > 2]}))
     last = [cell["text"] for cell in page.tables["pairs"][-1]]
@@ -455,6 +455,6 @@ def test_manoeuvres__a_failure_without_any_is_counted_last(small):
     assert int(last[2]) > 0
 
 
-def test_manoeuvres__without_a_table_nothing_is_said_of_them(page):
+def test_manoeuvres__without_a_table_there_is_no_section(page):
     assert "pairs" not in page.tables
     assert "Manoeuvres" not in page.text

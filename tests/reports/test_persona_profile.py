@@ -164,16 +164,16 @@ def test_drift__is_that_of_the_games_car() -> None:
 
 
 def test_attends__in_words() -> None:
-    said = " ".join(attends(profile_of(DISTRACTED)))
-    assert "Eyes off the road 56 % of the time" in said
-    assert "lapses of 4 to 6 s, with 4 s of attention between them on average; 6.7 lapses per minute" in said
-    assert "Of drives of 60 s, under 1 % have no lapse" in said
-    assert "after 5 s, 5.1 m to the right (standard deviation 0.93 m)" in said
+    text = " ".join(attends(profile_of(DISTRACTED)))
+    assert "Eyes off the road 56 % of the time" in text
+    assert "lapses of 4 to 6 s, with 4 s of attention between them on average; 6.7 lapses per minute" in text
+    assert "Of drives of 60 s, under 1 % have no lapse" in text
+    assert "after 5 s, 5.1 m to the right (standard deviation 0.93 m)" in text
     assert list(attends(profile_of(CAREFUL))) == [NO_LAPSES]
     straight = invented(attention={"mean_attentive_s": 55.0, "lapse_s": [5.0, 5.0]})
-    said = " ".join(attends(straight))
-    assert "Eyes off the road 8 % of the time, in the long run: lapses of 5 s, with 55 s" in said
-    assert STRAIGHT_WHEEL in said
+    text = " ".join(attends(straight))
+    assert "Eyes off the road 8 % of the time, in the long run: lapses of 5 s, with 55 s" in text
+    assert STRAIGHT_WHEEL in text
 
 
 def test_sees__in_words() -> None:
@@ -320,7 +320,7 @@ def test_page__opens_in_dark_and_light_loads_nothing_and_does_not_scroll_sideway
 def test_show__names_a_mistake_in_the_file(tmp_path: Path) -> None:
     file = tmp_path / "anna.toml"
     file.write_text(CAREFUL.read_text(encoding="utf-8").replace("progress", "progres"), encoding="utf-8")
-    said = harness("persona", "show", file)
-    assert said.returncode == 2
-    assert "operational.terms.progres" in said.stderr
-    assert "'progress'" in said.stderr
+    result = harness("persona", "show", file)
+    assert result.returncode == 2
+    assert "operational.terms.progres" in result.stderr
+    assert "'progress'" in result.stderr

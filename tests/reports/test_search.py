@@ -1,4 +1,4 @@
-"""What the page says of searches: naive against reconfigured, the best over the trials, and the parameters found."""
+"""Searches on the page: naive against reconfigured, the best over the trials, and the found parameters."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _or_least(payoff: float) -> float:
 
 
 def reconfigured(**options: Any) -> dict[str, Any]:
-    """The fields of RunTables for a campaign whose ego was reconfigured, not retrained."""
+    """The fields of RunTables for a campaign with an ego that was reconfigured, not retrained."""
     given = campaign(personas=["speedy"], **options)
     given["manifest"] = json.loads(json.dumps(given["manifest"]).replace("retrained", "reconfigured"))
     given["manifest"]["stages"]["reconfigured_speedy-seed1"] |= {"kind": "reconfiguration"}
@@ -89,7 +89,7 @@ def test_page__says_what_was_found_and_escapes_names() -> None:
     assert rounds([{"kind": "reconfiguration"}]) in words_of(page)
 
 
-def test_page__of_a_campaign_without_a_search_says_nothing_of_any() -> None:
+def test_page__without_a_search_has_no_such_section() -> None:
     page = words_of(rendered(**campaign(personas=["speedy"])))
     assert "econfiguration" not in page
     assert "trial" not in page
@@ -109,11 +109,11 @@ def test_searches__in_words() -> None:
 def test_searches__each_seed_has_its_own() -> None:
     both = pd.concat([trials(1), trials(2, (1.0, 2.0))])
     assert [each.stage for each in searches(both)] == ["reconfigured_speedy, seed 1", "reconfigured_speedy, seed 2"]
-    assert "2 trials; best in trial 1" in str(searches(both)[1].figure)
+    assert "2 trials; the best is trial 1" in str(searches(both)[1].figure)
     assert searches(trials()[:0]) == []
 
 
-def test_mixed_versions__what_only_searches_are_made_by_is_compared_among_searches() -> None:
+def test_mixed_versions__programs_of_searches_are_compared_among_searches() -> None:
     def stage(kind: str, **versions: str) -> dict[str, Any]:
         return {"status": "done", "kind": kind, "versions": [versions]}
 

@@ -1,6 +1,6 @@
-"""A real browser for tests of the report: Debian's Chromium, driven by Playwright.
+"""A real browser for tests of the report: Debian's Chromium, controlled by Playwright.
 
-What is missing makes these tests skip, and fail where HARNESS_REQUIRE_BROWSER=1.
+Without Playwright or Chromium these tests are skipped; with HARNESS_REQUIRE_BROWSER=1 they fail.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ ARGUMENTS = [
 
 def missing(what: str) -> NoReturn:
     if os.environ.get("HARNESS_REQUIRE_BROWSER") == "1":
-        pytest.fail(f"{what}, and HARNESS_REQUIRE_BROWSER=1 asks for it")
+        pytest.fail(f"{what}, and HARNESS_REQUIRE_BROWSER=1 requires it")
     pytest.skip(what)
 
 
@@ -51,7 +51,7 @@ def launched() -> Iterator[Any]:
 
 @contextmanager
 def opener(browser: Any, report: Path) -> Iterator[Callable[..., Any]]:
-    """Opens a report in a window of its own; what the browser complained of or asked for is in `seen`."""
+    """Open a report in a new window; its list `seen` gets every message, error and request of the page."""
     contexts: list[Any] = []
 
     def open_page(
@@ -82,9 +82,9 @@ def opener(browser: Any, report: Path) -> Iterator[Callable[..., Any]]:
 
 
 def until(page: Any, expression: str, argument: Any = None, seconds: float = 20.0) -> None:
-    """Wait until a function of JavaScript is true; Playwright's own way of waiting breaks the page's policy."""
+    """Wait until a JavaScript function is true; Playwright's own waiting violates the page's content policy."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression, argument):
         if time.monotonic() > end:
-            pytest.fail(f"waited {seconds:g} s in vain for: {expression}")
+            pytest.fail(f"not true within {seconds:g} s: {expression}")
         page.wait_for_timeout(20)

@@ -1,4 +1,4 @@
-"""Made-up games of a campaign that goes on: arms of egos against non-egos, and best responses to pairs of them."""
+"""Made-up games of a campaign with cross-play: arms of egos against non-egos, and best responses to their pairs."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def arm(
 
 
 def table(*arms: pd.DataFrame) -> pd.DataFrame:
-    """Arms under one another, as episodes.csv holds them."""
+    """Arms one below the other, as in episodes.csv."""
     return typed(pd.concat(arms, ignore_index=True))
 
 
@@ -72,7 +72,7 @@ FAILING = {
     ("robust", "sumo"): 0.02,
 }
 """Share of games the ego fails."""
-MET = {
+TRAINED_AGAINST = {
     "retrained_speedy": ("speedy",),
     "retrained_distracted": ("distracted",),
     "robust": ("speedy", "distracted"),
@@ -84,7 +84,7 @@ GAINS: Gains = {
     ("ego", "distracted"): -0.3,
     ("non_ego", "distracted"): 0.1,
 }
-"""What the best response earns more, by role and persona."""
+"""The gain of the best response, by role and persona."""
 
 
 def a_campaign(
@@ -128,6 +128,6 @@ def findings(
     gains: Gains | None = None,
     significance: float = 0.01,
 ) -> Any:
-    """What is found in such a campaign."""
+    """The findings of such a campaign."""
     episodes, pairings, responses = a_campaign(seeds, games, gains)
-    return find(pairings, responses, MET, episodes, significance)
+    return find(pairings, responses, TRAINED_AGAINST, episodes, significance)

@@ -152,9 +152,9 @@ def rendered(games: Sequence[RecordedGame] = (), scene: SceneDrawing | None = No
     return render_page(RunTables(**tables), games, scene)
 
 
-def recordings(arguments: Mapping[str, Any], others: int = 2) -> dict[str, Any]:
+def recordings(arguments: Mapping[str, Any], background: int = 2) -> dict[str, Any]:
     """What `rendered` takes beside a campaign: recorded games that fit it, and their manoeuvres."""
-    games = recorded(arguments["episodes"], others)
+    games = recorded(arguments["episodes"], background)
     return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
 
 

@@ -1,4 +1,4 @@
-"""Recorded games drawn by hand, for tests of the page: on the road of networks/merge, without SUMO."""
+"""Made-up recorded games for tests of the page: on the road of networks/merge, without SUMO."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ SCENE = SceneDrawing(
 )
 
 
-def recorded(episodes: pd.DataFrame, others: int = 2) -> Iterator[RecordedGame]:
-    """A game for each row of `episodes` that was played, the ones to watch first on top."""
+def recorded(episodes: pd.DataFrame, background: int = 2) -> Iterator[RecordedGame]:
+    """A game for each played row of `episodes`, those to watch first at the front."""
     played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
     chosen = worst_first(choose_games(played))
     rest = worst_first(played.drop(chosen.index))
     for rows in (chosen, rest):
         for row in rows.itertuples():
-            yield recorded_game(row, others)
+            yield recorded_game(row, background)
 
 
-def recorded_game(row: Any, others: int = 2) -> RecordedGame:
-    """One game that ends as its row says."""
+def recorded_game(row: Any, background: int = 2) -> RecordedGame:
+    """One game with the outcome of its row and so many background vehicles."""
     outcome = row.ego_outcome or row.non_ego_outcome
     random = np.random.default_rng([row.seed, row.episode])
     ends = STEPS - 18 + int(random.integers(10)) if outcome in ("collision", "rail") else STEPS
@@ -63,7 +63,7 @@ def recorded_game(row: Any, others: int = 2) -> RecordedGame:
             heading_rad=0 * time,
             speed_mps=0 * time + 9.0,
         )
-        for n in range(others)
+        for n in range(background)
     ]
     return RecordedGame(
         arm=row.arm,
@@ -102,7 +102,7 @@ def _player(
         y = y_m + 0.75 * np.clip((time - time[-1] + 2.0) / 2.0, 0, 1) ** 2
     heading = np.arctan2(np.gradient(y), np.gradient(x))
     gap = np.where(np.abs(time - 3.5) < 2.5, 18 - 2.2 * time, np.inf)
-    soonest = np.where(time > 2.5, np.maximum(time[-1] - time, 0.0) * 1.3, np.inf)
+    time_to_collision = np.where(time > 2.5, np.maximum(time[-1] - time, 0.0) * 1.3, np.inf)
     return PlayerTrack(
         name=name,
         length_m=4.6,
@@ -116,7 +116,7 @@ def _player(
         steering_rad=np.gradient(heading) * 2.0,
         lapsed=(time > 2.0) & (time < 3.4) & (not ego),
         leader_gap_m=gap,
-        time_to_collision_s=soonest,
+        time_to_collision_s=time_to_collision,
         outcome=outcome,
         ended_step=len(time) - 1,
     )

@@ -132,7 +132,7 @@ def film(game: FoundGame, file: Path, console: Console) -> None:
             file,
             title=game.title,
             step_length_s=game.step_length_s,
-            report=lambda done, total: bar.update(task, completed=done, total=total),
+            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
 

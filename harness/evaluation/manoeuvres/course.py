@@ -26,7 +26,7 @@ Stretch = tuple[int, int]  # its first and last step
 
 @dataclass(frozen=True, kw_only=True)
 class Course:
-    """T steps of one game; arrays are [T], or [T, P] in `quantities`, whose games' axis is the steps'."""
+    """T steps of one game; arrays are [T], or [T, P] in `quantities`: its games' axis is the steps' axis."""
 
     quantities: Quantities
     """Of the players among all road users."""

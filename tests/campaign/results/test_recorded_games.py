@@ -45,7 +45,7 @@ def test_order__arms_take_turns_so_that_each_is_on_a_page_that_not_all_fit_on():
     ]
 
 
-def test_order__what_was_not_played_is_not_in_it():
+def test_order__has_played_games_only():
     table = episodes(("naive_alone", 0, "goal"), ("naive_alone", 1, "error"))
     table.loc[1, "error"] = "it died"
     assert in_order(table) == [("naive_alone", 0)]
@@ -83,9 +83,9 @@ def test_game__is_its_trace(merge, row):
     assert touch.y_m == pytest.approx(0.0, abs=0.01)
 
 
-def test_game__another_road_user_that_comes_and_goes_is_in_pieces(merge, row):
+def test_game__a_background_vehicle_that_is_absent_for_a_while_is_in_pieces(merge, row):
     game = recorded_game(trace(ego=(range(6), -1.6, {}), van=([1, 2, 4, 5], -4.8, {})), merge, row)
-    assert [(each.name, each.first_step, len(each.x_m)) for each in game.others] == [("van", 1, 2), ("van", 4, 2)]
+    assert [(each.name, each.first_step, len(each.x_m)) for each in game.background] == [("van", 1, 2), ("van", 4, 2)]
 
 
 def test_drawing__of_the_merge(merge):
