@@ -6,14 +6,16 @@ ARGS ?=
 CAMPAIGN := campaigns/merge.toml
 DEMO := campaigns/merge-demo.toml
 BIN := .venv/bin
+# A process per core, at most four: tests start campaigns that take several cores themselves. `ARGS="-n 0"` is one process.
+PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo campaign quick test bench check lock clean
+.PHONY: help install demo campaign quick test test-fast coverage bench check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
-	@sed -n 's/^\([a-z]*\):.*## \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r target text; do \
+	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r target text; do \
 	    printf '%-12s%s\n' "$$target" "$$text"; done
 
 install: $(INSTALLED) ## set up .venv from requirements.lock (again only when it or pyproject.toml changes)
@@ -27,8 +29,14 @@ campaign: install ## run the paper's campaign: harness campaign campaigns/merge.
 quick: install ## the same campaign with a budget of minutes: every stage, fewer steps
 	$(BIN)/harness campaign $(CAMPAIGN) --quick $(ARGS)
 
-test: install ## run every test
-	$(BIN)/pytest $(ARGS)
+test: install ## run every test, in about 15 minutes on two cores; `make test ARGS="-k payoff"` runs some
+	$(PYTEST) $(ARGS)
+
+test-fast: install ## run the tests of every room that take a moment, in about a minute: after each edit
+	$(PYTEST) -m "not slow" $(ARGS)
+
+coverage: install ## run every test and print the share of each module's lines that they run
+	$(PYTEST) --cov=harness --cov-report=term $(ARGS)
 
 bench: install ## what the harness costs, as ratios measured side by side: benchmarks/results.json, 20 minutes
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -c requirements.lock -e '.[bench]'

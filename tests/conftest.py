@@ -17,6 +17,22 @@ from harness.game.quantities import Quantities, World
 from harness.game.state import Bodies, State
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
+from tests.support.shared import shared_folder
+from tests.support.slow import slow_tests
+
+
+def pytest_configure() -> None:
+    """Make the session's shared folder in the first process, before pytest-xdist starts others."""
+    shared_folder()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of tests/slow_tests.txt as slow."""
+    slow = slow_tests()
+    for item in items:
+        test = item.nodeid.partition("[")[0]
+        if test in slow or test.partition("::")[0] in slow:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session")

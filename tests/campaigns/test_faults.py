@@ -31,6 +31,7 @@ from harness.evaluation.tables import read_csv
 from tests.support.tiny import (
     BY_SUMO,
     HARNESS,
+    PATIENCE_S,
     begin,
     end,
     harness,
@@ -124,11 +125,11 @@ def test_request_to_end__is_like_ctrl_c(number: signal.Signals, code: int, tmp_p
     process = begin(*command_of(tmp_path))
     wait_for(lambda: workers_of(process.pid), "the first worker")
     process.send_signal(number)
-    printed = process.communicate(timeout=60)[0]
+    printed = process.communicate(timeout=PATIENCE_S)[0]
     assert process.returncode == code
     assert printed.splitlines()[-1] == wording.INTERRUPTED
     assert "Traceback" not in printed
-    wait_for(lambda: not in_session(process.pid), "no process of it is left", 10.0)
+    wait_for(lambda: not in_session(process.pid), "no process of it is left")
 
 
 # --- disk, permissions, memory ----------------------------------------------------------------------------------------
@@ -180,7 +181,7 @@ def without_privileges(*arguments: object) -> subprocess.CompletedProcess[str]:
     """The command as somebody for whom permissions count, even where it is root who tests."""
     drop = ("setpriv", "--bounding-set", "-dac_override,-dac_read_search") if os.geteuid() == 0 else ()
     command = [*drop, HARNESS, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=200, check=False)
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
 
 
 @pytest.mark.skipif(os.geteuid() == 0 and not shutil.which("setpriv"), reason="root may write everywhere")

@@ -6,7 +6,6 @@ import json
 import os
 import shutil
 import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from harness.traffic.scene import open_scene
 from tests.support.tiny import (
     BY_SUMO,
     CAREFUL,
+    PATIENCE_S,
     SPEEDY,
     harness,
     learned_run,
@@ -231,7 +231,7 @@ def test_campaign__sumo_plays_a_replay_as_it_was_recorded(arm: str, run: Path, t
     command = [Path(sumo.SUMO_HOME) / "bin" / "sumo", "-c", folder / "scene.sumocfg", "--precision", "6"]
     command += ["--fcd-output", tmp_path / "played.xml", "--fcd-output.attributes", "id,x,y,angle,speed"]
     environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     assert done.returncode == 0, done.stderr
 
     scene = open_scene(run / "scene")
@@ -290,10 +290,8 @@ def test_campaign__is_the_same_with_one_worker_from_elsewhere_and_writes_nowhere
 def test_campaign__running_again_skips_everything(run: Path, tmp_path: Path) -> None:
     again = shutil.copytree(run, tmp_path / "run")
     before = files_in(again)
-    began = time.monotonic()
     done = harness("campaign", run.with_suffix(".toml"), "--out", again)
     assert done.returncode == 0, done.stdout + done.stderr
-    assert time.monotonic() - began < 30.0
     assert "started" not in done.stdout
     assert files_in(again) == before
 

@@ -25,6 +25,7 @@ from harness.evaluation.tables import read_csv
 from harness.training.parameter_search import read_trials
 from tests.support.external_drivers import document, find, problems
 from tests.support.repository import REPOSITORY
+from tests.support.shared import built_once
 from tests.support.tiny import ALL_TABLES, CAREFUL, SPEEDY, begin, end, harness, wait_for, write_campaign
 
 ADAS = REPOSITORY / "egos" / "adas.toml"
@@ -166,13 +167,16 @@ def test_quick__searches_less(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def campaign(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def campaign() -> Path:
     """A campaign that has been run into the folder `run` beside it."""
-    file = write(tmp_path_factory.mktemp("reconfigured"))
-    done = harness("campaign", file, "--out", file.parent / "run")
-    assert done.returncode == 0, done.stdout + done.stderr
-    (file.parent / "printed").write_text(done.stdout)
-    return file
+
+    def build(folder: Path) -> None:
+        file = write(folder)
+        done = harness("campaign", file, "--out", folder / "run")
+        assert done.returncode == 0, done.stdout + done.stderr
+        (folder / "printed").write_text(done.stdout)
+
+    return built_once("reconfigured", build) / "tiny.toml"
 
 
 @pytest.fixture

@@ -21,6 +21,7 @@ from harness.drivers.policy_file import write_policy
 from harness.errors import Problem, UsageError
 from harness.evaluation.tables import read_csv
 from tests.support.policies import some_policy
+from tests.support.shared import built_once
 from tests.support.tiny import CAREFUL, SPEEDY, TRAINING, harness, learned_run, tables, write_campaign, write_persona
 
 NAMES = ("naive", "speedy", "retrained_speedy")
@@ -230,15 +231,17 @@ def test_command__a_folder_that_is_not_there_is_the_users_mistake(tmp_path: Path
 
 
 @pytest.fixture(scope="module")
-def played(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def played() -> Path:
     """The run folder of a campaign whose players another run has trained."""
-    folder = tmp_path_factory.mktemp("played")
-    shutil.copytree(learned_run() / "policies", folder / "policies")
-    done = harness("campaign", write_played(folder), "--out", folder / "run", "--quick")
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert wording.NOTHING_TO_SHORTEN in done.stdout
-    assert "started  naive-seed1" not in done.stdout
-    return folder / "run"
+
+    def build(folder: Path) -> None:
+        shutil.copytree(learned_run() / "policies", folder / "policies")
+        done = harness("campaign", write_played(folder), "--out", folder / "run", "--quick")
+        assert done.returncode == 0, done.stdout + done.stderr
+        assert wording.NOTHING_TO_SHORTEN in done.stdout
+        assert "started  naive-seed1" not in done.stdout
+
+    return built_once("played", build) / "run"
 
 
 @pytest.mark.slow
@@ -282,14 +285,15 @@ def test_played__nothing_is_written_to_the_folder_of_the_policies(played: Path) 
 
 
 @pytest.mark.slow
-def test_played__again_is_skipped_and_report_and_replay_work(played: Path) -> None:
-    before = (played / "report.html").read_bytes()
-    again = harness("campaign", played.with_name("played.toml"), "--out", played)
+def test_played__again_is_skipped_and_report_and_replay_work(played: Path, tmp_path: Path) -> None:
+    run = shutil.copytree(played, tmp_path / "run")
+    before = (run / "report.html").read_bytes()
+    again = harness("campaign", played.with_name("played.toml"), "--out", run)
     assert again.returncode == 0, again.stderr
     assert "started" not in again.stdout
-    assert harness("report", played).returncode == 0
-    assert (played / "report.html").read_bytes() == before
-    listed = harness("replay", played, "--list")
+    assert harness("report", run).returncode == 0
+    assert (run / "report.html").read_bytes() == before
+    listed = harness("replay", run, "--list")
     assert listed.returncode == 0
     assert listed.stdout.count("naive_alone ") == 4
 

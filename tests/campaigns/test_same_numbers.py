@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.tables import read_csv
-from tests.support.tiny import BY_SUMO, HARNESS, SPEEDY, TABLES, harness, write_campaign, write_persona
+from tests.support.tiny import BY_SUMO, HARNESS, PATIENCE_S, SPEEDY, TABLES, harness, write_campaign, write_persona
 
 pytestmark = pytest.mark.slow
 
@@ -49,7 +49,7 @@ def on_a_terminal(*arguments: object) -> tuple[int, str]:
 
     reader = threading.Thread(target=read)
     reader.start()
-    code = process.wait(timeout=300)
+    code = process.wait(timeout=PATIENCE_S)
     reader.join()
     os.close(ours)
     return code, b"".join(shown).decode(errors="replace")

@@ -13,7 +13,7 @@ import pytest
 from harness.campaign.preflight import open_campaign
 from harness.drivers.policy_file import read_policy
 from harness.evaluation.tables import read_csv
-from tests.support.tiny import harness, write_campaign
+from tests.support.tiny import finished
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -34,9 +34,8 @@ FAILED: dict[str, tuple[float, float]] = {  # arm -> least and greatest share of
 
 
 @pytest.fixture(scope="module")
-def demo(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def demo(repository: Path) -> Path:
     """The run folder of the demonstration with fewer episodes; the rest of its document is as it is shipped."""
-    folder = tmp_path_factory.mktemp("demo")
     campaigns = repository / "campaigns"
     document: dict[str, Any] = tomllib.loads((campaigns / "merge-demo.toml").read_text(encoding="utf-8"))
     for key in ("scene", "policies"):
@@ -44,10 +43,7 @@ def demo(repository: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     document["personas"] = [os.path.normpath(campaigns / each) for each in document["personas"]]
     document["ego"]["persona"] = os.path.normpath(campaigns / document["ego"]["persona"])
     document["assessment"]["episodes"] = EPISODES
-    campaign = write_campaign(folder, **{"training": None, **document})
-    done = harness("campaign", campaign, "--out", folder / "run", timeout_s=280.0)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return folder / "run"
+    return finished(**{"training": None, **document})
 
 
 @pytest.fixture(scope="module")

@@ -106,7 +106,7 @@ def test_process__a_late_answer_is_an_error(change: str, tmp_path: Path, car: Ca
     began = time.monotonic()
     with pytest.raises(DriverError, match=r"did not answer within 0.3 s \(message: decide\)"):
         mine.decide(GAMES, SEEN, NOISE)
-    assert time.monotonic() - began < 5.0
+    assert time.monotonic() - began < 60.0  # it would sleep for 600
 
 
 def test_process__a_program_that_never_reads_misses_the_deadline(tmp_path: Path, car: Car) -> None:
@@ -141,7 +141,7 @@ def test_process__ends_with_its_driver(tmp_path: Path, car: Car) -> None:
     assert is_running(pid)
     del mine
     gc.collect()
-    wait_for(lambda: not is_running(pid), "the end of the program", 5.0)
+    wait_for(lambda: not is_running(pid), "the end of the program")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="PR_SET_PDEATHSIG exists on Linux only")
@@ -161,13 +161,13 @@ time.sleep(600)
 
     parent = subprocess.Popen([sys.executable, "-c", script])
     try:
-        wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text(), "the program's start", 30.0)
+        wait_for(lambda: (tmp_path / "pid").exists() and (tmp_path / "pid").read_text(), "the program's start")
         pid = int((tmp_path / "pid").read_text())
         assert is_running(pid)
     finally:
         parent.send_signal(signal.SIGKILL)
         parent.wait()
-    wait_for(lambda: not is_running(pid), "the end of the program", 5.0)
+    wait_for(lambda: not is_running(pid), "the end of the program")
 
 
 def test_process__a_crash_costs_one_game(tmp_path: Path, merge: OpenScene, car: Car) -> None:

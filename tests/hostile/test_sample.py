@@ -13,7 +13,7 @@ from tests.hostile.bad_documents import CAMPAIGNS, PERSONAS, POLICIES, SCENES
 from tests.hostile.bad_roads import NETS, ROUTE_FILES
 from tests.hostile.bad_run_folders import RUNS
 from tests.hostile.inputs import CHECK, Bad, Said, assert_refused, traces_of, write_project, write_run
-from tests.support.tiny import HARNESS, in_session
+from tests.support.tiny import HARNESS, PATIENCE_S, in_session
 
 TABLES = {
     "campaign": CAMPAIGNS,
@@ -79,7 +79,7 @@ def test_command__refuses_a_bad_input_and_leaves_nothing_behind(bad: Bad, tmp_pa
         start_new_session=True,
     )
     try:
-        out, err = command.communicate(timeout=200)  # of a machine that is busy with other things
+        out, err = command.communicate(timeout=PATIENCE_S)
     finally:
         left = in_session(command.pid)
         command.kill()

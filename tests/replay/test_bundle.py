@@ -280,7 +280,7 @@ def test_open__starts_sumo_gui_on_the_folder(monkeypatch: pytest.MonkeyPatch, tm
     (tmp_path / "game" / "scene.sumocfg").write_text("<configuration/>")
     monkeypatch.setenv("DISPLAY", ":1")
     monkeypatch.setattr(sumo_gui_module, "find_sumo_gui", lambda: program)
-    assert open_in_sumo_gui(tmp_path / "game").wait(timeout=10) == 0
+    assert open_in_sumo_gui(tmp_path / "game").wait(timeout=300) == 0
     home, option, file = (tmp_path / "game" / "called").read_text().strip().split("|")
     assert (Path(home), option) == ((tmp_path / "sumo").resolve(), "-c")
     assert Path(file) == tmp_path / "game" / "scene.sumocfg"

@@ -29,7 +29,7 @@ from harness.reports.wording import (
     verdicts,
 )
 from tests.support.recorded import SCENE, manoeuvres, recorded
-from tests.support.pages import Page, rendered, campaign, recomputed, recordings, with_errors
+from tests.support.pages import Page, blank_figures, rendered, campaign, recomputed, recordings, with_errors
 
 
 @pytest.fixture(scope="module")
@@ -80,7 +80,8 @@ def test_page__each_table_links_its_file(page):
 
 def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatch):
     monkeypatch.setattr(page_module, "MOST_ROWS", 10)
-    page = Page(rendered(**small))
+    with blank_figures():
+        page = Page(rendered(**small))
     assert "episodes" not in page.tables
     assert f"{len(small['episodes'])} games are too many for a page" in page.text
 
@@ -94,7 +95,8 @@ def text_of(arguments):
 
 
 def without_curves(arguments):
-    return rendered(**arguments | {"training": arguments["training"][:0]})
+    with blank_figures():
+        return rendered(**arguments | {"training": arguments["training"][:0]})
 
 
 def verdict_texts(arguments):

@@ -81,7 +81,7 @@ def opener(browser: Any, report: Path) -> Iterator[Callable[..., Any]]:
         context.close()
 
 
-def until(page: Any, expression: str, argument: Any = None, seconds: float = 20.0) -> None:
+def until(page: Any, expression: str, argument: Any = None, seconds: float = 300.0) -> None:
     """Wait until a JavaScript function is true; Playwright's own waiting violates the page's content policy."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression, argument):

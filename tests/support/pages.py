@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from html.parser import HTMLParser
 from typing import Any
 
 import numpy as np
 import pandas as pd
+import pytest
+from matplotlib.figure import Figure
 
 from harness.evaluation.comparison import compare
 from harness.evaluation.research_questions import Question, ResearchQuestion
@@ -145,6 +148,14 @@ def _windows(stage: str, seed: int, random: np.random.Generator) -> Iterator[dic
             "games": 900,
             "mean_duration_s": 11.5,
         }
+
+
+@contextmanager
+def blank_figures() -> Iterator[None]:
+    """Lay figures out but draw them blank: drawing takes most of a page's time, and tests of its text don't need it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, "savefig", lambda figure, file, **_: file.write('<svg viewBox="0 0 1 1"></svg>'))
+        yield
 
 
 def rendered(games: Sequence[RecordedGame] = (), scene: SceneDrawing | None = None, **tables: Any) -> str:

@@ -14,6 +14,7 @@ from defusedxml import ElementTree
 
 from harness.replay import write_replay
 from harness.replay.sumo_gui import find_sumo_gui
+from tests.support.tiny import PATIENCE_S
 
 STEP_S = 0.1
 RAILS = (
@@ -149,7 +150,7 @@ def play(folder: Path) -> tuple[pd.DataFrame, str]:
     ]
     command += ["--fcd-output.attributes", "id,x,y,angle,type,speed"]
     environment = os.environ | {"SUMO_HOME": str(sumo_program("sumo").parent.parent)}  # for its XML schemas
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=environment, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, env=environment, check=False)
     assert done.returncode == 0, done.stderr
     rows = [
         {"label_s": float(step.get("time")), **vehicle.attrib}

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import atexit
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterable
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +16,13 @@ import pytest
 
 from harness.config.campaign import Training
 from tests.support.repository import REPOSITORY
+from tests.support.shared import built_once
 
 MERGE = REPOSITORY / "networks" / "merge"
 CAREFUL, SPEEDY, DISTRACTED = (REPOSITORY / "personas" / f"{name}.toml" for name in ("careful", "speedy", "distracted"))
 HARNESS = Path(sys.executable).with_name("harness")
 TABLES = ("episodes.csv", "summary.csv", "comparisons.csv")
+PATIENCE_S = 600.0  # a bound on waiting: on a busy machine a second of work takes many; only a hang takes this long
 ALL_TABLES = (*TABLES, "training.csv", "manoeuvres.csv")
 
 TRAINING: dict[str, Any] = {
@@ -93,7 +91,7 @@ def _inline(value: Any) -> str:
     return f"[{', '.join(map(_inline, value))}]" if isinstance(value, list | tuple) else json.dumps(value)
 
 
-def harness(*arguments: object, timeout_s: float = 200.0, **options: Any) -> subprocess.CompletedProcess[str]:
+def harness(*arguments: object, timeout_s: float = PATIENCE_S, **options: Any) -> subprocess.CompletedProcess[str]:
     """Run the command to its end."""
     command = [str(HARNESS), *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout_s, check=False, **options)
@@ -120,7 +118,7 @@ def _heed_all() -> None:
 def end(process: subprocess.Popen[str]) -> str:
     """Wait for the command; what it printed. Whatever is left of it is killed, so that a failed test leaves nothing."""
     try:
-        return process.communicate(timeout=120)[0]
+        return process.communicate(timeout=PATIENCE_S)[0]
     finally:
         if left := in_session(process.pid):
             for each in left:
@@ -153,7 +151,7 @@ def _read(path: str) -> bytes:
         return b""
 
 
-def wait_for(condition: Callable[[], object], what: str, seconds: float = 60.0) -> None:
+def wait_for(condition: Callable[[], object], what: str, seconds: float = PATIENCE_S) -> None:
     """Wait until the condition holds; fails, naming it, if it does not in time."""
     until = time.monotonic() + seconds
     while not condition():
@@ -177,31 +175,27 @@ def numbers(run: Path) -> dict[str, bytes]:
     return found
 
 
-@cache
-def _scratch() -> Path:
-    folder = Path(tempfile.mkdtemp(prefix="harness-tests-"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return folder
-
-
 def finished(*options: object, **changes: Any) -> Path:
-    """Run a campaign to its end: its run folder, beside its document."""
-    campaign = write_campaign(_scratch(), **changes)
-    run = campaign.with_suffix("")
-    done = harness("campaign", campaign, "--out", run, *options, timeout_s=600.0)
-    assert done.returncode == 0, done.stdout + done.stderr
-    return run
+    """The run folder of a finished campaign, beside its document and `printed`, what the command printed. Built once
+    for the whole test session, by the campaign's name: tests read it, and none may change it."""
+    name = changes["name"]
+
+    def build(folder: Path) -> None:
+        campaign = write_campaign(folder, **changes)
+        done = harness("campaign", campaign, "--out", campaign.with_suffix(""), *options)
+        assert done.returncode == 0, done.stdout + done.stderr
+        (folder / "printed").write_text(done.stdout, encoding="utf-8")
+
+    return built_once(name, build) / name
 
 
-@cache
 def learned_run() -> Path:
-    """The run folder of a finished campaign with a learned ego. Many tests read it; none may change it."""
+    """The run folder of a finished campaign with a learned ego."""
     return finished(name="learned")
 
 
-@cache
 def sumo_run() -> Path:
-    """The run folder of a finished campaign whose ego SUMO drives. Many tests read it; none may change it."""
+    """The run folder of a finished campaign whose ego SUMO drives."""
     return finished("--jobs", 1, **BY_SUMO)
 
 

