@@ -93,11 +93,10 @@ def ego(campaign: OpenCampaign) -> str:
 def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
     """How many trainings and arms there are."""
     from harness.campaign.plan.stages import AssessmentStage, TrainingStage
-    from harness.evaluation.strategies import BestResponse
 
     document = campaign.document
     trainings = [stage for stage in stages if isinstance(stage, TrainingStage)]
-    responses = sum(isinstance(stage.strategy, BestResponse) for stage in trainings)
+    responses = sum(stage.is_best_response for stage in trainings)
     arms = sum(isinstance(stage, AssessmentStage) for stage in stages)
     if campaign.policies is None:
         parts = [f"{len(trainings) - responses} trainings of up to {document.training.steps:,} steps"]

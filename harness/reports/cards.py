@@ -9,11 +9,13 @@ from typing import NamedTuple
 from markupsafe import Markup
 
 from harness.evaluation.comparison import Verdict
+from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, Arm, NaiveEgo, against_persona, persona_alone
 from harness.reports import page_wording
 from harness.reports.distributions import MOST_LINES, Pairs, paired_figure, pairs_of, spread_figure, spreads_of
 from harness.reports.figures import Column, Point, rate_figure, speed_figure
 from harness.reports.numbers import MISSING, p_number, percent
 from harness.reports.results import Results
+from harness.reports.treatment import Change
 from harness.reports.wording import QUESTIONS, Conclusion, Row, effect, failures
 
 LONGEST_LABEL = 12
@@ -78,9 +80,9 @@ class ArmColumn(NamedTuple):
 
 def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None) -> Card:
     """The card of a persona; `place` makes the ids of its figures unique, `worst` is the game to show."""
-    made = found.change.made if found.asked("RQ2", persona) else None
-    columns = _columns(persona, made)
-    paired, paired_note = _paired(persona, place, found) if made else (None, "")
+    change = found.change if found.asked("RQ2", persona) else None
+    columns = _columns(persona, change)
+    paired, paired_note = _paired(persona, place, found) if change is not None else (None, "")
     return Card(
         persona=persona,
         anchor=f"persona-{place}",
@@ -88,8 +90,8 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
             (question.format(doing=found.change.doing), found.verdicts(name, persona))
             for name, question in QUESTIONS.items()
         ],
-        rates=[_rate(label, series, found.of(arm)) for label, series, arm in page_wording.arm_labels(persona, made)],
-        facts=_facts(persona, made, found),
+        rates=[_rate(label, series, found.of(arm)) for label, series, arm in page_wording.arm_labels(persona, change)],
+        facts=_facts(persona, change, found),
         tests=[_test(row) for row in found.comparisons if row["persona"] == persona],
         rate_figure=rate_figure(
             [Column(label=each.label, series=each.series, points=_rates(found.of(each.arm))) for each in columns],
@@ -114,7 +116,7 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
 
 def _paired(persona: str, place: int, found: Results) -> tuple[Markup, str]:
     """The figure of pairs and its note."""
-    pairs: Sequence[Pairs] = pairs_of(persona, found.games, found.change.made)
+    pairs: Sequence[Pairs] = pairs_of(persona, found.games, found.change)
     first = pairs[0]
     alternative = page_wording.paired_alternative(
         persona,
@@ -144,9 +146,9 @@ def _rate(label: str, series: str, rows: Mapping[int, Row]) -> Rate:
     )
 
 
-def _facts(persona: str, made: str | None, found: Results) -> list[tuple[str, Sequence[str]]]:
+def _facts(persona: str, change: Change | None, found: Results) -> list[tuple[str, Sequence[str]]]:
     """The notes of a card, as titles and lines."""
-    against = found.of(f"naive_vs_{persona}")
+    against = found.of(against_persona(NaiveEgo(), persona).name)
     facts: list[tuple[str, Sequence[str]]] = []
     causes = {seed: page_wording.causes(row) for seed, row in against.items() if failures(row)}
     if causes:
@@ -157,18 +159,20 @@ def _facts(persona: str, made: str | None, found: Results) -> list[tuple[str, Se
         several = len(found.seeds) > 1
         facts.append((page_wording.BY_DRIVER, [page_wording.by_driver(row, several) for row in by_driver]))
     else:
-        reached = {seed: page_wording.reaches_goal(row) for seed, row in found.of(f"{persona}_alone").items()}
+        reached = {seed: page_wording.reaches_goal(row) for seed, row in found.of(persona_alone(persona).name).items()}
         facts.append((page_wording.PERSONA_ALONE, page_wording.by_seed(reached)))
-    if made:
-        alone = page_wording.counts(found.of(f"{made}_alone_{persona}"), f"the {made} ego")
-        facts.append((page_wording.changed_ego_alone(made), alone))
-    if any(failures(row) for row in found.of("naive_alone").values()):
+    if change is not None:
+        arm = Arm(ego=change.ego(against=persona)).name
+        alone = page_wording.counts(found.of(arm), f"the {change.made} ego")
+        facts.append((page_wording.changed_ego_alone(change.made), alone))
+    if any(failures(row) for row in found.of(NAIVE_ALONE.name).values()):
         facts.append((page_wording.CAUTION, [page_wording.FAILS_ALONE]))
     return [(title, lines or [page_wording.NOT_PLAYED]) for title, lines in facts]
 
 
 def _ordinary_driver(persona: str, found: Results) -> list[str]:
-    ordinary, against = found.of("naive_vs_sumo"), found.of(f"naive_vs_{persona}")
+    ordinary = found.of(NAIVE_VS_SUMO.name)
+    against = found.of(against_persona(NaiveEgo(), persona).name)
     lines = page_wording.counts(ordinary, "the naive ego")
     seeds = [
         seed
@@ -191,15 +195,18 @@ def _test(row: Row) -> Test:
     )
 
 
-def _columns(persona: str, made: str | None) -> list[ArmColumn]:
+def _columns(persona: str, change: Change | None) -> list[ArmColumn]:
     """The columns of the figures, in the order of the paper's rounds."""
     name = persona if len(persona) <= LONGEST_LABEL else persona[: LONGEST_LABEL - 1] + "…"
     columns = [
-        ArmColumn("naive\nalone", "alone", "naive_alone"),
-        ArmColumn("naive vs\nSUMO driver", "sumo", "naive_vs_sumo"),
-        ArmColumn(f"naive vs\n{name}", "persona", f"naive_vs_{persona}"),
+        ArmColumn("naive\nalone", "alone", NAIVE_ALONE.name),
+        ArmColumn("naive vs\nSUMO driver", "sumo", NAIVE_VS_SUMO.name),
+        ArmColumn(f"naive vs\n{name}", "persona", against_persona(NaiveEgo(), persona).name),
     ]
-    return columns + ([ArmColumn(f"{made} vs\n{name}", "retrained", f"{made}_vs_{persona}")] if made else [])
+    if change is not None:
+        arm = against_persona(change.ego(against=persona), persona).name
+        columns.append(ArmColumn(f"{change.made} vs\n{name}", "retrained", arm))
+    return columns
 
 
 def _rates(rows: Mapping[int, Row]) -> list[Point]:

@@ -11,6 +11,8 @@ import pandas as pd
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from harness.evaluation.strategies import NaiveEgo, against_persona
+from harness.reports.treatment import RETRAINED, Change
 from harness.reports.figures import INK, SERIES, figure_of, svg
 from harness.reports.player_data import FloatArray
 
@@ -51,9 +53,10 @@ class Spread:
     """Label, series, values and failures of each arm."""
 
 
-def pairs_of(persona: str, games: pd.DataFrame, made: str = "retrained") -> list[Pairs]:
-    """`PAIRED` of the episodes that the naive ego and the ego of round 2 (`made`) both played against the persona."""
-    before, after = (games[games["arm"] == f"{ego}_vs_{persona}"] for ego in ("naive", made))
+def pairs_of(persona: str, games: pd.DataFrame, change: Change = RETRAINED) -> list[Pairs]:
+    """`PAIRED` of the episodes that the naive ego and the ego of round 2 both played against the persona."""
+    arms = (against_persona(ego, persona).name for ego in (NaiveEgo(), change.ego(against=persona)))
+    before, after = (games[games["arm"] == arm] for arm in arms)
     both = before.merge(after, on=["seed", "episode"], suffixes=("", "_after"))
     before_failed, after_failed = (_failed(both[column]) for column in ("ego_failed", "ego_failed_after"))
     return [

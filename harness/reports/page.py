@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports import page_wording
 from harness.reports.cards import Card, card
 from harness.reports.data_table import Table, table
@@ -104,7 +105,7 @@ def _cards(tables: RunTables, found: Results, embedded: Container[str]) -> dict[
 
 
 def _card(persona: str, place: int, found: Results, episodes: pd.DataFrame, embedded: Container[str]) -> Card:
-    return card(persona, place, found, worst_game(f"naive_vs_{persona}", episodes, embedded))
+    return card(persona, place, found, worst_game(against_persona(NaiveEgo(), persona).name, episodes, embedded))
 
 
 def _player(tables: RunTables, embedded: Embedded) -> dict[str, Any]:
@@ -127,7 +128,7 @@ def _manoeuvres(tables: RunTables) -> dict[str, Any]:
 def _learning(tables: RunTables) -> dict[str, Any]:
     """The learning curves, and the searches of egos that can't be trained."""
     return {
-        "learning": learning(tables.stages, tables.training),
+        "learning": learning(tables),
         "searches": searches(tables.reconfiguration),
     }
 
@@ -166,6 +167,6 @@ def _method(tables: RunTables, found: Results) -> dict[str, Any]:
     return {
         "significance": found.significance,
         "rules": sorted({stage["rule"] for stage in tables.stages.values() if stage.get("rule")}),
-        "glossary": page_wording.glossary(list(dict.fromkeys(tables.summary["arm"])), tables.personas),
+        "glossary": page_wording.glossary(list(dict.fromkeys(tables.summary["arm"])), tables.arms),
         "versions": tables.manifest.get("versions", {}),
     }

@@ -6,6 +6,17 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from harness.evaluation.strategies import (
+    NAIVE_ALONE,
+    Arm,
+    EgoStrategy,
+    NaiveEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    SumoNonEgo,
+    against_persona,
+    strategy_name,
+)
 from harness.reports.numbers import MISSING, SURE, interval, number, percent, steps_text, trimmed
 from harness.reports.treatment import Change
 from harness.reports.wording import Row, failures_of, played
@@ -70,13 +81,16 @@ def made_with(versions: str, stages: Sequence[str]) -> str:
 # --- a persona's card ---
 
 
-def arm_labels(persona: str, made: str | None) -> list[tuple[str, str, str]]:
-    """Label, series and arm of each failure rate of a card; `made` is the ego of round 2, None without it."""
+def arm_labels(persona: str, change: Change | None) -> list[tuple[str, str, str]]:
+    """Label, series and arm of each failure rate of a card; `change` is None without a round 2."""
     labels = [
-        ("naive ego, alone", "alone", "naive_alone"),
-        (f"naive ego, against {persona}", "persona", f"naive_vs_{persona}"),
+        ("naive ego, alone", "alone", NAIVE_ALONE.name),
+        (f"naive ego, against {persona}", "persona", against_persona(NaiveEgo(), persona).name),
     ]
-    return labels + ([(f"{made} ego, against {persona}", "retrained", f"{made}_vs_{persona}")] if made else [])
+    if change is None:
+        return labels
+    arm = against_persona(change.ego(against=persona), persona).name
+    return [*labels, (f"{change.made} ego, against {persona}", "retrained", arm)]
 
 
 def by_seed(lines: Mapping[int, str]) -> list[str]:
@@ -219,30 +233,38 @@ def worst_game(episode: int, outcome: str, least_time_s: float) -> str:
     return f"game {episode}: {OUTCOMES.get(outcome, outcome)}{nearest}"
 
 
-def glossary(arms: Sequence[str], personas: Sequence[str]) -> list[tuple[str, str]]:
-    """Each arm and what it pairs."""
-    meanings = {
-        "naive_alone": "the naive ego on the road without the non-ego",
-        "naive_vs_sumo": "the naive ego with an ordinary law-abiding SUMO driver in the non-ego's place",
-    }
-    for persona in personas:
-        meanings |= {
-            f"{persona}_alone": f"the non-ego {persona} without the ego",
-            f"naive_vs_{persona}": f"the naive ego against the non-ego {persona}",
-            f"reconfigured_vs_{persona}": f"the ego tuned against {persona}, against the same {persona}",
-            f"reconfigured_alone_{persona}": f"the ego tuned against {persona}, without the non-ego",
-            f"retrained_vs_{persona}": f"the ego retrained against {persona}, against the same {persona}",
-            f"retrained_alone_{persona}": f"the ego retrained against {persona}, without the non-ego",
-        }
-    return [(arm, meanings.get(arm) or _other_arm(arm)) for arm in arms]
+def glossary(arms: Sequence[str], records: Mapping[str, Arm]) -> list[tuple[str, str]]:
+    """Each arm that is planned, and what it pairs."""
+    return [(name, arm_in_words(records[name])) for name in arms if name in records]
 
 
-def _other_arm(arm: str) -> str:
-    """What an arm beyond the paper's rounds pairs, by its name."""
-    for ending, player in (("_non_ego_response", "the non-ego"), ("_ego_response", "the ego")):
-        if arm.endswith(ending):
-            return f"{arm.removesuffix(ending)}, {player} replaced by its best response"
-    ego, against, non_ego = arm.partition("_vs_")
-    if against:
-        return f"the ego {ego} against the non-ego {non_ego}"
-    return f"{arm.removesuffix('_alone')} alone on the road"
+def arm_in_words(arm: Arm) -> str:
+    """What an arm pairs."""
+    if arm.best_response_of is not None:
+        player = ("the ego", "the non-ego")[arm.best_response_of]
+        return f"{arm.pair.name}, {player} replaced by its best response"
+    match arm:
+        case Arm(ego=None, non_ego=non_ego) if non_ego is not None:
+            return f"the non-ego {strategy_name(non_ego)} without the ego"
+        case Arm(ego=NaiveEgo(), non_ego=None):
+            return "the naive ego on the road without the non-ego"
+        case Arm(ego=ego, non_ego=None) if ego is not None:
+            return f"{_ego_in_words(ego)}, without the non-ego"
+        case Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()):
+            return "the naive ego with an ordinary law-abiding SUMO driver in the non-ego's place"
+        case Arm(ego=ego, non_ego=non_ego) if ego is not None and non_ego is not None:
+            return f"{_ego_in_words(ego)} against the non-ego {strategy_name(non_ego)}"
+    raise ValueError("an arm has at least one player")
+
+
+def _ego_in_words(ego: EgoStrategy) -> str:
+    match ego:
+        case NaiveEgo():
+            return "the naive ego"
+        case ReconfiguredEgo(against=against):
+            return f"the ego tuned against {against}"
+        case RetrainedEgo(against=against, round=2):
+            return f"the ego retrained against {against}"
+        case _:
+            return f"the ego {strategy_name(ego)}"
+

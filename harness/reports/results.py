@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from harness.evaluation.strategies import ReconfiguredEgo
 from harness.reports import wording
 from harness.reports.run_tables import RunTables
 from harness.reports.treatment import ARMS, RECONFIGURED, RETRAINED, Change
@@ -28,6 +29,8 @@ class Results:
     significance: float | None
     planned: Collection[str]
     """Ids of the stages of the campaign, whether they are done or not."""
+    is_reconfigured: bool
+    """Whether round 2 searches the parameters of an external ego."""
     by_driver: Sequence[Row]
     """Rows of `populations`: each arm against a population, by the persona that drove."""
 
@@ -39,8 +42,7 @@ class Results:
     @property
     def change(self) -> Change:
         """What round 2 makes of the ego, if it is played."""
-        arms = {*self.planned, *(arm for arm, _ in self.arms)}
-        return RECONFIGURED if any(arm.startswith(f"{RECONFIGURED.made}_vs_") for arm in arms) else RETRAINED
+        return RECONFIGURED if self.is_reconfigured else RETRAINED
 
     def asked(self, question: str, persona: str) -> list[int]:
         """The training seeds of which a question is asked: its treatment is planned, or it is compared."""
@@ -76,6 +78,7 @@ def results(tables: RunTables) -> Results:
         seeds=sorted({*manifest.get("seeds", ()), *summary["seed"].tolist(), *comparisons["seed"].tolist()}),
         significance=manifest.get("campaign", {}).get("assessment", {}).get("significance"),
         planned=tables.stages,
+        is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),
         by_driver=tables.populations.to_dict("records"),
     )
 

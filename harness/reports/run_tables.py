@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.game_theory.records import GameFindings
+from harness.evaluation.strategies import Arm, Strategy
 from harness.evaluation.tables import TABLES, typed
 
 
@@ -22,6 +23,10 @@ class RunTables:
 
     manifest: Mapping[str, Any]
     """The content of manifest.json."""
+    arms: Mapping[str, Arm] = field(default_factory=dict)
+    """The planned arms by name."""
+    strategies: Mapping[str, Strategy] = field(default_factory=dict)
+    """The strategies that are trained, by name."""
     episodes: pd.DataFrame = field(default_factory=_empty("episodes"))
     summary: pd.DataFrame = field(default_factory=_empty("summary"))
     comparisons: pd.DataFrame = field(default_factory=_empty("comparisons"))

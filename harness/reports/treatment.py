@@ -4,21 +4,34 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from harness.evaluation.strategies import (
+    NAIVE_ALONE,
+    NaiveEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    against_persona,
+)
+
 
 class Change(NamedTuple):
     """What round 2 makes of the ego."""
 
     made: str
-    """The name of the ego afterwards, with which the names of its arms begin."""
+    """The ego of round 2 in sentences."""
     doing: str
-    """The treatment, as a noun."""
+    """What round 2 does, in sentences."""
+    ego: type[RetrainedEgo] | type[ReconfiguredEgo]
+    """The ego of round 2 as a strategy."""
 
 
-RETRAINED = Change("retrained", "retraining")
-RECONFIGURED = Change("reconfigured", "reconfiguration")
+RETRAINED = Change("retrained", "retraining", RetrainedEgo)
+RECONFIGURED = Change("reconfigured", "reconfiguration", ReconfiguredEgo)
 
 ARMS = {
-    "RQ1": lambda persona, change: ("naive_alone", f"naive_vs_{persona}"),
-    "RQ2": lambda persona, change: (f"naive_vs_{persona}", f"{change.made}_vs_{persona}"),
+    "RQ1": lambda persona, change: (NAIVE_ALONE.name, against_persona(NaiveEgo(), persona).name),
+    "RQ2": lambda persona, change: (
+        against_persona(NaiveEgo(), persona).name,
+        against_persona(change.ego(against=persona), persona).name,
+    ),
 }
-"""Baseline and treatment arm of each question, by persona and change."""
+"""Baseline and treatment of each question, by the persona and by what round 2 does."""

@@ -18,7 +18,7 @@ import pytest
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, SearchStage, TrainingStage
 from harness.campaign.preflight import QUICK_TRIALS, open_campaign
 from harness.config.driver import read_driver
 from harness.evaluation.tables import read_csv
@@ -63,7 +63,7 @@ def test_plan__of_an_ego_with_something_to_tune(tmp_path: Path) -> None:
     assert {id for id, stage in trained.items() if isinstance(stage, TrainingStage)} == {"speedy-seed1", "speedy-seed7"}
     for seed in (1, 7):
         search = trained[f"reconfigured_speedy-seed{seed}"]
-        assert isinstance(search, ReconfigurationStage)
+        assert isinstance(search, SearchStage)
         assert (search.needs, search.reads) == ((f"speedy-seed{seed}",), ())
         for arm in ("vs_speedy", "alone_speedy"):
             stage = trained[f"reconfigured_{arm}-seed{seed}"]

@@ -15,6 +15,18 @@ from matplotlib.figure import Figure
 
 from harness.evaluation.comparison import compare
 from harness.evaluation.research_questions import Question, ResearchQuestion
+from harness.evaluation.strategies import (
+    NAIVE_ALONE,
+    NAIVE_VS_SUMO,
+    Arm,
+    NaiveEgo,
+    PersonaNonEgo,
+    RetrainedEgo,
+    Strategy,
+    against_persona,
+    persona_alone,
+    strategy_name,
+)
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import TABLES, typed
 from harness.replay.selection import choose_games, replay_name
@@ -89,12 +101,24 @@ def campaign(
     ]
     return {
         "manifest": manifest,
+        "arms": {arm.name: arm for persona in personas for arm in _arms(persona)},
+        "strategies": {strategy_name(each): each for persona in personas for each in _strategies(persona)},
         "episodes": episodes,
         "summary": summarise(episodes),
         "comparisons": compare(questions, episodes, 0.01),
         "training": typed(training),
         "replays": replays,
     }
+
+
+def _arms(persona: str) -> list[Arm]:
+    naive, retrained = NaiveEgo(), RetrainedEgo(against=persona)
+    pairs = [against_persona(ego, persona) for ego in (naive, retrained)]
+    return [NAIVE_ALONE, NAIVE_VS_SUMO, persona_alone(persona), *pairs, Arm(ego=retrained)]
+
+
+def _strategies(persona: str) -> list[Strategy]:
+    return [NaiveEgo(), PersonaNonEgo(persona=persona), RetrainedEgo(against=persona)]
 
 
 def _asked(persona: str) -> list[tuple[ResearchQuestion, str, str]]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import read_trace
 from harness.evaluation.trace_quantities import series_of
 from harness.game.state import ROLES
@@ -25,20 +26,21 @@ TAKE_TURNS = 20  # games of an arm and seed in turn, so that a page without room
 
 
 def recorded_games(
-    episodes: pd.DataFrame, traces: Callable[[str, int], Path], scene: OpenScene
+    episodes: pd.DataFrame, arms: Mapping[str, Arm], traces: Callable[[str, int], Path], scene: OpenScene
 ) -> Iterator[RecordedGame]:
     """Every played game, those to watch first at the front. Each is read when the iterator reaches it.
 
     Games with a replay come first, worst first, in turns of `TAKE_TURNS` per arm and seed. Each is followed by the game
-    of the same episode that it is compared with; then the rest. `traces` gives the traces file of an arm and seed.
+    of the same episode that it is compared with; then the rest. `arms` are the arms by name; `traces` gives the traces
+    file of an arm and seed.
     """
-    for game in watching_order(episodes).itertuples():
+    for game in watching_order(episodes, arms).itertuples():
         trace = read_trace(traces(game.arm, game.seed), game.episode)
         if not trace.empty:
             yield recorded_game(trace, scene, game)
 
 
-def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
+def watching_order(episodes: pd.DataFrame, arms: Mapping[str, Arm]) -> pd.DataFrame:
     """The rows of `episodes` that were played, in the order of `recorded_games`."""
     played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
     rows = {(game.arm, game.seed, game.episode): game.Index for game in played.itertuples()}
@@ -48,7 +50,7 @@ def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
     turn[chosen["ego_outcome"].where(chosen["ego_outcome"] != "", chosen["non_ego_outcome"]) == "goal"] = 0
     for game in chosen.loc[turn.sort_values(kind="stable").index].itertuples():
         order[game.Index] = None
-        for arm in _counterparts(game.arm):
+        for arm in _counterparts(arms.get(game.arm)):
             counterpart = rows.get((arm, game.seed, game.episode))
             if counterpart is not None:
                 order[counterpart] = None
@@ -56,11 +58,9 @@ def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
     return played.loc[list(order)]
 
 
-def _counterparts(arm: str) -> list[str]:
-    """The arms that an arm is compared with: naive with retrained or reconfigured."""
-    before, against, persona = arm.partition("_vs_")
-    others = {"naive": ("retrained", "reconfigured"), "retrained": ("naive",), "reconfigured": ("naive",)}
-    return [other + against + persona for other in others.get(before, (before,))]
+def _counterparts(arm: Arm | None) -> list[str]:
+    """The names of the arms beside which an arm is shown."""
+    return [each.name for each in counterparts(arm)] if arm is not None else []
 
 
 def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedGame:

@@ -14,7 +14,8 @@ from rich.console import Console
 from rich.progress import track
 
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.stages import stage_id
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
@@ -72,6 +73,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     reconfiguration = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
     summary = summarise(episodes)
     campaign = _campaign(manifest)
+    stages = plan(campaign, manifest["personas"], is_tuned(manifest))
+    arms = {stage.name: stage.arm for stage in stages if isinstance(stage, AssessmentStage)}
     asked = _questions(campaign, manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
@@ -91,6 +94,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     replays = _write_replays(folder, scene, episodes, console)
     report = RunTables(
         manifest=manifest,
+        arms=arms,
+        strategies={stage.name: stage.strategy for stage in stages if isinstance(stage, TrainingStage)},
         episodes=episodes,
         summary=summary,
         comparisons=comparisons,
@@ -102,7 +107,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         populations=populations,
     )
     with console.status("writing the report"):
-        games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
+        games = recorded_games(episodes, arms, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
         page = render_page(report, games, scene_drawing(scene))
     write_atomically(folder.path / "report.html", page.encode())
     warn(mixed_versions(manifest["stages"]), console)
