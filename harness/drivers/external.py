@@ -13,9 +13,7 @@ line. An installed package needs no permission, because the user has installed i
 
 from __future__ import annotations
 
-import hashlib
 import os
-import shutil
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,6 +27,7 @@ from harness.config.rule_driver import Rules
 from harness.config.toml_reading import nearest
 from harness.config.tunable import Adjustable, Tunable
 from harness.drivers.car import Car
+from harness.drivers.driver_files import find_program, is_file, names_beside, relative_to, resolve_in, sha256_of
 from harness.drivers.entry_points import entry_point, installed_driver, installed_names, version_of
 from harness.drivers.fmu import fmu_driver
 from harness.drivers.policy import LearnedDriver
@@ -123,11 +122,9 @@ class ExternalDriver:
         assert self.document is not None, "a policy has no document"
         match self.document:
             case Process(folder=written):
-                return self.document.model_copy(
-                    update={"folder": _relative_to(folder, resolve_in(self.place, written))}
-                )
+                return self.document.model_copy(update={"folder": relative_to(folder, resolve_in(self.place, written))})
             case Fmu(file=file) | StableBaselines3(file=file):
-                return self.document.model_copy(update={"file": _relative_to(folder, resolve_in(self.place, file))})
+                return self.document.model_copy(update={"file": relative_to(folder, resolve_in(self.place, file))})
         return self.document
 
     @property
@@ -155,7 +152,7 @@ class ExternalDriver:
         Raises UsageError if its files or parameters do not fit, DriverError if it can't be made or its files have
         changed.
         """
-        changed = [file for file, known in self.files.items() if _hash(Path(file)) != known]
+        changed = [file for file, known in self.files.items() if sha256_of(Path(file)) != known]
         if changed:
             raise DriverError(f"changed since the campaign was checked: {', '.join(changed)}")
         match self.document:
@@ -215,9 +212,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
     if not os.path.exists(place):
         if written.endswith(".toml") or "/" in written:
             remedy = (
-                nearest(place.name, _names_beside(place))
-                if os.path.isdir(place.parent)
-                else f"no folder {place.parent}"
+                nearest(place.name, names_beside(place)) if os.path.isdir(place.parent) else f"no folder {place.parent}"
             )
             raise UsageError.of(file, key, f"{written!r}: there is no such file or folder", remedy)
         names = [LEARNED, SUMO, *installed_names()]
@@ -240,19 +235,19 @@ def _from_document(written: str, place: Path, document: DriverDocument) -> Exter
         case Process(command=command, files=files):
             runs_in = resolve_in(folder, document.folder)
             if not runs_in.is_dir():
-                remedy = nearest(runs_in.name, _names_beside(runs_in))
+                remedy = nearest(runs_in.name, names_beside(runs_in))
                 raise UsageError.of(place, "folder", f"{document.folder!r}: there is no such folder", remedy)
-            program = _program(command[0], runs_in, place)
-            depends_on = [*(each for each in command[1:] if _is_file(runs_in, each)), *files]
-            missing = [each for each in files if not _is_file(runs_in, each)]
+            program = find_program(command[0], runs_in, place)
+            depends_on = [*(each for each in command[1:] if is_file(runs_in, each)), *files]
+            missing = [each for each in files if not is_file(runs_in, each)]
             if missing:
-                remedy = nearest(Path(missing[0]).name, _names_beside(resolve_in(runs_in, missing[0])))
+                remedy = nearest(Path(missing[0]).name, names_beside(resolve_in(runs_in, missing[0])))
                 raise UsageError.of(place, "files", f"{missing[0]!r}: there is no such file", remedy)
             paths = [program, *(resolve_in(runs_in, each) for each in depends_on)]
             return _external(written, folder, document, files=paths, command=(str(program), *command[1:]))
         case Fmu(file=file) | StableBaselines3(file=file):
-            if not _is_file(folder, file):
-                remedy = nearest(Path(file).name, _names_beside(resolve_in(folder, file)))
+            if not is_file(folder, file):
+                remedy = nearest(Path(file).name, names_beside(resolve_in(folder, file)))
                 raise UsageError.of(place, "file", f"{file!r}: there is no such file", remedy)
             return _external(written, folder, document, files=[resolve_in(folder, file)])
         case Python(entry_point=name):
@@ -276,45 +271,6 @@ def _external(
         place=place,
         document=document,
         command=command,
-        files={str(file): _hash(file) for file in files},
+        files={str(file): sha256_of(file) for file in files},
         package=package or {},
     )
-
-
-def _program(name: str, folder: Path, document: Path) -> Path:
-    """The file of a program: relative to the folder it runs in if its name contains a `/`, otherwise on PATH."""
-    # Links are not resolved: the python of a virtual environment is a link, and its path selects the packages.
-    found = shutil.which(os.path.abspath(folder / name) if "/" in name else name)
-    if found is None:
-        where = f"in {folder}" if "/" in name else "on PATH"
-        message = f"there is no executable program {name!r} {where}"
-        raise UsageError.of(document, "command", message, "build or install it, or correct its name or permissions")
-    return Path(found)
-
-
-def resolve_in(folder: Path, written: str) -> Path:
-    """A path in a driver document, which is relative to the document's folder."""
-    return resolve(folder / "document", written)
-
-
-def _relative_to(folder: Path, file: Path) -> str:
-    return Path(os.path.relpath(file, os.path.realpath(folder))).as_posix()
-
-
-def _is_file(folder: Path, written: str) -> bool:
-    try:
-        return resolve_in(folder, written).is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def _names_beside(path: Path) -> list[str]:
-    names = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
-    return names or ["(its folder is empty)"]
-
-
-def _hash(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise UsageError.of(path, "", f"cannot be read: {error}", "correct its permissions") from None

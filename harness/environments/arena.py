@@ -25,12 +25,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.drivers.protocol import Driver
+from harness.environments.nearby_bodies import nearby_bodies
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import release_controls
 from harness.game.bicycle import move, requests
 from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
-from harness.game.neighbours import NOTICED_M
 from harness.game.observation import SIZE, observe
 from harness.game.payoff import Payoff
 from harness.game.quantities import Quantities, terminations
@@ -45,7 +45,6 @@ _RUNNING, _GOAL = (
     int(Outcome.RUNNING),
     int(Outcome.GOAL),
 )  # plain integers: comparing arrays with members of the enumeration is slower
-NEAREST = 16  # background vehicles in a game's bodies
 
 
 @dataclass(frozen=True)
@@ -288,26 +287,6 @@ class Arena:
         )
 
     def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
-        """The players, then the background vehicles nearest to them, in `games`; `state` is that of the same games."""
-        reading = self.reading
-        players = Bodies(
-            x_m=state.x_m,
-            y_m=state.y_m,
-            heading_rad=state.heading_rad,
-            speed_mps=state.speed_mps,
-            length_m=self._players_length[games],
-            width_m=self._players_width[games],
-            present=state.present.copy(),
-        )
-        if reading is None or not reading.present.size:
-            return players
-        background = Bodies(
-            x_m=reading.x_m[games],
-            y_m=reading.y_m[games],
-            heading_rad=reading.heading_rad[games],
-            speed_mps=reading.speed_mps[games],
-            length_m=reading.length_m[games],
-            width_m=reading.width_m[games],
-            present=reading.present[games],
-        )
-        return players.with_nearest(background, NEAREST, NOTICED_M)
+        """The players and the background vehicles near them in `games`; `state` is that of the same games."""
+        lengths_m, widths_m = self._players_length[games], self._players_width[games]
+        return nearby_bodies(state, self.reading, games, length_m=lengths_m, width_m=widths_m)

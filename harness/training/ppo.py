@@ -91,9 +91,8 @@ def train(
     environment = _environment(spec)
     try:
         model = _learner(spec, environment, tensorboard)
-        progress = read_checkpoint(model, key, checkpoint) or Progress(
-            segments=0, steps=0, segment_payoffs=[], curve=[]
-        )
+        new = Progress(segments=0, steps=0, segment_payoffs=[], curve=[])
+        progress = read_checkpoint(model, key, checkpoint) or new
         while (stopped := _stop_reason(spec, progress)) is None:
             on_start(progress.segments)
             progress = _segment(spec, model, environment, progress=progress, on_progress=on_progress)
@@ -189,8 +188,7 @@ def _learner(spec: TrainingSpec, environment: ArenaVecEnv, tensorboard: Path | N
 
 
 def _zero_other_weights(model: PPO) -> None:
-    """Set the input weights of the entries of other road users to zero, so that they have no effect on a learner that
-    is always alone. They change as soon as the entries vary."""
+    """Set the weights of the entries of other road users to zero: a learner that is always alone ignores them."""
     extractor: Any = model.policy.mlp_extractor
     with torch.no_grad():
         for network in (extractor.policy_net, extractor.value_net):
