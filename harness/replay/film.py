@@ -66,8 +66,8 @@ def write_film(
 ) -> int:
     """Film a replay folder with its game's trace into a `.gif` or `.mp4`; returns the number of pictures.
 
-    `on_progress` is called after each picture with the number done and the total. The file appears only when it is complete.
-    Raises UsageError for the problems that `film_problems` lists, HarnessError if an installed program fails.
+    `on_progress` is called after each picture with the number done and the total. The file appears only when it is
+    complete. Raises UsageError for the problems that `film_problems` lists, HarnessError if an installed program fails.
     """
     if problems := film_problems(file):
         raise UsageError(problems)

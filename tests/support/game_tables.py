@@ -76,8 +76,8 @@ GAINS = {
 
 
 def a_campaign(seeds=(1,), games=50, gains=None):
-    """Episodes, pairings and responses of a made-up campaign: every cell of FAILING, and best responses of both sides of
-    each persona's last pair."""
+    """Episodes, pairings and responses of a made-up campaign: every cell of FAILING, and best responses of both
+    sides of each persona's last pair."""
     gains, random = GAINS | (gains or {}), np.random.default_rng(5)
     arms, pairings, responses = [], [], []
     for seed in seeds:
