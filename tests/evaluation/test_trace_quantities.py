@@ -13,7 +13,7 @@ from tests.support.tiny import learned_run, sumo_run
 
 
 def drawn(**players):
-    """A trace of players that go straight along lane approach_1 or _0 of networks/merge: x (m) per step, speed, y."""
+    """A trace of players that drive straight on approach_1 or _0 of networks/merge: x (m) per step, speed, y."""
     rows = []
     for name, (places, speed_mps, y_m, outcomes) in players.items():
         for step, x_m in enumerate(places):

@@ -93,7 +93,7 @@ def straight(x_m: float, y_m: float, speed_mps: float, steps: int) -> list[Pose]
 
 
 def clean_game() -> pd.DataFrame:
-    """The non-ego merges behind the ego and stays; the ego leaves, with its nose beyond the road's end."""
+    """The non-ego merges behind the ego and stays; the ego leaves, with its front beyond the road's end."""
     merged = [min(max(k - 40, 0) / 50, 1) for k in range(170)]
     merging = [
         (20 + 1.0 * k, -4.8 + 3.2 * share, math.atan2(0.064, 1.0) if 0 < share < 1 else 0.0, 10.0)
@@ -117,7 +117,7 @@ def collision_game() -> pd.DataFrame:
 
 
 def rail_game() -> pd.DataFrame:
-    """The ego spins through the left rail and lies across it; the other is shoved off the road backwards."""
+    """The ego spins through the left rail and lies across it; the other is pushed off the road backwards."""
     spin: list[Pose] = [(90 + 1.1 * k, -1.6 + 0.09 * k, 0.3 * k, 11.0) for k in range(30)]
     resting = [(spin[-1][0], spin[-1][1], spin[-1][2], 0.0)] * 5
     backwards: list[Pose] = [(140 - 0.8 * k, -3.0 - 0.12 * k, math.pi - 0.2, 8.0) for k in range(35)]
@@ -146,7 +146,7 @@ def write(trace: pd.DataFrame, net: Path, folder: Path, **changes: object) -> Pa
 
 
 def play(folder: Path) -> tuple[pd.DataFrame, str]:
-    """What SUMO reports of a replay, one row per vehicle and step, and what it printed."""
+    """SUMO's recording of a replay, one row per vehicle and step, and its output."""
     output = folder.parent / "played.xml"
     command = [
         sumo_program("sumo"),
@@ -182,7 +182,7 @@ def assert_plays(folder: Path, trace: pd.DataFrame, lengths_m: Mapping[str, floa
     played, printed = play(folder)
     assert printed == ""
 
-    # the first frame of each vehicle is SUMO putting it into the simulation, a step before it was there
+    # the first frame of each vehicle is its insertion by SUMO, one step early
     played["step"] = np.rint(played["label_s"] / STEP_S).astype(int) - 1
     entering = played.groupby("player")["step"].idxmin()
     expected_entries = trace.groupby("player")["step"].min() - 1

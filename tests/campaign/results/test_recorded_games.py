@@ -52,7 +52,7 @@ def test_order__has_played_games_only():
 
 
 def trace(**players):
-    """A trace of road users that go straight on at 10 m/s, each given as the steps it is there in and its y (m)."""
+    """A trace of road users that drive straight at 10 m/s, each with the steps of its presence and its y (m)."""
     rows = []
     for name, (steps, y_m, outcomes) in players.items():
         for step in steps:
