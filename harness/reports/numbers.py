@@ -15,7 +15,7 @@ SURE = f"95{NO_SPACE}%"
 
 
 def number(value: float, digits: int) -> str:
-    """A number with so many decimals and a typographic minus."""
+    """A number with `digits` decimals and a typographic minus."""
     if not math.isfinite(value):
         return MISSING
     text = f"{value:,.{digits}f}"

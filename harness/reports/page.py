@@ -63,7 +63,7 @@ def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: Sc
 
 
 def _room_for_games(rows: int, section: GameSection | None) -> int:
-    """Bytes that a page with so many rows of games and this section leaves for recorded games."""
+    """Bytes that a page with this number of rows of games and this section leaves for recorded games."""
     taken = _REST_BYTES + rows * _ROW_BYTES + (section.bytes if section else 0)
     return max(min(GAMES_BYTES, PAGE_BYTES - taken), 0)
 

@@ -1,4 +1,4 @@
-"""Templates of the pages, with what stands beside them: style sheets are included, scripts are inserted as they are."""
+"""Templates of the pages. Style sheets are included by the templates; scripts are inserted unchanged."""
 
 from __future__ import annotations
 

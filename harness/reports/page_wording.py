@@ -48,7 +48,7 @@ UNKNOWN_VERSION = "of no known version"
 
 
 def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
-    """The facts below the page's title, as label and value, of a campaign of so many personas."""
+    """The facts below the page's title, as label and value. `personas` is their number."""
     campaign = manifest.get("campaign", {})
     assessment, training = campaign.get("assessment", {}), campaign.get("training", {})
     ego = str(campaign.get("ego", {}).get("driver", ""))

@@ -66,7 +66,7 @@ class Strips {
     return bottom - (Math.min(Math.max(value, low), high) - low) / (high - low) * (bottom - top);
   }
 
-  /** All but the cursor, kept. */
+  /** Draw everything except the cursor to a canvas of its own. */
   drawStill() {
     const { width, height, ratio } = this.sheet;
     Object.assign(this.still, { width: Math.max(1, Math.round(width * ratio)), height: Math.max(1, Math.round(height * ratio)) });

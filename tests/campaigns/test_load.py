@@ -244,7 +244,7 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
     assert int((episodes["ego_failed"] == 1).sum()) > 1_000
     assert len(large["replays"]) < 3 * MOST_FAILURES_PER_ARM
 
-    games = recorded_games(episodes[episodes["arm"].isin(LARGE)], lambda arm, seed: traces, merge)
+    games = recorded_games(episodes[episodes["arm"].isin(LARGE)], {}, lambda arm, seed: traces, merge)
     html = rendered(**large, games=games, scene=scene_drawing(merge))
     assert PAGE_BYTES / 2 < len(html.encode()) <= PAGE_BYTES  # the room there is, is used
     assert f"{len(episodes)} games are too many for a page" in html

@@ -60,7 +60,7 @@ def test_published__replay_of_a_game_names_the_report_that_shows_it(more: list[s
     command = harness("replay", published, "naive_alone", 0, *more, cwd=published.parent)
     assert command.returncode == 2
     (line,) = command.stderr.strip().splitlines()
-    assert "naive_alone 0: was recorded, but the traces are not in this folder" in line
+    assert "naive_alone 0: was recorded, but this folder does not contain the traces" in line
     assert str(published / "report.html") in line
     assert not (published.parent / "film.gif").exists()
 

@@ -54,7 +54,7 @@ def car(
     outcome: str = "",
     kind: str = "car",
 ) -> pd.DataFrame:
-    """A car's rows: it begins at `x_m`, is at `y_m` in every step, its nose where it goes; the last has `outcome`."""
+    """A car's rows: start at `x_m`, `y_m` in every step, heading along its path; the last row has `outcome`."""
     time = np.arange(steps)
     speed = np.broadcast_to(np.asarray(speed_mps, dtype=float), steps)
     y = np.broadcast_to(np.asarray(y_m, dtype=float), steps)
@@ -80,7 +80,7 @@ def car(
 
 
 def across(begin_m: float, end_m: float, first: int, last: int, steps: int = 60) -> FloatArray:
-    """[T] y that goes over from one to the other, evenly between two steps."""
+    """[T] y that changes linearly from one value to the other between two steps."""
     return np.interp(np.arange(steps), [first, last], [begin_m, end_m])
 
 
@@ -101,8 +101,8 @@ def names(found: Sequence[Manoeuvre], player: str) -> list[str]:
 
 
 def cutting_in(gap_m: float, speed_mps: float = 12.0, **changes: Any) -> list[pd.DataFrame]:
-    """The non-ego goes over into the ego's lane so far ahead of it, bumper to bumper where it enters its way (step
-    24); the ego drives at 12 m/s."""
+    """The non-ego moves into the ego's lane with this gap, bumper to bumper, where it enters the ego's path (step 24);
+    the ego drives at 12 m/s."""
     ahead = gap_m + LENGTH_M - (speed_mps - 12.0) * 24 * STEP_S
     return [
         car("ego", 5.0),
@@ -112,10 +112,10 @@ def cutting_in(gap_m: float, speed_mps: float = 12.0, **changes: Any) -> list[pd
 
 def test_cut_in__has_its_time_gap_and_time_to_collision(merge: OpenScene) -> None:
     (found,) = only(named(merge, *cutting_in(10.0, 8.0)), "non_ego", "cut_in")
-    assert found.time_s == 2.4  # from then on their middles are less than 1.8 m apart across the road
+    assert found.time_s == 2.4  # from here on their centres are less than 1.8 m apart across the road
     assert found.gap_m == pytest.approx(10.0, abs=0.3)
     assert found.ttc_s == pytest.approx(10.0 / 4.0)
-    assert found.until_s == 3.2  # within half a metre of the ego's way
+    assert found.until_s == 3.2  # within half a metre of the ego's path
     assert found.text == f"cuts in {found.gap_m:.1f} m ahead, TTC {found.ttc_s:.1f} s"
 
 
@@ -145,7 +145,7 @@ def test_cut_in__not_by_a_leader_while_the_other_moves_over(merge: OpenScene) ->
     cars = [car("ego", 5.0, across(ENDING_Y, THROUGH_Y, 15, 35)), car("non_ego", 18.0)]
     found = named(merge, *cars)
     assert not only(found, "non_ego", "cut_in")
-    assert not only(found, "ego", "cut_in")  # it comes in behind
+    assert not only(found, "ego", "cut_in")  # it enters behind
 
 
 @pytest.mark.parametrize("ahead_m", [0.5, 30.0])
@@ -198,7 +198,7 @@ def test_hard_brake__a_short_pause_does_not_split_it(straight: OpenScene) -> Non
 
 
 def swerving(lateral_mps2: float, turned_deg: float, steps: int = 60, side: float = 1.0) -> pd.DataFrame:
-    """Steers for half a second from step 20 on, after which it has turned so far."""
+    """Steers for half a second from step 20 on, and has then turned by this angle."""
     steering = np.arctan(WHEELBASE_M * lateral_mps2 / 12.0**2)
     wheel = np.where((np.arange(steps) >= 20) & (np.arange(steps) < 25), side * steering, 0.0)
     heading = side * np.radians(turned_deg) * np.clip((np.arange(steps) - 19) / 5, 0, 1)
@@ -221,7 +221,7 @@ def test_swerve__by_lateral_acceleration_and_heading(
 
 
 def test_swerve__straightening_is_not_one(straight: OpenScene) -> None:
-    """Turned to the right, it steers to the left until it follows the road."""
+    """The car points to the right and steers left until it follows the road."""
     heading = np.radians(-8.0) * (1.0 - np.clip((np.arange(60) - 19) / 5, 0, 1))
     wheel = np.where((np.arange(60) >= 20) & (np.arange(60) < 25), 0.08, 0.0)
     assert not only(named(straight, car("ego", 20.0, heading_rad=heading, steering_rad=wheel)), "ego", "swerve")
@@ -245,7 +245,7 @@ def test_swerve__following_a_bend_is_not_one(tmp_path: Path) -> None:
     drawn = car("ego", 0.0, 0.0, 10.0, 150, heading_rad=routes.heading_rad[rows], steering_rad=steering)
     drawn = drawn.assign(x_m=routes.x_m[rows], y_m=routes.y_m[rows])
     assert not only(named(scene, drawn), "ego", "swerve")
-    turned = np.where(station > 100.0, np.radians(10.0), 0.0)  # the same wheel, where the road is straight
+    turned = np.where(station > 100.0, np.radians(10.0), 0.0)  # the same steering on a straight road
     astray = drawn.assign(heading_rad=drawn["heading_rad"] + turned, steering_rad=np.roll(steering, -45))
     assert only(named(scene, astray), "ego", "swerve")
 
@@ -305,7 +305,7 @@ def test_drift__a_lane_change_by_sumo_is_not_one(straight: OpenScene) -> None:
 
 
 def overtaking(behind_m: float, ahead_m: float, steps: int = 50) -> list[pd.DataFrame]:
-    """From so far behind the ego's middle to so far ahead of it, beside it."""
+    """From a distance behind the ego's centre to a distance ahead of it, in the lane beside it."""
     gains = (behind_m + ahead_m) / ((steps - 1) * STEP_S)
     ego = car("ego", 20.0, THROUGH_Y, 10.0, steps)
     return [ego, car("non_ego", 20.0 - behind_m, ENDING_Y, 10.0 + gains, steps)]
@@ -316,8 +316,8 @@ def overtaking(behind_m: float, ahead_m: float, steps: int = 50) -> list[pd.Data
     [
         (6.0, 6.0, True),
         (2.1, 4.7, True),
-        (1.9, 6.0, False),  # was beside it all along
-        (6.0, 4.5, False),  # not wholly past
+        (1.9, 6.0, False),  # was beside it from the start
+        (6.0, 4.5, False),  # not completely past
         (6.0, -0.5, False),
     ],
 )
@@ -374,7 +374,7 @@ def test_tailgate__behind_any_road_user(straight: OpenScene) -> None:
 
 
 def stopping(at_x_m: float, to_mps: float = 1.0, steps: int = 60) -> tuple[float, FloatArray]:
-    """Where to begin, and speeds from 12 m/s down by 3 m/s2 to `to_mps` at that place, and stay there."""
+    """The start, and speeds that fall from 12 m/s by 3 m/s2 to `to_mps` at this place, and stay constant."""
     speed = np.maximum(12.0 - 0.3 * np.arange(steps), to_mps)
     slow = int(np.flatnonzero(speed <= 2.2)[0])
     return at_x_m - speed[1 : slow + 1].sum() * STEP_S, np.where(np.arange(steps) <= slow + 3, speed, 0.0)
@@ -459,18 +459,18 @@ DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4
         ([SWERVE], "- -> swerve -> rail"),
         ([DRIFT, SWERVE], "drift -> swerve -> rail"),
         ([SWERVE, DRIFT], "drift -> swerve -> rail"),
-        # startled by the ego's answer: that is not what it answered
+        # begins after the ego's response: it is not the cause
         ([DRIFT, SWERVE, done("non_ego", "hard_brake", 4.8, 5.2)], "drift -> swerve -> rail"),
-        # the ego had recovered, then came something new
+        # a new cause after the end of the response
         ([DRIFT, SWERVE, done("non_ego", "cut_in", 6.6, 7.0)], "cut in -> - -> rail"),
-        # what it still did when the cause came counts
+        # a response that had begun before the cause counts
         (
             [done("ego", "tailgate", 1.0, 8.0), done("non_ego", "hard_brake", 7.0, 8.0)],
             "hard brake -> tailgate -> rail",
         ),
         ([done("ego", "tailgate", 1.0, 3.0), done("non_ego", "cut_in", 7.0, 8.0)], "cut in -> - -> rail"),
         ([DRIFT, SWERVE, done("ego", "hard_brake", 5.0, 5.5)], "drift -> hard brake -> rail"),
-        # what was over long before is not answered
+        # an old manoeuvre is not a cause
         ([done("non_ego", "overtake", 0.0, 1.0), done("ego", "swerve", 6.5, 7.0)], "- -> swerve -> rail"),
     ],
 )
@@ -486,7 +486,7 @@ def test_pair__nothing_after_the_end() -> None:
 
 
 class Scripted:
-    """Turns the wheel as its script says, step by step, and keeps its speed."""
+    """Steers by a script, step by step, with constant speed."""
 
     takes_over = True
 

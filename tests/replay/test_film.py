@@ -30,7 +30,7 @@ def frames(file: Path) -> list[np.ndarray]:
 
 
 def place_m(mask: np.ndarray) -> np.ndarray:
-    """Where the middle of the marked pixels is from the middle of the picture: x, y."""
+    """The centre of the marked pixels relative to the centre of the picture: x, y."""
     rows, columns = np.nonzero(mask)
     x, y = 0.5 * (columns.min() + columns.max()), 0.5 * (rows.min() + rows.max())
     return np.array([x - 0.5 * SIZE_PX[0], 0.5 * SIZE_PX[1] - y]) / PX_PER_M
@@ -53,16 +53,16 @@ def test_film__shows_the_players_where_the_trace_has_them(merge_net: Path, tmp_p
     assert progress == [(k + 1, steps) for k in range(steps)]
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["film.gif", "replay"]
     pictures = frames(tmp_path / "film.gif")
-    assert len(pictures) == steps  # the clock in them makes each another
+    assert len(pictures) == steps  # the clock makes each picture different
     with Image.open(tmp_path / "film.gif") as film:
         assert film.size == SIZE_PX
-        assert film.info["duration"] == 100  # ms: at the speed of life
+        assert film.info["duration"] == 100  # ms: real time
 
     for step in (0, 10, 25, 32, steps - 1):
         there = trace[trace["step"] == step].set_index("player")[["x_m", "y_m"]]
         assert place_m(blue(pictures[step])) == pytest.approx([0.0, 0.0], abs=0.4)
         apart = (there.loc["non_ego"] - there.loc["ego"]).to_numpy()
-        if step != 32:  # there they touch, and one hides a part of the other
+        if step != 32:  # there they touch, and one covers a part of the other
             assert place_m(orange(pictures[step])) == pytest.approx(apart, abs=0.5)
 
 

@@ -28,7 +28,7 @@ TRAFFIC = """
 
 
 class Steady:
-    """Keeps pedals and wheel where they are."""
+    """Keeps pedals and wheel constant."""
 
     takes_over = True
 
@@ -36,7 +36,7 @@ class Steady:
         self._action = (pedals, wheel)
 
     def reset(self, games: IntArray) -> None:
-        """Nothing to forget."""
+        """It has no state."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         return np.tile(self._action, (len(games), 1))
@@ -55,7 +55,7 @@ def paper(repository: Path) -> OpenScene:
 
 @pytest.fixture(scope="module")
 def busy(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """Two lanes with vans that keep coming, and a car ahead."""
+    """Two lanes with a flow of vans, and a car ahead."""
     return build_scene(tmp_path_factory.mktemp("scenes") / "busy", others=TRAFFIC, cars=CARS, time_limit_s=12.0)
 
 

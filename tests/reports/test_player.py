@@ -1,4 +1,4 @@
-"""The player of the report in a real browser: it plays, steps, scrubs, keeps two games in step, and opens its links."""
+"""The player of the report in a real browser: it plays, steps, seeks, synchronises two games, and opens its links."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from tests.support.pages import campaign, recordings, rendered
 from tests.support.chromium import launched, opener, until
 from tests.support.recorded import STEP_S, recorded
 
-GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and what retraining made of it
+GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and the same episode after retraining
 
 
 @pytest.fixture(scope="module")

@@ -90,7 +90,7 @@ GAINS: Gains = {
 def a_campaign(
     seeds: Sequence[int] = (1,), games: int = 50, gains: Gains | None = None
 ) -> tuple[pd.DataFrame, list[Pairing], list[Response]]:
-    """Episodes, pairings and responses of a whole made-up campaign: every cell of FAILING, a best response of both
+    """Episodes, pairings and responses of a made-up campaign: every cell of FAILING, and best responses of both
     sides of each persona's last pair."""
     gains, random = {**GAINS, **(gains or {})}, np.random.default_rng(5)
     arms, pairings, responses = [], [], []

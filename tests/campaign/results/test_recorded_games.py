@@ -5,9 +5,13 @@ import pandas as pd
 import pytest
 
 from harness.campaign.results.recorded_games import TAKE_TURNS, recorded_game, scene_drawing, watching_order
+from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
 from harness.traffic.drawing import lane_marks
 from harness.traffic.network import read_net
 from harness.traffic.scene import open_scene
+
+NAIVE, RETRAINED, RECONFIGURED = NaiveEgo(), RetrainedEgo(against="speedy"), ReconfiguredEgo(against="speedy")
+ARMS = {arm.name: arm for arm in (against_persona(ego, "speedy") for ego in (NAIVE, RETRAINED, RECONFIGURED))}
 
 
 def episodes(*rows):
@@ -19,7 +23,7 @@ def episodes(*rows):
 
 
 def in_order(table):
-    return [(row.arm, row.episode) for row in watching_order(table).itertuples()]
+    return [(row.arm, row.episode) for row in watching_order(table, ARMS).itertuples()]
 
 
 @pytest.mark.parametrize("made", ["retrained", "reconfigured"])
@@ -52,7 +56,7 @@ def test_order__has_played_games_only():
 
 
 def trace(**players):
-    """A trace of road users that go straight on at 10 m/s, each given as the steps it is there in and its y (m)."""
+    """A trace of road users that drive straight at 10 m/s, each with the steps of its presence and its y (m)."""
     rows = []
     for name, (steps, y_m, outcomes) in players.items():
         for step in steps:

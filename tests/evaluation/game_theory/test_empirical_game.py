@@ -104,7 +104,7 @@ def test_left_out__when_every_ego_lacks_a_cell_there_is_no_game():
 
 
 def test_none_verified__has_rows_without_numbers(monkeypatch):
-    monkeypatch.setattr(module, "solve", lambda *game: Solution((), True))
+    monkeypatch.setattr(module, "solve", lambda *game: Solution(equilibria=(), all_supports=True))
     found = rows(equilibria(played(PENNIES)), game="speedy")
     assert [row["solution"] for row in found] == [SolutionKind.NOT_VERIFIED.value] * 4
     for row in found:
