@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.repository import REPOSITORY
+from tests.support.slow import slow_tests
 from tests.support.sources import PACKAGE, SOURCES, label, tree_of
 
 # Which room may import which others, from the lowest floor to the highest. A room is a module or folder directly under
@@ -195,6 +196,26 @@ def test_tests__no_test_module_imports_another() -> None:
         if module.split(".")[-1].startswith("test_") and module.split(".")[0] == "tests"
     ]
     assert wrong == []
+
+
+def test_slow_tests__each_line_names_a_test_and_every_room_keeps_fast_ones() -> None:
+    """Of tests/slow_tests.txt, which says what `make test-fast` leaves out."""
+    tests = {path: names for path in TESTS if path.stem.startswith("test_") and (names := set(functions_of(path)))}
+    known = {label(path) for path in tests} | {
+        f"{label(path)}::{name}" for path, names in tests.items() for name in names
+    }
+    assert sorted(slow_tests() - known) == []
+    fast = {path for path, names in tests.items() if label(path) not in slow_tests() and names - slow_in(path)}
+    folders = {path.relative_to(REPOSITORY / "tests").parts[0] for path in fast}
+    assert {room.split(".")[0] for room in ROOMS} - {"errors", "files", "harness", "__main__"} <= folders
+
+
+def functions_of(path: Path) -> list[str]:
+    return [node.name for node in tree_of(path).body if isinstance(node, ast.FunctionDef) and node.name[:5] == "test_"]
+
+
+def slow_in(path: Path) -> set[str]:
+    return {line.partition("::")[2] for line in slow_tests() if line.startswith(f"{label(path)}::")}
 
 
 # --- names, docstrings, length ---
