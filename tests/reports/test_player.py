@@ -394,4 +394,4 @@ def test_page__games_that_do_not_fit_stay_in_the_run_folder(arguments, monkeypat
     shown = len(re.findall(r'"packed"', html))
     assert 0 < shown < len(arguments["episodes"])
     assert f"{shown} recorded games" in html
-    assert f"{len(arguments['episodes']) - shown} more games are too many for a page" in html
+    assert f"{len(arguments['episodes']) - shown} more games do not fit into the page" in html
