@@ -377,7 +377,7 @@ def test_page__of_a_default_campaign_is_small_and_soon_interactive(browser, tmp_
     arguments = campaign(games=100)
     html = rendered(**arguments, **recordings(arguments, background=6))
     assert len(html.encode()) <= PAGE_BYTES
-    assert "more games are too many" not in html
+    assert "more games do not fit" not in html
     path = tmp_path / "report.html"
     path.write_text(html, encoding="utf-8")
     with opener(browser, path) as open_page:
