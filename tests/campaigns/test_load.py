@@ -264,7 +264,7 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
         assert len(listed) >= 100
         intro = page.locator("#player-intro").inner_text()
         assert intro.startswith(f"{len(listed)} recorded games")
-        assert f"{len(episodes) - len(listed)} more games are too many for a page" in intro
+        assert f"{len(episodes) - len(listed)} more games do not fit into the page" in intro
         for outcome in ("collision", "goal"):  # the worst, and what went well
             assert any(outcome in each for each in listed), outcome
         names = page.locator("[data-is=game] option").evaluate_all("options => options.map(each => each.value)")

@@ -377,7 +377,7 @@ def test_page__of_a_default_campaign_is_small_and_soon_interactive(browser, tmp_
     arguments = campaign(games=100)
     html = rendered(**arguments, **recordings(arguments, background=6))
     assert len(html.encode()) <= PAGE_BYTES
-    assert "more games are too many" not in html
+    assert "more games do not fit" not in html
     path = tmp_path / "report.html"
     path.write_text(html, encoding="utf-8")
     with opener(browser, path) as open_page:
@@ -394,4 +394,4 @@ def test_page__games_that_do_not_fit_stay_in_the_run_folder(arguments, monkeypat
     shown = len(re.findall(r'"packed"', html))
     assert 0 < shown < len(arguments["episodes"])
     assert f"{shown} recorded games" in html
-    assert f"{len(arguments['episodes']) - shown} more games are too many for a page" in html
+    assert f"{len(arguments['episodes']) - shown} more games do not fit into the page" in html
