@@ -1,1 +1,1 @@
-"""What the harness costs, as ratios measured side by side: `python -m benchmarks`, or `make bench`."""
+"""Measurements of the cost of the harness: `python -m benchmarks`, or `make bench`."""

@@ -1,4 +1,4 @@
-"""`python -m benchmarks`: measure, show, keep. `python -m benchmarks table`: the kept results in Markdown.
+"""`python -m benchmarks`: measure, print and store. `python -m benchmarks table`: the stored results in Markdown.
 
 `python -m benchmarks step`: where the time of a step goes.
 """
@@ -6,18 +6,19 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from benchmarks.budget import FAST, FULL
-from benchmarks.figures import KEYS, Measurement, missed, needed_for
+from benchmarks.budget import FAST, FULL, Budget
+from benchmarks.figures import KEYS, Measurement, measurements_of, missed
 from benchmarks.machine import machine, versions
-from benchmarks.results import RESULTS, begun, read, write
-from benchmarks.sides import SideFailed, Tell
+from benchmarks.results import RESULTS, read, results_to_extend, write
+from benchmarks.sides import OnProgress, SideFailed
 from benchmarks.table import described_machine, markdown_table, terminal_table
 
 MISSED, USERS_MISTAKE, INTERRUPTED = 1, 2, 130
@@ -27,15 +28,15 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="Exit codes: 0 done, 1 a target is missed and --strict was given, or a measurement failed, 2 your mistake, "
-    "130 interrupted (what was measured is kept).",
+    epilog="Exit codes: 0 done, 1 a measurement failed, or a target is missed and --strict was given, 2 wrong "
+    "arguments, 130 interrupted (finished measurements are stored).",
 )
 
 
-def _checked(keys: list[str]) -> list[str]:
+def _check_keys(keys: list[str]) -> list[str]:
     unknown = [key for key in keys if key not in KEYS]
     if unknown:
-        raise typer.BadParameter(f"there is no figure {', '.join(unknown)}; there are {', '.join(KEYS)}")
+        raise typer.BadParameter(f"unknown figure {', '.join(unknown)}; the figures are {', '.join(KEYS)}")
     return keys
 
 
@@ -46,68 +47,48 @@ def measure(
         list[str] | None,
         typer.Option(
             metavar="KEY",
-            help="Measure only this figure; may be given several times. The others stay as they are in the file, "
-            "if it is of this machine and these versions.  [default: every figure]",
+            help="Measure only this figure; may be given several times. The others stay as they are in the file "
+            "if the file is of this machine and these versions.  [default: every figure]",
             show_default=False,
         ),
     ] = None,
     out: Annotated[
-        Path, typer.Option(metavar="FILE", help="Where the results are kept.", show_default="benchmarks/results.json")
+        Path, typer.Option(metavar="FILE", help="The file for the results.", show_default="benchmarks/results.json")
     ] = RESULTS,
     fast: Annotated[
-        bool, typer.Option("--fast", help="See in a few minutes that everything works; the figures mean little.")
+        bool, typer.Option("--fast", help="Only check that everything works, in a few minutes; figures mean little.")
     ] = False,
     strict: Annotated[bool, typer.Option("--strict", help="Exit with 1 if a target is missed.")] = False,
 ) -> None:
-    """Measure what the harness costs: ratios whose two sides take turns on this machine, and a few absolute figures.
+    """Measure the cost of the harness: ratios of two sides that take turns on this machine, and some absolute figures.
 
-    In full it takes 15 to 20 minutes. Leave the machine alone meanwhile: a core that is busy elsewhere shows in the
-    figures.
+    A full run takes 15 to 20 minutes. Do not use the machine meanwhile: other work on its cores changes the figures.
     """
     if context.invoked_subcommand is not None:
         return
     console = Console()
-    keys = _checked(only or list(KEYS))
-    results = begun(out, machine(), versions(), fast)
-    failed: list[str] = []
-    budget = FAST if fast else FULL
-    chosen = needed_for(keys)
-    measured = [key for each in chosen for key in each.keys]
+    measurements = measurements_of(_check_keys(only or list(KEYS)))
+    keys = [key for measurement in measurements for key in measurement.keys]
+    results = results_to_extend(out, machine(), versions(), fast)
     try:
-        with _bars(console) as bars:
-            whole = bars.add_task("benchmarks", total=sum(each.seconds(budget) for each in chosen))
-            done_s = 0.0
-            for each in chosen:
-                bars.update(whole, description=each.name)
-                results["details"]["load_before"][each.name] = _load()
-                try:
-                    values, details = each.measure(budget, _teller(bars, whole, each, done_s, each.seconds(budget)))
-                except (SideFailed, OSError) as error:
-                    failed.append(each.name)
-                    bars.console.print(f"{each.name} failed: {error}", style="red", highlight=False, markup=False)
-                    values, details = {}, {"failed": str(error).strip().splitlines()[-1]}
-                results |= {key: values.get(key) for key in each.keys}
-                results["details"][each.name] = details
-                write(out, results)
-                done_s += each.seconds(budget)
-                bars.update(whole, completed=done_s)
+        failed = _measure_all(measurements, FAST if fast else FULL, results, out, console)
     except KeyboardInterrupt:
-        console.print("Interrupted. What was measured is kept.")
+        console.print("Interrupted. Finished measurements are stored.")
         raise typer.Exit(INTERRUPTED) from None
-    console.print(terminal_table(results, measured))
+    console.print(terminal_table(results, keys))
     console.print(described_machine(results), highlight=False, soft_wrap=True)
-    console.print(f"Kept in {out}", highlight=False, soft_wrap=True)
-    if failed or (strict and missed(results, measured)):
+    console.print(f"Stored in {out}", highlight=False, soft_wrap=True)
+    if failed or (strict and missed(results, keys)):
         raise typer.Exit(MISSED)
 
 
 @app.command()
 def table(
     file: Annotated[
-        Path, typer.Argument(metavar="[FILE]", help="Results that were kept.", show_default="benchmarks/results.json")
+        Path, typer.Argument(metavar="[FILE]", help="Stored results.", show_default="benchmarks/results.json")
     ] = RESULTS,
 ) -> None:
-    """Print kept results as a table in Markdown, as docs/performance.md has it."""
+    """Print stored results as a table in Markdown, as in docs/performance.md."""
     try:
         print(markdown_table(read(file)))
     except (OSError, ValueError, KeyError) as error:
@@ -118,18 +99,46 @@ def table(
 @app.command()
 def step(
     seconds: Annotated[float, typer.Option(metavar="S", help="How long to measure.")] = 10.0,
-    others: Annotated[
+    background: Annotated[
         int,
-        typer.Option(metavar="N", min=0, help="Others that SUMO drives in each game, on the merge with longer roads."),
+        typer.Option(metavar="N", min=0, help="Background vehicles per game, on the merge with longer roads."),
     ] = 0,
 ) -> None:
     """Print where the time of an arena's step goes, as a table in Markdown."""
     from benchmarks.step import step_table
 
-    print(step_table(seconds, others))
+    print(step_table(seconds, background))
 
 
-def _bars(console: Console) -> Progress:
+def _measure_all(
+    measurements: Sequence[Measurement], budget: Budget, results: dict[str, Any], out: Path, console: Console
+) -> list[str]:
+    """Measure into `results`, which are stored after each measurement. Returns the names of those that failed."""
+    failed: list[str] = []
+    with _progress_bars(console) as bars:
+        task = bars.add_task("benchmarks", total=sum(measurement.seconds(budget) for measurement in measurements))
+        done_s = 0.0
+        for measurement in measurements:
+            seconds = measurement.seconds(budget)
+            bars.update(task, description=measurement.name)
+            results["details"]["load_before"][measurement.name] = _load_average()
+            try:
+                on_progress = _bar_updater(bars, task, done_s, seconds)
+                values, details = measurement.measure(budget, on_progress)
+            except (SideFailed, OSError) as error:
+                failed.append(measurement.name)
+                message = f"{measurement.name} failed: {error}"
+                bars.console.print(message, style="red", highlight=False, markup=False)
+                values, details = {}, {"failed": str(error).strip().splitlines()[-1]}
+            results |= {key: values.get(key) for key in measurement.keys}
+            results["details"][measurement.name] = details
+            write(out, results)
+            done_s += seconds
+            bars.update(task, completed=done_s)
+    return failed
+
+
+def _progress_bars(console: Console) -> Progress:
     columns = (TextColumn("{task.description:<13}"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"))
     return Progress(
         *columns,
@@ -142,15 +151,15 @@ def _bars(console: Console) -> Progress:
     )
 
 
-def _teller(bars: Progress, task: object, measurement: Measurement, before_s: float, seconds: float) -> Tell:
-    def tell(share: float) -> None:
-        bars.update(task, completed=before_s + share * seconds)  # type: ignore[arg-type]
+def _bar_updater(bars: Progress, task: TaskID, before_s: float, seconds: float) -> OnProgress:
+    def update(share: float) -> None:
+        bars.update(task, completed=before_s + share * seconds)
 
-    return tell
+    return update
 
 
-def _load() -> float | None:
-    """How many processes want a core, on average over the last minute: what the figures can be trusted for."""
+def _load_average() -> float | None:
+    """Processes that want a core, averaged over the last minute: a high load makes the figures unreliable."""
     return round(os.getloadavg()[0], 2) if hasattr(os, "getloadavg") else None
 
 

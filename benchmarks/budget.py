@@ -1,38 +1,39 @@
-"""How long is measured: in full for figures that count, in a minute or two to see that everything works."""
+"""How long the measurements take: in full for figures that count, in a minute or two to see that everything works."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Budget:
     """The lengths and repeats of all measurements."""
 
-    stretch_s: float
-    """How long one side of a ratio runs before the other has its turn."""
+    lap_s: float
+    """Length of one turn of one side of a ratio."""
     repeats: int
     """Turns of each side."""
-    training_stretch_s: float
+    training_lap_s: float
+    """The same where the sides train."""
     traffic_steps: int
-    """Steps of an arena among traffic, from the same start each time."""
+    """Steps of an arena among background traffic, from the same start each time."""
     traffic_repeats: int
     campaign_share: float
-    """How much of each training of the campaign is really done."""
+    """Share of each training of the campaign that is carried out."""
     memory_warm_up_steps: int
     memory_steps: int
     episodes: int
-    """Of each arm of that campaign."""
+    """Episodes of each arm of that campaign."""
     arms: int
-    """How often an arm of 100 episodes is played, after a first time."""
+    """How often an arm of 100 episodes is played, after a first time that does not count."""
     starts: int
-    """How often a command is started."""
+    """How often a command is started, after a first time that does not count."""
 
 
 FULL = Budget(
-    stretch_s=1.0,
+    lap_s=1.0,
     repeats=11,
-    training_stretch_s=4.0,
+    training_lap_s=4.0,
     traffic_steps=100,
     traffic_repeats=7,
     campaign_share=0.1,
@@ -43,9 +44,9 @@ FULL = Budget(
     starts=9,
 )
 FAST = Budget(
-    stretch_s=0.3,
+    lap_s=0.3,
     repeats=3,
-    training_stretch_s=0.5,
+    training_lap_s=0.5,
     traffic_steps=20,
     traffic_repeats=2,
     campaign_share=0.005,

@@ -1,7 +1,7 @@
-"""How long the paper's campaign takes where no training stops early, and how long one arm of it.
+"""How long the paper's campaign takes if no training stops early, and how long one of its arms takes.
 
-The campaign is run with a share of its training steps; from the rate of each training its whole length follows, and
-the plan is laid out on two workers as the harness lays it out. Arms and the report are timed whole.
+The campaign runs with a share of its training steps. The full length of each training follows from its rate; the plan
+is then scheduled on two workers as the harness schedules it. Arms and the report are timed in full.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import io
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -18,13 +19,15 @@ from unittest.mock import patch
 from rich.console import Console
 
 from benchmarks.budget import Budget
+from benchmarks.figures import Measured
 from benchmarks.games import MERGE, REPOSITORY, coasting_policy, persona_file
-from benchmarks.sides import Pace, Side, Tell, opened
-from harness.campaign.execution import run_campaign as campaign_run
+from benchmarks.sides import LapTimer, OnProgress, Side, running_sides
+from harness.campaign.execution import run_campaign as campaign_module
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.worker_pool import Event
+from harness.campaign.execution.schedule import Schedule
+from harness.campaign.execution.worker_process import Event
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
@@ -49,97 +52,105 @@ episodes = {episodes}
 
 
 def _write_document(folder: Path, steps: int, episodes: int) -> Path:
-    people = {name: persona_file(name).as_posix() for name in ("careful", "speedy", "distracted")}
+    personas = {name: persona_file(name).as_posix() for name in ("careful", "speedy", "distracted")}
     file = folder / "benchmark.toml"
-    text = _DOCUMENT.format(scene=MERGE.as_posix(), steps=steps, episodes=episodes, **people)
+    text = _DOCUMENT.format(scene=MERGE.as_posix(), steps=steps, episodes=episodes, **personas)
     file.write_text(text, encoding="utf-8")
     return file
 
 
-class _Watch:
-    """Stands where a campaign shows its progress: notes what happened when, and passes on how far it is."""
+class _EventRecorder:
+    """Replaces `StageProgress`: records the time of every event, and reports the progress of the campaign."""
 
-    def __init__(self, pace: Pace) -> None:
-        self._pace = pace
+    def __init__(self, timer: LapTimer) -> None:
+        self._timer = timer
         self.stages: Sequence[Stage] = ()
-        self.seen: dict[str, list[tuple[float, int]]] = {}  # seconds and steps
+        self.progress: dict[str, list[tuple[float, int]]] = {}
+        """Seconds and steps of each progress event, by stage."""
         self.ended_s: dict[str, float] = {}
         self.infos: dict[str, Mapping[str, Any]] = {}
 
-    def __call__(self, stages: Sequence[Stage], finished: int, console: Console) -> _Watch:
+    def __call__(self, stages: Sequence[Stage], finished: int, console: Console) -> _EventRecorder:
         self.stages = stages
         return self
 
-    def __enter__(self) -> _Watch:
+    def __enter__(self) -> _EventRecorder:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        """Nothing was opened."""
+        """Nothing to close."""
 
-    def tell(self, event: Event) -> None:
-        """Note an event. Raises RuntimeError where a stage failed."""
+    def emit(self, event: Event) -> None:
+        """Record an event. Raises RuntimeError if a stage failed."""
         if event.kind == "progress":
-            self.seen.setdefault(event.stage, []).append((time.perf_counter(), event.done))
+            self.progress.setdefault(event.stage, []).append((time.perf_counter(), event.done))
         elif event.kind == "done":
             self.ended_s[event.stage], self.infos[event.stage] = time.perf_counter(), event.info
-            self._pace.tell(len(self.ended_s) / len(self.stages))
+            self._timer.progress(len(self.ended_s) / len(self.stages))
         elif event.kind != "started":
             raise RuntimeError(f"{event.stage} {event.kind}: {event.message}")
 
 
-def campaign_side(pace: Pace, steps: int, episodes: int) -> None:
-    """One campaign, shortened; what it brings are the seconds of its parts."""
+def campaign_side(timer: LapTimer, steps: int, episodes: int) -> None:
+    """One shortened campaign in one lap; the lap's values are the seconds of its parts."""
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
         opened_campaign = open_campaign(_write_document(Path(scratch), steps, episodes))
-        watch = _Watch(pace)
-        pace.begin()
-        with patch.object(campaign_run, "StageProgress", watch):
-            began = time.perf_counter()
+        recorder = _EventRecorder(timer)
+        timer.ready()
+        with patch.object(campaign_module, "StageProgress", recorder):
+            start_s = time.perf_counter()
             folder = RunFolder(Path(scratch) / "run")
-            campaign_run.run_campaign(opened_campaign, folder, _WORKERS, Console(file=io.StringIO()))
-            ended = time.perf_counter()
+            campaign_module.run_campaign(opened_campaign, folder, _WORKERS, Console(file=io.StringIO()))
+            end_s = time.perf_counter()
         stages = {}
-        for stage in watch.stages:
-            info, seen = watch.infos[stage.id], watch.seen[stage.id]
-            stages[stage.id] = {"needs": list(stage.needs), "seconds": float(info["seconds"])}
+        for stage in recorder.stages:
+            info, progress = recorder.infos[stage.id], recorder.progress[stage.id]
+            stages[stage.id] = {"seed": stage.seed, "needs": list(stage.needs), "seconds": float(info["seconds"])}
             if isinstance(stage, TrainingStage):
-                (first_s, first), (last_s, last) = seen[0], seen[-1]
+                (first_s, first), (last_s, last) = progress[0], progress[-1]
                 stages[stage.id] |= {"steps": info["steps"], "steps_per_s": (last - first) / (last_s - first_s)}
-        pace.lap(1.0, stages=stages, whole_s=ended - began, report_s=ended - max(watch.ended_s.values()))
+        report_s = end_s - max(recorder.ended_s.values())
+        timer.finish_lap(1.0, stages=stages, whole_s=end_s - start_s, report_s=report_s)
 
 
-def laid_out(stages: Mapping[str, tuple[float, Sequence[str]]], workers: int) -> float:
-    """Seconds until all stages (their seconds, and what they need) are done: whoever is free takes, of what can be
-    done, that which most others wait for, as `harness.campaign.execution.worker_pool` hands it out."""
-    waiting, running, done = dict(stages), dict[str, float](), set[str]()
-    now = 0.0
-    while waiting or running:
-        while len(running) < workers:
-            ready = [name for name, (_, needs) in waiting.items() if set(needs) <= done]
-            if not ready:
-                break
-            name = max(ready, key=lambda one: sum(one in needs for _, needs in waiting.values()))
-            running[name] = now + waiting.pop(name)[0]
-        first = min(running, key=lambda one: running[one])
-        now = running.pop(first)
-        done.add(first)
-    return now
+@dataclass(frozen=True, kw_only=True)
+class TimedStage:
+    """A stage as the schedule knows it, and its measured length."""
+
+    id: str
+    seed: int
+    needs: Sequence[str]
+    seconds: float
 
 
-def campaign_minutes(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict[str, Any]]:
+def makespan_s(stages: Sequence[TimedStage], workers: int) -> float:
+    """Seconds until all stages are done, on this number of workers, dispatched by the campaign's own schedule."""
+    schedule, running, now_s = Schedule(stages, finished=()), dict[str, float](), 0.0
+    while True:
+        while len(running) < workers and (stage := schedule.take()) is not None:
+            running[stage.id] = now_s + stage.seconds
+        if not running:
+            return now_s
+        first = min(running, key=running.__getitem__)
+        now_s = running.pop(first)
+        schedule.done(first)
+
+
+def campaign_minutes(budget: Budget, on_progress: OnProgress) -> Measured:
     """Minutes of a campaign of one naive ego, two personas and two retrainings, of 3 million steps each."""
     steps = int(_STEPS * budget.campaign_share)
-    with opened({"campaign": Side(campaign_side, (steps, budget.episodes))}, 0.0) as runners:
-        values = runners["campaign"].lap(tell).values
-    lengths: dict[str, tuple[float, Sequence[str]]] = {}
+    side = Side(run=campaign_side, arguments=(steps, budget.episodes))
+    with running_sides({"campaign": side}, lap_s=0.0) as runners:
+        values = runners["campaign"].lap(on_progress).values
+    stages = []
     for name, stage in values["stages"].items():
         left_s = (_STEPS - stage["steps"]) / stage["steps_per_s"] if "steps" in stage else 0.0
-        lengths[name] = (stage["seconds"] + left_s, stage["needs"])
-    stages_s = laid_out(lengths, _WORKERS)
+        stages.append(TimedStage(id=name, seed=stage["seed"], needs=stage["needs"], seconds=stage["seconds"] + left_s))
+    stages_s = makespan_s(stages, _WORKERS)
     details = {
         "extrapolated_from_share": budget.campaign_share,
         "workers": _WORKERS,
-        "seconds": {name: seconds for name, (seconds, _) in lengths.items()},
+        "seconds": {stage.id: stage.seconds for stage in stages},
         "stages_minutes": stages_s / 60.0,
         "report_minutes": values["report_s"] / 60.0,
         "measured": dict(values),
@@ -147,8 +158,8 @@ def campaign_minutes(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict
     return {"campaign_minutes": (stages_s + values["report_s"]) / 60.0}, details
 
 
-def assessment_side(pace: Pace) -> None:
-    """One arm, as a stage of a campaign plays, records and names its games."""
+def assessment_side(timer: LapTimer) -> None:
+    """One arm as a stage of a campaign: games, records, traces and manoeuvres."""
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
         campaign = open_campaign(REPOSITORY / "campaigns" / "merge.toml")
         folder = RunFolder(Path(scratch) / "run")
@@ -156,26 +167,26 @@ def assessment_side(pace: Pace) -> None:
         scene = campaign.scene.document
         folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
         stages = plan(campaign.document, [each.name for each in campaign.personas])
-        conditions = run_context_of(campaign, folder, stage_keys(campaign, stages))
+        context = run_context_of(campaign, folder, stage_keys(campaign, stages))
         arm = next(stage for stage in stages if stage.id == _ARM)
         for needed in arm.needs:
             write_policy(coasting_policy(), folder.policy(needed))
-        pace.begin()
+        timer.ready()
         while True:
-            info = carry_out(arm, conditions, lambda done, total: pace.tell(done / total))
-            pace.lap(float(info["episodes"]))
+            info = carry_out(arm, context, lambda done, total: timer.progress(done / total))
+            timer.finish_lap(float(info["episodes"]))
 
 
-def assessment_seconds(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict[str, Any]]:
-    """Seconds for an arm of 100 episodes on one core: the median of several, the first one left out."""
+def assessment_seconds(budget: Budget, on_progress: OnProgress) -> Measured:
+    """Seconds of an arm of 100 episodes on one core: the median of several, without the first."""
     laps, times = [], budget.arms + 1
-    with opened({"arm": Side(assessment_side)}, 0.0) as runners:
+    with running_sides({"arm": Side(run=assessment_side)}, lap_s=0.0) as runners:
         for done in range(times):
 
-            def tell_of_all(share: float, done: int = done) -> None:
-                tell((done + share) / times)
+            def on_progress_of_arm(share: float, done: int = done) -> None:
+                on_progress((done + share) / times)
 
-            laps.append(runners["arm"].lap(tell_of_all))
+            laps.append(runners["arm"].lap(on_progress_of_arm))
     seconds = [lap.seconds for lap in laps]
     details = {"unit": "s", "episodes": laps[0].units, "first_s": seconds[0], "seconds": seconds[1:]}
     return {"assessment_seconds": median(seconds[1:])}, details

@@ -1,4 +1,4 @@
-"""The figures: what each is called, what it says, what it is to reach, and which measurement brings it."""
+"""The figures: key, meaning, unit and target of each, and the measurement that produces it."""
 
 from __future__ import annotations
 
@@ -9,35 +9,35 @@ from importlib import import_module
 from typing import Any
 
 from benchmarks.budget import Budget
-from benchmarks.sides import Tell
+from benchmarks.sides import OnProgress
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Figure:
     """One number of the results."""
 
     key: str
-    what: str
+    meaning: str
     unit: str = ""
     target: float | None = None
     at_least: bool = False
-    """Whether the target is the least it may be; otherwise it is the most."""
+    """Whether the target is a lower bound; otherwise it is an upper bound."""
 
     def reached(self, value: float | None) -> bool | None:
-        """Whether the target is reached; None where there is none, and never by what was not measured."""
+        """Whether the value reaches the target: None without a target, False for a figure that was not measured."""
         if self.target is None:
             return None
         return value is not None and (value >= self.target if self.at_least else value <= self.target)
 
-    def written(self, value: float | None) -> str:
-        """The value for people."""
+    def format_value(self, value: float | None) -> str:
+        """The value with its unit."""
         if value is None:
             return "not measured"
         digits = 2 if abs(value) < 10 else 1 if abs(value) < 100 else 0
         return f"{value:.{digits}f}{self.unit}"
 
-    def written_target(self) -> str:
-        """The target for people."""
+    def format_target(self) -> str:
+        """The target with its unit."""
         if self.target is None:
             return "reported"
         return f"{'≥' if self.at_least else '≤'} {self.target:g}{self.unit}"
@@ -45,104 +45,195 @@ class Figure:
 
 FIGURES = (
     Figure(
-        "arena_vs_libsumo",
-        "game-steps/s of an arena (64 games, two learners, everything counted), as a share of a bare libsumo loop's",
+        key="arena_vs_libsumo",
+        meaning="game-steps/s of an arena (64 games, two learners, everything included), as a share of a bare "
+        "libsumo loop's",
         target=0.55,
         at_least=True,
     ),
     Figure(
-        "training_vs_free_env",
-        "training steps/s on the arena, as a share of those on an environment that costs nothing",
+        key="training_vs_free_env",
+        meaning="training steps/s on the arena, as a share of those on an environment that costs nothing",
         target=0.70,
         at_least=True,
     ),
-    Figure("vs_highway_env", "game-steps/s of one process, in multiples of highway-env's merge", "×", 30.0, True),
-    Figure("vs_subproc", "training steps/s, in multiples of SubprocVecEnv's on all cores", "×", 5.0, True),
-    Figure("libsumo_vs_traci", "steps/s of one game in libsumo, in multiples of TraCI's over a socket", "×"),
     Figure(
-        "traffic_overhead_50", "what the harness adds to SUMO's step, as a share of it, with 50 others a game", "", 0.25
+        key="vs_highway_env",
+        meaning="game-steps/s of one process, in multiples of highway-env's merge",
+        unit="×",
+        target=30.0,
+        at_least=True,
     ),
-    Figure("traffic_overhead_200", "the same with 200 others a game", "", 0.25),
-    Figure("cost_256_over_64", "cost of a game-step with 256 games at once, in multiples of that with 64", "×", 1.3),
     Figure(
-        "campaign_minutes",
-        "five trainings of 3 million steps and all arms on two workers, extrapolated from a tenth of the steps",
-        " min",
-        20.0,
+        key="vs_subproc",
+        meaning="training steps/s, in multiples of SubprocVecEnv's on all cores",
+        unit="×",
+        target=5.0,
+        at_least=True,
     ),
-    Figure("assessment_seconds", "an arm of 100 episodes with traces and metrics, on one core", " s", 10.0),
-    Figure("help_seconds", "harness --help", " s", 0.4),
-    Figure("check_seconds", "harness check campaigns/merge.toml", " s", 1.5),
-    Figure("worker_peak_mb", "most memory of a training worker", " MB", 1000.0),
-    Figure("worker_growth_mb", "what it grows by over a million training steps", " MB", 20.0),
+    Figure(
+        key="libsumo_vs_traci",
+        meaning="steps/s of one game in libsumo, in multiples of TraCI's over a socket",
+        unit="×",
+    ),
+    Figure(
+        key="traffic_overhead_50",
+        meaning="what the harness adds to SUMO's step, as a share of it, with 50 background vehicles per game",
+        target=0.25,
+    ),
+    Figure(key="traffic_overhead_200", meaning="the same with 200 background vehicles per game", target=0.25),
+    Figure(
+        key="cost_256_over_64",
+        meaning="cost of a game-step with 256 games at once, in multiples of that with 64",
+        unit="×",
+        target=1.3,
+    ),
+    Figure(
+        key="campaign_minutes",
+        meaning="five trainings of 3 million steps and all arms on two workers, extrapolated from a tenth of the steps",
+        unit=" min",
+        target=20.0,
+    ),
+    Figure(
+        key="assessment_seconds",
+        meaning="an arm of 100 episodes with traces and metrics, on one core",
+        unit=" s",
+        target=10.0,
+    ),
+    Figure(key="help_seconds", meaning="harness --help", unit=" s", target=0.4),
+    Figure(key="check_seconds", meaning="harness check campaigns/merge.toml", unit=" s", target=1.5),
+    Figure(key="worker_peak_mb", meaning="peak memory of a training worker", unit=" MB", target=1000.0),
+    Figure(
+        key="worker_growth_mb",
+        meaning="growth of its memory over a million training steps",
+        unit=" MB",
+        target=20.0,
+    ),
 )
 KEYS = tuple(figure.key for figure in FIGURES)
 
 Measured = tuple[dict[str, float], dict[str, Any]]
-"""The figures by their keys, and the raw numbers."""
+"""The figures by key, and the raw numbers."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """What brings one or more figures."""
+    """A function that measures one or more figures."""
 
     name: str
     keys: Sequence[str]
+    """The figures it measures."""
     module: str
     function: str
     seconds: Callable[[Budget], float]
-    """About how long it takes, for the time left."""
+    """About how long it takes, for the progress bar."""
 
-    def measure(self, budget: Budget, tell: Tell) -> Measured:
+    def measure(self, budget: Budget, on_progress: OnProgress) -> Measured:
         """Measure. Raises SideFailed."""
-        # Each is imported by need: what a measurement loads is in nobody else's memory.
-        measure: Callable[[Budget, Tell], Measured] = getattr(import_module(f"benchmarks.{self.module}"), self.function)
-        return measure(budget, tell)
+        # Imported here: the modules of one measurement must not be in the memory of another.
+        function = getattr(import_module(f"benchmarks.{self.module}"), self.function)
+        measured: Measured = function(budget, on_progress)
+        return measured
 
 
-def _turns(sides: int, stretches: str, budget: Budget) -> float:
-    return sides * (budget.repeats * float(getattr(budget, stretches)) + 3.0)
+def _seconds_of_turns(sides: int, lap_s_of: Callable[[Budget], float], budget: Budget) -> float:
+    return sides * (budget.repeats * lap_s_of(budget) + 3.0)
 
 
-_SHORT, _LONG = "stretch_s", "training_stretch_s"
+def _lap_s(budget: Budget) -> float:
+    return budget.lap_s
+
+
+def _training_lap_s(budget: Budget) -> float:
+    return budget.training_lap_s
+
+
 MEASUREMENTS = (
-    Measurement("commands", ("help_seconds", "check_seconds"), "commands", "waiting", lambda b: 2.0 * b.starts),
-    Measurement("arena", ("arena_vs_libsumo",), "arena", "arena_vs_libsumo", partial(_turns, 2, _SHORT)),
-    Measurement("traci", ("libsumo_vs_traci",), "arena", "libsumo_vs_traci", partial(_turns, 2, _SHORT)),
-    Measurement("games", ("cost_256_over_64",), "arena", "cost_of_games", partial(_turns, 4, _SHORT)),
-    Measurement("highway-env", ("vs_highway_env",), "rivals", "vs_highway_env", partial(_turns, 2, _SHORT)),
     Measurement(
-        "traffic",
-        ("traffic_overhead_50", "traffic_overhead_200"),
-        "traffic",
-        "traffic_overhead",
-        lambda b: 60.0 + 0.1 * b.traffic_repeats * b.traffic_steps,
+        name="commands",
+        keys=("help_seconds", "check_seconds"),
+        module="commands",
+        function="command_seconds",
+        seconds=lambda budget: 2.0 * budget.starts,
     ),
-    Measurement("training", ("training_vs_free_env",), "training", "training_vs_free_env", partial(_turns, 2, _LONG)),
-    Measurement("subprocesses", ("vs_subproc",), "training", "vs_subproc", lambda b: 60.0 + _turns(3, _LONG, b)),
     Measurement(
-        "memory",
-        ("worker_peak_mb", "worker_growth_mb"),
-        "memory",
-        "worker_memory",
-        lambda b: 5.0 + (b.memory_warm_up_steps + b.memory_steps) / 10_000,
+        name="arena",
+        keys=("arena_vs_libsumo",),
+        module="arena",
+        function="arena_vs_libsumo",
+        seconds=partial(_seconds_of_turns, 2, _lap_s),
     ),
-    Measurement("assessment", ("assessment_seconds",), "campaign", "assessment_seconds", lambda b: 9.0 * (b.arms + 1)),
     Measurement(
-        "campaign",
-        ("campaign_minutes",),
-        "campaign",
-        "campaign_minutes",
-        lambda b: 40.0 + 1200.0 * b.campaign_share + 0.6 * b.episodes,
+        name="traci",
+        keys=("libsumo_vs_traci",),
+        module="arena",
+        function="libsumo_vs_traci",
+        seconds=partial(_seconds_of_turns, 2, _lap_s),
+    ),
+    Measurement(
+        name="games",
+        keys=("cost_256_over_64",),
+        module="arena",
+        function="cost_of_games",
+        seconds=partial(_seconds_of_turns, 4, _lap_s),
+    ),
+    Measurement(
+        name="highway-env",
+        keys=("vs_highway_env",),
+        module="highway_env_merge",
+        function="vs_highway_env",
+        seconds=partial(_seconds_of_turns, 2, _lap_s),
+    ),
+    Measurement(
+        name="traffic",
+        keys=("traffic_overhead_50", "traffic_overhead_200"),
+        module="traffic",
+        function="traffic_overhead",
+        seconds=lambda budget: 60.0 + 0.1 * budget.traffic_repeats * budget.traffic_steps,
+    ),
+    Measurement(
+        name="training",
+        keys=("training_vs_free_env",),
+        module="training",
+        function="training_vs_free_env",
+        seconds=partial(_seconds_of_turns, 2, _training_lap_s),
+    ),
+    Measurement(
+        name="subprocesses",
+        keys=("vs_subproc",),
+        module="training",
+        function="vs_subproc",
+        seconds=lambda budget: 60.0 + _seconds_of_turns(3, _training_lap_s, budget),
+    ),
+    Measurement(
+        name="memory",
+        keys=("worker_peak_mb", "worker_growth_mb"),
+        module="memory",
+        function="worker_memory",
+        seconds=lambda budget: 5.0 + (budget.memory_warm_up_steps + budget.memory_steps) / 10_000,
+    ),
+    Measurement(
+        name="assessment",
+        keys=("assessment_seconds",),
+        module="campaign",
+        function="assessment_seconds",
+        seconds=lambda budget: 9.0 * (budget.arms + 1),
+    ),
+    Measurement(
+        name="campaign",
+        keys=("campaign_minutes",),
+        module="campaign",
+        function="campaign_minutes",
+        seconds=lambda budget: 40.0 + 1200.0 * budget.campaign_share + 0.6 * budget.episodes,
     ),
 )
 
 
-def needed_for(keys: Sequence[str]) -> list[Measurement]:
-    """The measurements that bring these figures."""
-    return [each for each in MEASUREMENTS if set(each.keys) & set(keys)]
+def measurements_of(keys: Sequence[str]) -> list[Measurement]:
+    """The measurements that produce these figures."""
+    return [measurement for measurement in MEASUREMENTS if set(measurement.keys) & set(keys)]
 
 
 def missed(values: Mapping[str, float | None], keys: Sequence[str]) -> list[str]:
-    """Those of the figures whose target is not reached."""
-    return [each.key for each in FIGURES if each.key in keys and each.reached(values.get(each.key)) is False]
+    """The keys, among these, of the figures that miss their target."""
+    return [figure.key for figure in FIGURES if figure.key in keys and figure.reached(values.get(figure.key)) is False]

@@ -1,4 +1,4 @@
-"""What the figures were measured on: the machine, and the versions of what it ran."""
+"""The machine that the figures were measured on, and the versions of the packages."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ RESULTS = Path(__file__).resolve().parent / "results.json"
 
 
 def empty(machine: Mapping[str, Any], versions: Mapping[str, str], fast: bool) -> dict[str, Any]:
-    """Results of nothing yet: what was not measured is null."""
+    """Results without any figure: a figure that was not measured is null."""
     return {
         "machine": dict(machine),
         "versions": dict(versions),
@@ -23,8 +23,10 @@ def empty(machine: Mapping[str, Any], versions: Mapping[str, str], fast: bool) -
     }
 
 
-def begun(file: Path, machine: Mapping[str, Any], versions: Mapping[str, str], fast: bool) -> dict[str, Any]:
-    """The results to add to: the file's, if they come from the same machine, versions and lengths; else none."""
+def results_to_extend(
+    file: Path, machine: Mapping[str, Any], versions: Mapping[str, str], fast: bool
+) -> dict[str, Any]:
+    """The results in the file if they are of the same machine, versions and budget, otherwise empty results."""
     fresh = empty(machine, versions, fast)
     try:
         found = read(file)
@@ -35,7 +37,7 @@ def begun(file: Path, machine: Mapping[str, Any], versions: Mapping[str, str], f
 
 
 def read(file: Path) -> dict[str, Any]:
-    """Results as they were written. Raises OSError or ValueError where there are none."""
+    """Read results. Raises OSError if the file can't be read and ValueError if it holds no results."""
     found = json.loads(file.read_text(encoding="utf-8"))
     if not isinstance(found, dict):
         raise ValueError("no results")

@@ -1,7 +1,7 @@
-"""The sides of a comparison, each in a process of its own, that take turns: while one runs, the others wait.
+"""The sides of a comparison: each runs in its own process, and the sides take turns.
 
-A process has room for one libsumo, and a machine's mood changes within seconds: so every side is opened and warmed up
-once, and then short stretches of all sides follow each other, again and again.
+A process has room for one libsumo, and the speed of a machine changes within seconds. So each side is opened and
+warmed up once; then short laps of all sides alternate many times. While one side runs, the others wait.
 """
 
 from __future__ import annotations
@@ -20,129 +20,131 @@ from statistics import median
 from typing import Any
 
 _CONTEXT = multiprocessing.get_context("spawn")
-_ENDS_WITHIN_S = 20.0
+_END_TIMEOUT_S = 20.0
 
-Tell = Callable[[float], None]
-"""Told how much of a measurement is done, 0 to 1."""
+OnProgress = Callable[[float], None]
+"""Called with the finished share of a measurement, 0 to 1."""
 
 
 class SideFailed(Exception):
-    """A side of a comparison raised; its traceback is the message."""
+    """A side of a comparison raised an exception; its traceback is the message."""
 
 
 class Finished(BaseException):
-    """Raised in a side when nothing more is asked of it. No Exception: nobody on the way is to take it for an error."""
+    """Raised in a side when there is no further lap. Not an `Exception`, so that no code in between catches it."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Lap:
     """What a side did in one turn."""
 
     units: float
+    """Work done, in the unit of the measurement: game-steps, steps or episodes."""
     seconds: float
     own_cpu_s: float
-    """Of the side's process alone: less than `seconds` where it had to wait for a core, or for other processes."""
+    """CPU time of the side's process alone: less than `seconds` if it waited for a core or for other processes."""
     values: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def per_s(self) -> float:
+        """Units per second."""
         return self.units / self.seconds
 
 
-class Pace:
-    """The side's end of the line: when to run, when to let the others run."""
+class LapTimer:
+    """The side's end of the connection: says when to run, measures laps and sends them to the parent."""
 
-    def __init__(self, connection: Connection, stretch_s: float) -> None:
-        self._connection, self._stretch_s = connection, stretch_s
-        self._began = self._cpu = 0.0
+    def __init__(self, connection: Connection, lap_s: float) -> None:
+        self._connection, self._lap_s = connection, lap_s
+        self._start_s = self._start_cpu_s = 0.0
 
-    def begin(self) -> None:
-        """The side is open and warm; returns when it is its turn."""
+    def ready(self) -> None:
+        """Report that the side is open and warm, and wait for its first turn."""
         self._connection.send("ready")
         self._wait()
 
-    def due(self) -> bool:
-        """Whether the side has had its stretch of time."""
-        return time.perf_counter() - self._began >= self._stretch_s
+    def lap_is_over(self) -> bool:
+        """Whether the lap has lasted as long as it should."""
+        return time.perf_counter() - self._start_s >= self._lap_s
 
-    def start_clock(self) -> None:
-        """What was done in this turn until now was preparation: it is not counted."""
-        self._began, self._cpu = time.perf_counter(), time.process_time()
+    def restart_clock(self) -> None:
+        """Start timing the lap now: what this turn did before was preparation."""
+        self._start_s, self._start_cpu_s = time.perf_counter(), time.process_time()
 
-    def tell(self, share: float) -> None:
-        """Say how much of a long turn is done."""
+    def progress(self, share: float) -> None:
+        """Report the finished share of a long lap."""
         self._connection.send(share)
 
-    def lap(self, units: float, **values: Any) -> None:
-        """A turn is over: so much was done in it. Returns at the next; raises Finished if there is none."""
-        seconds, cpu = time.perf_counter() - self._began, time.process_time() - self._cpu
-        self._connection.send(Lap(units, seconds, cpu, values))
+    def finish_lap(self, units: float, **values: Any) -> None:
+        """Send the lap and wait for the next turn. Raises Finished if there is none."""
+        seconds, cpu_s = time.perf_counter() - self._start_s, time.process_time() - self._start_cpu_s
+        self._connection.send(Lap(units=units, seconds=seconds, own_cpu_s=cpu_s, values=values))
         self._wait()
 
     def _wait(self) -> None:
         try:
-            go = self._connection.recv()
+            proceed = self._connection.recv()
         except EOFError:
-            go = False
-        if not go:
+            proceed = False
+        if not proceed:
             raise Finished
-        self.start_clock()
+        self.restart_clock()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Side:
-    """A function `run(pace, *arguments)` of a module, which opens, warms up, begins, and runs lap after lap."""
+    """A function `run(timer, *arguments)`, which opens, warms up, calls `timer.ready()` and runs lap after lap."""
 
     run: Callable[..., None]
     arguments: Sequence[Any] = ()
 
 
 class Runner:
-    """The parent's end of the line."""
+    """The parent's end of the connection to one side."""
 
-    def __init__(self, side: Side, stretch_s: float) -> None:
-        self._connection, theirs = _CONTEXT.Pipe()
-        self._process: BaseProcess = _CONTEXT.Process(target=_serve, args=(theirs, side, stretch_s))
+    def __init__(self, side: Side, lap_s: float) -> None:
+        self._connection, child_end = _CONTEXT.Pipe()
+        self._process: BaseProcess = _CONTEXT.Process(target=_serve, args=(child_end, side, lap_s))
         self._process.start()
-        theirs.close()
+        child_end.close()
 
-    def ready(self) -> None:
+    def wait_until_ready(self) -> None:
         """Wait until the side is open and warm. Raises SideFailed."""
         self._receive(lambda share: None)
 
-    def lap(self, tell: Tell = lambda share: None) -> Lap:
-        """Give the side a turn. Raises SideFailed."""
+    def lap(self, on_progress: OnProgress = lambda share: None) -> Lap:
+        """Run one lap of the side. Raises SideFailed."""
         self._connection.send(True)
-        lap = self._receive(tell)
+        lap = self._receive(on_progress)
         assert isinstance(lap, Lap)
         return lap
 
-    def stop(self) -> None:
-        """Have the side drop what it is at."""
+    def terminate(self) -> None:
+        """Interrupt the side."""
         self._process.terminate()
 
-    def end(self) -> None:
-        """Let the side go, by force if it lingers."""
+    def close(self) -> None:
+        """End the side's process; kill it if it does not end in time."""
         with suppress(OSError):
             self._connection.send(False)
-        self._process.join(_ENDS_WITHIN_S)
+        self._process.join(_END_TIMEOUT_S)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
         self._connection.close()
 
-    def _receive(self, tell: Tell) -> Any:
+    def _receive(self, on_progress: OnProgress) -> Any:
         while True:
             try:
                 message = self._connection.recv()
             except (EOFError, OSError):
-                self._process.join(_ENDS_WITHIN_S)
+                self._process.join(_END_TIMEOUT_S)
                 raise SideFailed(f"a side ended with exit code {self._process.exitcode}") from None
             if isinstance(message, _Failure):
                 raise SideFailed(message.traceback)
             if not isinstance(message, float):
                 return message
-            tell(message)
+            on_progress(message)
 
 
 @dataclass(frozen=True)
@@ -150,61 +152,63 @@ class _Failure:
     traceback: str
 
 
-def _serve(connection: Connection, side: Side, stretch_s: float) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to answer
-    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(1))  # what is open is closed
+def _serve(connection: Connection, side: Side, lap_s: float) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent handles Ctrl-C
+    signal.signal(signal.SIGTERM, lambda number, frame: sys.exit(1))  # so that `finally` blocks run
     try:
-        side.run(Pace(connection, stretch_s), *side.arguments)
+        side.run(LapTimer(connection, lap_s), *side.arguments)
     except Finished:
         pass
     except Exception:
         connection.send(_Failure(traceback.format_exc()))
     finally:
-        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it is ending
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the process is ending already
 
 
 @contextmanager
-def opened(sides: Mapping[str, Side], stretch_s: float) -> Iterator[dict[str, Runner]]:
-    """The sides, open and warm, one opened after the other."""
+def running_sides(sides: Mapping[str, Side], lap_s: float) -> Iterator[dict[str, Runner]]:
+    """The sides, open and warm. They are opened one after the other."""
     runners: dict[str, Runner] = {}
     try:
         for name, side in sides.items():
-            runners[name] = Runner(side, stretch_s)
-            runners[name].ready()
+            runners[name] = Runner(side, lap_s)
+            runners[name].wait_until_ready()
         yield runners
     except BaseException:
         for runner in runners.values():
-            runner.stop()
+            runner.terminate()
         raise
     finally:
         for runner in runners.values():
-            runner.end()
+            runner.close()
 
 
-def take_turns(sides: Mapping[str, Side], repeats: int, stretch_s: float, tell: Tell) -> dict[str, list[Lap]]:
-    """Laps of all sides, taken in turns: there and back, so that none always follows the same other."""
+def take_turns(
+    sides: Mapping[str, Side], *, repeats: int, lap_s: float, on_progress: OnProgress
+) -> dict[str, list[Lap]]:
+    """Laps of all sides in turns. The order is reversed every time, so that no side always follows the same other."""
     laps: dict[str, list[Lap]] = {name: [] for name in sides}
-    with opened(sides, stretch_s) as runners:
+    with running_sides(sides, lap_s) as runners:
         for repeat in range(repeats):
             for name in list(runners)[:: -1 if repeat % 2 else 1]:
                 laps[name].append(runners[name].lap())
-            tell((repeat + 1) / repeats)
+            on_progress((repeat + 1) / repeats)
     return laps
 
 
-def best(laps: Sequence[Lap]) -> float:
-    """Units a second of the lap that was disturbed least."""
+def best_rate(laps: Sequence[Lap]) -> float:
+    """Units per second of the least disturbed lap."""
     return max(lap.per_s for lap in laps)
 
 
-def described(laps: Mapping[str, Sequence[Lap]]) -> dict[str, Any]:
-    """The raw numbers of sides, for the details: rates are units a second."""
+def raw_numbers(laps: Mapping[str, Sequence[Lap]]) -> dict[str, Any]:
+    """The raw numbers of the sides, for the details of the results. Rates are units per second."""
     return {
         name: {
-            "best_per_s": best(each),
-            "median_per_s": median(lap.per_s for lap in each),
-            "best_per_own_cpu_s": max(lap.units / max(lap.own_cpu_s, 1e-9) for lap in each),
-            "laps": [asdict(lap) for lap in each],
+            "best_per_s": best_rate(of_side),
+            "median_per_s": median(lap.per_s for lap in of_side),
+            "best_per_own_cpu_s": max(lap.units / max(lap.own_cpu_s, 1e-9) for lap in of_side),
+            "laps": [asdict(lap) for lap in of_side],
         }
-        for name, each in laps.items()
+        for name, of_side in laps.items()
     }

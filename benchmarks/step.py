@@ -1,7 +1,7 @@
-"""Where the time of an arena's step goes, part by part as the table in `harness.environments.arena` has them.
+"""Where the time of an arena's step goes: the parts of the table in `harness.environments.arena`.
 
-Each part is timed with a clock around it, less what the parts inside it take. A part that the arena no longer has
-under its name is counted to the rest.
+Each part is timed on its own, without the time of the parts inside it. A part whose function has been renamed in the
+arena is counted to the rest.
 """
 
 from __future__ import annotations
@@ -12,102 +12,114 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.bare import Placement, place_and_step, record
-from benchmarks.games import GAMES, Played, merge
+from benchmarks.bare_sumo import Placement, place_and_step, record_placements
+from benchmarks.games import GAMES, CoastingGames, merge_scene
 from benchmarks.traffic import write_scene
-from harness.environments.gymnasium_env import arena as stepping
+from harness.environments import arena as arena_module
 from harness.traffic.background_traffic import BackgroundTraffic
 from harness.traffic.scene import open_scene
 
-_ALONE_STEPS, _AMONG_OTHERS_STEPS = 300, 100
+_MERGE_STEPS, _TRAFFIC_STEPS = 300, 100
 _PARTS = (
-    ("drivers, attention, requests", "decide", stepping.Arena, "_decide"),
-    ("the players' cars move", "drive", stepping, "drive"),
-    ("others near the players read", "read", BackgroundTraffic, "read"),
-    ("where each is along its route", "locate", stepping.Arena, "_locate"),
-    ("contact, goal, time", "terminations", stepping.Arena, "_terminations"),
-    ("payoffs", "pay", stepping.Arena, "_payoffs"),
-    ("everyone looks", "observe", stepping, "observe"),
-    ("who ended leaves or stands", "settle", stepping.Arena, "_finish"),
-    ("ended games start anew", "start", Played, "start"),
+    ("drivers, attention, requests", "decide", arena_module.Arena, "_decide"),
+    ("the players' cars move", "drive", arena_module, "move"),
+    ("background traffic near the players is read", "read", BackgroundTraffic, "read"),
+    ("players are located along their routes", "locate", arena_module.Arena, "_locate"),
+    ("contact, goal, time", "terminations", arena_module.Arena, "_terminations"),
+    ("payoffs", "payoffs", arena_module.Arena, "_payoffs"),
+    ("observations", "observe", arena_module, "observe"),
+    ("players that ended are removed or halted", "finish", arena_module.Arena, "_finish"),
+    ("ended games are reset", "reset", CoastingGames, "reset"),
 )
 
 
-class _Clock:
-    """Seconds of each part, less those of the parts inside it."""
+class _Profiler:
+    """Seconds of each part, without those of the parts inside it."""
 
     def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self.kept: dict[str, float] = {}
-        self._inside = [0.0]
+        self.total_s: dict[str, float] = {}
+        self._pending_s: dict[str, float] = {}
+        self._inner_s = [0.0]  # of the parts inside each part that is running, outermost first
 
-    def keep(self) -> None:
-        """Add what was measured since the last time to what is kept."""
-        for part, taken in self.seconds.items():
-            self.kept[part] = self.kept.get(part, 0.0) + taken
-        self.seconds.clear()
+    def commit(self) -> None:
+        """Add the seconds since the last call of `commit` or `discard` to the total."""
+        for part, seconds in self._pending_s.items():
+            self.total_s[part] = self.total_s.get(part, 0.0) + seconds
+        self._pending_s.clear()
 
-    def around(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    def discard(self) -> None:
+        """Forget the seconds since the last call of `commit` or `discard`."""
+        self._pending_s.clear()
+
+    def wrap(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
+        """The function, with its time counted to the part."""
+
         def timed(*arguments: Any, **keywords: Any) -> Any:
-            self._inside.append(0.0)
-            began = time.perf_counter()
+            self._inner_s.append(0.0)
+            start_s = time.perf_counter()
             try:
                 return function(*arguments, **keywords)
             finally:
-                taken = time.perf_counter() - began
-                self.seconds[part] = self.seconds.get(part, 0.0) + taken - self._inside.pop()
-                self._inside[-1] += taken
+                taken_s = time.perf_counter() - start_s
+                self._pending_s[part] = self._pending_s.get(part, 0.0) + taken_s - self._inner_s.pop()
+                self._inner_s[-1] += taken_s
 
         return timed
 
 
-def step_table(seconds: float, others: int = 0) -> str:
-    """The parts of a step of 64 games in Markdown, in microseconds of a game-step: on the merge, where games that end
-    start anew; or with so many others a game on the merge with longer roads, again and again from the same start.
+def step_table(seconds: float, background: int = 0) -> str:
+    """The parts of a step of 64 games in Markdown, in microseconds per game-step.
 
-    It patches the arena for good: for a process of its own.
+    Without background traffic the scene is the merge, and games that end are reset. With `background` vehicles per
+    game it is the merge with longer roads, from the same start again and again.
+    The arena stays patched: call this once per process.
     """
-    if not others:
-        return _table(Played(merge(), GAMES), seconds, _ALONE_STEPS, restart=True)
+    if not background:
+        return _table(CoastingGames(merge_scene(), GAMES), seconds, _MERGE_STEPS, reset_ended=True)
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
-        scene = open_scene(write_scene(Path(scratch) / "scene", others))
-        return _table(Played(scene, GAMES), seconds, _AMONG_OTHERS_STEPS, restart=False)
+        scene = open_scene(write_scene(Path(scratch) / "scene", background))
+        return _table(CoastingGames(scene, GAMES), seconds, _TRAFFIC_STEPS, reset_ended=False)
 
 
-def _table(played: Played, seconds: float, stretch: int, restart: bool) -> str:
-    played.begin_again()
-    placements = record(played, stretch, restart)
-    played.begin_again()
+def _table(coasting: CoastingGames, seconds: float, steps_per_pass: int, reset_ended: bool) -> str:
+    coasting.reset_all()
+    placements = record_placements(coasting, steps_per_pass, reset_ended)
+    coasting.reset_all()
     bare_us = _bare_us(placements)
-    clock = _Clock()
-    for _, part, owner, name in _PARTS:
-        if hasattr(owner, name):
-            setattr(owner, name, clock.around(part, getattr(owner, name)))
-    simulation: Any = played.arena.simulation
-    simulation.step = clock.around("simulation", simulation.step)
-    whole = clock.around("rest", lambda: played.step(restart))
-    steps, until = 0, time.perf_counter() + seconds
-    while time.perf_counter() < until:
-        played.begin_again()
-        clock.seconds.clear()  # what it takes to begin is no part of a step
-        for _ in range(stretch):
-            whole()
-        clock.keep()
-        steps += stretch
-    played.arena.close()
-    microseconds = {part: 1e6 * taken / (steps * GAMES) for part, taken in clock.kept.items()}
-    rows = [(words, microseconds.get(part, 0.0)) for words, part, *_ in _PARTS if part in microseconds]
+    microseconds = _time_parts(coasting, seconds, steps_per_pass, reset_ended)
+    rows = [(words, microseconds[part]) for words, part, *_ in _PARTS if part in microseconds]
     rows.insert(2, ("SUMO alone: placements and its step", bare_us))
-    rows.insert(3, ("around SUMO: poses there, readings back", microseconds["simulation"] - bare_us))
+    rows.insert(3, ("around SUMO: poses in, readings out", microseconds["simulation"] - bare_us))
     rows.append(("the rest", microseconds["rest"]))
-    whole_us = sum(taken for _, taken in rows)
-    lines = ["| part | µs a game-step | share |", "| --- | ---: | ---: |"]
-    lines += [f"| {words} | {taken:.2f} | {taken / whole_us:.0%} |" for words, taken in rows]
+    whole_us = sum(part_us for _, part_us in rows)
+    lines = ["| part | µs per game-step | share |", "| --- | ---: | ---: |"]
+    lines += [f"| {words} | {part_us:.2f} | {part_us / whole_us:.0%} |" for words, part_us in rows]
     return "\n".join([*lines, f"| all | {whole_us:.2f} | {1e6 / whole_us:,.0f} game-steps/s |"])
 
 
+def _time_parts(coasting: CoastingGames, seconds: float, steps_per_pass: int, reset_ended: bool) -> dict[str, float]:
+    """Microseconds per game-step of each part; `simulation` and `rest` included."""
+    profiler = _Profiler()
+    for _, part, owner, name in _PARTS:
+        if hasattr(owner, name):
+            setattr(owner, name, profiler.wrap(part, getattr(owner, name)))
+    simulation: Any = coasting.arena.simulation
+    simulation.step = profiler.wrap("simulation", simulation.step)
+    step = profiler.wrap("rest", lambda: coasting.step(reset_ended))
+    steps, end_s = 0, time.perf_counter() + seconds
+    while time.perf_counter() < end_s:
+        coasting.reset_all()
+        profiler.discard()  # a reset of everything is no part of a step
+        for _ in range(steps_per_pass):
+            step()
+        profiler.commit()
+        steps += steps_per_pass
+    coasting.arena.close()
+    return {part: 1e6 * total_s / (steps * GAMES) for part, total_s in profiler.total_s.items()}
+
+
 def _bare_us(placements: list[list[Placement]]) -> float:
-    began = time.perf_counter()
-    for each in placements:
-        place_and_step(each)
-    return 1e6 * (time.perf_counter() - began) / (len(placements) * GAMES)
+    start_s = time.perf_counter()
+    for of_step in placements:
+        place_and_step(of_step)
+    return 1e6 * (time.perf_counter() - start_s) / (len(placements) * GAMES)

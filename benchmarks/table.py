@@ -18,8 +18,8 @@ def _reached(figure: Figure, value: float | None) -> str:
 
 
 def terminal_table(results: Mapping[str, Any], keys: Sequence[str] = KEYS) -> Table:
-    """A table for the terminal, of the figures asked for."""
-    table = Table(title="benchmarks" + (" (fast: no figures to quote)" if results["details"]["fast"] else ""))
+    """A table of these figures for the terminal."""
+    table = Table(title="benchmarks" + (" (fast: figures are not meaningful)" if results["details"]["fast"] else ""))
     for column, side in (("figure", "left"), ("what", "left"), ("value", "right"), ("target", "right")):
         table.add_column(column, justify="right" if side == "right" else "left", no_wrap=column != "what")
     table.add_column("reached")
@@ -27,25 +27,31 @@ def terminal_table(results: Mapping[str, Any], keys: Sequence[str] = KEYS) -> Ta
         if figure.key in keys:
             value = results[figure.key]
             style = _STYLES[figure.reached(value)] if value is not None else "dim"
-            row = (figure.key, figure.what, figure.written(value), figure.written_target(), _reached(figure, value))
+            row = (
+                figure.key,
+                figure.meaning,
+                figure.format_value(value),
+                figure.format_target(),
+                _reached(figure, value),
+            )
             table.add_row(*row, style=style)
     return table
 
 
 def markdown_table(results: Mapping[str, Any]) -> str:
-    """The same for the documentation, with the machine and the versions under it."""
+    """A table of all figures for the documentation, with the machine and the versions below it."""
     lines = ["| figure | what | value | target | reached |", "| --- | --- | ---: | ---: | --- |"]
     for figure in FIGURES:
         value = results[figure.key]
-        cells = (f"`{figure.key}`", figure.what, figure.written(value), figure.written_target())
+        cells = (f"`{figure.key}`", figure.meaning, figure.format_value(value), figure.format_target())
         lines.append(f"| {' | '.join(cells)} | {_reached(figure, value)} |")
     lines += ["", described_machine(results)]
     return "\n".join(lines)
 
 
 def described_machine(results: Mapping[str, Any]) -> str:
-    """A sentence on what the figures were measured on."""
+    """A sentence with the machine and the versions that the figures were measured on."""
     machine, versions = results["machine"], results["versions"]
-    told = ", ".join(f"{name} {version}" for name, version in versions.items())
+    packages = ", ".join(f"{name} {version}" for name, version in versions.items())
     ram = f", {machine['ram_gb']:g} GB" if machine["ram_gb"] else ""
-    return f"Measured on {machine['cpu']}, {machine['cores']} cores{ram}, {machine['os']}; {told}."
+    return f"Measured on {machine['cpu']}, {machine['cores']} cores{ram}, {machine['os']}; {packages}."

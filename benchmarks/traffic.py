@@ -1,4 +1,4 @@
-"""What the harness adds to SUMO's own step where SUMO drives others: the same traffic, with an arena and without."""
+"""What the harness adds to SUMO's own step among background traffic: the same traffic with and without an arena."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from typing import Any
 
 import sumo
 
-from benchmarks.bare import place_and_step, record
+from benchmarks.bare_sumo import place_and_step, record_placements
 from benchmarks.budget import Budget
-from benchmarks.games import GAMES, Played
-from benchmarks.sides import Pace, Side, Tell, best, described, take_turns
+from benchmarks.figures import Measured
+from benchmarks.games import GAMES, CoastingGames
+from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers, take_turns
 from harness.traffic.scene import open_scene
 
-OTHERS = (0, 10, 50, 200)
+BACKGROUND_VEHICLES = (0, 10, 50, 200)
 _APPROACH_M, _TAPER_M, _EXIT_M = 1600.0, 30.0, 2400.0
-_START_M = 700.0  # of the players, along the approach
+_START_M = 700.0  # start of the players along the approach
 _SPACING_M = 25.0
 
 _NODES = f"""<nodes>
@@ -68,30 +69,31 @@ speed_mps = [7.0, 8.0]
 """
 
 
-def write_scene(folder: Path, others: int) -> Path:
-    """The merge on longer roads, with so many others on it from the first step on: those nearest to the players."""
+def write_scene(folder: Path, background: int) -> Path:
+    """Write the merge on longer roads, with so many background vehicles from the first step on, near the players."""
     folder.mkdir(parents=True)
     for name, text in (("nod", _NODES), ("edg", _EDGES), ("con", _CONNECTIONS)):
         (folder / f"long.{name}.xml").write_text(text, encoding="utf-8")
     program = shutil.which("netconvert", path=os.path.join(sumo.SUMO_HOME, "bin"))
-    assert program is not None, "eclipse-sumo brings it"
+    assert program is not None, "eclipse-sumo contains netconvert"
     sources = ["-n", "long.nod.xml", "-e", "long.edg.xml", "-x", "long.con.xml", "-o", "long.net.xml"]
     environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
     subprocess.run([program, *sources], cwd=folder, env=environment, check=True, capture_output=True)
-    net = folder / "long.net.xml"  # its comment holds the time: without it, the tiles made of it are made once
+    net = folder / "long.net.xml"
+    # netconvert writes the time into a comment. Without it the net stays the same, and its tiles are cached.
     net.write_text(re.sub(r"<!--.*?-->", "", net.read_text(encoding="utf-8"), flags=re.DOTALL), encoding="utf-8")
     vehicles = "".join(
         f'\n    <vehicle id="other{k}" type="other_car" route="{route}" depart="0" departLane="{lane}"'
         f' departPos="{position_m}" departSpeed="11"/>'
-        for k, (route, lane, position_m) in enumerate(_nearest_places(others))
+        for k, (route, lane, position_m) in enumerate(_nearest_places(background))
     )
     (folder / "long.rou.xml").write_text(f"<routes>{_CARS}{vehicles}\n</routes>", encoding="utf-8")
     (folder / "scene.toml").write_text(_SCENE, encoding="utf-8")
     return folder
 
 
-def _nearest_places(others: int) -> list[tuple[str, int, float]]:
-    """Route, lane and position along its first edge, nearest to the players first; nobody where they start."""
+def _nearest_places(count: int) -> list[tuple[str, int, float]]:
+    """Route, lane and position along its first edge, nearest to the players first; none where the players start."""
     places = []
     for k in range(int((_APPROACH_M - 50.0) / _SPACING_M)):
         along_m = 10.0 + k * _SPACING_M
@@ -100,63 +102,68 @@ def _nearest_places(others: int) -> list[tuple[str, int, float]]:
     for k in range(int((_EXIT_M - 400.0) / _SPACING_M)):
         along_m = 30.0 + k * _SPACING_M
         places.append((_APPROACH_M + _TAPER_M + along_m - _START_M, ("onward", 1, along_m)))
-    assert others <= len(places), "the roads are too short for so many"
-    return [place for _, place in sorted(places)[:others]]
+    assert count <= len(places), "the roads are too short for so many vehicles"
+    return [place for _, place in sorted(places)[:count]]
 
 
-def arena_side(pace: Pace, folder: Path, steps: int) -> None:
-    """Arena steps from the same start, lap after lap; starting is not counted."""
-    played = Played(open_scene(folder), GAMES)
+def arena_side(timer: LapTimer, folder: Path, steps: int) -> None:
+    """Arena steps from the same start in every lap; the reset is not counted."""
+    coasting = CoastingGames(open_scene(folder), GAMES)
     try:
-        played.begin_again()
+        coasting.reset_all()
         for _ in range(steps):
-            played.step(restart=False)
-        played.begin_again()
-        pace.begin()
+            coasting.step(reset_ended=False)
+        coasting.reset_all()
+        timer.ready()
         while True:
             for _ in range(steps):
-                played.step(restart=False)
-            reading = played.arena.reading
-            pace.lap(steps, others=float(reading.present.sum()) / GAMES if reading is not None else 0.0)
-            played.begin_again()
-            pace.start_clock()
+                coasting.step(reset_ended=False)
+            reading = coasting.arena.reading
+            background = float(reading.present.sum()) / GAMES if reading is not None else 0.0
+            timer.finish_lap(steps, others=background)
+            coasting.reset_all()
+            timer.restart_clock()
     finally:
-        played.arena.close()
+        coasting.arena.close()
 
 
-def libsumo_side(pace: Pace, folder: Path, steps: int) -> None:
-    """SUMO's steps alone from that start, with the players placed where the arena had them: the same traffic."""
-    played = Played(open_scene(folder), GAMES)
+def libsumo_side(timer: LapTimer, folder: Path, steps: int) -> None:
+    """Steps of SUMO alone from that start, with the players placed where the arena had them: the same traffic."""
+    coasting = CoastingGames(open_scene(folder), GAMES)
     try:
-        played.begin_again()
-        placements = record(played, steps, restart=False)
-        played.begin_again()
-        pace.begin()
+        coasting.reset_all()
+        placements = record_placements(coasting, steps, reset_ended=False)
+        coasting.reset_all()
+        timer.ready()
         while True:
-            for each in placements:
-                place_and_step(each)
-            pace.lap(steps)
-            played.begin_again()
-            pace.start_clock()
+            for of_step in placements:
+                place_and_step(of_step)
+            timer.finish_lap(steps)
+            coasting.reset_all()
+            timer.restart_clock()
     finally:
-        played.arena.close()
+        coasting.arena.close()
 
 
-def traffic_overhead(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict[str, Any]]:
-    """What an arena's step takes beyond SUMO's own, as a share of SUMO's own."""
+def traffic_overhead(budget: Budget, on_progress: OnProgress) -> Measured:
+    """Time that an arena's step takes beyond SUMO's own step, as a share of SUMO's own."""
     values: dict[str, float] = {}
     details: dict[str, Any] = {"unit": "steps/s of all games", "games": GAMES}
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
-        for done, others in enumerate(OTHERS):
-            folder = write_scene(Path(scratch) / str(others), others)
+        for done, background in enumerate(BACKGROUND_VEHICLES):
+            folder = write_scene(Path(scratch) / str(background), background)
             arguments = (folder, budget.traffic_steps)
-            sides = {"arena": Side(arena_side, arguments), "libsumo": Side(libsumo_side, arguments)}
+            sides = {
+                "arena": Side(run=arena_side, arguments=arguments),
+                "libsumo": Side(run=libsumo_side, arguments=arguments),
+            }
 
-            def tell_of_all(share: float, done: int = done) -> None:
-                tell((done + share) / len(OTHERS))
+            def on_progress_of_scene(share: float, done: int = done) -> None:
+                on_progress((done + share) / len(BACKGROUND_VEHICLES))
 
-            laps = take_turns(sides, budget.traffic_repeats, 0.0, tell_of_all)
-            share = best(laps["libsumo"]) / best(laps["arena"]) - 1.0
-            details[str(others)] = {"overhead": share, **described(laps)}
-            values[f"traffic_overhead_{others}"] = share
+            repeats = budget.traffic_repeats
+            laps = take_turns(sides, repeats=repeats, lap_s=0.0, on_progress=on_progress_of_scene)
+            share = best_rate(laps["libsumo"]) / best_rate(laps["arena"]) - 1.0
+            details[str(background)] = {"overhead": share, **raw_numbers(laps)}
+            values[f"traffic_overhead_{background}"] = share
     return {key: values[key] for key in ("traffic_overhead_50", "traffic_overhead_200")}, details

@@ -1,7 +1,6 @@
-"""Training as campaigns train: against the same learner on an environment that costs nothing, and on one that is
-stepped game by game in SB3's subprocesses.
+"""Training as in a campaign, against the same training on an environment that costs nothing and on SB3's subprocesses.
 
-All three sides are `harness.training.ppo.train` with a campaign's own settings; only the world under it is another.
+All sides call `harness.training.ppo.train` with a campaign's own settings; only the environment differs.
 """
 
 from __future__ import annotations
@@ -18,8 +17,9 @@ import numpy as np
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
 from benchmarks.budget import Budget
-from benchmarks.games import GAMES, MERGE, coasting_policy, merge, persona, persona_file
-from benchmarks.sides import Pace, Side, Tell, best, described, take_turns
+from benchmarks.figures import Measured
+from benchmarks.games import GAMES, MERGE, coasting_policy, merge_scene, persona, persona_file
+from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers, take_turns
 from harness.campaign.execution.worker_pool import cores
 from harness.config.campaign import Retraining, Training
 from harness.drivers.policy import LearnedDriver
@@ -35,103 +35,118 @@ _WARM_UP_UPDATES = 3
 _OPPONENT = "speedy"
 
 
-def lesson(settings: Training) -> TrainingSpec:
-    """The ego's retraining against a person with a learned policy."""
-    people = (persona("careful"), persona(_OPPONENT))
-    opponent = LearnedDriver(coasting_policy(), people[1].decisions == "sampled")
-    alone_share = Retraining().alone_share
+def training_spec(settings: Training) -> TrainingSpec:
+    """The ego's retraining against a persona with a policy."""
+    personas = (persona("careful"), persona(_OPPONENT))
     return TrainingSpec(
-        merge(), EGO, people, opponent, alone_share, 0.0, coasting_policy(), settings, ("benchmarks", 1)
+        scene=merge_scene(),
+        learner=EGO,
+        personas=personas,
+        opponent=LearnedDriver(coasting_policy(), sampled=personas[1].decisions == "sampled"),
+        alone_share=Retraining().alone_share,
+        attentive_share=0.0,
+        initial=coasting_policy(),
+        settings=settings,
+        parts=("benchmarks", 1),
     )
 
 
-def endless(**changes: Any) -> Training:
-    """A campaign's own settings, and no end."""
+def endless_training(**changes: Any) -> Training:
+    """A campaign's own settings, without an end."""
     return Training.model_validate({"steps": _ENDLESS, "early_convergence": False, **changes})
 
 
-def train_in_laps(pace: Pace, settings: Training, values: Callable[[], dict[str, float]] = dict) -> None:
-    """Training steps, after the first few thousand; `values` are asked for after each lap and go with it."""
-    began, last = False, 0
+def train_in_laps(timer: LapTimer, settings: Training, values: Callable[[], dict[str, float]] = dict) -> None:
+    """Count training steps in laps, after the first few thousand. `values` is called at the end of each lap."""
+    is_warm, last = False, 0
 
     def report(done: int, total: int) -> None:
-        nonlocal began, last
-        if not began and done >= _WARM_UP_UPDATES * settings.buffer:
-            pace.begin()
-            began, last = True, done
-        elif began and pace.due():
-            so_many, last = done - last, done
-            pace.lap(so_many, **values())
+        nonlocal is_warm, last
+        if not is_warm and done >= _WARM_UP_UPDATES * settings.buffer:
+            timer.ready()
+            is_warm, last = True, done
+        elif is_warm and timer.lap_is_over():
+            steps, last = done - last, done
+            timer.finish_lap(steps, **values())
 
-    with tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
-        train(lesson(settings), Path(folder) / "checkpoint", "benchmark", {}, Path(folder) / "tensorboard", report)
-
-
-def arena_side(pace: Pace) -> None:
-    """On the arena."""
-    train_in_laps(pace, endless())
-
-
-def free_side(pace: Pace) -> None:
-    """On nothing."""
-    with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=_FreeGames):
-        train_in_laps(pace, endless())
+    with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
+        train(
+            training_spec(settings),
+            checkpoint=Path(scratch) / "checkpoint",
+            key="benchmark",
+            card={},
+            tensorboard=Path(scratch) / "tensorboard",
+            on_progress=report,
+        )
 
 
-def subprocess_side(pace: Pace, environments: int, policy: Path) -> None:
-    """On so many of the harness's Gymnasium environments, each in a process of SB3's SubprocVecEnv."""
-    one = partial(DrivingEnv, MERGE, "ego", persona_file("careful"), policy, persona_file(_OPPONENT))
+def arena_side(timer: LapTimer) -> None:
+    """Training on the arena."""
+    train_in_laps(timer, endless_training())
+
+
+def free_side(timer: LapTimer) -> None:
+    """Training on an environment that costs nothing."""
+    with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=_FreeVecEnv):
+        train_in_laps(timer, endless_training())
+
+
+def subprocess_side(timer: LapTimer, environments: int, policy: Path) -> None:
+    """Training on so many of the harness's Gymnasium environments, each in a process of SB3's SubprocVecEnv."""
+    make_env = partial(DrivingEnv, MERGE, "ego", persona_file("careful"), policy, persona_file(_OPPONENT))
     default = Training()
-    settings = endless(games=environments, buffer=default.buffer // environments * environments)
-    with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=partial(_SubprocessGames, one)):
-        train_in_laps(pace, settings)
+    settings = endless_training(games=environments, buffer=default.buffer // environments * environments)
+    with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=partial(_SubprocessVecEnv, make_env)):
+        train_in_laps(timer, settings)
 
 
 class _NoArena:
-    """Stands where `train` expects an arena."""
+    """Replaces the arena in `train`."""
 
-    def __init__(self, scene: Any, games: int, *how: Any, **more: Any) -> None:
+    def __init__(self, scene: Any, games: int, *arguments: Any, **keywords: Any) -> None:
         self.games = games
 
     def reload(self, seed: int) -> None:
-        """There is no SUMO."""
+        """No SUMO is running."""
 
 
-class _FreeGames(VecEnv):
-    """Arrays of the arena's shapes, made beforehand; nothing is played."""
+class _FreeVecEnv(VecEnv):
+    """Returns precomputed arrays of the arena's shapes; no game is played."""
 
     render_mode = None
 
-    def __init__(self, arena: _NoArena, learner: int, start_distribution: Any, *parts: str | int, **how: Any) -> None:
+    def __init__(
+        self, arena: _NoArena, learner: int, start_distribution: Any, *parts: str | int, **keywords: Any
+    ) -> None:
         super().__init__(arena.games, OBSERVATION_SPACE, ACTION_SPACE)
         self.arena = arena
         generator = np.random.default_rng(1)
         shape = (16, arena.games, *OBSERVATION_SPACE.shape)
-        self._seen = generator.uniform(-1.0, 1.0, shape).astype(np.float32)
+        self._observations = generator.uniform(-1.0, 1.0, shape).astype(np.float32)
         self._payoff = generator.standard_normal((16, arena.games)).astype(np.float32)
         self._done = np.zeros(arena.games, dtype=bool)
         self._infos: list[dict[str, Any]] = [{} for _ in range(arena.games)]
         self._steps = 0
 
     def sample_from(self, start_distribution: Any, *parts: str | int) -> None:
-        """Nothing is drawn."""
+        """No start is drawn."""
 
     def take_finished(self) -> list[Any]:
         """No game ends."""
         return []
 
     def reset(self) -> FloatArray:
-        return self._seen[0]
+        return self._observations[0]
 
     def step_async(self, actions: FloatArray) -> None:
-        """Nobody drives."""
+        """Actions have no effect."""
 
     def step_wait(self) -> tuple[FloatArray, FloatArray, Any, list[dict[str, Any]]]:
         self._steps = (self._steps + 1) % 16
-        return self._seen[self._steps], self._payoff[self._steps], self._done, self._infos
+        return self._observations[self._steps], self._payoff[self._steps], self._done, self._infos
 
     def close(self) -> None:
-        """Nothing is open."""
+        """Nothing to close."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
@@ -146,49 +161,52 @@ class _FreeGames(VecEnv):
         return [False for _ in self._get_indices(indices)]
 
 
-class _SubprocessGames(SubprocVecEnv):
-    """SB3's own, with the words that `train` has for its games."""
+class _SubprocessVecEnv(SubprocVecEnv):
+    """SB3's own, with the methods that `train` calls on its environment."""
 
     def __init__(
         self,
-        one: Callable[[], gymnasium.Env[Any, Any]],
+        make_env: Callable[[], gymnasium.Env[Any, Any]],
         arena: _NoArena,
         learner: int,
         start_distribution: Any,
         *parts: str | int,
-        **how: Any,
+        **keywords: Any,
     ) -> None:
-        super().__init__([one] * arena.games)
+        super().__init__([make_env] * arena.games)
         self.arena = arena
 
     def sample_from(self, start_distribution: Any, *parts: str | int) -> None:
         """Each environment draws its own games."""
 
     def take_finished(self) -> list[Any]:
-        """Nobody counts them."""
+        """Finished games are not counted."""
         return []
 
 
-def training_vs_free_env(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict[str, Any]]:
-    """What training keeps of its speed when the environment is an arena rather than nothing."""
-    sides = {"arena": Side(arena_side), "free": Side(free_side)}
-    laps = take_turns(sides, budget.repeats, budget.training_stretch_s, tell)
-    value = best(laps["arena"]) / best(laps["free"])
-    return {"training_vs_free_env": value}, {"unit": "training steps/s", "games": GAMES, **described(laps)}
+def training_vs_free_env(budget: Budget, on_progress: OnProgress) -> Measured:
+    """Rate of training on the arena, as a share of its rate on an environment that costs nothing."""
+    sides = {"arena": Side(run=arena_side), "free": Side(run=free_side)}
+    laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.training_lap_s, on_progress=on_progress)
+    value = best_rate(laps["arena"]) / best_rate(laps["free"])
+    return {"training_vs_free_env": value}, {"unit": "training steps/s", "games": GAMES, **raw_numbers(laps)}
 
 
-def vs_subproc(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict[str, Any]]:
-    """Training on one core's arena against the same game on every core: the better of two numbers of environments."""
-    with tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
-        policy = Path(folder) / "policy"
+def vs_subproc(budget: Budget, on_progress: OnProgress) -> Measured:
+    """Rate of training on an arena on one core, in multiples of its rate on Gymnasium environments on all cores.
+
+    Of two numbers of environments, the faster one counts.
+    """
+    with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
+        policy = Path(scratch) / "policy"
         write_policy(coasting_policy(), policy)
         counts = sorted({max(cores(), 2), 4 * cores()})
-        sides = {"arena": Side(arena_side)}
-        sides |= {f"subprocesses_{count}": Side(subprocess_side, (count, policy)) for count in counts}
-        laps = take_turns(sides, budget.repeats, budget.training_stretch_s, tell)
-    rival = max(best(each) for name, each in laps.items() if name != "arena")
-    return {"vs_subproc": best(laps["arena"]) / rival}, {
+        sides = {"arena": Side(run=arena_side)}
+        sides |= {f"subprocesses_{count}": Side(run=subprocess_side, arguments=(count, policy)) for count in counts}
+        laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.training_lap_s, on_progress=on_progress)
+    subprocess_rate = max(best_rate(of_side) for name, of_side in laps.items() if name != "arena")
+    return {"vs_subproc": best_rate(laps["arena"]) / subprocess_rate}, {
         "unit": "training steps/s",
         "cores": cores(),
-        **described(laps),
+        **raw_numbers(laps),
     }

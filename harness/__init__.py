@@ -1,7 +1,7 @@
 """A co-simulation harness on Eclipse SUMO that tests an automated vehicle against selfish human drivers.
 
-What a library user needs is exported here; each name is imported when it is first asked for, so that importing
-`harness` alone costs nothing. Gymnasium knows `harness/Ego-v0` and `harness/NonEgo-v0` once both are imported.
+This module exports the public names of the library. Each is imported at its first use: `import harness` stays fast.
+When `harness` and Gymnasium are both imported, Gymnasium knows `harness/Ego-v0` and `harness/NonEgo-v0`.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ __all__ = [
     "read_policy",
 ]
 
-_HOMES = {
+_MODULES = {
     "config.persona": ("Persona",),
     "config.toml_reading": ("read_document",),
     "drivers.policy": ("LearnedDriver",),
@@ -65,9 +65,9 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    for home, names in _HOMES.items():
+    for module, names in _MODULES.items():
         if name in names:
-            return getattr(importlib.import_module(f"harness.{home}"), name)
+            return getattr(importlib.import_module(f"harness.{module}"), name)
     raise AttributeError(f"module 'harness' has no attribute {name!r}")
 
 
@@ -86,19 +86,19 @@ def _register() -> None:
             register(name, entry_point="harness.environments.gymnasium_env:DrivingEnv", kwargs={"player": player})
 
 
-class _OnImport:
-    """Registers the environments when Gymnasium is imported after us: importing it here would cost everyone 0.1 s."""
+class _GymnasiumFinder:
+    """Registers the environments if Gymnasium is imported later. Importing Gymnasium here would take 0.1 s."""
 
-    looking = False
+    searching = False
 
     def find_spec(self, name: str, path: object = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        if name != "gymnasium" or self.looking:
+        if name != "gymnasium" or self.searching:
             return None
-        self.looking = True
+        self.searching = True
         try:
             spec = importlib.util.find_spec(name)
         finally:
-            self.looking = False
+            self.searching = False
         if spec is not None and spec.loader is not None:
             execute = spec.loader.exec_module
 
@@ -113,4 +113,4 @@ class _OnImport:
 if "gymnasium" in sys.modules:
     _register()
 else:
-    sys.meta_path.insert(0, _OnImport())
+    sys.meta_path.insert(0, _GymnasiumFinder())

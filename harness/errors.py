@@ -1,10 +1,10 @@
 """The error tree.
 
-HarnessError                 anything the harness itself raises
-├── UsageError               the user's mistake: printed without a traceback, exit code 2
-├── StageFailed              a training or an assessment could not be finished, named by its stage
-├── SimulationError          SUMO refused, died or lost a vehicle
-└── DriverError              a driver that somebody brought died, was late or gave no answer that is one
+HarnessError                 any error that the harness raises
+├── UsageError               an error of the user: printed without a traceback, exit code 2
+├── StageFailed              a training or an assessment could not be finished; the message names the stage
+├── SimulationError          SUMO refused a command, died or lost a vehicle
+└── DriverError              an external driver died, was late or gave an invalid answer
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 T = TypeVar("T")
-_LONGEST = 2_000  # characters of what is said of one problem
+_LONGEST = 2_000  # characters of each part of a problem
 
 
 class HarnessError(Exception):
-    """Anything the harness itself raises."""
+    """Base of all errors that the harness raises."""
 
 
 @dataclass(frozen=True, order=True)
 class Problem:
-    """One thing the user can mend: where it is, what is wrong, and what to do about it."""
+    """One error that the user can correct: file, key, message and remedy."""
 
     file: str
     key: str
@@ -31,18 +31,18 @@ class Problem:
     remedy: str = ""
 
     def __str__(self) -> str:
-        """One line, whatever the names in it: what a document says can't steer a terminal or feign another message."""
+        """One line of plain text: names in a document can't control a terminal or imitate another message."""
         key, message, remedy = (_shortened(part) for part in (self.key, self.message, self.remedy))
         where = f"{self.file}: {key}" if key else self.file
         return plain(f"{where}: {message}" + (f" ({remedy})" if remedy else ""))
 
 
 def plain(text: str) -> str:
-    """The text with everything but letters, signs and plain spaces escaped: line ends, controls, invisible marks."""
+    """The text with all unprintable characters escaped: line ends, control characters, invisible marks."""
     if text.isprintable():
         return text
     return "".join(
-        each if each.isprintable() else each.encode("unicode_escape", "surrogatepass").decode() for each in text
+        char if char.isprintable() else char.encode("unicode_escape", "surrogatepass").decode() for char in text
     )
 
 
@@ -51,7 +51,7 @@ def _shortened(text: str) -> str:
 
 
 class UsageError(HarnessError):
-    """The user's mistake, as a list of problems, so that all are shown at once."""
+    """An error of the user, as a list of problems: all problems are reported at once."""
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = sorted(set(problems))
@@ -59,6 +59,7 @@ class UsageError(HarnessError):
 
     @classmethod
     def of(cls, file: object, key: str, message: str, remedy: str = "") -> UsageError:
+        """An error with one problem."""
         return cls([Problem(str(file), key, message, remedy)])
 
 
@@ -67,23 +68,23 @@ class StageFailed(HarnessError):
 
 
 class SimulationError(HarnessError):
-    """SUMO refused a command, died, or lost a vehicle it was given."""
+    """SUMO refused a command, died, or lost a vehicle."""
 
 
 class DriverError(HarnessError):
-    """A driver that somebody brought died, was late, or gave no answer that is one."""
+    """An external driver died, was late, or gave an invalid answer."""
 
 
 _OUT_OF_MEMORY = ("allocate memory", "failed to map segment", "can't start new thread", "bad_alloc")
 
 
 def is_of_memory(error: BaseException) -> bool:
-    """Whether an error says that the machine is short of memory: libraries have each their own for it."""
+    """Whether an error means that memory ran out. Libraries report this by different errors."""
     return isinstance(error, MemoryError) or any(words in str(error) for words in _OUT_OF_MEMORY)
 
 
 def collect(problems: list[Problem], action: Callable[[], T]) -> T | None:
-    """The action's result, or None: the user's mistakes in it join `problems`, so that the rest is looked at too."""
+    """The action's result; on a UsageError, None, and the error's problems are added to `problems`."""
     try:
         return action()
     except UsageError as error:

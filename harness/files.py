@@ -1,7 +1,7 @@
-"""Reading files that others wrote, and writing files whole or not at all, even if the power fails.
+"""Reading of untrusted files, and atomic, durable writing of files.
 
-Reading takes plain files of a limited size, never a pipe. Writing goes through a temporary file beside the final name;
-a process that is killed leaves it behind, and `drop_scratch` removes it.
+Only plain files of a limited size are read, never pipes. A file is written under a temporary name beside its final one
+and then renamed. A killed process leaves the temporary file behind; `drop_scratch` removes it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _KINDS = {
 
 
 def write_atomically(path: Path, content: bytes) -> None:
-    """Write a file by way of a temporary one beside it. Raises OSError; then the old file, if any, is untouched."""
+    """Write a file through a temporary one beside it. If this raises OSError, an existing file is unchanged."""
     handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=_SCRATCH)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -36,25 +36,25 @@ def write_atomically(path: Path, content: bytes) -> None:
 
 
 def scratch_beside(path: Path) -> Path:
-    """Where a file that is written piece by piece is until it is whole."""
+    """The temporary name of a file that is written in parts, until it is complete."""
     return path.with_name(f".{path.name}{_SCRATCH}")
 
 
 def replace_durably(scratch: Path, path: Path) -> None:
-    """Give a whole file its name: after a power cut there is the old file or this one, with all that is in it."""
+    """Rename a complete file to its final name. A power failure leaves either the old file or the complete new one."""
     sync_file(scratch)
     os.replace(scratch, path)
     sync_folder(path.parent)
 
 
 def drop_scratch(folder: Path) -> None:
-    """Take away what killed processes left half written, in a folder and below."""
-    for left in folder.rglob(f".*{_SCRATCH}"):
-        left.unlink(missing_ok=True)
+    """Remove the temporary files of killed processes in a folder and its subfolders."""
+    for scratch in folder.rglob(f".*{_SCRATCH}"):
+        scratch.unlink(missing_ok=True)
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, and what it lies in, so that they outlast a power cut as the files in them do."""
+    """Make a folder and its parents, so that they survive a power failure."""
     if not folder.is_dir():
         make_folder(folder.parent)
         folder.mkdir(exist_ok=True)
@@ -62,13 +62,13 @@ def make_folder(folder: Path) -> None:
 
 
 def sync_file(path: Path) -> None:
-    """Make sure that a file's content outlasts a power cut."""
+    """Make a file's content survive a power failure."""
     with path.open("rb") as file:
         os.fsync(file.fileno())
 
 
 def sync_folder(folder: Path) -> None:
-    """Make sure that the names in a folder, new ones and replaced ones, outlast a power cut."""
+    """Make new and replaced names in a folder survive a power failure."""
     if os.name == "posix":
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -78,23 +78,23 @@ def sync_folder(folder: Path) -> None:
 
 
 def check_file(path: Path, most_bytes: int) -> None:
-    """Raise OSError, with what is wrong in its `strerror`, unless this is a plain file of at most so many bytes."""
+    """Raise OSError, with the reason in its `strerror`, unless this is a plain file of at most `most_bytes` bytes."""
     status = os.stat(path)
     kind = stat.S_IFMT(status.st_mode)
     if kind != stat.S_IFREG:
-        raise OSError(errno.EINVAL, _KINDS.get(kind, "is no plain file"), str(path))
+        raise OSError(errno.EINVAL, _KINDS.get(kind, "is not a plain file"), str(path))
     if status.st_size > most_bytes:
         raise OSError(errno.EFBIG, _too_large(status.st_size, most_bytes), str(path))
 
 
 def content_of(path: Path, most_bytes: int) -> bytes:
-    """The bytes of a plain file. Raises OSError, with what is wrong in its `strerror`, for anything else."""
+    """The bytes of a plain file. Raises OSError, with the reason in its `strerror`, for any other or larger file."""
     check_file(path, most_bytes)
-    # it may have become something else in the meantime: a pipe that nobody writes to must not be waited for
+    # the path may have been replaced since: opening a pipe without a writer must not block
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     with os.fdopen(descriptor, "rb") as file:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise OSError(errno.EINVAL, "is no plain file", str(path))
+            raise OSError(errno.EINVAL, "is not a plain file", str(path))
         content = file.read(most_bytes + 1)
     if len(content) > most_bytes:
         raise OSError(errno.EFBIG, _too_large(len(content), most_bytes), str(path))
@@ -102,7 +102,7 @@ def content_of(path: Path, most_bytes: int) -> bytes:
 
 
 def leads_out(path: Path, folder: Path) -> bool:
-    """Whether a path below a folder is, through symbolic links, a place outside it."""
+    """Whether symbolic links make a path below a folder lead outside the folder."""
     return not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder))
 
 

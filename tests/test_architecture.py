@@ -57,7 +57,7 @@ GAME_MAY_IMPORT = {
     *("__future__", "abc", "bisect", "collections", "dataclasses", "enum", "functools", "harness", "hashlib"),
     *("itertools", "math", "numpy", "operator", "typing"),
 }
-JIT_MAY_IMPORT = GAME_MAY_IMPORT | {"contextlib", "fcntl", "numba", "pathlib", "platformdirs", "threading"}
+JIT_MAY_IMPORT = GAME_MAY_IMPORT | {"contextlib", "filelock", "numba", "pathlib", "platformdirs", "threading"}
 FILE_ACCESS_CALLS = {
     *("fromfile", "genfromtxt", "load", "loadtxt", "memmap", "open", "save", "savetxt", "savez", "tofile"),
 }

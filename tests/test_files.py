@@ -1,4 +1,4 @@
-"""Files are there whole or not at all."""
+"""Atomic writing of files."""
 
 from __future__ import annotations
 
@@ -18,27 +18,25 @@ def test_write_atomically__writes_and_replaces(tmp_path: Path) -> None:
     assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
 
 
-def test_write_atomically__the_file_can_be_read_by_others(tmp_path: Path) -> None:
+def test_write_atomically__the_file_is_readable_for_all(tmp_path: Path) -> None:
     write_atomically(tmp_path / "table.csv", b"")
     assert (tmp_path / "table.csv").stat().st_mode & 0o777 == 0o644
 
 
-def test_write_atomically__failure_leaves_the_old_file_and_nothing_else(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_write_atomically__a_failure_leaves_only_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = tmp_path / "table.csv"
     write_atomically(file, b"old")
 
-    def full(*_: object) -> None:
+    def disk_full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", disk_full)
     with pytest.raises(OSError, match="No space left"):
         write_atomically(file, b"new")
     assert file.read_bytes() == b"old"
     assert [each.name for each in tmp_path.iterdir()] == ["table.csv"]
 
 
-def test_write_atomically__missing_folder_is_an_error(tmp_path: Path) -> None:
+def test_write_atomically__a_missing_folder_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         write_atomically(tmp_path / "nowhere" / "table.csv", b"")

@@ -1,11 +1,11 @@
 """The figures of docs/game.md, from the tables of a run.
 
-    python docs/game/figures.py gaps reports/merge-seeds              # how much each player could still gain
-    python docs/game/figures.py failures reports/merge-arms-race      # every ego against every non-ego
-    python docs/game/figures.py strangers reports/merge-arms-race     # egos against people they never met
+    python docs/game/figures.py gaps reports/merge-seeds              # best-response gaps
+    python docs/game/figures.py failures reports/merge-arms-race      # failure rates of every ego against every non-ego
+    python docs/game/figures.py strangers reports/merge-arms-race     # egos against non-egos new to them
 
-Each prints a table in Markdown. They read gaps.csv, crossplay.csv and generalisation.csv of the folder named, or the
-file itself.
+Each command prints a table in Markdown. The argument is a run folder with gaps.csv, crossplay.csv or
+generalisation.csv, or such a file.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ def read(run: Path, table: str) -> pd.DataFrame:
 
 
 def gaps_table(found: pd.DataFrame) -> str:
-    """A row for each pair and player that could change; seed by seed in a cell."""
+    """A row for each pair of strategies, player that may deviate, and seed."""
     lines = [
-        "| pair, and who changes | seed | payoff → best response's | gap (95 %) | share | p (Holm) | the ego fails |",
+        "| pair: deviating player | seed | payoff → best response's | gap (95 %) | share | p (Holm) | the ego fails |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for row in found.sort_values(["persona", "round", "role", "seed"], kind="stable").to_dict("records"):
-        who = "ego" if row["role"] == "ego" else row["non_ego"]
+        player = "ego" if row["role"] == "ego" else row["non_ego"]
         interval = f"{row['gap']:+.2f} ({row['ci_low']:+.2f} to {row['ci_high']:+.2f})"
         fails = f"{row['ego_failure_rate']:.0%} → {row['ego_failure_rate_best_response']:.0%}"
         cells = (
-            f"`{row['ego']}` against `{row['non_ego']}`: {who}",
+            f"`{row['ego']}` against `{row['non_ego']}`: {player}",
             row["seed"],
             f"{row['payoff']:.2f} → {row['payoff_best_response']:.2f}",
             interval,
@@ -54,18 +54,17 @@ def failures_table(found: pd.DataFrame) -> str:
     """Failure rates in percent: a row for each ego, a column for each non-ego; the mean over seeds."""
     rates = found.groupby(["ego", "non_ego"], sort=False)["failure_rate"].mean().unstack()
     egos, non_egos = found["ego"].unique(), found["non_ego"].unique()
-    lines = [f"| ego | {' | '.join(f'`{each}`' for each in non_egos)} |", "| --- |" + " ---: |" * len(non_egos)]
+    lines = [f"| ego | {' | '.join(f'`{non_ego}`' for non_ego in non_egos)} |", "| --- |" + " ---: |" * len(non_egos)]
     for ego in egos:
-        cells = [rates.loc[ego, non_ego] for non_ego in non_egos]
-        shown = ["–" if pd.isna(each) else f"{each:.0%}" for each in cells]
-        lines.append(f"| `{ego}` | {' | '.join(shown)} |")
+        cells = ["–" if pd.isna(rate) else f"{rate:.0%}" for rate in rates.loc[ego, non_egos]]
+        lines.append(f"| `{ego}` | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
 def strangers_table(found: pd.DataFrame) -> str:
-    """A row for each ego and each person whom it never met."""
+    """A row for each ego and each non-ego that it was not trained against."""
     lines = [
-        "| ego | met | meets | fails (95 %) | the naive ego | share of it | p (Holm) |",
+        "| ego | trained against | plays against | fails (95 %) | naive ego fails | share | p (Holm) |",
         "| --- | --- | --- | --- | ---: | ---: | ---: |",
     ]
     for row in found.to_dict("records"):
@@ -87,19 +86,19 @@ def strangers_table(found: pd.DataFrame) -> str:
 
 @app.command()
 def gaps(run: Run) -> None:
-    """How much each player could still gain by changing its strategy alone."""
+    """Print how much each player could gain by changing its strategy alone."""
     print(gaps_table(read(run, "gaps")))
 
 
 @app.command()
 def failures(run: Run) -> None:
-    """How often each ego fails against each non-ego."""
+    """Print how often each ego fails against each non-ego."""
     print(failures_table(read(run, "crossplay")))
 
 
 @app.command()
 def strangers(run: Run) -> None:
-    """How egos fare against people they never met."""
+    """Print how often egos fail against non-egos that they were not trained against."""
     print(strangers_table(read(run, "generalisation")))
 
 

@@ -1,9 +1,10 @@
-"""What a run of campaigns/merge-seeds.toml found, seed by seed, against what it was to find.
+"""The findings of a run of campaigns/merge-seeds.toml, seed by seed, against the expected ones.
 
     python docs/reproduction/findings.py reports/merge-seeds
 
-prints the table of docs/reproduction.md from the run folder's CSV files. Only the law-abiding driver in the speedy
-driver's place is played here: SUMO drives the non-ego against each seed's naive ego, on the speedy driver's payoff.
+prints the table of docs/reproduction.md from the run folder's CSV files. It plays only the games of a
+law-abiding driver in the speedy driver's place: SUMO drives the non-ego against each seed's naive ego, on the speedy
+driver's payoff.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ PERSONAS = ("speedy", "distracted")
 ALPHA = 0.01
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Tables:
-    """A run's tables, of one training seed."""
+    """The tables of a run, restricted to one training seed."""
 
     episodes: pd.DataFrame
     comparisons: pd.DataFrame
@@ -45,129 +46,125 @@ class Tables:
         return float(rows[column].astype(float).mean())
 
     def failures(self, arm: str) -> float:
+        """Share of the arm's games in which the ego failed."""
         return self.mean(arm, "ego_failed")
 
     def speed(self, arm: str) -> float:
+        """The ego's mean speed in the arm, m/s."""
         return self.mean(arm, "ego_mean_speed_mps")
 
     def goals(self, arm: str) -> float:
+        """Share of the arm's games in which the non-ego reached its goal."""
         rows = self.episodes[self.episodes["arm"] == arm]
         return float((rows["non_ego_outcome"] == "goal").mean())
 
     def p(self, question: str, persona: str, column: str) -> float:
-        """p of the question about failures, plain or corrected."""
+        """p of the question about failures. `column`: `p_value`, or `p_holm` with Holm's correction."""
         rows = self.comparisons
         rows = rows[(rows["question"] == question) & (rows["persona"] == persona) & (rows["metric"] == "failure")]
         return float(rows[column].iloc[0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finding:
-    """A row: what is looked at, and what it was to be."""
+    """A row: a value of a run and its expected range."""
 
     what: str
     bound: str
+    """The expected range, in words."""
     value: Callable[[Tables], float]
     holds: Callable[[float], bool]
     form: str = "{:.0%}"
+    """Format of the value."""
 
 
 def findings() -> list[Finding]:
-    """Every row, in the order of the page."""
+    """All rows, in the order of the page."""
     rows = [
-        Finding("naive_alone: failures", "0", lambda t: t.failures("naive_alone"), lambda v: v == 0.0),
-        Finding("naive_vs_sumo: failures", "≤ 3 %", lambda t: t.failures("naive_vs_sumo"), lambda v: v <= 0.03),
-        Finding("naive_vs_speedy: failures", "≥ 20 %", lambda t: t.failures("naive_vs_speedy"), lambda v: v >= 0.20),
+        _failure_rate("naive_alone", "0", lambda rate: rate == 0.0),
+        _failure_rate("naive_vs_sumo", "≤ 3 %", lambda rate: rate <= 0.03),
+        _failure_rate("naive_vs_speedy", "≥ 20 %", lambda rate: rate >= 0.20),
         Finding(
-            "naive_vs_speedy: speed against naive_alone",
-            "lower",
-            lambda t: t.speed("naive_vs_speedy") / t.speed("naive_alone") - 1.0,
-            lambda v: v < 0.0,
-            "{:+.1%}",
+            what="naive_vs_speedy: speed against naive_alone",
+            bound="lower",
+            value=lambda tables: tables.speed("naive_vs_speedy") / tables.speed("naive_alone") - 1.0,
+            holds=lambda change: change < 0.0,
+            form="{:+.1%}",
+        ),
+        _failure_rate("retrained_vs_speedy", "≤ 3 %", lambda rate: rate <= 0.03),
+        Finding(
+            what="retrained_vs_speedy: speed against naive_alone",
+            bound="within 5 %",
+            value=lambda tables: tables.speed("retrained_vs_speedy") / tables.speed("naive_alone") - 1.0,
+            holds=lambda change: abs(change) <= 0.05,
+            form="{:+.1%}",
+        ),
+        _failure_rate("naive_vs_distracted", "≥ 12 %", lambda rate: rate >= 0.12),
+        _failure_rate("retrained_vs_distracted", "≤ 5 %", lambda rate: rate <= 0.05),
+        *(_failure_rate(f"retrained_alone_{persona}", "0", lambda rate: rate == 0.0) for persona in PERSONAS),
+        _goal_rate("speedy_alone: goal", "≥ 97 %", 0.97),
+        _goal_rate("distracted_alone: goal", "≥ 80 %", 0.80),
+        _goal_rate("naive_vs_speedy: its own goal", "≥ 60 %", 0.60),
+        Finding(
+            what="speedy_alone: speed against the limit",
+            bound="+5 to +30 %",
+            value=lambda tables: tables.mean("speedy_alone", "non_ego_mean_speed_mps") / tables.limit_mps - 1.0,
+            holds=lambda change: 0.05 <= change <= 0.30,
+            form="{:+.1%}",
         ),
         Finding(
-            "retrained_vs_speedy: failures", "≤ 3 %", lambda t: t.failures("retrained_vs_speedy"), lambda v: v <= 0.03
-        ),
-        Finding(
-            "retrained_vs_speedy: speed against naive_alone",
-            "within 5 %",
-            lambda t: t.speed("retrained_vs_speedy") / t.speed("naive_alone") - 1.0,
-            lambda v: abs(v) <= 0.05,
-            "{:+.1%}",
-        ),
-        Finding(
-            "naive_vs_distracted: failures",
-            "≥ 12 %",
-            lambda t: t.failures("naive_vs_distracted"),
-            lambda v: v >= 0.12,
-        ),
-        Finding(
-            "retrained_vs_distracted: failures",
-            "≤ 5 %",
-            lambda t: t.failures("retrained_vs_distracted"),
-            lambda v: v <= 0.05,
-        ),
-        *(
-            Finding(f"retrained_alone_{p}: failures", "0", _failures(f"retrained_alone_{p}"), lambda v: v == 0.0)
-            for p in PERSONAS
-        ),
-        Finding("speedy_alone: goal", "≥ 97 %", lambda t: t.goals("speedy_alone"), lambda v: v >= 0.97),
-        Finding("distracted_alone: goal", "≥ 80 %", lambda t: t.goals("distracted_alone"), lambda v: v >= 0.80),
-        Finding("naive_vs_speedy: its own goal", "≥ 60 %", lambda t: t.goals("naive_vs_speedy"), lambda v: v >= 0.60),
-        Finding(
-            "speedy_alone: speed against the limit",
-            "+5 to +30 %",
-            lambda t: t.mean("speedy_alone", "non_ego_mean_speed_mps") / t.limit_mps - 1.0,
-            lambda v: 0.05 <= v <= 0.30,
-            "{:+.1%}",
-        ),
-        Finding(
-            "naive_vs_speedy: its payoff less a law-abiding driver's",
-            "> 0",
-            lambda t: t.mean("naive_vs_speedy", "non_ego_payoff") - t.lawful_payoff,
-            lambda v: v > 0.0,
-            "{:+.1f}",
+            what="naive_vs_speedy: its payoff less a law-abiding driver's",
+            bound="> 0",
+            value=lambda tables: tables.mean("naive_vs_speedy", "non_ego_payoff") - tables.lawful_payoff,
+            holds=lambda difference: difference > 0.0,
+            form="{:+.1f}",
         ),
     ]
-    for question in ("RQ1", "RQ2"):
-        for persona in PERSONAS:
-            for column, word in (("p_value", "p"), ("p_holm", "Holm-corrected p")):
-                rows.append(
-                    Finding(
-                        f"{question} {persona}: {word} of failure",
-                        f"< {ALPHA}",
-                        _p(question, persona, column),
-                        lambda v: v < ALPHA,
-                        "{:.2g}",
-                    )
-                )
-    return rows
+    return rows + [
+        _significance(question, persona, column, word)
+        for question in ("RQ1", "RQ2")
+        for persona in PERSONAS
+        for column, word in (("p_value", "p"), ("p_holm", "Holm-corrected p"))
+    ]
 
 
-def _failures(arm: str) -> Callable[[Tables], float]:
-    return lambda tables: tables.failures(arm)
+def _failure_rate(arm: str, bound: str, holds: Callable[[float], bool]) -> Finding:
+    return Finding(what=f"{arm}: failures", bound=bound, value=lambda tables: tables.failures(arm), holds=holds)
 
 
-def _p(question: str, persona: str, column: str) -> Callable[[Tables], float]:
-    return lambda tables: tables.p(question, persona, column)
+def _goal_rate(what: str, bound: str, least: float) -> Finding:
+    arm = what.partition(":")[0]
+    return Finding(what=what, bound=bound, value=lambda tables: tables.goals(arm), holds=lambda rate: rate >= least)
+
+
+def _significance(question: str, persona: str, column: str, word: str) -> Finding:
+    return Finding(
+        what=f"{question} {persona}: {word} of failure",
+        bound=f"< {ALPHA}",
+        value=lambda tables: tables.p(question, persona, column),
+        holds=lambda p: p < ALPHA,
+        form="{:.2g}",
+    )
 
 
 def main(
     run: Annotated[Path, typer.Argument(metavar="RUN", help="The run folder, such as reports/merge-seeds.")],
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also written as CSV.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the table as CSV.")] = None,
 ) -> None:
     """Print the table of findings as Markdown, a column per training seed."""
     episodes, comparisons = pd.read_csv(run / "episodes.csv"), pd.read_csv(run / "comparisons.csv")
     seeds = sorted(episodes["seed"].unique())
-    tables = {
-        seed: Tables(
-            episodes[episodes["seed"] == seed],
-            comparisons[comparisons["seed"] == seed],
-            *_lawful(run, int(seed), int((episodes["arm"] == "naive_alone").sum() / len(seeds))),
+    count = int((episodes["arm"] == "naive_alone").sum() / len(seeds))
+    tables = {}
+    for seed in seeds:
+        lawful_payoff, limit_mps = _play_lawful_driver(run, int(seed), count)
+        tables[seed] = Tables(
+            episodes=episodes[episodes["seed"] == seed],
+            comparisons=comparisons[comparisons["seed"] == seed],
+            lawful_payoff=lawful_payoff,
+            limit_mps=limit_mps,
         )
-        for seed in seeds
-    }
-    print("| what | was to be | " + " | ".join(f"seed {seed}" for seed in seeds) + " | held |")
+    print("| finding | expected | " + " | ".join(f"seed {seed}" for seed in seeds) + " | held |")
     print("| --- | --- |" + " --- |" * (len(seeds) + 1))
     rows = []
     for finding in findings():
@@ -181,12 +178,12 @@ def main(
         pd.DataFrame(rows).to_csv(out, index=False)
 
 
-def _lawful(run: Path, seed: int, episodes: int) -> tuple[float, float]:
-    """Mean payoff, on the speedy driver's terms, of SUMO's driver in its place; and the speed limit."""
+def _play_lawful_driver(run: Path, seed: int, episodes: int) -> tuple[float, float]:
+    """The mean payoff of SUMO's driver in the speedy driver's place, on its terms, and the speed limit in m/s."""
     scene = open_scene(ROOT / "networks" / "merge")
     careful, speedy = (read_document(ROOT / "personas" / f"{n}.toml", Persona) for n in ("careful", "speedy"))
     naive = LearnedDriver(read_policy(run / "policies" / f"naive-seed{seed}"), careful.decisions == "sampled")
-    arm = Arm("lawful", scene, (naive, SumoDriver()), (careful, speedy), seed)
+    arm = Arm(name="lawful", scene=scene, drivers=(naive, SumoDriver()), personas=(careful, speedy), seed=seed)
     payoffs = [game.record["non_ego_payoff"] for game in assess(arm, episodes)]
     routes = scene.world.road.routes
     return float(np.mean(payoffs)), float(routes.speed_limit_mps[routes.first_row[1]])

@@ -1,9 +1,9 @@
-"""Sweep levers of the reproduction: each setting is a campaign of its own, run by the real command's own code.
+"""Sweep the levers of the reproduction: each setting is its own campaign, run by the code of `harness campaign`.
 
     python docs/reproduction/sweep.py docs/reproduction/levers.toml
 
-reads the levers (which document, which key, which values), runs one campaign per value into a run folder of its own,
-and writes one row per setting and arm, with what was asked of the arm. Interrupted, it goes on where it stopped.
+reads the levers (document, key, values), runs one campaign per value into its own run folder, and writes one row per
+setting and arm. An interrupted sweep continues where it stopped.
 """
 
 from __future__ import annotations
@@ -33,29 +33,29 @@ COLUMNS = [
 
 
 class Lever(Document):
-    """One key of one persona, and the values it is given; everything else stays as shipped."""
+    """One key of one persona and its values; everything else stays as shipped."""
 
     persona: str
     """The persona's file, relative to this document."""
     key: str
-    """Dotted, as in `safety.terms.collision`; of the campaign itself where it begins with `campaign.`, of the ego's own
-    persona where it begins with `ego.`."""
+    """Dotted, as in `safety.terms.collision`. With the prefix `campaign.` it is a key of the campaign itself, with
+    `ego.` one of the ego's own persona."""
     values: list[Any] = Field(min_length=1)
 
 
 class Sweep(Document):
-    """What is swept."""
+    """The document of a sweep."""
 
     campaign: str
-    """The campaign that every setting varies, relative to this document."""
+    """The campaign that all settings are variants of, relative to this document."""
     steps: int = Field(ge=1_000)
-    """Budget of each training, in steps of its player."""
+    """Budget of each training, in steps of the learning player."""
     levers: list[Lever] = Field(min_length=1)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One value of one lever: a campaign of its own."""
+    """One value of one lever: one campaign."""
 
     lever: Lever
     value: Any
@@ -69,10 +69,10 @@ class Setting:
 
 def main(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="The levers, such as docs/reproduction/levers.toml.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Where the run folders go.")] = Path("reports/sweep"),
+    out: Annotated[Path, typer.Option(metavar="DIR", help="The folder for the run folders.")] = Path("reports/sweep"),
     table: Annotated[Path | None, typer.Option(metavar="FILE", help="The table.  [default: beside FILE]")] = None,
 ) -> None:
-    """Run every setting that is not done yet, and write the table of all of them."""
+    """Run all settings that are not finished, and write the table of all settings."""
     console = Console()
     sweep = read_document(file, Sweep)
     settings = [Setting(lever, value) for lever in sweep.levers for value in lever.values]
@@ -89,14 +89,14 @@ def main(
 
 
 def _write_campaign(base: Path, sweep: Sweep, setting: Setting, folder: Path) -> Path:
-    """The campaign's documents with one value changed, in a folder of their own."""
+    """Write the campaign's documents, with one value changed, into their own folder. Returns the campaign's file."""
     folder.mkdir(parents=True, exist_ok=True)
     source = base / sweep.campaign
     campaign = tomlkit.parse(source.read_text(encoding="utf-8"))
     ego: Any = campaign["ego"]
     files = {"": (base / setting.lever.persona).resolve(), "ego": (source.parent / str(ego["persona"])).resolve()}
-    of, _, key = setting.lever.key.partition(".")
-    changed = of if of in ("campaign", "ego") else ""
+    prefix, _, key = setting.lever.key.partition(".")
+    changed = prefix if prefix in ("campaign", "ego") else ""
     for name, file in files.items():
         persona = tomlkit.parse(file.read_text(encoding="utf-8"))
         if name == changed:
@@ -129,7 +129,7 @@ def _put(document: Any, key: str, value: Any) -> None:
 
 
 def _rows(folder: Path, setting: Setting) -> pd.DataFrame:
-    """What came of a setting, an arm a row, from its run folder's tables."""
+    """The results of a setting, one row per arm, from the tables of its run folder."""
     summary = pd.read_csv(folder / "summary.csv")
     episodes = pd.read_csv(folder / "episodes.csv")
     by_arm = episodes.groupby("arm")

@@ -1,4 +1,4 @@
-"""The commands about what a person writes: personas, drivers, and the schemas of all documents."""
+"""The commands for documents: personas, drivers, and the schemas of all documents."""
 
 from __future__ import annotations
 
@@ -9,47 +9,49 @@ from typing import Annotated
 
 import typer
 
+from harness.cli import wording
+
 NOT_CONFORMANT = 1
 
 AllowCode = Annotated[
     bool,
     typer.Option(
         "--allow-code",
-        help="Let a driver run that is code which comes as a file: a program, an FMU, a file of Stable-Baselines3. "
-        "It can do whatever you can: use this for files you trust.",
+        help="Permit drivers that run code from a file: a program, an FMU, or a file of Stable-Baselines3. Such code "
+        "can do everything that you can: use this only for files that you trust.",
     ),
 ]
 persona_app = typer.Typer(
-    no_args_is_help=True, help="Write a person of your own, and see what a persona's document means."
+    no_args_is_help=True, help="Create the document of a persona, and show what a persona's document means."
 )
 
 
 @persona_app.command("new")
 def new_persona(
     name: Annotated[
-        str, typer.Argument(metavar="NAME", help="What the person is called, such as late_merger.", show_default=False)
+        str, typer.Argument(metavar="NAME", help="The name of the persona, such as late_merger.", show_default=False)
     ],
     out: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="The file.  [default: personas/NAME.toml]", show_default=False),
     ] = None,
 ) -> None:
-    """Write a commented template of a persona: valid as it stands, with every key there is. Overwrites nothing."""
+    """Write a commented template of a persona: a valid document with every key. No file is overwritten."""
     from harness.cli.persona_template import create_persona
 
     file = create_persona(name, out)
-    print(f"{file}: a careful driver so far. What it means: harness persona show {file}")
+    print(wording.persona_created(file))
 
 
 @persona_app.command("show")
 def show_persona(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The persona's TOML document.", show_default=False)],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The TOML file of the persona.", show_default=False)],
     html: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Write it as a page, too, that opens offline.", show_default=False),
+        typer.Option(metavar="FILE", help="Also write an HTML page that opens offline.", show_default=False),
     ] = None,
 ) -> None:
-    """Draw what a persona means: what everything is worth to it, membership curves, a sample of its lapses."""
+    """Show the profile of a persona: the value of each term, membership functions, and a sample of its lapses."""
     from rich.console import Console
 
     from harness.config.persona import Persona
@@ -57,17 +59,17 @@ def show_persona(
     from harness.reports.persona.profile import persona_profile
     from harness.reports.persona.terminal import show
 
-    portrait = persona_profile(read_document(file, Persona))
+    profile = persona_profile(read_document(file, Persona))
     if html is not None:
         from harness.reports.persona.page import write_profile
 
-        write_profile(portrait, html)
+        write_profile(profile, html)
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # of a terminal that does not know every character
+        sys.stdout.reconfigure(errors="replace")  # the terminal may not have every character
     console = Console()
-    show(portrait, console)
+    show(profile, console)
     if html is not None:
-        console.print(f"Page: {html}", highlight=False, markup=False, soft_wrap=True)
+        console.print(wording.page_written(html), highlight=False, markup=False, soft_wrap=True)
 
 
 def schema(
@@ -75,7 +77,7 @@ def schema(
         str | None,
         typer.Argument(
             metavar="DOCUMENT",
-            help="Which: campaign, persona, scene or driver.  [default: all, with --out]",
+            help="campaign, persona, scene or driver.  [default: all, with --out]",
             show_default=False,
         ),
     ] = None,
@@ -84,7 +86,8 @@ def schema(
         typer.Option(metavar="DIR", help="Write DOCUMENT.schema.json into this folder.", show_default=False),
     ] = None,
 ) -> None:
-    """Print the JSON Schema of a kind of document, or write it, or all: editors complete and check TOML by them."""
+    """Print the JSON Schema of a kind of document, or write one or all schemas. Editors use them to complete and check
+    TOML files."""
     from harness.cli.schema_files import write_schemas
     from harness.config.json_schema import DOCUMENTS, schema_text
     from harness.errors import UsageError
@@ -95,36 +98,35 @@ def schema(
     elif document is not None:
         print(schema_text(document), end="")
     else:
-        kinds = ", ".join(DOCUMENTS)
-        raise UsageError.of(
-            "harness schema", "DOCUMENT", "is missing", f"one of {kinds}; or all of them with --out DIR"
-        )
+        raise UsageError.of("harness schema", "DOCUMENT", *wording.no_document_kind(tuple(DOCUMENTS)))
 
 
 def check_driver(
     driver: Annotated[
         str,
         typer.Argument(
-            metavar="DRIVER", help="A driver document, a policy's folder, or an installed driver.", show_default=False
+            metavar="DRIVER",
+            help="A driver document, a policy's folder, an installed driver, or sumo.",
+            show_default=False,
         ),
     ],
     scene: Annotated[
-        Path, typer.Option(metavar="DIR", help="The scene it drives on.  [default: networks/merge]", show_default=False)
+        Path, typer.Option(metavar="DIR", help="The scene of the games.  [default: networks/merge]", show_default=False)
     ] = Path("networks/merge"),
     games: Annotated[int, typer.Option(min=2, max=1000, metavar="N", help="Games to play.")] = 3,
     allow_code: AllowCode = False,
 ) -> None:
-    """Check that a driver keeps to the protocol, and say in words where it does not.
+    """Check that a driver conforms to the driver protocol, and list every violation.
 
-    Plays seeded games twice, and shows them again all at once. Exit code 1: it does not keep to it.
+    Plays seeded games twice, then replays their observations with all games at once. Exit code 1: it does not conform.
     """
     from rich.console import Console
 
     from harness.environments.conformance import check_named
 
-    found = check_named(driver, scene, games, allow_code)
+    findings = check_named(driver, scene, games, allow_code=allow_code)
     console = Console()
-    for line in found.lines():
+    for line in findings.lines():
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    if found.wrong:
+    if findings.violations:
         raise typer.Exit(NOT_CONFORMANT)

@@ -1,1 +1,1 @@
-"""What a person writes: campaigns, scenes and personas, as validated, frozen records."""
+"""The documents that users write (campaigns, scenes, personas and drivers) as validated, frozen records."""

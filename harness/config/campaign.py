@@ -1,4 +1,4 @@
-"""A campaign: which ego meets which personas on which scene, how they learn, and how they are judged."""
+"""A campaign: ego, personas and scene, how the players are trained, and how they are assessed."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pydantic import Field, field_validator, model_validator
 from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
 
-LEARNED, SUMO = "learned", "sumo"  # drivers an ego can have by name
-ROBUST = "robust"  # what the ego is called that is retrained against several personas at once
-OF_TRAINING = ("training", "non_ego_training", "retraining")  # the tables that say how players learn
+LEARNED, SUMO = "learned", "sumo"  # drivers of an ego that have a name
+ROBUST = "robust"  # the name of the ego that is retrained against several personas at once
+TRAINING_TABLES = ("training", "non_ego_training", "retraining")
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]
 CampaignName = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
@@ -24,48 +24,50 @@ class Ego(Document):
     """The vehicle under study."""
 
     driver: DocumentPath = LEARNED
-    """`learned` by the campaign, `sumo` for SUMO's own models, or the folder of a policy."""
+    """`learned`: trained by the campaign. `sumo`: SUMO's own models. Else the folder of a policy, a driver document or
+    an installed driver."""
     persona: DocumentPath = "../personas/careful.toml"
-    """The ego's own payoff."""
+    """The persona of the ego, which gives its payoff."""
 
 
 class Training(Document):
-    """How players learn: PPO with the paper's table 1 as defaults."""
+    """Training of the players with PPO. The defaults are those of table 1 of the paper."""
 
     steps: int = Field(3_000_000, ge=1_000, le=1_000_000_000)
-    """Budget of each training, in steps of its player."""
+    """Budget of each training, in steps of the player."""
     early_convergence: bool = True
-    """Stop when the learning curve has settled (the rule is in the manifest)."""
+    """Stop when the learning curve has converged (the manifest states the rule)."""
     learning_rate: float = Field(1e-4, gt=0.0, le=1.0)
-    """Step size of PPO's optimiser, Adam."""
+    """Step size of Adam, the optimiser of PPO."""
     discount: float = Field(0.99, gt=0.0, le=1.0)
-    """Gamma: what a payoff one step later is worth now."""
+    """Gamma: factor of the payoff of the next step."""
     clip: float = Field(0.1, gt=0.0, le=1.0)
-    """Epsilon: how far an update may shift the odds of an action, as a share."""
+    """Epsilon: in an update, the probability ratio of an action is clipped to 1 - epsilon and 1 + epsilon."""
     entropy_coefficient: float = Field(0.02, ge=0.0, le=1.0)
-    """What a varied policy is worth in PPO's loss, so that it goes on exploring."""
+    """Weight of the policy's entropy in the loss of PPO, which keeps the policy exploring."""
     buffer: int = Field(2048, ge=64, le=1_000_000)
-    """Steps gathered, over all games, between two updates."""
+    """Steps collected, over all games, between two updates."""
     games: int = Field(64, ge=1, le=1024)
-    """Games played at once."""
+    """Games played in parallel."""
     minibatch: int = Field(512, ge=8, le=1_000_000)
-    """Steps in one gradient step; at most the buffer."""
+    """Steps per gradient step; at most the buffer."""
     epochs: int = Field(10, ge=1, le=100)
-    """Passes over the buffer in an update."""
+    """Passes over the buffer per update."""
     network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)
-    """Sizes of the hidden layers, of actor and critic each."""
+    """Sizes of the hidden layers of the actor, and of the critic."""
     initial_deviation: float = Field(0.5, gt=0.0, le=2.0)
-    """Standard deviation of a new policy's actions."""
+    """Standard deviation of the actions of a new policy."""
     max_deviation: float = Field(0.5, gt=0.0, le=2.0)
-    """The greatest it may become: the entropy term raises it for ever where little is left to learn."""
+    """Upper bound of that standard deviation. Without it, the entropy term raises the standard deviation without limit
+    once little is left to learn."""
     payoff_scale: float = Field(0.1, gt=0.0, le=1000.0)
-    """What payoffs are multiplied by where PPO sees them (tables show them as they are): its step is bounded by the
-    gradient of actor and critic together, and the errors of a critic of large payoffs leave the actor little of it."""
+    """Factor of the payoffs that PPO receives; tables show the payoffs without it. The gradients of actor and critic
+    are clipped together: with large payoffs, the errors of the critic would leave little of the step to the actor."""
     segment_steps: int = Field(131_072, ge=1_024, le=100_000_000)
-    """Training is kept on disk and its learning curve judged this often."""
+    """A checkpoint is written, and the learning curve evaluated, each time after this many steps."""
 
     @model_validator(mode="after")
-    def _divides(self) -> Training:
+    def _sizes_are_consistent(self) -> Training:
         if self.buffer % self.games:
             raise ValueError(f"buffer ({self.buffer}) must be a multiple of games ({self.games})")
         if self.initial_deviation > self.max_deviation:
@@ -78,117 +80,120 @@ class Training(Document):
 
 
 class NonEgoTraining(Document):
-    """Round 1: how the non-ego learns."""
+    """Training of the non-ego in round 1."""
 
     alone_share: float = Field(0.7, ge=0.0, le=1.0)
-    """Share of games without the ego: people learn on roads where mostly nobody is beside them."""
+    """Share of games without the ego: people mostly learn to drive on roads with no car beside them."""
     attentive_share: float = Field(0.5, ge=0.0, le=1.0)
-    """Share of the budget in which its attention does not lapse yet: people learn to drive before they text."""
+    """Share of the budget, at its start, without lapses of attention: people learn to drive before they text."""
     warm_start: bool = False
-    """Begin from the naive ego's parameters, a driver who knows the empty road, rather than from nothing."""
+    """Start from the parameters of the naive ego, which can drive on the empty road, instead of random ones."""
 
 
 class Retraining(Document):
-    """Round 2: how the ego is retrained."""
+    """Retraining of the ego in round 2."""
 
     alone_share: float = Field(0.25, ge=0.0, le=1.0)
-    """Share of games without the non-ego, so that nothing is forgotten."""
+    """Share of games without the non-ego, so that the ego does not forget what it has learned."""
     warm_start: bool = False
-    """Begin from the naive ego's parameters, rather than from nothing."""
+    """Start from the parameters of the naive ego, instead of random ones."""
 
     against: list[Name] = Field([], max_length=50)
-    """Personas, by name, against all of whom one ego more is retrained, `robust`, in equal shares of its games and with
-    as many times the budget. It meets those of the campaign who are left out as well: drivers whom it never met."""
+    """Names of personas. One more ego, `robust`, is retrained against all of them, in equal shares of its games, and
+    with a budget multiplied by their number. It is also assessed against the other personas of the campaign, which it
+    has not met in training."""
 
 
 class Population(Document):
-    """A kind of traffic: drivers of several personas, one of whom a game has."""
+    """A mixture of personas. Each game has a non-ego of one of them."""
 
     name: Name
-    """What it is called, in stages, arms and tables."""
+    """The name of the population in stages, arms and tables."""
     shares: dict[Name, Annotated[float, Field(gt=0.0, le=1000.0)]] = Field(min_length=2, max_length=50)
-    """Each persona's share of the games, by name. Shares are relative: 1 and 3 are a quarter and three quarters."""
+    """Share of the games of each persona, by name. Shares are relative: 1 and 3 are a quarter and three quarters."""
 
 
 class Rounds(Document):
-    """How often non-ego and ego answer one another."""
+    """Iterated best response: non-ego and ego are trained against each other in turn."""
 
     count: int = Field(2, ge=2, le=20)
-    """The last round. In odd rounds the non-ego learns, in even rounds the ego; the paper ends after 2."""
+    """Number of the last round. The non-ego learns in odd rounds, the ego in even rounds. The paper has 2 rounds."""
     personas: list[Name] = Field([], max_length=50)
-    """The personas, by name, whose exchange goes on after round 2. Left out: all."""
+    """Names of the personas with rounds after round 2. Left out: all personas."""
     against: Literal["latest", "all", "equilibrium"] = "latest"
-    """Whom a player answers from round 3 on: the other player's latest strategy, all it has had so far in equal shares
-    (fictitious play), or the equilibrium's mixture of them (policy-space response oracles)."""
+    """Opponent of a player from round 3 on. `latest`: the latest strategy of the other player. `all`: all its
+    strategies so far in equal shares (fictitious play). `equilibrium`: the mixture of them in the equilibrium
+    (policy-space response oracles)."""
     stop_early: bool | None = None
-    """Whether an exchange ends when neither player's best response gains anything distinguishable from 0: it does, if
-    it is left out and there is a table [best_response]."""
+    """Whether the rounds of a persona end early, when an approximate equilibrium is reached: neither player has a
+    best-response gap that is distinguishable from 0. Left out: yes if there is a table [best_response]."""
 
 
 class BestResponse(Document):
-    """How much each player of an arm could still gain by changing its strategy alone (equation 2): the last arm of each
-    exchange is measured, and the arms that are named."""
+    """Best-response gap of each player of an arm: the gain from a change of its own strategy alone (equation 2). It is
+    measured for the last arm of each persona's rounds, and for the arms named here."""
 
     steps: int = Field(500_000, ge=1_000, le=1_000_000_000)
     """Budget of each training of a best response."""
     starts: int = Field(2, ge=1, le=20)
-    """Trainings of each best response: the first begins from the player's own policy, the others from nothing."""
+    """Trainings of each best response. The first starts from the player's own policy, the others from random
+    parameters."""
     choice_episodes: int = Field(100, ge=2, le=100_000)
-    """Games, beside the assessment's, by which the best of them is chosen."""
+    """Games that select the best of these trainings; none of them is a game of the assessment."""
     arms: list[Annotated[str, Field(min_length=1, max_length=200)]] = Field([], max_length=200)
-    """Further arms to measure, by name."""
+    """Names of further arms to measure."""
 
 
 class CrossPlay(Document):
-    """Every ego of the campaign meets every non-ego."""
+    """Games of every ego of the campaign against every non-ego."""
 
     egos: list[DocumentPath] = Field([], max_length=50)
-    """Other drivers who meet them too: as in `[ego] driver`, `sumo`, a driver document or the folder of a policy."""
+    """Further egos, as in `[ego] driver`: `sumo`, a driver document or the folder of a policy."""
 
 
 class Reconfiguration(Document):
-    """Round 2 of an ego that is given and has something to tune: how its parameters are searched."""
+    """Round 2 of an external ego with tunable parameters: the search of these parameters."""
 
     trials: int = Field(40, ge=2, le=10_000)
-    """Drivers tried, the first with the parameters that the ego has."""
+    """Number of trials of the search. The first has the parameters of the ego's document."""
     games: int = Field(64, ge=1, le=100_000)
-    """Games of each trial, the same for all: the ego's mean payoff in them is what the search is for."""
+    """Games of each trial, the same for all trials. The search maximises the ego's mean payoff in them."""
     alone_share: float = Field(0.25, ge=0.0, le=1.0)
-    """Share of those games without the non-ego, so that what worked is not lost."""
+    """Share of these games without the non-ego, so that the ego still drives well alone."""
     games_at_once: int = Field(64, ge=1, le=1024)
-    """Games played at once."""
+    """Games played in parallel."""
 
 
 class Assessment(Document):
-    """How players are judged."""
+    """Assessment of the players."""
 
     episodes: int = Field(100, ge=2, le=1_000_000)
-    """Games of each arm; game k starts alike in every arm."""
+    """Games of each arm. Game k has the same start in every arm."""
     significance: float = Field(0.01, gt=0.0, lt=1.0)
-    """The p-value, after Holm's correction, below which a difference is called real."""
+    """A difference is called real if its p-value, after Holm's correction, is below this."""
 
 
 class Campaign(Document):
-    """One document, one command, one run folder."""
+    """A campaign: one document, run by one command into one run folder."""
 
     name: CampaignName
-    """What it is called; its run folder is reports/<name> if no other is given."""
+    """The name of the campaign. The default run folder is reports/<name>."""
     scene: DocumentPath
-    """Folder of the scene: a path from this file."""
+    """Folder of the scene, relative to this file."""
     personas: list[DocumentPath] = Field(min_length=1, max_length=50)
-    """The people whom the ego meets, one after the other: paths of their files from this file."""
+    """Files of the personas that the ego meets, one after the other, relative to this file."""
     seeds: list[Seed] = Field([1], min_length=1, max_length=100)
-    """Training seeds: everything is trained and assessed once for each."""
+    """Training seeds. All players are trained and assessed once per seed."""
     policies: DocumentPath | None = None
-    """Folder of policies trained before, laid out as a run folder's `policies/`: nothing is trained, every learned
-    player is read from it."""
+    """Folder of trained policies, with the layout of `policies/` in a run folder. Nothing is trained; every learned
+    player is read from this folder."""
     ego: Ego = Ego()
     training: Training = Training()
     non_ego_training: NonEgoTraining = NonEgoTraining()
     retraining: Retraining = Retraining()
     reconfiguration: Reconfiguration = Reconfiguration()
     population: list[Population] = Field([], max_length=50)
-    """Kinds of traffic that the ego meets as it meets a persona, and is retrained against."""
+    """Mixtures of personas. The ego meets a population like a persona, and is retrained against it."""
     rounds: Rounds = Rounds()
     best_response: BestResponse | None = None
     crossplay: CrossPlay | None = None
@@ -198,40 +203,40 @@ class Campaign(Document):
     @classmethod
     def _distinct(cls, seeds: list[int]) -> list[int]:
         if len(set(seeds)) < len(seeds):
-            raise ValueError("a seed stands twice")
+            raise ValueError("a seed occurs twice")
         return seeds
 
     @model_validator(mode="after")
     def _nothing_is_ignored(self) -> Campaign:
-        if self.policies is not None and (given := self._of_no_use()):
+        if self.policies is not None and (unused := self._unused_tables()):
             message = "with `policies` nothing is trained: this table would be ignored"
-            raise Mistakes([(name, message, "leave out this table or `policies`") for name in given])
+            raise Mistakes([(name, message, "leave out this table or `policies`") for name in unused])
         if self.rounds.stop_early and self.best_response is None:
-            message = "without [best_response] nobody knows when an exchange has settled"
-            raise Mistakes([("rounds.stop_early", message, "add [best_response] or leave it out")])
+            message = "without [best_response], it is not measured whether an equilibrium is reached"
+            raise Mistakes([("rounds.stop_early", message, "add [best_response] or leave out this key")])
         if self.ego.driver != LEARNED and self.rounds.count > Rounds().count:
-            message = "an ego that does not learn answers nobody: there is nothing after round 1"
-            raise Mistakes([("rounds.count", message, "leave it out, or let the ego be learned")])
+            message = "the ego does not learn, so there are no further rounds"
+            raise Mistakes([("rounds.count", message, "leave out this key, or set ego.driver to 'learned'")])
         if self.ego.driver != LEARNED and self.retraining.against:
             message = "an ego that does not learn can't be retrained"
-            raise Mistakes([("retraining.against", message, "leave it out, or let the ego be learned")])
+            raise Mistakes([("retraining.against", message, "leave out this key, or set ego.driver to 'learned'")])
         return self
 
-    def _of_no_use(self) -> list[str]:
-        """The tables given that say how players learn, though none learns so."""
-        given = [name for name in OF_TRAINING if name in self.model_fields_set]
+    def _unused_tables(self) -> list[str]:
+        """The training tables of the document that nothing uses in a campaign with `policies`."""
+        given = [name for name in TRAINING_TABLES if name in self.model_fields_set]
         if self.retraining.model_fields_set <= {"against"} and "retraining" in given:
-            given.remove("retraining")  # who met whom counts without a training as well
+            given.remove("retraining")  # `against` names the arms of the robust ego, which exist without training too
         return given if self.best_response is None else [name for name in given if name == "retraining"]
 
     @property
     def stops_early(self) -> bool:
-        """Whether an exchange may end before its last round."""
+        """Whether rounds may end before the last one."""
         return self.best_response is not None and self.rounds.stop_early is not False
 
     def recorded(self) -> dict[str, Any]:
-        """Every key that counts with its value, as a manifest holds it: how players learn or are tuned only where some
-        may be."""
+        """The document as the manifest records it: every key with its value. Keys about training and tuning are left
+        out where they have no effect."""
         unused: dict[str, Any] = {"reconfiguration": True} if self.ego.driver in (LEARNED, SUMO) else {}
         if self.policies is None:
             return self.model_dump(mode="json", exclude=unused)
@@ -241,6 +246,6 @@ class Campaign(Document):
         return self.model_dump(mode="json", exclude=unused)
 
 
-def resolve(campaign_file: Path, written: str) -> Path:
-    """A path in a campaign is relative to the campaign's own file."""
-    return Path(os.path.realpath(campaign_file.parent / written))
+def resolve(campaign_file: Path, path: str) -> Path:
+    """The absolute path of a path in a campaign, which is relative to the campaign's file."""
+    return Path(os.path.realpath(campaign_file.parent / path))

@@ -1,6 +1,6 @@
-"""A driver that somebody brings: a TOML file with its `kind`, and what that kind needs to know.
+"""An external driver: a TOML file with a `kind`, and the keys of that kind.
 
-Paths in it are relative to the document's own folder.
+Paths in the document are relative to its folder.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from harness.errors import UsageError
 from harness.game.observation import LAYOUT
 
 OUTPUTS = ("acceleration_mps2", "steering_rad")
-"""What a driver that thinks in units asks of its car."""
+"""The outputs of a driver that uses SI units."""
 
 Argument = Annotated[str, Field(max_length=2000, pattern=r"^[^\x00]*$")]
 VariableName = Annotated[str, Field(min_length=1, max_length=200)]
@@ -26,37 +26,37 @@ DeadlineS = Annotated[float, Field(gt=0.0, le=600.0)]
 
 
 class Sumo(Document):
-    """SUMO's own models, as a vehicle type of the scene's route file sets them."""
+    """SUMO's own models, as a vehicle type in the route file of the scene configures them."""
 
     kind: Literal["sumo"]
-    """Which kind of driver this is: what the other keys are goes by it."""
+    """The kind of driver, which determines the other keys."""
     vehicle_type: Annotated[str, Field(min_length=1, max_length=200)]
-    """The id of a `vType`: the ego is a car of this type, its size and top speed included."""
+    """The id of a `vType`. The ego is a car of this type, with its size and top speed."""
 
 
 class Process(Adjustable):
-    """A program in any language, which answers observations with controls: docs/egos.md has the protocol."""
+    """A program in any language that answers observations with controls. The protocol is in docs/egos.md."""
 
     parameter_table: ClassVar[str] = "parameters"
 
     kind: Literal["process"]
-    """Which kind of driver this is: what the other keys are goes by it."""
+    """The kind of driver, which determines the other keys."""
     command: list[Argument] = Field(min_length=1, max_length=100)
-    """The program and its arguments. It is run in `folder`; a name without `/` is looked for on PATH."""
+    """The program and its arguments. It runs in `folder`; a name without `/` is searched on PATH."""
     folder: DocumentPath = "."
-    """Where the program is run, from this document's folder; the paths of its files are from there, too."""
+    """The working folder of the program, relative to this document's folder. Paths of its files are relative to it."""
     files: list[DocumentPath] = Field([], max_length=1000)
-    """Further files its decisions depend on: when one changes, the games are played again. Arguments that are files
-    count anyway."""
+    """Further files that its decisions depend on. When one of them changes, the games are played again. Arguments that
+    are files are always included."""
     units: Literal["si", "scaled"] = "si"
-    """`si`: it sees metres, seconds and radians, and asks for acceleration_mps2 and steering_rad. `scaled`: it sees
-    and acts as learned policies do, in -1 to 1."""
+    """`si`: observations in metres, seconds and radians; outputs acceleration_mps2 and steering_rad. `scaled`:
+    observations and actions of learned policies, in -1 to 1."""
     deadline_s: DeadlineS = 10.0
-    """How long a decision may take. Not how quick it has to be: a busy machine must not change what comes of a game."""
+    """Longest time of a decision. It only detects programs that hang: a busy machine must not change a game."""
     start_deadline_s: DeadlineS = 20.0
-    """How long it may take to start."""
+    """Longest time of the start."""
     parameters: dict[ParameterName, bool | int | float | str] = Field({}, max_length=1000)
-    """What the program is told under `parameters` when it is greeted."""
+    """Parameters that the program receives in the first message, under `parameters`."""
 
 
 class Fmu(Adjustable):
@@ -65,32 +65,32 @@ class Fmu(Adjustable):
     parameter_table: ClassVar[str] = "start"
 
     kind: Literal["fmu"]
-    """Which kind of driver this is: what the other keys are goes by it."""
+    """The kind of driver, which determines the other keys."""
     file: DocumentPath
-    """The FMU, from this document's folder."""
+    """The FMU, relative to this document's folder."""
     inputs: dict[VariableName, str] = Field({}, max_length=200)
-    """What each input of the FMU is given: an entry of the observation. An input that is not here has to be called
-    like an entry."""
+    """The entry of the observation that each input of the FMU receives. An input that is not listed must have the name
+    of an entry."""
     outputs: dict[str, VariableName] = Field({}, max_length=2)
-    """Which output of the FMU is `acceleration_mps2` and which `steering_rad`, where they are called otherwise."""
+    """The names of the FMU's outputs for `acceleration_mps2` and `steering_rad`, if they differ from these."""
     start: dict[VariableName, float] = Field({}, max_length=1000)
-    """Start values: of parameters, and of inputs that nothing is given to."""
+    """Start values of parameters, and of inputs that receive no entry."""
     deadline_s: DeadlineS = 10.0
-    """How long a decision may take. Not how quick it has to be: a busy machine must not change what comes of a game."""
+    """Longest time of a decision. It only detects programs that hang: a busy machine must not change a game."""
     start_deadline_s: DeadlineS = 60.0
-    """How long it may take to load and to initialise."""
+    """Longest time of loading and initialisation."""
 
     @field_validator("inputs")
     @classmethod
-    def _entries(cls, inputs: dict[str, str]) -> dict[str, str]:
+    def _entries_exist(cls, inputs: dict[str, str]) -> dict[str, str]:
         for entry in inputs.values():
             if entry not in LAYOUT:
-                raise ValueError(f"there is no entry {entry!r} in what a driver sees: {nearest(entry, LAYOUT)}")
+                raise ValueError(f"the observation has no entry {entry!r}: {nearest(entry, LAYOUT)}")
         return inputs
 
     @field_validator("outputs")
     @classmethod
-    def _asked(cls, outputs: dict[str, str]) -> dict[str, str]:
+    def _controls_exist(cls, outputs: dict[str, str]) -> dict[str, str]:
         for name in outputs:
             if name not in OUTPUTS:
                 raise ValueError(f"there is no control {name!r}: {nearest(name, OUTPUTS)}")
@@ -98,25 +98,25 @@ class Fmu(Adjustable):
 
 
 class StableBaselines3(Document):
-    """A policy that Stable-Baselines3 saved, trained on `harness/Ego-v0` or an environment with its spaces."""
+    """A policy saved by Stable-Baselines3, trained on `harness/Ego-v0` or an environment with the same spaces."""
 
     kind: Literal["stable_baselines3"]
-    """Which kind of driver this is: what the other keys are goes by it."""
+    """The kind of driver, which determines the other keys."""
     file: DocumentPath
-    """The `.zip` that Stable-Baselines3 saved, from this document's folder."""
+    """The `.zip` file that Stable-Baselines3 saved, relative to this document's folder."""
     algorithm: Literal["PPO", "A2C", "SAC", "TD3"]
-    """Which of its algorithms saved it."""
+    """The algorithm that saved it."""
 
 
 class Python(Adjustable):
-    """An installed Python package's entry point of the group `harness.drivers`, with arguments."""
+    """An entry point of an installed Python package, in the group `harness.drivers`, with arguments."""
 
     parameter_table: ClassVar[str] = "parameters"
 
     kind: Literal["python"]
-    """Which kind of driver this is: what the other keys are goes by it."""
+    """The kind of driver, which determines the other keys."""
     entry_point: Annotated[str, Field(min_length=1, max_length=200)]
-    """The entry point's name, as the package declares it."""
+    """The name of the entry point, as the package declares it."""
     parameters: dict[str, Any] = Field({}, max_length=1000)
     """Keyword arguments of the entry point."""
 

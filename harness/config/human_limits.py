@@ -1,4 +1,4 @@
-"""How a person attends to the road, and what its body can't do: the tables of a persona beside its payoff."""
+"""Human limits of a persona, beside its payoff: attention, perception, reaction time and use of the car."""
 
 from __future__ import annotations
 
@@ -10,23 +10,38 @@ from pydantic import Field, SerializerFunctionWrapHandler, field_validator, mode
 from harness.config.scene import Interval
 from harness.config.toml_reading import Document
 from harness.game.attention import Attention, NoBlindSpotCheck
-from harness.game.human_limits import NOBODY, PERSISTENCE_S, LookedButFailedToSee, Reaction, Sight, Uses
+from harness.game.human_limits import (
+    ALL_NOTICED,
+    PERSISTENCE_S,
+    ActuatorShares,
+    LookedButFailedToSee,
+    Reaction,
+    Sight,
+)
 
 LONGEST_DELAY_S = 5.0
-LATER = ("misses_share", "noticed_within_m", "range_m", "distance_error", "closing_error_per_s", "error_s")
-"""Keys of perception that earlier versions did not know."""
+LATER = (
+    "looked_but_failed_to_see_share",
+    "noticed_within_m",
+    "range_m",
+    "distance_error",
+    "closing_error_per_s",
+    "error_correlation_time_s",
+)
+"""Keys of `Perception` that were added later."""
 
 
 class AttentionLapses(Document):
-    """When attention lapses, for how long, and what the car does meanwhile."""
+    """When attention lapses, how long a lapse lasts, and how the car drifts in it."""
 
     mean_attentive_s: float = Field(gt=0.1, le=3600.0)
-    """Mean time between lapses (exponential)."""
+    """Mean time between lapses (exponential distribution)."""
     lapse_s: Interval
-    """Range of a lapse's length (uniform). In it the policy's actions are omitted: pedals and wheel are let go."""
-    crown_rad: float = Field(0.0, ge=0.0, le=0.1)
-    """Steering angle, to the right, that the road's crown makes of a wheel let go."""
-    bumps_rad: float = Field(0.0, ge=0.0, le=0.1)
+    """Range of the length of a lapse (uniform distribution). In a lapse the policy's actions are omitted: pedals and
+    wheel are released."""
+    crown_steering_rad: float = Field(0.0, ge=0.0, le=0.1, serialization_alias="crown_rad")
+    """Steering angle, to the right, that the crown of the road gives to a released wheel."""
+    bump_steering_sd_rad: float = Field(0.0, ge=0.0, le=0.1, serialization_alias="bumps_rad")
     """Standard deviation, from lapse to lapse, of the steering angle that bumps and the car's own pull add to it."""
 
     @field_validator("lapse_s")
@@ -38,100 +53,117 @@ class AttentionLapses(Document):
 
     @property
     def attention(self) -> Attention:
-        """When attention lapses, as the game knows it."""
-        return Attention(self.mean_attentive_s, self.lapse_s, self.crown_rad, self.bumps_rad)
+        """The lapses as the game uses them."""
+        return Attention(
+            mean_attentive_s=self.mean_attentive_s,
+            lapse_s=self.lapse_s,
+            crown_rad=self.crown_steering_rad,
+            bumps_rad=self.bump_steering_sd_rad,
+        )
 
 
 class ReactionTime(Document):
-    """How late decisions reach pedals and wheel: while the person itself is trained, too."""
+    """How late decisions reach pedals and wheel, in the training of the person as well."""
 
     delay_s: Interval
-    """Range of the delay (uniform, drawn for each drive). Until the first decision arrives, the car coasts straight
-    on. 0 to 5 s."""
+    """Range of the delay (uniform distribution, drawn for each drive), within 0 to 5 s. Until the first decision
+    arrives, the car coasts straight on."""
 
     @field_validator("delay_s")
     @classmethod
     def _possible(cls, delay_s: tuple[float, float]) -> tuple[float, float]:
         if not 0.0 <= delay_s[0] <= delay_s[1] <= LONGEST_DELAY_S:
-            raise ValueError(f"decisions arrive 0 to {LONGEST_DELAY_S:g} s later")
+            raise ValueError(f"the delay must be between 0 and {LONGEST_DELAY_S:g} s")
         return delay_s
 
     @property
     def reaction(self) -> Reaction:
-        """How late decisions arrive, as the game knows it."""
-        return Reaction(self.delay_s)
+        """The delay as the game uses it."""
+        return Reaction(delay_s=self.delay_s)
 
 
 class Perception(Document):
-    """What a person fails to see. NoBlindSpotCheck and missing others are habits of driving, not of learning: while the
-    person itself is trained, its eyes are open, for nobody has learned from what was overlooked and went well. How
-    far and how exactly it sees is the body's doing, and there from the first lesson on."""
+    """What a person fails to see. No blind-spot check, and looking but failing to see, are habits of driving, not of
+    learning: they do not apply in the training of the person, because a car that is not seen and does no harm teaches
+    nothing. How far and how exactly a person sees is a limit of the body, and applies in training as well."""
 
-    overlooks_share: float = Field(0.0, ge=0.0, le=1.0)
+    no_blind_spot_check_share: float = Field(0.0, ge=0.0, le=1.0, serialization_alias="overlooks_share")
     """Share of the drives in which the person does not look into the mirrors and over the shoulder."""
-    overlooked_up_to_m: float = Field(0.0, ge=-20.0, le=100.0)
-    """In such a drive, others whose centre is not at least this far ahead of the person's own are not seen."""
-    misses_share: float = Field(0.0, ge=0.0, le=1.0)
-    """Share of the drives in which the person looks and fails to see: others are noticed only when they are near."""
+    unseen_behind_m: float = Field(0.0, ge=-20.0, le=100.0, serialization_alias="overlooked_up_to_m")
+    """In such a drive, a car is not seen if its centre is less than this far ahead of the centre of the person's own
+    car."""
+    looked_but_failed_to_see_share: float = Field(0.0, ge=0.0, le=1.0, serialization_alias="misses_share")
+    """Share of the drives in which the person looks but fails to see: other cars are noticed only when they are
+    near."""
     noticed_within_m: float | None = Field(None, gt=0.0, le=100.0)
-    """In such a drive, others are seen only within this distance, from centre to centre."""
+    """In such a drive, other cars are seen only within this distance, from centre to centre."""
     range_m: float | None = Field(None, gt=0.0, le=100.0)
-    """Others farther away than this, from centre to centre, are never seen."""
+    """Other cars farther away than this, from centre to centre, are never seen."""
     distance_error: float = Field(0.0, ge=0.0, le=1.0)
-    """Standard deviation of how far off the distance of others is judged: of the logarithm of its factor, so 0.1 is
-    about a tenth."""
+    """Error in the estimated distance of other cars: standard deviation of the logarithm of the factor, so 0.1 is about
+    10 %."""
     closing_error_per_s: float = Field(0.0, ge=0.0, le=1.0)
-    """Standard deviation of how far off others' closing speed is judged, per distance: 0.01 is 0.3 m/s at 30 m."""
-    error_s: float = Field(PERSISTENCE_S, gt=0.0, le=3600.0)
+    """Error in the estimated closing speed of other cars: standard deviation, per distance. 0.01 is 0.3 m/s at 30 m."""
+    error_correlation_time_s: float = Field(PERSISTENCE_S, gt=0.0, le=3600.0, serialization_alias="error_s")
     """How long such an error lasts (correlation time)."""
 
     @model_validator(mode="after")
     def _nothing_is_ignored(self) -> Perception:
-        if self.misses_share and self.noticed_within_m is None:
-            raise ValueError("misses_share says nothing without noticed_within_m: give the distance")
-        if self.noticed_within_m is not None and not self.misses_share:
-            raise ValueError("noticed_within_m says nothing without misses_share: give the share of the drives")
-        if "error_s" in self.model_fields_set and not self.distance_error and not self.closing_error_per_s:
-            raise ValueError("error_s says nothing without distance_error or closing_error_per_s: give one of them")
+        if self.looked_but_failed_to_see_share and self.noticed_within_m is None:
+            raise ValueError("looked_but_failed_to_see_share has no effect without noticed_within_m: add the distance")
+        if self.noticed_within_m is not None and not self.looked_but_failed_to_see_share:
+            raise ValueError(
+                "noticed_within_m has no effect without looked_but_failed_to_see_share: add the share of the drives"
+            )
+        has_error = self.distance_error or self.closing_error_per_s
+        if "error_correlation_time_s" in self.model_fields_set and not has_error:
+            raise ValueError(
+                "error_correlation_time_s has no effect without distance_error or closing_error_per_s: add one of them"
+            )
         return self
 
     @model_serializer(mode="wrap")
-    def _without_limits_that_nobody_has(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A person without the limits of later versions is written as before them: stages keep their keys."""
-        usual = {name: Perception.model_fields[name].default for name in LATER}
-        return {key: each for key, each in dump(self).items() if key not in LATER or each != usual[key]}
+    def _without_unused_later_keys(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out keys of later versions that have their default: stages of personas without them keep their keys."""
+        unused = {name for name in LATER if getattr(self, name) == Perception.model_fields[name].default}
+        aliases = {Perception.model_fields[name].serialization_alias for name in unused}
+        return {key: value for key, value in dump(self).items() if key not in unused | aliases}
 
     @property
     def no_blind_spot_check(self) -> NoBlindSpotCheck:
-        """Whom the person overlooks."""
-        return NoBlindSpotCheck(self.overlooks_share, self.overlooked_up_to_m)
+        """The missing blind-spot check as the game uses it."""
+        return NoBlindSpotCheck(share=self.no_blind_spot_check_share, ahead_m=self.unseen_behind_m)
 
     @property
     def looked_but_failed_to_see(self) -> LookedButFailedToSee:
-        """Whom the person looks at and fails to see."""
-        return (
-            NOBODY if self.noticed_within_m is None else LookedButFailedToSee(self.misses_share, self.noticed_within_m)
-        )
+        """Looking but failing to see, as the game uses it."""
+        if self.noticed_within_m is None:
+            return ALL_NOTICED
+        return LookedButFailedToSee(share=self.looked_but_failed_to_see_share, within_m=self.noticed_within_m)
 
     @property
     def sight(self) -> Sight:
-        """How far and how exactly the person sees."""
-        far = np.inf if self.range_m is None else self.range_m
-        return Sight(far, self.distance_error, self.closing_error_per_s, self.error_s)
+        """How far and how exactly the person sees, as the game uses it."""
+        return Sight(
+            range_m=np.inf if self.range_m is None else self.range_m,
+            distance_error=self.distance_error,
+            closing_error_per_s=self.closing_error_per_s,
+            error_s=self.error_correlation_time_s,
+        )
 
 
 class CarUse(Document):
-    """Shares of what the car can do that this person uses, with pedals and wheel as far as they go: while the person
-    itself is trained, too."""
+    """Shares of what the car can do that the person uses with pedals and wheel at their limit, in the training of the
+    person as well."""
 
     throttle_share: float = Field(1.0, gt=0.0, le=1.0)
     """Share of the car's acceleration."""
     braking_share: float = Field(1.0, gt=0.0, le=1.0)
     """Share of the car's braking."""
     steering_share: float = Field(1.0, gt=0.0, le=1.0)
-    """Share of the steering angle that is of use at the speed."""
+    """Share of the useful steering angle at the current speed."""
 
     @property
-    def uses(self) -> Uses:
-        """What the person uses of the car, as the game knows it."""
-        return Uses(self.throttle_share, self.braking_share, self.steering_share)
+    def uses(self) -> ActuatorShares:
+        """The shares as the game uses them."""
+        return ActuatorShares(throttle=self.throttle_share, braking=self.braking_share, steering=self.steering_share)

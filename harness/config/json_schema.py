@@ -1,7 +1,7 @@
-"""The documents as JSON Schemas, for editors: made from the models, so that there is one description of each.
+"""The JSON Schemas of the documents, for editors, generated from the models.
 
-What a schema can't say (an interval's lower end comes first, a buffer is a multiple of the games, ...) is left to the
-models; a schema refuses nothing that they accept. TOML has no null: a key that may be left out is one that isn't there.
+Only the models check what a schema can't express (an interval has its lower end first, a buffer is a multiple of the
+games, ...). A schema refuses nothing that the model accepts. TOML has no null: an optional key is left out.
 """
 
 from __future__ import annotations
@@ -23,25 +23,24 @@ from harness.errors import UsageError
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS, Term
 
 DOCUMENTS: Mapping[str, Any] = {"campaign": Campaign, "persona": Persona, "scene": Scene, "driver": DriverDocument}
-"""Every kind of document that a person writes, with its type: what `harness schema` knows of."""
+"""All kinds of documents that users write, with their types."""
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 UNITS = {"mps2": "m/s²", "mps": "m/s", "radps": "rad/s", "rad": "rad", "m": "m", "s": "s"}
-"""Units by what a key's name ends with."""
+"""Units by the ending of a key."""
 
 
 def schema_of(document: str) -> dict[str, Any]:
     """The JSON Schema (draft 2020-12) of a kind of document. Raises KeyError when there is no such kind."""
-    schema = TypeAdapter(DOCUMENTS[document]).json_schema(schema_generator=_OfToml)
+    schema = TypeAdapter(DOCUMENTS[document]).json_schema(schema_generator=_TomlSchema)
     if document == "persona":
         _name_terms(schema)
-    for name, described in _properties(schema):
-        if "description" in described:
-            described["description"] = " ".join(described["description"].split())
-        if unit := unit_of(name):
-            described["description"] = f"{described.get('description', '')} Unit: {unit}.".lstrip()
-        if "prefixItems" in described:
-            described["description"] = f"{described.get('description', '')} Two numbers, the lower first.".lstrip()
+    for name, node in _properties(schema):
+        notes = [" ".join(node.get("description", "").split())]
+        notes += [f"Unit: {unit}."] if (unit := unit_of(name)) else []
+        notes += ["Two numbers, the lower first."] if "prefixItems" in node else []
+        if description := " ".join(filter(None, notes)):
+            node["description"] = description
     for table in schema.get("$defs", {}).values():
         if "description" in table:
             table["description"] = " ".join(table["description"].split())
@@ -49,7 +48,7 @@ def schema_of(document: str) -> dict[str, Any]:
 
 
 def schema_text(document: str) -> str:
-    """A schema as the text of its file. Raises UsageError when there is no such kind of document."""
+    """The content of a schema file. Raises UsageError when there is no such kind of document."""
     if document not in DOCUMENTS:
         raise UsageError.of(
             "harness schema", "", f"there is no kind of document {document!r}", nearest(document, DOCUMENTS)
@@ -58,26 +57,26 @@ def schema_text(document: str) -> str:
 
 
 def file_of(document: str) -> str:
-    """What a schema's file is called."""
+    """The name of a schema file."""
     return f"{document}.schema.json"
 
 
 def unit_of(key: str) -> str:
-    """The unit in a key's name, e.g. "m/s" of speed_mps; empty: it has none."""
+    """The unit in the name of a key, such as "m/s" for speed_mps; empty if there is none."""
     if key.endswith("_per_s"):
         return "1/s"
     return UNITS.get(key.rpartition("_")[2], "") if "_" in key else ""
 
 
 def term_in_words(term: Term) -> str:
-    """What a unit of a term's weight is counted for."""
+    """The meaning of a term: what its weight is multiplied by."""
     if term.parameter:
-        return f"{term.meaning}; per second at 0, nothing from {term.parameter} on"
+        return f"{term.meaning}; per second at 0, and 0 from {term.parameter} on"
     return term.meaning + (", per second" if term.per_second and "second" not in term.meaning else "")
 
 
-class _OfToml(GenerateJsonSchema):
-    """Schemas without titles made of keys, and without null."""
+class _TomlSchema(GenerateJsonSchema):
+    """Schemas without titles derived from keys, and without null."""
 
     def field_title_should_be_set(self, schema: Any) -> bool:
         return False
@@ -86,14 +85,14 @@ class _OfToml(GenerateJsonSchema):
         return self.generate_inner(schema["schema"])
 
     def default_schema(self, schema: Any) -> dict[str, Any]:
-        made = super().default_schema(schema)
-        if made.get("default") is None or isinstance(made["default"], dict):  # a table's keys have defaults themselves
-            made.pop("default", None)
-        return made
+        node = super().default_schema(schema)
+        if node.get("default") is None or isinstance(node["default"], dict):  # the keys of a table have defaults
+            node.pop("default", None)
+        return node
 
 
 def _properties(node: Any) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Every key that a schema knows, at any depth, with its schema."""
+    """All keys of a schema, at any depth, each with its schema."""
     if isinstance(node, dict):
         properties = node.get("properties")
         if isinstance(properties, dict):
@@ -106,16 +105,16 @@ def _properties(node: Any) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _name_terms(schema: dict[str, Any]) -> None:
-    """Give each group of equation 1 its own terms by name, where the model checks names after reading."""
+    """Add the names of the terms to each group of equation 1; the model checks these names after reading."""
     tables = schema["$defs"]
     for group in GROUPS:
         field = schema["properties"][group]
         title = group.capitalize()
-        given = deepcopy(tables[field["$ref"].rpartition("/")[2]])
-        given["title"] = title
-        weight, limits = given["properties"]["weight"], tables["Parametrised"]["properties"]
-        given["properties"]["terms"] = {
-            "description": given["properties"]["terms"]["description"],
+        table = deepcopy(tables[field["$ref"].rpartition("/")[2]])
+        table["title"] = title
+        weight, limits = table["properties"]["weight"], tables["Parametrised"]["properties"]
+        table["properties"]["terms"] = {
+            "description": table["properties"]["terms"]["description"],
             "type": "object",
             "additionalProperties": False,
             "properties": {
@@ -123,11 +122,11 @@ def _name_terms(schema: dict[str, Any]) -> None:
             },
         }
         schema["properties"][group] = field | {"$ref": f"#/$defs/{title}"}
-        tables[title] = given
+        tables[title] = table
     quantity = tables["FuzzyTerm"]["properties"]["quantity"]
     quantity["enum"] = list(FUZZY_QUANTITIES)
-    known = "; ".join(f"{name}: {meaning}" for name, meaning in FUZZY_QUANTITIES.items())
-    quantity["description"] += f" {known}."
+    meanings = "; ".join(f"{name}: {meaning}" for name, meaning in FUZZY_QUANTITIES.items())
+    quantity["description"] += f" {meanings}."
     for unused in ("Group", "Parametrised"):
         if f'"#/$defs/{unused}"' not in json.dumps(schema):
             del tables[unused]

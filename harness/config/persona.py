@@ -1,7 +1,8 @@
-"""A persona: what a kind of person wants of a drive, and how they attend to it."""
+"""A persona: the payoff and the human limits of a kind of driver."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -20,7 +21,7 @@ from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest
 from harness.game.attention import HumanFactors
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
-from harness.game.human_limits import ALL, AT_ONCE, EXACT, NOBODY
+from harness.game.human_limits import ALL_NOTICED, EXACT_SIGHT, FULL_SHARES, NO_DELAY
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
@@ -29,89 +30,87 @@ Membership = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class Source(Document):
-    """What is known of such people: the statistic the persona rests on, and where it is from."""
+    """The evidence for a persona: a statistic and its source."""
 
     statistic: str = Field(min_length=10, max_length=2000)
-    """What was counted or measured, with its figure."""
+    """What was counted or measured, with the figure."""
     citation: str = Field(min_length=5, max_length=2000)
-    """Who published it, where and when."""
+    """Author, publication and year."""
 
 
 class Parametrised(Document):
-    """A term that takes a limit: `{ weight = 1.0, within_m = 0.5 }`."""
+    """A term with a limit: `{ weight = 1.0, within_m = 0.5 }`."""
 
     weight: Weight
-    """What the term counts."""
+    """The term's weight."""
     within_m: float | None = Field(None, gt=0.0, le=100.0)
-    """The distance from which on the term is nothing."""
+    """The term is 0 from this distance on."""
     within_s: float | None = Field(None, gt=0.0, le=60.0)
-    """The time from which on the term is nothing."""
+    """The term is 0 from this time on."""
 
 
 WeightOrTable = Annotated[
     Annotated[Weight, Tag(NUMBER)] | Annotated[Parametrised, Tag(TABLE)],
-    Discriminator(lambda given: TABLE if isinstance(given, dict | Parametrised) else NUMBER),
+    Discriminator(lambda value: TABLE if isinstance(value, dict | Parametrised) else NUMBER),
 ]
 
 
 class Group(Document):
-    """One of equation 1's three groups of terms. A term that is left out weighs nothing."""
+    """One of the three groups of terms in equation 1. A term that is left out has the weight 0."""
 
     weight: Weight = 1.0
-    """Its coefficient alpha in equation 1."""
+    """Coefficient alpha of the group in equation 1."""
     terms: dict[str, WeightOrTable] = Field(default_factory=dict)
     """Each term's weight, or its weight and limit."""
 
 
 class MembershipFunction(Document):
-    """A fuzzy set: linear between points of [input, membership in 0..1], constant outside them."""
+    """A fuzzy set: membership is linear between the points [input, membership in 0..1], and constant outside them."""
 
     name: Name
-    """What the set is called."""
-    points: list[tuple[Annotated[float, Field(ge=-1e6, le=1e6)], Annotated[float, Field(ge=0.0, le=1.0)]]] = Field(
-        min_length=1, max_length=20
-    )
-    """Points of [input in the quantity's unit, membership], the inputs rising."""
+    """The name of the set."""
+    points: list[tuple[Input, Membership]] = Field(min_length=1, max_length=20)
+    """Points [input in the unit of the quantity, membership], with increasing inputs."""
     value: float = Field(ge=-1000.0, le=1000.0)
-    """What being wholly in this set is worth, per second."""
+    """Payoff per second at full membership."""
 
     @field_validator("points")
     @classmethod
-    def _rising(cls, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    def _inputs_increase(cls, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
         inputs = [point[0] for point in points]
         if inputs != sorted(set(inputs)):
-            raise ValueError("the points' inputs must rise")
+            raise ValueError("the inputs of the points must increase")
         return points
 
     @property
     def fuzzy_set(self) -> FuzzySet:
-        """The set as the game knows it."""
+        """The set as the game uses it."""
         inputs, memberships = zip(*self.points, strict=True)
-        return FuzzySet(self.name, inputs, memberships, self.value)
+        return FuzzySet(name=self.name, inputs=inputs, memberships=memberships, value=self.value)
 
 
 class FuzzyTerm(Document):
-    """A human term declared by membership functions over one quantity of the game."""
+    """A human term defined by membership functions of one quantity of the game."""
 
     name: Name
-    """What the term is called, in tables too."""
+    """The name of the term, also in tables."""
     weight: Weight = 1.0
-    """What the function's value is multiplied by."""
+    """Factor of the function's value."""
     quantity: str
-    """The quantity of the game that it is a function of."""
+    """The quantity of the game that the term is a function of."""
     sets: list[MembershipFunction] = Field(min_length=1, max_length=20)
-    """The fuzzy sets. Between them the value is the average of theirs, weighted by membership; outside all, 0."""
+    """The fuzzy sets. The value of the term is the mean of their values, weighted by membership; 0 outside all sets."""
 
     @field_validator("quantity")
     @classmethod
-    def _known(cls, quantity: str) -> str:
+    def _quantity_exists(cls, quantity: str) -> str:
         if quantity not in FUZZY_QUANTITIES:
             raise ValueError(f"unknown quantity {quantity!r}: {nearest(quantity, FUZZY_QUANTITIES)}")
         return quantity
 
     @field_validator("name")
     @classmethod
-    def _free(cls, name: str) -> str:
+    def _name_is_not_built_in(cls, name: str) -> str:
         if name in TERMS:
             raise ValueError(f"{name!r} is a built-in term: give the fuzzy term another name")
         return name
@@ -120,44 +119,44 @@ class FuzzyTerm(Document):
     def _contact_is_worst(self) -> FuzzyTerm:
         if self.quantity in NEARNESS:
             inputs = {0.0, *(max(point[0], 0.0) for each in self.sets for point in each.points)}
-            some = np.array(sorted(inputs | {each + 1e-6 for each in inputs} | {max(inputs) + 1.0}))
-            worth = self.function(some)
-            if worth[0] > worth.min() + 1e-9:
+            samples = np.array(sorted(inputs | {each + 1e-6 for each in inputs} | {max(inputs) + 1.0}))
+            values = self.function(samples)
+            if values[0] > values.min() + 1e-9:
                 raise ValueError(
-                    f"nobody may be paid for a crash: at contact (0) it is worth {worth[0]:g}, "
-                    f"more than the {worth.min():g} at {some[worth.argmin()]:g}"
+                    f"a crash must not be rewarded: the value at contact (0) is {values[0]:g}, "
+                    f"more than the {values.min():g} at {samples[values.argmin()]:g}"
                 )
         return self
 
     @property
     def function(self) -> FuzzyFunction:
         """The function of the quantity."""
-        return FuzzyFunction(self.quantity, tuple(each.fuzzy_set for each in self.sets))
+        return FuzzyFunction(quantity=self.quantity, sets=tuple(each.fuzzy_set for each in self.sets))
 
 
 class Human(Group):
-    """The human group: besides named terms, any number of fuzzy ones."""
+    """The human group: named terms, and any number of fuzzy terms."""
 
     fuzzy: list[FuzzyTerm] = Field(default_factory=list, max_length=50)
-    """Terms declared by membership functions."""
+    """Terms defined by membership functions."""
 
 
-def _fits(parameter: str, given: float | Parametrised) -> bool:
-    """Whether a term that takes this limit (or none) was given as it has to be."""
-    if isinstance(given, Parametrised):
-        return {name for name in ("within_m", "within_s") if getattr(given, name) is not None} == {parameter}
-    return not parameter
+def _has_limit(value: float | Parametrised, limit: str) -> bool:
+    """Whether the value of a term has exactly this limit; an empty name stands for no limit."""
+    if isinstance(value, Parametrised):
+        return {name for name in ("within_m", "within_s") if getattr(value, name) is not None} == {limit}
+    return not limit
 
 
 class Persona(Document):
-    """A kind of driver, as equation 1 and human limits."""
+    """A kind of driver: the payoff of equation 1 and human limits."""
 
     name: Name
-    """What such a person is called, in stages, arms and tables."""
+    """The name of the persona in stages, arms and tables."""
     description: str = Field(min_length=10, max_length=2000)
-    """Who this is, in a sentence."""
+    """The driver in one sentence."""
     sources: list[Source] = Field(min_length=1, max_length=50)
-    """What is known of such people: no persona without a statistic."""
+    """The evidence for the persona: at least one statistic."""
     safety: Group = Group()
     operational: Group = Group()
     human: Human = Human()
@@ -166,70 +165,68 @@ class Persona(Document):
     reaction: ReactionTime | None = None
     actuators: CarUse | None = None
     decisions: Literal["mode", "sampled"] = "mode"
-    """Whether it always takes its policy's most likely action, or varies as the policy does."""
+    """`mode`: always the most likely action of the policy. `sampled`: actions drawn from the policy's distribution."""
 
     @model_validator(mode="after")
-    def _terms_fit(self) -> Persona:
-        wrong = []
-        for group in GROUPS:
-            known = [name for name, term in TERMS.items() if term.group == group]
-            for name, given in getattr(self, group).terms.items():
-                key = f"{group}.terms.{name}"
-                if name in TERMS and name not in known:
-                    right = TERMS[name].group
-                    wrong.append((key, f"belongs to the {right} terms", f"move it to [{right}.terms]"))
-                elif name not in known:
-                    wrong.append((key, f"unknown {group} term", nearest(name, known)))
-                elif not _fits(TERMS[name].parameter, given):
-                    limit = TERMS[name].parameter
-                    remedy = f"{{ weight = ..., {limit} = ... }}" if limit else "a plain weight"
-                    wrong.append((key, "its weight is not given as it has to be", f"give {remedy}"))
+    def _terms_are_valid(self) -> Persona:
+        mistakes = [mistake for group in GROUPS for mistake in self._mistakes_in(group)]
         names = [each.name for each in self.human.fuzzy]
         for k, name in enumerate(names):
             if name in names[:k]:
-                wrong.append((f"human.fuzzy[{k}].name", f"{name!r} stands twice", "give each a name of its own"))
-        if wrong:
-            raise Mistakes(wrong)
+                mistakes.append((f"human.fuzzy[{k}].name", f"{name!r} occurs twice", "give each term its own name"))
+        if mistakes:
+            raise Mistakes(mistakes)
         if not any(getattr(self, group).terms for group in GROUPS) and not self.human.fuzzy:
             raise ValueError("the payoff has no terms: nothing could be learned from it")
         return self
 
+    def _mistakes_in(self, group: str) -> Iterator[tuple[str, str, str]]:
+        """Key, message and remedy of each mistake in the terms of a group."""
+        known = [name for name, term in TERMS.items() if term.group == group]
+        for name, value in getattr(self, group).terms.items():
+            key = f"{group}.terms.{name}"
+            if name not in TERMS:
+                yield key, f"unknown {group} term", nearest(name, known)
+            elif name not in known:
+                right = TERMS[name].group
+                yield key, f"belongs to the {right} terms", f"move it to [{right}.terms]"
+            elif not _has_limit(value, limit := TERMS[name].parameter):
+                remedy = f"{{ weight = ..., {limit} = ... }}" if limit else "a plain weight"
+                yield key, "has the wrong form", f"give {remedy}"
+
     @model_serializer(mode="wrap")
-    def _without_limits_that_nobody_has(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """A person without the limits of later versions is written as before them: stages keep their keys."""
-        written: dict[str, Any] = dump(self)
+    def _without_unused_later_tables(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """Leave out tables of later versions that are not used: stages of personas without them keep their keys."""
+        document: dict[str, Any] = dump(self)
         for table in ("reaction", "actuators"):
-            if written.get(table, 0) is None:
-                del written[table]
-        return written
+            if document.get(table, 0) is None:
+                del document[table]
+        return document
 
     @property
     def payoff(self) -> Payoff:
         """Equation 1 of this persona."""
         terms = []
         for group in (self.safety, self.operational, self.human):
-            for name, given in group.terms.items():
-                if isinstance(given, Parametrised):
-                    terms.append(Weighted(name, given.weight, given.within_m or given.within_s))
+            for name, value in group.terms.items():
+                if isinstance(value, Parametrised):
+                    limit = value.within_m or value.within_s
+                    terms.append(Weighted(name=name, weight=value.weight, parameter=limit))
                 else:
-                    terms.append(Weighted(name, given))
+                    terms.append(Weighted(name=name, weight=value))
         fuzzy = {each.name: (each.weight, each.function) for each in self.human.fuzzy}
-        alpha = {
-            "safety": self.safety.weight,
-            "operational": self.operational.weight,
-            "human": self.human.weight,
-        }
-        return Payoff(alpha, tuple(terms), fuzzy)
+        alpha = {group: getattr(self, group).weight for group in GROUPS}
+        return Payoff(alpha=alpha, terms=tuple(terms), fuzzy=fuzzy)
 
     @property
     def human_factors(self) -> HumanFactors:
-        """How this person attends to the road."""
+        """The human limits as the game uses them."""
         perception = self.perception
         return HumanFactors(
-            self.attention.attention if self.attention else None,
-            perception.no_blind_spot_check if perception else HumanFactors.no_blind_spot_check,
-            perception.looked_but_failed_to_see if perception else NOBODY,
-            self.reaction.reaction if self.reaction else AT_ONCE,
-            perception.sight if perception else EXACT,
-            self.actuators.uses if self.actuators else ALL,
+            attention=self.attention.attention if self.attention else None,
+            no_blind_spot_check=perception.no_blind_spot_check if perception else HumanFactors.no_blind_spot_check,
+            looked_but_failed_to_see=perception.looked_but_failed_to_see if perception else ALL_NOTICED,
+            reaction=self.reaction.reaction if self.reaction else NO_DELAY,
+            sight=perception.sight if perception else EXACT_SIGHT,
+            actuator_shares=self.actuators.uses if self.actuators else FULL_SHARES,
         )

@@ -1,4 +1,4 @@
-"""A road scene: `scene.toml` beside SUMO's net and route files."""
+"""A road scene: `scene.toml` beside the net file and the route file of SUMO."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from harness.config.toml_reading import Document
 
 def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
     if interval[0] > interval[1]:
-        raise ValueError(f"the interval [{interval[0]:g}, {interval[1]:g}] is empty: put the lower end first")
+        raise ValueError(f"the interval [{interval[0]:g}, {interval[1]:g}] is empty: write the lower end first")
     return interval
 
 
@@ -22,16 +22,16 @@ Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Z
 
 
 class Goal(Document):
-    """Where the players want to go."""
+    """The destination of the players."""
 
     edge: str
-    """The edge of the net the goal is on."""
+    """The edge of the goal, an edge of the net."""
     position_m: float = Field(ge=0.0)
     """Distance along that edge."""
 
 
 class Actuators(Document):
-    """What the players' cars can do beyond what their vehicle type in the route file says."""
+    """Limits of a player's car that its vehicle type in the route file does not have."""
 
     max_acceleration_mps2: float = Field(3.0, gt=0.0, le=15.0)
     """Acceleration at full throttle."""
@@ -40,24 +40,24 @@ class Actuators(Document):
     max_steering_rad: float = Field(0.6, gt=0.0, le=1.2)
     """Road wheel angle at full lock."""
     max_steering_rate_radps: float = Field(0.8, gt=0.0, le=10.0)
-    """How fast the road wheels turn."""
+    """Greatest rate of the road wheel angle."""
     wheelbase_m: float = Field(2.7, gt=0.5, le=12.0)
     """Distance between the axles."""
 
 
 class Player(Document):
-    """A vehicle of the route file that the harness takes over, and where it starts in each episode."""
+    """A vehicle of the route file that the harness controls, and the ranges of its start in each episode."""
 
     vehicle: str
-    """Its id in the route file."""
+    """The id of the vehicle in the route file."""
     lane: str
-    """The lane it starts in."""
+    """The lane of the start."""
     position_m: Interval | None = None
-    """Range of its front bumper's start along the lane."""
+    """Range of the start of its front bumper, along the lane."""
     beside_ego_m: Interval | None = None
-    """Instead of `position_m`: range of its start relative to the ego's, ahead (+) or behind (-)."""
+    """Instead of `position_m`: range of the start relative to the start of the ego, ahead (+) or behind (-)."""
     speed_mps: Interval
-    """Range of its speed at the start."""
+    """Range of the speed at the start."""
     actuators: Actuators = Actuators()
 
     @model_validator(mode="after")
@@ -70,22 +70,22 @@ class Player(Document):
 
 
 class Scene(Document):
-    """The road, who drives on it, and how a game on it starts and ends."""
+    """The road, the players on it, and how a game starts and ends."""
 
     name: Name
-    """What the scene is called."""
+    """The name of the scene."""
     net: PlainFile
-    """The SUMO net, a file of the scene's folder."""
+    """The SUMO net file in the folder of the scene."""
     routes: PlainFile
-    """The SUMO routes, vehicle types and vehicles, a file of the scene's folder."""
+    """The SUMO file of routes, vehicle types and vehicles in the folder of the scene."""
     step_length_s: float = Field(0.1, ge=0.01, le=0.2)
-    """Contact is looked for once a step: in a longer one a car could jump over another."""
+    """Length of a step. Contact is tested once per step; in a longer step one car could pass through another."""
     time_limit_s: float = Field(gt=0.0, le=600.0)
-    """A player that has not reached its goal by then has failed."""
+    """Longest duration of a game. A player that has not reached its goal by then has failed."""
     friction: float = Field(0.8, gt=0.0, le=1.5)
-    """Tyre on road, as a share of g."""
+    """Coefficient of friction between tyre and road, as a share of g."""
     lane_change_duration_s: float = Field(2.0, ge=0.0, le=10.0)
-    """How long vehicles that SUMO drives take to change lanes."""
+    """Duration of a lane change of background traffic."""
     goal: Goal
     ego: Player
     non_ego: Player
@@ -93,12 +93,12 @@ class Scene(Document):
     @model_validator(mode="after")
     def _ego_leads(self) -> Scene:
         if self.ego.beside_ego_m is not None:
-            raise ValueError("ego.beside_ego_m: the ego can't start beside itself, give ego.position_m")
+            raise ValueError("ego.beside_ego_m: the ego can't start beside itself; give ego.position_m")
         return self
 
     @property
     def players(self) -> tuple[Player, Player]:
-        """Ego and non-ego, in the order of the players' axis."""
+        """Ego and non-ego, in the order of the player axis of arrays."""
         return self.ego, self.non_ego
 
 
@@ -106,5 +106,5 @@ SCENE_FILE = "scene.toml"
 
 
 def scene_file(folder: Path) -> Path:
-    """The scene document of a scene's folder."""
+    """The scene document in the folder of a scene."""
     return folder / SCENE_FILE

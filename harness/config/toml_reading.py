@@ -1,4 +1,4 @@
-"""Reading a TOML document into a pydantic model; every mistake in it becomes a `Problem`, all at once."""
+"""Reading a TOML document into a pydantic model. All mistakes in it are reported together, each as a `Problem`."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import difflib
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError
+from typing_extensions import Self
 
 from harness.errors import Problem, UsageError
 from harness.files import content_of
@@ -22,32 +23,56 @@ else:  # pragma: no cover
 
 
 class Document(BaseModel):
-    """A frozen record that knows all its keys: an unknown one is an error."""
+    """A frozen record that knows all its keys: an unknown one is an error.
+
+    A key that has been renamed has its earlier name as `serialization_alias`. A TOML file with the earlier name is
+    refused, and the remedy is the present name. A record of a run may have either name.
+    """
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
 
+    @classmethod
+    def renamed_keys(cls) -> dict[str, str]:
+        """The earlier names of keys, each with the present name."""
+        fields = cls.model_fields.items()
+        return {field.serialization_alias: name for name, field in fields if field.serialization_alias is not None}
+
+    @classmethod
+    def from_record(cls, record: object) -> Self:
+        """A document as a run folder records it; earlier names of keys are read as the present ones.
+
+        Raises pydantic's ValidationError.
+        """
+        present = _with_present_keys(cls, record) if isinstance(record, Mapping) else record
+        return cls.model_validate(present, strict=False)
+
+    def identity(self) -> dict[str, Any]:
+        """The document as JSON values under the earlier names of its keys: hashes of it outlast a renaming."""
+        return self.model_dump(mode="json", by_alias=True)
+
 
 class Mistakes(ValueError):
-    """Several mistakes that a record's validator found: key below the record, message and remedy of each."""
+    """Several mistakes found by the validator of a record: key below the record, message and remedy of each."""
 
-    def __init__(self, found: list[tuple[str, str, str]]) -> None:
-        self.found = found
-        super().__init__("; ".join(f"{key}: {message}" for key, message, _ in found))
+    def __init__(self, mistakes: list[tuple[str, str, str]]) -> None:
+        self.mistakes = mistakes
+        super().__init__("; ".join(f"{key}: {message}" for key, message, _ in mistakes))
 
 
 _MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
-_NAMES_SHOWN, _COMPARED = 40, 200
+_NAMES_SHOWN, _COMPARED_CHARACTERS = 40, 200
 _QUOTED = re.compile(r""""[^"\n]*"|'[^'\n]*'""")
 _ENDLESS_KEY = re.compile(r"(?<![\w.-])(?:[\w-]+[ \t]*\.[ \t]*){50}")
-NUMBER, TABLE = "<number>", "<table>"  # tags of what may be either; not part of any key
+NUMBER, TABLE = "<number>", "<table>"  # tags of a union's members; not part of any key
+_NESTED_TOO_DEEP = ("tables are nested too deeply", "use a few levels of tables at most")
 
 D = TypeVar("D", bound=Document)
 
 
 def read_document(path: Path, model: type[D]) -> D:
-    """Read a TOML file into a model. Raises UsageError naming file, key and remedy for each mistake in it."""
+    """Read a TOML file into a model. Raises UsageError with file, key and remedy of each mistake in it."""
     remedy = "a UTF-8 TOML file is needed"
     try:
         text = content_of(path, _MOST_BYTES).decode("utf-8")
@@ -58,13 +83,13 @@ def read_document(path: Path, model: type[D]) -> D:
     except UnicodeDecodeError as error:
         raise UsageError.of(path, "", f"cannot be read: {error}", remedy) from None
     if text.startswith("\ufeff"):
-        raise UsageError.of(path, "", "begins with a byte order mark", "save it as UTF-8 without one")
-    if _ENDLESS_KEY.search(_QUOTED.sub("q", text)):  # it would be read for minutes
-        raise UsageError.of(path, "", "has tables in tables without end", "no key has more than a few dots")
+        raise UsageError.of(path, "", "begins with a byte order mark", "save the file as UTF-8 without one")
+    if _ENDLESS_KEY.search(_QUOTED.sub("q", text)):  # reading it would take minutes
+        raise UsageError.of(path, "", *_NESTED_TOO_DEEP)
     try:
         table = tomllib.loads(text)
     except (ValueError, RecursionError) as error:  # ValueError: besides bad TOML, a number of thousands of digits
-        raise UsageError.of(path, "", f"is not valid TOML: {error}", "mend it at the line named") from None
+        raise UsageError.of(path, "", f"is not valid TOML: {error}", "correct the file at this line") from None
     return _validated(path, table, model)
 
 
@@ -73,17 +98,17 @@ def _validated(path: Path, table: dict[str, Any], model: type[D]) -> D:
         return model.model_validate_json(json.dumps(table, default=str))
     except ValidationError as error:
         first = error.errors(include_url=False)[:_MOST_MISTAKES]
-        raise UsageError(found for each in first for found in _problems(path, model, each)) from None
+        raise UsageError(problem for each in first for problem in _problems(path, model, each)) from None
     except RecursionError:
-        raise UsageError.of(path, "", "has tables in tables without end", "no key has more than a few dots") from None
-    except ValueError as error:  # NaN and infinity have no place in JSON
+        raise UsageError.of(path, "", *_NESTED_TOO_DEEP) from None
+    except ValueError as error:  # JSON has no NaN and no infinity
         raise UsageError.of(path, "", str(error), "numbers must be finite") from None
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """A remedy naming the valid word nearest to a misspelt one, or all of them, if they are not too many."""
+    """A remedy: the valid word nearest to a misspelt one, else the valid words (the first 40)."""
     words = sorted(words)
-    close = difflib.get_close_matches(word[:_COMPARED], words, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(word[:_COMPARED_CHARACTERS], words, n=1, cutoff=0.5)
     if close:
         return f"did you mean {close[0]!r}?"
     more = f" and {len(words) - _NAMES_SHOWN} more" if len(words) > _NAMES_SHOWN else ""
@@ -95,12 +120,11 @@ def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Proble
     key = ".".join(f"[{part}]" if isinstance(part, int) else str(part) for part in location).replace(".[", "[")
     cause = error.get("ctx", {}).get("error")
     if error["type"] == "extra_forbidden":
-        known = nearest(str(location[-1]), _keys_at(model, location[:-1]))
-        yield Problem(str(path), key, "unknown key", known)
+        yield _unknown_key(path, key, str(location[-1]), _model_at(model, location[:-1]))
     elif error["type"] == "missing":
         yield Problem(str(path), key, "is missing", "add it")
     elif isinstance(cause, Mistakes):
-        for below, message, remedy in cause.found:
+        for below, message, remedy in cause.mistakes:
             yield Problem(str(path), f"{key}.{below}" if key else below, message, remedy)
     elif cause is not None:
         yield Problem(str(path), key, str(cause))
@@ -108,30 +132,54 @@ def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Proble
         yield Problem(str(path), key, f"{_shown(error['input'])} is not possible", _lower(error["msg"]))
 
 
-def _shown(given: Any) -> str:
-    if isinstance(given, dict | list):
-        return "this table" if isinstance(given, dict) else "this list"
-    return repr(given)[:60]
+def _shown(value: Any) -> str:
+    if isinstance(value, dict | list):
+        return "this table" if isinstance(value, dict) else "this list"
+    return repr(value)[:60]
 
 
 def _lower(message: str) -> str:
     return message[0].lower() + message[1:]
 
 
-def _keys_at(model: type[BaseModel], location: list[Any]) -> list[str]:
-    here: Any = model
+def _unknown_key(path: Path, key: str, name: str, model: type[BaseModel] | None) -> Problem:
+    present = model.renamed_keys().get(name) if model is not None and issubclass(model, Document) else None
+    if present is not None:
+        return Problem(str(path), key, "is the earlier name of a key", f"rename it to {present}")
+    return Problem(str(path), key, "unknown key", nearest(name, model.model_fields if model is not None else ()))
+
+
+def _model_at(model: type[BaseModel], location: list[Any]) -> type[BaseModel] | None:
+    """The model of the table at a location; None where there is none."""
+    table: Any = model
     for part in location:
-        if isinstance(part, int) or not hasattr(here, "model_fields"):
+        if isinstance(part, int) or not hasattr(table, "model_fields"):
             continue
-        field = here.model_fields.get(part)
-        here = _model_in(field.annotation) if field else here  # else: the key of a table whose keys are free
-    return list(here.model_fields) if hasattr(here, "model_fields") else []
+        field = table.model_fields.get(part)
+        table = _model_in(field.annotation) if field else table  # no field: a key of a table with free keys
+    return table if hasattr(table, "model_fields") else None
+
+
+def _with_present_keys(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table of a record with the present names of all keys, at every depth."""
+    renamed = model.renamed_keys() if issubclass(model, Document) else {}
+    result: dict[str, Any] = {}
+    for key, value in table.items():
+        name = renamed.get(key, key)
+        field = model.model_fields.get(name)
+        inner = _model_in(field.annotation) if field else None
+        if inner is not None and isinstance(value, dict):
+            value = _with_present_keys(inner, value)
+        elif inner is not None and isinstance(value, list):
+            value = [_with_present_keys(inner, each) if isinstance(each, dict) else each for each in value]
+        result[name if name not in table else key] = value
+    return result
 
 
 def _model_in(annotation: Any) -> Any:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
-    return next((found for each in get_args(annotation) if (found := _model_in(each))), None)
+    return next((model for each in get_args(annotation) if (model := _model_in(each))), None)
 
 
 def _similar_file(path: Path) -> str:

@@ -1,1 +1,1 @@
-"""Who decides what a player does: one protocol for the ego and the non-ego alike."""
+"""Drivers: what decides a player's actions, behind one protocol for the ego and the non-ego."""

@@ -1,7 +1,7 @@
-"""When there is danger, and how hard to brake for it: emergency braking, and the reference drivers of UN R157.
+"""Danger and the braking it requires: emergency braking, and the reference drivers of UN R157.
 
-Each function takes what is met [N, K] and gives, for each of the others, whether it is a danger, and the braking
-(m/s^2) that it calls for. Formulas are cited; R157's own figures 6 and following are drawings without numbers.
+Each function takes `Encounters` [N, K] and returns two arrays [N, K]: whether each road user is a danger, and the
+braking (m/s^2) that it requires. Formulas are cited. Figures 6 and following of R157 are drawings without numbers.
 """
 
 from __future__ import annotations
@@ -13,45 +13,48 @@ from harness.drivers.perception import Encounters
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
 
-_STILL_MPS = 1e-6
-_LETS_GO_AT = 2.0
-"""Who brakes for a short time to collision goes on until it is so many times as long."""
+_MIN_CLOSING_MPS = 1e-6
+_RELEASE_FACTOR = 2.0
+"""Braking for a short time to collision ends when the time is longer than its threshold by this factor."""
 
 
 def time_to_collision_s(gap_m: FloatArray, closing_mps: FloatArray) -> FloatArray:
-    """[...] time until the gap is closed at this closing speed; 0 where there is none left, inf where nobody closes."""
+    """[...] time until the gap closes at this closing speed; 0 where the gap is not positive, inf where it does not
+    close."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         time = np.maximum(gap_m, 0.0) / closing_mps
-    return np.where(closing_mps > _STILL_MPS, time, np.inf)
+    return np.where(closing_mps > _MIN_CLOSING_MPS, time, np.inf)
 
 
 def emergency(
-    met: Encounters, own_mps: FloatArray, braking: BoolArray, law: EmergencyBraking
+    encounters: Encounters, own_mps: FloatArray, braking: BoolArray, law: EmergencyBraking
 ) -> tuple[BoolArray, FloatArray]:
-    """UN R152, 5.2.1: first a warning, then all the braking there is, for who is ahead and will be in the way when the
-    gap is closed. `braking`: where it has begun already."""
-    time = time_to_collision_s(met.gap_m, own_mps - met.speed_mps)
-    brakes = law.brakes_ttc_s * np.where(braking, _LETS_GO_AT, 1.0)
+    """UN R152, 5.2.1: a warning, then full braking, for a road user ahead that will be in the path when the gap closes.
+    `braking` [N, 1]: whether braking is under way."""
+    time = time_to_collision_s(encounters.gap_m, own_mps - encounters.speed_mps)
+    brakes = law.brakes_ttc_s * np.where(braking, _RELEASE_FACTOR, 1.0)
     warns = np.maximum(brakes, law.brakes_ttc_s + law.warns_before_s)
-    meets = met.clearance_m - np.minimum(time, warns) * np.maximum(met.approach_mps, 0.0) <= 0.0
-    danger = met.seen & (met.ahead_m > 0.0) & (met.gap_m > 0.0) & meets & (time <= warns)
+    in_path = encounters.clearance_m - np.minimum(time, warns) * np.maximum(encounters.approach_mps, 0.0) <= 0.0
+    danger = encounters.seen & (encounters.ahead_m > 0.0) & (encounters.gap_m > 0.0) & in_path & (time <= warns)
     return danger, np.where(time <= brakes, law.braking_mps2, law.warning_braking_mps2)
 
 
 def careful_and_competent(
-    met: Encounters, own_mps: FloatArray, braking: BoolArray, law: CarefulAndCompetent
+    encounters: Encounters, own_mps: FloatArray, braking: BoolArray, law: CarefulAndCompetent
 ) -> tuple[BoolArray, FloatArray]:
-    """UN R157, Annex 4, Appendix 3, 3.3: a car has visibly begun to cut in once its centre has left its lane's centre
-    by the wandering distance and by what it does in the perception time; it is a danger if the time to collision is
-    short. Brakes with table 1's values. `braking`: where it has begun already."""
-    lanes_away = np.maximum(np.round(np.abs(met.offset_m) / law.lane_width_m), 1.0)
-    moved = lanes_away * law.lane_width_m - np.abs(met.offset_m)
-    cuts_in = (met.approach_mps > 0.0) & (moved > law.wander_m + law.perception_s * met.approach_mps)
-    next_to = np.abs(met.offset_m) < 1.5 * law.lane_width_m
-    time = time_to_collision_s(met.gap_m, own_mps - met.speed_mps)
-    near = time <= law.ttc_s * np.where(braking, _LETS_GO_AT, 1.0)
-    danger = met.seen & (met.ahead_m > 0.0) & ((next_to & cuts_in) | (met.clearance_m <= 0.0)) & near
-    wrapped = np.abs(met.offset_m) <= law.wrapped_m
+    """UN R157, Annex 4, Appendix 3, 3.3: a cut-in is perceived when the centre of the car is farther from the centre of
+    its lane than the wandering distance plus its lateral motion during the perception time. It is a danger if the time
+    to collision is short. The braking is that of table 1. `braking` [N, 1]: whether braking is under way."""
+    lanes_away = np.maximum(np.round(np.abs(encounters.offset_m) / law.lane_width_m), 1.0)
+    moved = lanes_away * law.lane_width_m - np.abs(encounters.offset_m)
+    cuts_in = (encounters.approach_mps > 0.0) & (moved > law.wander_m + law.perception_s * encounters.approach_mps)
+    next_to = np.abs(encounters.offset_m) < 1.5 * law.lane_width_m
+    time = time_to_collision_s(encounters.gap_m, own_mps - encounters.speed_mps)
+    near = time <= law.ttc_s * np.where(braking, _RELEASE_FACTOR, 1.0)
+    danger = (
+        encounters.seen & (encounters.ahead_m > 0.0) & ((next_to & cuts_in) | (encounters.clearance_m <= 0.0)) & near
+    )
+    wrapped = np.abs(encounters.offset_m) <= law.wrapped_m
     return danger, GRAVITY_MPS2 * np.where(wrapped, law.wrapped_braking_g, law.full_braking_g)
 
 
@@ -66,7 +69,7 @@ def rss_gap_m(own_mps: FloatArray, other_mps: FloatArray, law: Rss) -> FloatArra
 
 
 def rss_clearance_m(approach_mps: FloatArray, law: Rss) -> FloatArray:
-    """[...] safe lateral distance (definition 6) from one who moves over at this speed, while one keeps to one's lane:
+    """[...] safe lateral distance (definition 6) from a road user with this lateral speed; the own car keeps its lane:
 
     mu + (2 v + r a) r / 2 + (v + r a)^2 / (2 a)
     """
@@ -75,18 +78,25 @@ def rss_clearance_m(approach_mps: FloatArray, law: Rss) -> FloatArray:
     return law.lateral_margin_m + 0.5 * (speed + after) * law.reaction_s + after**2 / (2.0 * law.lateral_mps2)
 
 
-def rss(met: Encounters, own_mps: FloatArray, law: Rss) -> tuple[BoolArray, FloatArray]:
-    """Danger is where neither distance is safe (definitions 1, 6 and 8), to who is ahead; then all braking. Parameters,
-    and that one's own lane keeping adds nothing, as in Mattas et al. 2022 (Accident Analysis & Prevention 174, 106743).
+def rss(encounters: Encounters, own_mps: FloatArray, law: Rss) -> tuple[BoolArray, FloatArray]:
+    """A road user ahead is a danger if neither distance to it is safe (definitions 1, 6 and 8). It requires full
+    braking. The parameters, and the assumption that the own lane keeping adds no lateral motion, are those of Mattas
+    et al. 2022 (Accident Analysis & Prevention 174, 106743).
     """
-    near = met.gap_m < rss_gap_m(own_mps, met.speed_mps, law)
-    danger = met.seen & (met.ahead_m > 0.0) & near & (met.clearance_m < rss_clearance_m(met.approach_mps, law))
+    near = encounters.gap_m < rss_gap_m(own_mps, encounters.speed_mps, law)
+    danger = (
+        encounters.seen
+        & (encounters.ahead_m > 0.0)
+        & near
+        & (encounters.clearance_m < rss_clearance_m(encounters.approach_mps, law))
+    )
     return danger, np.full(danger.shape, law.full_braking_g * GRAVITY_MPS2)
 
 
 def proactive(gap_m: FloatArray, own_mps: FloatArray, other_mps: FloatArray, law: FuzzySafety) -> FloatArray:
-    """[...] PFS in 0..1 (Mattas et al. 2020, Accident Analysis & Prevention 148, 105794): how far one is from being
-    able to stop behind who leads, should they brake as hard as they can.
+    """[...] PFS (proactive fuzzy surrogate safety metric) in 0..1 (Mattas et al. 2020, Accident Analysis & Prevention
+    148, 105794): 0 if comfortable braking stops the car behind a leader that brakes as hard as it can, 1 if the
+    hardest braking does not.
 
     0 from v r + v^2 / (2 b_comfortable) - v_other^2 / (2 b_other) + 2 margin on;
     1 up to v r + v^2 / (2 b_hardest) - v_other^2 / (2 b_other) + margin; linear between.
@@ -100,11 +110,12 @@ def proactive(gap_m: FloatArray, own_mps: FloatArray, other_mps: FloatArray, law
 def critical(
     gap_m: FloatArray, own_mps: FloatArray, own_mps2: FloatArray, other_mps: FloatArray, law: FuzzySafety
 ) -> FloatArray:
-    """[...] CFS in 0..1 (ibid.): how far one is from avoiding who leads, should they keep their speed.
+    """[...] CFS (critical fuzzy surrogate safety metric) in 0..1 (ibid.): 0 if comfortable braking avoids a leader
+    that keeps its speed, 1 if the hardest braking does not.
 
     With the own acceleration a (no braking beyond b_comfortable counts) and v' = v + r a: 0 from
-    r ((v + v') / 2 - v_other) + (v' - v_other)^2 / (2 b_comfortable) on, 1 up to the same with b_hardest; if one
-    brakes already so that v' < v_other, 1 within (v - v_other)^2 / (2 |a|), else 0.
+    r ((v + v') / 2 - v_other) + (v' - v_other)^2 / (2 b_comfortable) on, 1 up to the same with b_hardest. If the
+    present braking gives v' < v_other: 1 within (v - v_other)^2 / (2 |a|), else 0.
     """
     acceleration = np.maximum(own_mps2, -law.comfortable_mps2)
     closing = own_mps - other_mps
@@ -120,17 +131,19 @@ def critical(
     return np.where(closing <= 0.0, 0.0, np.where(after < 0.0, slowed.astype(float), graded))
 
 
-def fuzzy(met: Encounters, own_mps: FloatArray, own_mps2: FloatArray, law: FuzzySafety) -> tuple[BoolArray, FloatArray]:
-    """The fuzzy safety model: who is in the way, or comes into it before one is past, calls for as much braking as
-    PFS (up to comfortable) and CFS (between comfortable and hardest) say."""
-    closing = own_mps - met.speed_mps
+def fuzzy(
+    encounters: Encounters, own_mps: FloatArray, own_mps2: FloatArray, law: FuzzySafety
+) -> tuple[BoolArray, FloatArray]:
+    """The fuzzy safety model: a road user that is in the path, or enters it before the own car is past, requires
+    braking by PFS (up to comfortable) and CFS (from comfortable to hardest)."""
+    closing = own_mps - encounters.speed_mps
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        past_s = (np.abs(met.ahead_m) + met.lengths_m) / closing
-        comes_s = met.clearance_m / met.approach_mps
-    comes = (met.approach_mps > 0.0) & (closing > 0.0) & (comes_s <= past_s + law.lateral_margin_s)
-    relevant = met.seen & (met.ahead_m > 0.0) & ((met.clearance_m <= 0.0) | comes)
-    pfs = proactive(met.gap_m, own_mps, met.speed_mps, law)
-    cfs = critical(met.gap_m, own_mps, own_mps2, met.speed_mps, law)
+        pass_s = (np.abs(encounters.ahead_m) + encounters.lengths_m) / closing
+        enter_s = encounters.clearance_m / encounters.approach_mps
+    enters = (encounters.approach_mps > 0.0) & (closing > 0.0) & (enter_s <= pass_s + law.lateral_margin_s)
+    relevant = encounters.seen & (encounters.ahead_m > 0.0) & ((encounters.clearance_m <= 0.0) | enters)
+    pfs = proactive(encounters.gap_m, own_mps=own_mps, other_mps=encounters.speed_mps, law=law)
+    cfs = critical(encounters.gap_m, own_mps=own_mps, own_mps2=own_mps2, other_mps=encounters.speed_mps, law=law)
     graded = law.comfortable_mps2 + cfs * (law.hardest_mps2 - law.comfortable_mps2)
     braking = np.where(cfs > 0.0, graded, pfs * law.comfortable_mps2)
     return relevant & (braking > 0.0), np.minimum(braking, law.full_braking_g * GRAVITY_MPS2)

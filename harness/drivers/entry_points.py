@@ -3,8 +3,8 @@
     [project.entry-points."harness.drivers"]
     my_driver = "my_package:driver"
 
-Such an entry point is a callable: given the car (`harness.drivers.car.Car`) and the document's parameters as keywords
-it returns a `harness.drivers.protocol.Driver`.
+The entry point is a callable. Its arguments are the car (`harness.drivers.car.Car`) and, as keywords, the document's
+parameters; it returns a `harness.drivers.protocol.Driver`.
 """
 
 from __future__ import annotations
@@ -25,26 +25,27 @@ GROUP = "harness.drivers"
 
 
 def installed_names() -> list[str]:
-    """The drivers that installed packages offer."""
+    """Names of the drivers of installed packages, sorted."""
     return sorted({each.name for each in importlib.metadata.entry_points(group=GROUP)})
 
 
 def entry_point(name: str, file: object, key: str) -> importlib.metadata.EntryPoint:
-    """An installed driver. Raises UsageError, for this key of this file, where there is none or more than one."""
+    """The entry point of an installed driver. Raises UsageError, for this key of this file, if no package or more than
+    one package provides it."""
     found = [each for each in importlib.metadata.entry_points(group=GROUP) if each.name == name]
     packages = sorted({each.dist.name for each in found if each.dist is not None})
     if not found:
-        remedy = nearest(name, installed_names() or ["(no installed package offers a driver)"])
-        raise UsageError.of(file, key, f"no installed package offers a driver {name!r}", remedy)
+        remedy = nearest(name, installed_names() or ["(no installed package provides a driver)"])
+        raise UsageError.of(file, key, f"no installed package provides a driver {name!r}", remedy)
     if len(packages) > 1:
-        message = f"several packages offer a driver {name!r}: {', '.join(packages)}"
+        message = f"several packages provide a driver {name!r}: {', '.join(packages)}"
         raise UsageError.of(file, key, message, "uninstall all but one")
     return found[0]
 
 
 def version_of(point: importlib.metadata.EntryPoint) -> dict[str, str]:
-    """What tells an installed driver from another: package, version, and a hash of the code, for a package that is
-    being worked on changes without its version."""
+    """The identity of an installed driver: package, version, entry point, and a hash of its code. The hash is needed
+    because the code of a package under development changes without its version."""
     package = point.dist
     return {
         "package": package.name if package is not None else "",
@@ -55,20 +56,22 @@ def version_of(point: importlib.metadata.EntryPoint) -> dict[str, str]:
 
 
 def installed_driver(point: importlib.metadata.EntryPoint, car: Car, parameters: Mapping[str, Any]) -> Driver:
-    """Make an installed driver. Raises DriverError where the package fails to, or makes something else."""
+    """Make an installed driver. Raises DriverError if the package raises an error or returns no driver."""
     try:
-        made = point.load()(car, **parameters)
-    except Exception as error:  # a package may raise what it likes
+        driver = point.load()(car, **parameters)
+    except Exception as error:  # a package may raise any exception
         message = f"{point.name} ({point.value}) can't be made: {type(error).__name__}: {error}"
         raise DriverError(message) from error
-    if not isinstance(made, Driver):
-        lacks = [name for name in ("takes_over", "reset", "decide") if not hasattr(made, name)]
-        raise DriverError(f"{point.name} ({point.value}) made a {type(made).__name__} without {', '.join(lacks)}")
-    return made
+    if not isinstance(driver, Driver):
+        missing = [name for name in ("takes_over", "reset", "decide") if not hasattr(driver, name)]
+        raise DriverError(
+            f"{point.name} ({point.value}) returned a {type(driver).__name__} without {', '.join(missing)}"
+        )
+    return driver
 
 
 def _code(module: str) -> str:
-    """The hash of the Python files of a module's top package."""
+    """SHA-256 over the Python files of a module's top-level package; empty if the package is not found."""
     try:
         spec = importlib.util.find_spec(module.partition(".")[0])
     except (ImportError, ValueError):

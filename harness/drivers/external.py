@@ -1,4 +1,4 @@
-"""A driver that a campaign is given rather than trains: found, hashed, and made for a car.
+"""External drivers: drivers that a campaign does not train. They are found, hashed, and made for a car.
 
 | in the campaign | is |
 | --- | --- |
@@ -6,17 +6,15 @@
 | `driver = "egos/adas.toml"` | a driver document, see `harness.config.driver` |
 | `driver = "my_driver"` | an installed package's entry point, see `harness.drivers.entry_points` |
 
-Programs, FMUs and files of Stable-Baselines3 are code that comes as a file. A campaign is a document, which people
-send each other: it must not be able to start such code by itself, nor may a document that it names. Only who runs
-the command can allow it. An installed package was installed by that very person: it needs no further leave.
+Programs, FMUs and files of Stable-Baselines3 are code in files. Campaigns are documents that people exchange: neither a
+campaign nor a driver document may start such code. It runs only with the permission of the user, given on the command
+line. An installed package needs no permission, because the user has installed it.
 """
 
 from __future__ import annotations
 
-import hashlib
 import os
-import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +27,7 @@ from harness.config.rule_driver import Rules
 from harness.config.toml_reading import nearest
 from harness.config.tunable import Adjustable, Tunable
 from harness.drivers.car import Car
+from harness.drivers.driver_files import find_program, is_file, names_beside, relative_to, resolve_in, sha256_of
 from harness.drivers.entry_points import entry_point, installed_driver, installed_names, version_of
 from harness.drivers.fmu import fmu_driver
 from harness.drivers.policy import LearnedDriver
@@ -41,46 +40,49 @@ from harness.errors import DriverError, UsageError
 from harness.game.observation import SIZE
 
 ALLOW_CODE = "--allow-code"
-_RUNS = {
+_RUNS_CODE = {
     Process: "starts a program",
     Fmu: "runs an FMU, which is a program",
-    StableBaselines3: "reads a file of Stable-Baselines3, which may hold pickles: they run whatever code is in them",
+    StableBaselines3: "reads a file of Stable-Baselines3, which may contain pickles: reading them can run any code",
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ExternalDriver:
-    """A driver that was found, with all that its decisions rest on. Small enough to be sent to another process."""
+    """A driver that was found, with everything its decisions depend on. It can be pickled for another process."""
 
     written: str
-    """As the campaign names it."""
+    """The name of the driver in the campaign."""
     place: Path
     """The folder of a policy, or the folder that paths in the document are relative to."""
     document: DriverDocument | None
     """None: a policy's folder."""
     command: tuple[str, ...]
-    """Of a program: with its place."""
+    """Of a program: its path and arguments. Empty for other kinds."""
     files: Mapping[str, str]
-    """SHA-256 of each file it rests on, by its path."""
+    """SHA-256 of each file that the driver depends on, by path."""
     package: Mapping[str, str]
     """Of an installed driver: package, version, entry point, and a hash of the code."""
 
     @property
     def kind(self) -> str:
+        """The document's `kind`, or "policy"."""
         return "policy" if self.document is None else self.document.kind
 
     @property
     def vehicle_type(self) -> str | None:
-        """The vehicle type that its car is of, where that is not the scene's."""
+        """The vehicle type of its car; None: the type in the scene."""
         return self.document.vehicle_type if isinstance(self.document, Sumo) else None
 
     @property
     def identity(self) -> Any:
-        """What its numbers depend on: hashed into the keys of stages."""
+        """Everything its decisions depend on. It is hashed into the keys of stages."""
         if self.document is None:
             return self.files[str(policy_files(self.place)[1])]
-        document = self.document.model_dump(mode="json", exclude={"tunable"})  # what may be is not what is
-        if isinstance(self.document, Process):  # its files are hashed, wherever they are
+        document = self.document.model_dump(
+            mode="json", exclude={"tunable"}
+        )  # bounds of a search, without effect on decisions
+        if isinstance(self.document, Process):  # the files are hashed, so their place has no effect
             del document["folder"]
             if not self.document.parameters:
                 del document["parameters"]
@@ -88,7 +90,7 @@ class ExternalDriver:
 
     @property
     def recorded(self) -> dict[str, Any]:
-        """What a manifest says of it."""
+        """The driver's entry in a manifest."""
         return {
             "driver": self.written,
             "kind": self.kind,
@@ -100,33 +102,34 @@ class ExternalDriver:
 
     @property
     def searched(self) -> tuple[Tunable, ...]:
-        """The parameters of it that may be searched for a better driver. Nothing: it has nothing to tune."""
+        """The parameters that a search may change; empty: it has none."""
         return self.document.searched if isinstance(self.document, Adjustable) else ()
 
     @property
     def numbers(self) -> dict[str, float]:
-        """The values that those parameters have, in their order."""
+        """The values of those parameters, in their order."""
         numbers = self.document.numbers if isinstance(self.document, Adjustable) else {}
         return {each.key: numbers[each.key] for each in self.searched}
 
     def tuned(self, values: Mapping[str, float]) -> ExternalDriver:
-        """The same driver with other values of such parameters. Raises KeyError and ValueError as its document does."""
-        assert isinstance(self.document, Adjustable), "a driver that has nothing to tune"
+        """The same driver with other values of those parameters. Raises KeyError for an unknown parameter,
+        ValueError for a value out of bounds."""
+        assert isinstance(self.document, Adjustable), "the driver has no parameters to tune"
         return replace(self, document=self.document.tuned(values))
 
     def document_in(self, folder: Path) -> DriverDocument:
-        """Its document as it has to be in a folder, so that the paths in it lead to the same files."""
-        assert self.document is not None, "a policy's folder is no document"
+        """Its document, with paths relative to `folder` that lead to the same files."""
+        assert self.document is not None, "a policy has no document"
         match self.document:
             case Process(folder=written):
-                return self.document.model_copy(update={"folder": _path_from(folder, resolve_in(self.place, written))})
+                return self.document.model_copy(update={"folder": relative_to(folder, resolve_in(self.place, written))})
             case Fmu(file=file) | StableBaselines3(file=file):
-                return self.document.model_copy(update={"file": _path_from(folder, resolve_in(self.place, file))})
+                return self.document.model_copy(update={"file": relative_to(folder, resolve_in(self.place, file))})
         return self.document
 
     @property
     def in_words(self) -> str:
-        """Which driver this is, for a reader of a report."""
+        """A description of the driver for reports."""
         match self.document:
             case None:
                 return f"the policy {self.written}"
@@ -144,11 +147,12 @@ class ExternalDriver:
                 return f"{name} of the package {self.package['package']} {self.package['version']}"
 
     def make(self, car: Car, sampled: bool) -> Driver:
-        """The driver, for a car. A policy of ours or of Stable-Baselines3 varies as it does where it is `sampled`.
+        """Make the driver for a car. `sampled`: a policy samples its actions; other drivers ignore it.
 
-        Raises UsageError where what it is made of doesn't fit, DriverError where it can't be made.
+        Raises UsageError if its files or parameters do not fit, DriverError if it can't be made or its files have
+        changed.
         """
-        changed = [file for file, known in self.files.items() if _hash(Path(file)) != known]
+        changed = [file for file, known in self.files.items() if sha256_of(Path(file)) != known]
         if changed:
             raise DriverError(f"changed since the campaign was checked: {', '.join(changed)}")
         match self.document:
@@ -159,9 +163,15 @@ class ExternalDriver:
             case Rules():
                 return RulesDriver(self.document, car)
             case Process(folder=folder, units=units):
-                deadlines = self.document.deadline_s, self.document.start_deadline_s
-                place, told = resolve_in(self.place, folder), self.document.parameters
-                return ProcessDriver(self.command, place, car, units, *deadlines, parameters=told)
+                return ProcessDriver(
+                    self.command,
+                    resolve_in(self.place, folder),
+                    car,
+                    units=units,
+                    deadline_s=self.document.deadline_s,
+                    start_deadline_s=self.document.start_deadline_s,
+                    parameters=self.document.parameters,
+                )
             case Fmu(file=file):
                 return fmu_driver(self.document, resolve_in(self.place, file), car)
             case StableBaselines3(file=file):
@@ -172,7 +182,7 @@ class ExternalDriver:
                 return installed_driver(entry_point(name, self.written, "entry_point"), car, parameters)
 
     def try_out(self, car: Car, sampled: bool, games: int = 1) -> None:
-        """Make it, begin so many games at once and decide once. Raises UsageError where that fails."""
+        """Make the driver, reset this number of games and decide once in each. Raises UsageError if that fails."""
         try:
             driver = self.make(car, sampled)
             if driver.takes_over:
@@ -180,115 +190,87 @@ class ExternalDriver:
                 driver.decide(np.arange(games), np.zeros((games, SIZE), dtype=np.float32), np.zeros((games, 2)))
         except UsageError:
             raise
-        except Exception as error:  # a driver may raise what it likes
-            what = str(error) if isinstance(error, DriverError) else f"{type(error).__name__}: {error}"
-            remedy = f"harness check-driver {self.written} says more"
-            raise UsageError.of(self.written, "", f"could not drive when it was tried: {what}", remedy) from error
+        except Exception as error:  # a driver may raise any exception
+            cause = str(error) if isinstance(error, DriverError) else f"{type(error).__name__}: {error}"
+            remedy = f"see harness check-driver {self.written}"
+            raise UsageError.of(self.written, "", f"the test decision failed: {cause}", remedy) from error
 
 
 def find_driver(written: str, file: Path, key: str, allow_code: bool) -> ExternalDriver:
-    """The driver that is named so under `key` in `file`; paths are relative to that file's folder.
+    """The driver named `written` under `key` in `file`; paths are relative to that file's folder.
 
-    Raises UsageError with what is wrong with it, or where it runs code that comes as a file without leave.
+    Raises UsageError if it is not found or invalid, and if it runs code in files without permission (`allow_code`).
     """
     place = resolve(file, written)
     if os.path.isdir(place):
         read_policy(place)
-        return _given(written, place, None, policy_files(place))
+        return _external(written, place, None, files=policy_files(place))
     if place.suffix.lower() != ".toml":
         kind = "fmu" if place.suffix.lower() == ".fmu" else "stable_baselines3"
-        document_of = f'; or name a TOML document with kind = "{kind}", file = "{place.name}"'
-        check_no_archive(file, key, written, place, document_of)
+        remedy = f'; or name a TOML document with kind = "{kind}", file = "{place.name}"'
+        check_no_archive(file, key, written, place, remedy=remedy)
     if not os.path.exists(place):
         if written.endswith(".toml") or "/" in written:
-            remedy = nearest(place.name, _beside(place)) if os.path.isdir(place.parent) else f"no folder {place.parent}"
+            remedy = (
+                nearest(place.name, names_beside(place)) if os.path.isdir(place.parent) else f"no folder {place.parent}"
+            )
             raise UsageError.of(file, key, f"{written!r}: there is no such file or folder", remedy)
         names = [LEARNED, SUMO, *installed_names()]
         if written not in names:
             remedy = nearest(written, names) + "; or name a driver document or the folder of a policy"
             raise UsageError.of(file, key, f"there is no driver {written!r}", remedy)
         document: DriverDocument = Python(kind="python", entry_point=written)
-        return _given(written, place.parent, document, (), version_of(entry_point(written, file, key)))
+        package = version_of(entry_point(written, file, key))
+        return _external(written, place.parent, document, package=package)
     document = read_driver(place)
-    if (runs := _RUNS.get(type(document))) and not allow_code:
-        remedy = f"if you trust it, say so on the command line: {ALLOW_CODE}"
-        raise UsageError.of(place, "kind", f"this driver {runs}; a document can't give itself leave to", remedy)
-    return _opened(written, place, document)
+    if (runs := _RUNS_CODE.get(type(document))) and not allow_code:
+        remedy = f"if you trust it, allow it on the command line: {ALLOW_CODE}"
+        raise UsageError.of(place, "kind", f"this driver {runs}; a document can't give the permission", remedy)
+    return _from_document(written, place, document)
 
 
-def _opened(written: str, place: Path, document: DriverDocument) -> ExternalDriver:
+def _from_document(written: str, place: Path, document: DriverDocument) -> ExternalDriver:
     folder = place.parent
     match document:
         case Process(command=command, files=files):
             runs_in = resolve_in(folder, document.folder)
             if not runs_in.is_dir():
-                remedy = nearest(runs_in.name, _beside(runs_in))
+                remedy = nearest(runs_in.name, names_beside(runs_in))
                 raise UsageError.of(place, "folder", f"{document.folder!r}: there is no such folder", remedy)
-            program = _program(command[0], runs_in, place)
-            rests_on = [*(each for each in command[1:] if _is_file(runs_in, each)), *files]
-            missing = [each for each in files if not _is_file(runs_in, each)]
+            program = find_program(command[0], runs_in, place)
+            depends_on = [*(each for each in command[1:] if is_file(runs_in, each)), *files]
+            missing = [each for each in files if not is_file(runs_in, each)]
             if missing:
-                remedy = nearest(Path(missing[0]).name, _beside(resolve_in(runs_in, missing[0])))
+                remedy = nearest(Path(missing[0]).name, names_beside(resolve_in(runs_in, missing[0])))
                 raise UsageError.of(place, "files", f"{missing[0]!r}: there is no such file", remedy)
-            paths = [program, *(resolve_in(runs_in, each) for each in rests_on)]
-            return _given(written, folder, document, paths, command=(str(program), *command[1:]))
+            paths = [program, *(resolve_in(runs_in, each) for each in depends_on)]
+            return _external(written, folder, document, files=paths, command=(str(program), *command[1:]))
         case Fmu(file=file) | StableBaselines3(file=file):
-            if not _is_file(folder, file):
-                remedy = nearest(Path(file).name, _beside(resolve_in(folder, file)))
+            if not is_file(folder, file):
+                remedy = nearest(Path(file).name, names_beside(resolve_in(folder, file)))
                 raise UsageError.of(place, "file", f"{file!r}: there is no such file", remedy)
-            return _given(written, folder, document, [resolve_in(folder, file)])
+            return _external(written, folder, document, files=[resolve_in(folder, file)])
         case Python(entry_point=name):
-            point = entry_point(name, place, "entry_point")
-            return _given(written, folder, document, (), version_of(point))
+            package = version_of(entry_point(name, place, "entry_point"))
+            return _external(written, folder, document, package=package)
         case _:
-            return _given(written, folder, document, ())
+            return _external(written, folder, document)
 
 
-def _given(
+def _external(
     written: str,
     place: Path,
     document: DriverDocument | None,
-    files: Any,
+    *,
+    files: Iterable[Path] = (),
     package: Mapping[str, str] | None = None,
     command: tuple[str, ...] = (),
 ) -> ExternalDriver:
-    return ExternalDriver(written, place, document, command, {str(file): _hash(file) for file in files}, package or {})
-
-
-def _program(name: str, folder: Path, document: Path) -> Path:
-    """The file of a program: from the folder it runs in where its name has a `/`, otherwise on PATH."""
-    # not resolved: a virtual environment's python is a link, and knows by its place which packages it has
-    found = shutil.which(os.path.abspath(folder / name) if "/" in name else name)
-    if found is None:
-        where = "here" if "/" in name else "on PATH"
-        message = f"there is no program {name!r} {where} that can be run"
-        raise UsageError.of(document, "command", message, "build or install it, or mend its name and permissions")
-    return Path(found)
-
-
-def resolve_in(folder: Path, written: str) -> Path:
-    """A path in a driver document is relative to the document's own folder."""
-    return resolve(folder / "document", written)
-
-
-def _path_from(folder: Path, file: Path) -> str:
-    return Path(os.path.relpath(file, os.path.realpath(folder))).as_posix()
-
-
-def _is_file(folder: Path, written: str) -> bool:
-    try:
-        return resolve_in(folder, written).is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def _beside(path: Path) -> list[str]:
-    names = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
-    return names or ["(there is nothing in its folder)"]
-
-
-def _hash(path: Path) -> str:
-    try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise UsageError.of(path, "", f"cannot be read: {error}", "mend its permissions") from None
+    return ExternalDriver(
+        written=written,
+        place=place,
+        document=document,
+        command=command,
+        files={str(file): sha256_of(file) for file in files},
+        package=package or {},
+    )

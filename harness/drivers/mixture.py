@@ -1,7 +1,7 @@
-"""A mixed strategy: several drivers for one player, of whom a game has one, drawn when it starts.
+"""A mixed strategy: several drivers for one player; each game has one of them, drawn when the game is reset.
 
-A population of people is one, and so is the mixture of all whom a player has met before. A driver alone is a mixture
-of one.
+A population of people is a mixture, and so is the mixture of all opponents of earlier rounds. A single driver is a
+mixture of one.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from harness.drivers.protocol import Driver
 from harness.game.attention import HumanFactors
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Member:
-    """One of a mixture: who drives, as which person, in what share of the games (shares are relative)."""
+    """One member of a mixture: a driver, its persona, and its share of the games (shares are relative)."""
 
     driver: Driver
     persona: Persona
@@ -25,7 +25,7 @@ class Member:
 
 @dataclass(frozen=True)
 class Mixture:
-    """A player's drivers. Either SUMO drives all of them or none: who places a car is settled for all games alike."""
+    """A player's drivers. SUMO drives all of them or none: a player's control mode is the same in all games."""
 
     members: tuple[Member, ...]
 
@@ -53,9 +53,9 @@ class Mixture:
 
 
 Player: TypeAlias = Driver | Mixture | None
-"""Who has a player's seat: a driver, one of several in each game, or nobody."""
+"""The driver of a player's seat: one driver, one of several in each game, or None (the player does not take part)."""
 
 
 def mixture_of(player: Driver | Mixture, persona: Persona) -> Mixture:
-    """A driver as a mixture of one, who drives as `persona`; a mixture as it is."""
-    return player if isinstance(player, Mixture) else Mixture((Member(player, persona),))
+    """A driver as a mixture of one, with `persona`; a mixture unchanged."""
+    return player if isinstance(player, Mixture) else Mixture((Member(driver=player, persona=persona),))

@@ -1,7 +1,7 @@
-"""What a driver by rules makes of what is seen: the way ahead, and the others on it and beside it, in metres.
+"""Perception of a rule-based driver: the path ahead and the road users on it and beside it, in metres.
 
-Others are seen as points with headings: their size is not in view, so each is taken to be as large as one's own car.
-What is beyond the bounds of the view is taken at its worst: whoever closes by 10 m/s or more is taken to stand.
+An observation gives a road user's position and heading, not its size: each is taken to be as large as the own car.
+An entry at its bound is taken at its worst: a road user that closes at 10 m/s or more is taken to stand.
 """
 
 from __future__ import annotations
@@ -21,96 +21,95 @@ _TURNED = LAYOUT.index("path_turned_rad@0m")
 _LEFT = LAYOUT.index("path_left_m")
 _OTHER = LAYOUT.index("other0_seen")
 _ENTRIES = (SIZE - _OTHER) // OTHERS
-_WHERE = LAYOUT.index("other0_ahead_mps")
-MOST_CLOSING_MPS = 10.0
-"""The view tells closing speeds up to here."""
+MAX_CLOSING_MPS = 10.0
+"""Bound of the closing speed in an observation."""
 
 
 class Encounters(NamedTuple):
-    """Others [N, K] against one's own way; where `seen` is false the rest means nothing."""
+    """Other road users [N, K] relative to the own path; where `seen` is false the other fields are undefined."""
 
     seen: BoolArray
     ahead_m: FloatArray
-    """From one's own centre to theirs, along the way."""
+    """From the own centre to the other's, along the path."""
     gap_m: FloatArray
-    """Bumper to bumper along the way; negative beside each other."""
+    """Bumper to bumper along the path; negative side by side."""
     offset_m: FloatArray
-    """Of their centre from one's way, to the left."""
+    """Of the other's centre from the own path, to the left."""
     clearance_m: FloatArray
-    """From side to side, if one keeps to one's way; negative where they reach into it."""
+    """Lateral distance between the sides if the own car keeps to its path; negative where the other reaches into it."""
     speed_mps: FloatArray
-    """Along the way."""
+    """Along the path."""
     approach_mps: FloatArray
-    """Towards one's way, across it."""
+    """Towards the path, across it."""
     lengths_m: FloatArray
-    """Half of theirs and half of one's own."""
+    """Half the length of the other plus half the length of the own car, along the path."""
 
 
 class OwnMotion(NamedTuple):
-    """What is seen of oneself and of the way, [N] or [N, len(AHEAD_M)]."""
+    """The own motion and the own path, [N] or [N, len(AHEAD_M)]."""
 
     speed_mps: FloatArray
     limit_mps: FloatArray
-    """Of speed; NaN while one stands, for it is seen as a share of it only."""
+    """Speed limit; NaN while the car stands, because the observation gives the speed relative to the limit only."""
     acceleration_mps2: FloatArray
     steering_rad: FloatArray
     path_left_m: FloatArray
     path_turned_rad: FloatArray
 
 
-def look(car: Car, observation: FloatArray) -> tuple[OwnMotion, Encounters]:
-    """What there is to see in N games, from what the driver sees [N, SIZE]."""
-    seen = car.seen(observation)
-    speed = seen[:, _SPEED]
+def perceive(car: Car, observation: FloatArray) -> tuple[OwnMotion, Encounters]:
+    """Own motion and other road users in N games, from observations [N, SIZE]."""
+    values = car.physical(observation)
+    speed = values[:, _SPEED]
     with np.errstate(divide="ignore", invalid="ignore"):
-        limit = np.where(speed > 0.1, speed / (1.0 + seen[:, _OVER]), np.nan)
-    view = OwnMotion(
-        speed,
-        limit,
-        seen[:, _ACCELERATION],
-        seen[:, _STEERING],
-        seen[:, _LEFT],
-        seen[:, _TURNED : _TURNED + len(AHEAD_M)],
+        limit = np.where(speed > 0.1, speed / (1.0 + values[:, _OVER]), np.nan)
+    motion = OwnMotion(
+        speed_mps=speed,
+        limit_mps=limit,
+        acceleration_mps2=values[:, _ACCELERATION],
+        steering_rad=values[:, _STEERING],
+        path_left_m=values[:, _LEFT],
+        path_turned_rad=values[:, _TURNED : _TURNED + len(AHEAD_M)],
     )
-    others = seen[:, _OTHER:].reshape(len(seen), OTHERS, _ENTRIES)
-    return view, _meet(car, view, others)
+    others = values[:, _OTHER:].reshape(len(values), OTHERS, _ENTRIES)
+    return motion, _encounters(car, motion, others)
 
 
-def _meet(car: Car, view: OwnMotion, others: FloatArray) -> Encounters:
-    there, ahead, left, closing, across, sin, cos = np.moveaxis(others, -1, 0)
-    own = view.speed_mps[:, None]
+def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
+    seen, ahead, left, closing, across, sin, cos = np.moveaxis(others, -1, 0)
+    own = motion.speed_mps[:, None]
     forward = own + closing
-    forward = np.where(closing <= -MOST_CLOSING_MPS, np.minimum(forward, 0.0), forward)
-    way_left, way_turned = _way_at(view, ahead)
-    along_cos, along_sin = np.cos(way_turned), np.sin(way_turned)
-    offset = (left - way_left) * along_cos
+    forward = np.where(closing <= -MAX_CLOSING_MPS, np.minimum(forward, 0.0), forward)
+    path_left, path_turned = _path_at(motion, ahead)
+    along_cos, along_sin = np.cos(path_turned), np.sin(path_turned)
+    offset = (left - path_left) * along_cos
     turned_cos, turned_sin = np.abs(cos * along_cos + sin * along_sin), np.abs(sin * along_cos - cos * along_sin)
     half_length = 0.5 * (car.length_m * turned_cos + car.width_m * turned_sin)
     half_width = 0.5 * (car.length_m * turned_sin + car.width_m * turned_cos)
     lengths = half_length + 0.5 * car.length_m
     leftwards = across * along_cos - forward * along_sin
     return Encounters(
-        there > 0.5,
-        ahead,
-        np.abs(ahead) - lengths,
-        offset,
-        np.abs(offset) - half_width - 0.5 * car.width_m,
-        forward * along_cos + across * along_sin,
-        -np.sign(offset) * leftwards,
-        lengths,
+        seen=seen > 0.5,
+        ahead_m=ahead,
+        gap_m=np.abs(ahead) - lengths,
+        offset_m=offset,
+        clearance_m=np.abs(offset) - half_width - 0.5 * car.width_m,
+        speed_mps=forward * along_cos + across * along_sin,
+        approach_mps=-np.sign(offset) * leftwards,
+        lengths_m=lengths,
     )
 
 
-def _way_at(view: OwnMotion, ahead_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """[N, K] how far to the left one's way is at a distance ahead, and how far it has turned there."""
-    turned = view.path_turned_rad
+def _path_at(motion: OwnMotion, ahead_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """[N, K] offset of the path to the left at a distance ahead, and its heading there."""
+    turned = motion.path_turned_rad
     steps = np.diff(AHEAD_M) * np.sin(0.5 * (turned[:, 1:] + turned[:, :-1]))
-    left = view.path_left_m[:, None] + np.concatenate((np.zeros((len(turned), 1)), np.cumsum(steps, axis=1)), axis=1)
+    left = motion.path_left_m[:, None] + np.concatenate((np.zeros((len(turned), 1)), np.cumsum(steps, axis=1)), axis=1)
     k = np.clip(np.searchsorted(AHEAD_M, ahead_m, side="right") - 1, 0, len(AHEAD_M) - 2)
     share = (ahead_m - AHEAD_M[k]) / (AHEAD_M[k + 1] - AHEAD_M[k])
 
-    def between(values: FloatArray, share: FloatArray) -> FloatArray:
-        here, there = np.take_along_axis(values, k, 1), np.take_along_axis(values, k + 1, 1)
-        return here + share * (there - here)
+    def interpolate(values: FloatArray, share: FloatArray) -> FloatArray:
+        low, high = np.take_along_axis(values, k, 1), np.take_along_axis(values, k + 1, 1)
+        return low + share * (high - low)
 
-    return between(left, share), between(turned, np.clip(share, 0.0, 1.0))
+    return interpolate(left, share), interpolate(turned, np.clip(share, 0.0, 1.0))

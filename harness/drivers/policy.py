@@ -1,4 +1,4 @@
-"""A learned policy as a driver: the actor's network in NumPy, so that no framework is needed to drive."""
+"""A learned policy as a driver: the actor's network in NumPy, so that driving needs no framework."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from harness.game.arrays import FloatArray, IntArray
 
 
 class LearnedDriver:
-    """Drives by a policy: by its most likely action, or varied as the policy itself varies."""
+    """Drives by a policy: by its most likely action, or by a sample of its distribution."""
 
     takes_over = True
 
@@ -18,10 +18,10 @@ class LearnedDriver:
         self._deviation = np.exp(policy.tensors["log_deviation"]) if sampled else None
 
     def reset(self, games: IntArray) -> None:
-        """Nothing to forget: each decision is made from what is seen at that moment."""
+        """Do nothing: each decision depends on the current observation only."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        """Actions [N, 2] from observations [N, SIZE]; `noise` [N, 2] is used where decisions vary."""
+        """Actions [N, 2] from observations [N, SIZE]; `noise` [N, 2] is used if decisions are sampled."""
         hidden = observation
         for weight, bias in self._layers[:-1]:
             hidden = np.tanh(hidden @ weight + bias)

@@ -1,7 +1,7 @@
-"""A learned policy on disk: parameters as safetensors, the rest as JSON. Opening one runs no code.
+"""A learned policy on disk: parameters as safetensors, metadata as JSON. Opening a policy runs no code.
 
 <name>/policy.safetensors    actor.<k>.weight [out, in], actor.<k>.bias [out], log_deviation [2]; critic likewise
-<name>/policy.json           format, what was learned where, the names of the observation's entries
+<name>/policy.json           format, description of the training, names of the observation's entries
 """
 
 from __future__ import annotations
@@ -28,17 +28,18 @@ from harness.game.arrays import FloatArray
 from harness.game.observation import LAYOUT
 
 FORMAT = 1
+_NOT_LEARNED_BY = ("name", "description", "sources")  # keys of a persona
 ACTIONS = 2
 ARCHIVES = (".zip", ".pkl", ".pickle", ".pt", ".pth", ".ckpt", ".joblib", ".npy", ".npz", ".onnx")
-_MOST_TENSOR_BYTES, _MOST_CARD_BYTES = 100_000_000, 1_000_000
-_MOST = 1e6  # no parameter of a network that learned anything is larger
+_MAX_TENSOR_BYTES, _MAX_CARD_BYTES = 100_000_000, 1_000_000
+_MAX_PARAMETER = 1e6  # a larger parameter is a sign of damage
 _PARAMETER = re.compile(r"(actor|critic)\.(\d{1,2})\.(weight|bias)", re.ASCII)
-_NAMED = "name the folder of a policy, as under <run>/policies/"
+_POLICY_FOLDER = "name the folder of a policy, as under <run>/policies/"
 
 
 @dataclass(frozen=True)
 class Policy:
-    """Actor and critic as plain arrays: layers with tanh between them, and the actions' log deviation [2]."""
+    """Actor and critic as arrays: layers with tanh between them, and the log standard deviation of the actions [2]."""
 
     tensors: Mapping[str, FloatArray]
     card: Mapping[str, Any] = field(default_factory=dict)
@@ -50,7 +51,7 @@ class Policy:
 
 
 def write_policy(policy: Policy, folder: Path) -> None:
-    """Write a policy's folder. The same policy gives the same bytes."""
+    """Write a policy's folder. Equal policies give equal bytes."""
     folder.mkdir(parents=True, exist_ok=True)
     card_file, tensor_file = policy_files(folder)
     card = {"format": FORMAT, "observation": list(LAYOUT), **policy.card}
@@ -63,12 +64,12 @@ def write_policy(policy: Policy, folder: Path) -> None:
 
 def persona_hash(persona: Persona) -> str:
     """SHA-256 of what a policy learns by: the persona's document without its name, description and sources."""
-    learned_by = persona.model_dump(mode="json", exclude={"name", "description", "sources"})
+    learned_by = {key: value for key, value in persona.identity().items() if key not in _NOT_LEARNED_BY}
     return hashlib.sha256(json.dumps(learned_by, sort_keys=True).encode()).hexdigest()
 
 
 def policy_files(folder: Path) -> tuple[Path, Path]:
-    """What a policy is made of: its JSON and its parameters."""
+    """The two files of a policy: its JSON and its parameters."""
     return folder / "policy.json", folder / "policy.safetensors"
 
 
@@ -79,12 +80,12 @@ def read_policy(folder: Path) -> Policy:
         raise UsageError.of(
             policy_files(folder)[0],
             "observation",
-            "was learned from other observations than this version's",
+            "its format or its observation layout is not that of this version",
             "train it again",
         )
     tensor_file = policy_files(folder)[1]
     try:
-        policy = Policy(load_tensors(_content(tensor_file, _MOST_TENSOR_BYTES)), card)
+        policy = Policy(load_tensors(_content(tensor_file, _MAX_TENSOR_BYTES)), card)
         _check_shapes(policy)
     except (SafetensorError, ValueError, LookupError, TypeError, AttributeError, OverflowError, MemoryError) as error:
         raise UsageError.of(tensor_file, "", f"is damaged: {error}", "train the policy again") from None
@@ -92,12 +93,12 @@ def read_policy(folder: Path) -> Policy:
 
 
 def read_card(folder: Path) -> dict[str, Any]:
-    """What a policy's JSON says. Raises UsageError if it is missing or damaged."""
+    """The content of a policy's JSON. Raises UsageError if it is missing or damaged."""
     file = policy_files(folder)[0]
     try:
-        card = json.loads(_content(file, _MOST_CARD_BYTES).decode("utf-8"))
+        card = json.loads(_content(file, _MAX_CARD_BYTES).decode("utf-8"))
         if not isinstance(card, dict):
-            raise TypeError("it holds no table")
+            raise TypeError("it contains no JSON object")
         if missing := [key for key in ("format", "observation") if key not in card]:
             raise ValueError(f"it has no {missing[0]!r}")
     except (ValueError, LookupError, TypeError, RecursionError) as error:
@@ -105,13 +106,13 @@ def read_card(folder: Path) -> dict[str, Any]:
     return card
 
 
-def _content(file: Path, most_bytes: int) -> bytes:
+def _content(file: Path, max_bytes: int) -> bytes:
     try:
-        return content_of(file, most_bytes)
+        return content_of(file, max_bytes)
     except (FileNotFoundError, NotADirectoryError):
-        raise UsageError.of(file, "", "there is no such file", _NAMED) from None
+        raise UsageError.of(file, "", "there is no such file", _POLICY_FOLDER) from None
     except OSError as error:
-        raise UsageError.of(file, "", str(error.strerror), _NAMED) from None
+        raise UsageError.of(file, "", str(error.strerror), _POLICY_FOLDER) from None
 
 
 def _check_shapes(policy: Policy) -> None:
@@ -131,15 +132,17 @@ def _check_shapes(policy: Policy) -> None:
             raise ValueError(f"{name} is {tensor.dtype}, not float32")
         if not np.isfinite(tensor).all():
             raise ValueError(f"{name} is not finite")
-        if np.abs(tensor).max() > _MOST:
-            raise ValueError(f"{name} has parameters over {_MOST:g}")
+        if np.abs(tensor).max() > _MAX_PARAMETER:
+            raise ValueError(f"{name} has parameters over {_MAX_PARAMETER:g}")
 
 
-def _check_names(given: Iterable[str]) -> None:
-    """Raises ValueError for a parameter that no policy has, and for one that is missing between those there are."""
-    matches = {name: _PARAMETER.fullmatch(name) for name in given}
+def _check_names(names: Iterable[str]) -> None:
+    """Raises ValueError for an unknown parameter and for a missing one."""
+    matches = {name: _PARAMETER.fullmatch(name) for name in names}
     layers = {(match[1], int(match[2])) for match in matches.values() if match}
-    parts = {part: max((k for of, k in layers if of == part), default=0) for part in ("actor", "critic")}
+    parts = {
+        part: max((k for layer_part, k in layers if layer_part == part), default=0) for part in ("actor", "critic")
+    }
     expected = {f"{part}.{k}.{each}" for part, k in layers for each in ("weight", "bias")} | {"log_deviation"}
     for name, match in matches.items():
         if match is None and name != "log_deviation":
@@ -149,16 +152,17 @@ def _check_names(given: Iterable[str]) -> None:
         raise ValueError(f"there are no parameters {missing[0]!r}")
 
 
-def check_no_archive(file: Path, key: str, written: str, named: Path, more: str = "") -> None:
-    """Raise UsageError where a file is named, under `key` in `file`, as if it were a policy.
+def check_no_archive(file: Path, key: str, written: str, path: Path, remedy: str = "") -> None:
+    """Raise UsageError if `path`, written as `written` under `key` in `file`, is a file and not a policy's folder.
 
-    A learner's own archive is not opened, not even to look into it: pickles in it are programs.
+    The archive of a training library is never opened, because pickles in it are programs. `remedy` is added to the
+    message.
     """
-    if named.suffix.lower() in ARCHIVES or os.path.isfile(named):
+    if path.suffix.lower() in ARCHIVES or os.path.isfile(path):
         raise UsageError.of(
             file,
             key,
             f"{written!r} is a file: archives such as .zip, .pt and .pkl can carry pickles, which run code when they "
-            "are opened, so they are not read",
-            "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/" + more,
+            "are opened, so the harness does not read them",
+            "a policy is a folder with policy.safetensors and policy.json, as under <run>/policies/" + remedy,
         )

@@ -1,4 +1,4 @@
-"""What every driver is."""
+"""The protocol of every driver."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from harness.game.arrays import FloatArray, IntArray
 class Driver(Protocol):
     """Decides a player's actions in many games at once.
 
-    A driver sees only `harness.game.observation`, and draws no random numbers of its own: chance comes to it as
-    `noise`, drawn when the game started, so that a game can be played again.
+    A driver sees only `harness.game.observation`. It draws no random numbers of its own: randomness is passed to it as
+    `noise`, which is drawn when the game is reset, so that a game can be replayed.
     """
 
     takes_over: bool
-    """False: SUMO's own models drive the player, and `decide` is never asked."""
+    """False: SUMO's own models drive the player, and `decide` is never called."""
 
     def reset(self, games: IntArray) -> None:
-        """Games [N] start anew: forget what was remembered of them."""
+        """Reset games [N]: discard their state."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        """Actions [N, 2] in [-1, 1] (pedals, wheel: see `harness.game.bicycle.requests`) in games [N], from what
-        the player sees [N, SIZE] and standard normal noise [N, 2]."""
+        """Actions [N, 2] in [-1, 1] (pedals, wheel: see `harness.game.bicycle.requests`) in games [N], from the
+        player's observations [N, SIZE] and standard normal noise [N, 2]."""
         ...

@@ -1,4 +1,4 @@
-"""SUMO as a driver: the player is left to the car-following and lane-changing models of its vehicle type."""
+"""SUMO as a driver: the car-following and lane-changing models of the player's vehicle type drive it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ class SumoDriver:
     takes_over = False
 
     def reset(self, games: IntArray) -> None:
-        """Nothing to forget: SUMO remembers."""
+        """Do nothing: SUMO holds the state."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        """Never asked. Raises RuntimeError."""
+        """Never called. Raises RuntimeError."""
         raise RuntimeError("SUMO drives this player; it has no actions")

@@ -1,20 +1,20 @@
-"""The arena: G games played together by one SUMO simulation. Its step is the only stepping loop there is.
+"""The arena: G games in one SUMO simulation. Its step is the only stepping loop of the harness.
 
-| order | what happens in a step | where |
+| order | part of a step | module |
 | --- | --- | --- |
-| 1 | drivers decide from what they saw at the end of the step before; learners' actions come from outside | `drivers` |
-| 2 | they reach pedals and wheel, late or in part; lapses of attention omit them | `game.limits`, `game.attention` |
+| 1 | drivers decide from the observations of the step before; learners' actions are an argument | `drivers` |
+| 2 | reaction delay, limits of the controls and lapses of attention | `game.human_limits`, `game.attention` |
 | 3 | the players' cars move | `game.bicycle` |
-| 4 | their poses go to SUMO, SUMO moves everyone else, and is read back | `traffic.simulation` |
-| 5 | contact, goal and time decide outcomes | `game.quantities` |
-| 6 | payoffs are worked out | `game.payoff` |
-| 7 | who reached the goal leaves; who crashed stays as an obstacle | here |
-| 8 | everyone looks | `game.observation` |
+| 4 | their poses are sent to SUMO, SUMO moves the other vehicles, their state is read | `traffic.simulation` |
+| 5 | contact, goal and time limit determine outcomes | `game.quantities` |
+| 6 | payoffs are computed | `game.payoff` |
+| 7 | a player at its goal is removed; a crashed player stays as an obstacle | this module |
+| 8 | observations are computed | `game.observation` |
 
-What can't be right ends the step with an error (`game.plausibility`): decisions before 3, motion and payoffs before 7,
-observations after 8.
+Impossible numbers end the step with an error (`game.sanity_checks`): decisions are checked before 3, motion and payoffs
+before 7, observations after 8.
 
-A game's chance is drawn when it starts (`game.start`). Training and assessment are two thin uses of this loop.
+The random numbers of a game are drawn when it is reset (`game.initial_state`). Training and assessment use this loop.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.drivers.protocol import Driver
+from harness.environments.nearby_bodies import nearby_bodies
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import release_controls
 from harness.game.bicycle import move, requests
 from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
-from harness.game.neighbours import NOTICED_M
 from harness.game.observation import SIZE, observe
 from harness.game.payoff import Payoff
 from harness.game.quantities import Quantities, terminations
@@ -41,32 +41,34 @@ from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading
 
-_RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # NumPy would ask the enumeration each time
-NEAREST = 16  # others that a game's bodies have room for
+_RUNNING, _GOAL = (
+    int(Outcome.RUNNING),
+    int(Outcome.GOAL),
+)  # plain integers: comparing arrays with members of the enumeration is slower
 
 
 @dataclass(frozen=True)
 class Seat:
-    """A player's place in the arena: who drives, and on what payoff (None: nobody asks)."""
+    """A player's seat in the arena: its driver and its payoff (None: the payoff is not computed)."""
 
     driver: Driver | None
-    """None: a learner, whose actions are given to `Arena.step`."""
+    """None: a learner; its actions are an argument of `Arena.step`."""
     payoff: Payoff | None = None
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Step:
-    """What a step brought. Arrays are [G, P]."""
+    """The result of a step. Arrays are [G, P]."""
 
     payoff: FloatArray
     drove: BoolArray
-    """Who was still driving when the step began."""
+    """Whether the player was still driving when the step began."""
     quantities: Quantities
-    """As of the end of the step, before anyone left."""
+    """At the end of the step, before a player is removed."""
 
 
 class Arena:
-    """G games on one scene, in which the same seats are taken."""
+    """G games on one scene with the same seats."""
 
     def __init__(
         self,
@@ -76,25 +78,27 @@ class Arena:
         seed: int = 0,
         recorded: bool = False,
     ) -> None:
-        """Load SUMO. Every game has to be started with `reset` before the first step.
+        """Load SUMO. Each game needs a `reset` before the first step.
 
-        A player may have several seats: `InitialState.member` says whose game it is. SUMO drives all of them or none.
-        `recorded`: `reading` tells of all others in every step, and not only of those near a player (at a price).
-        Raises SimulationError if SUMO can't load the scene.
+        `seats` has one entry per player: a seat, or several, of which `InitialState.member` selects one per game. SUMO
+        drives all seats of a player or none. `recorded`: `reading` contains all background vehicles in every step, not
+        only those near a player; this costs time. Raises SimulationError if SUMO can't load the scene.
         """
         self.scene, self.world, self.games = scene, scene.world, games
         self.seats = tuple((each,) if isinstance(each, Seat) else tuple(each) for each in seats)
-        first = [of_player[0].driver for of_player in self.seats]
-        self._taken_over = np.array([driver is None or driver.takes_over for driver in first])
+        first_drivers = [of_player[0].driver for of_player in self.seats]
+        self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
         self._slack_m = slack_m(self._taken_over)
-        self.simulation = open_simulation(scene, games, self._taken_over.tolist(), seed, recorded)
+        self.simulation = open_simulation(
+            scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
+        )
         players = len(self.seats)
         self.state = State.empty(games, players)
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
         self._member = np.zeros((games, players), dtype=np.int64)
         drivers = [seat.driver for of_player in self.seats for seat in of_player if seat.driver is not None]
-        self._asks_drivers = any(driver.takes_over for driver in drivers)
-        self._noise = np.zeros((games, players, self.world.steps if self._asks_drivers else 0, 2))
+        self._has_drivers = any(driver.takes_over for driver in drivers)
+        self._noise = np.zeros((games, players, self.world.steps if self._has_drivers else 0, 2))
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._limits = PlayersLimits(games, players, self.world.steps)
@@ -106,7 +110,7 @@ class Arena:
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
     ) -> None:
-        """(Re)start games, each from its `InitialState`, and look."""
+        """Reset games, each to its `InitialState` and with its departures of background traffic, and observe."""
         for game, start in starts.items():
             self._place(game, start)
             self.simulation.reset(game, start, list((departures or {}).get(game, [])))
@@ -117,41 +121,44 @@ class Arena:
             for member, seat in enumerate(seats):
                 if seat.driver is not None:
                     seat.driver.reset(games if len(seats) == 1 else games[self._member[games, player] == member])
-        seen = self.observation[games] = observe(self._first_quantities(games))
-        check_observation(seen, games, self.state.step)
+        observation = self.observation[games] = observe(self._first_quantities(games))
+        check_observation(observation, games, self.state.step)
 
     def reload(self, seed: int) -> None:
-        """Start SUMO anew from a seed, as assessment does before each game."""
+        """Reload SUMO with a seed, as assessment does before each game."""
         self.simulation.reload(seed)
         self.reading = None
 
     def step(self, actions: FloatArray | None = None) -> Step:
-        """Play one step of every game. `actions` [G, P, 2] are the learners'; other seats' entries are ignored.
+        """Play one step of every game. `actions` [G, P, 2] are the learners'; entries of other seats are ignored.
 
-        Raises ImpossibleNumber where what came of it can't be right (`game.plausibility`), SimulationError where SUMO
-        fails.
+        Raises ImpossibleNumber if a number is impossible (`game.sanity_checks`), SimulationError if SUMO fails.
         """
         before = self.state
-        state = self.state = before.copy()  # the quantities of the step before stay what they were
+        state = self.state = before.copy()  # the quantities of the step before refer to the old state
         drove = state.running
         acceleration, steering = self._decide(actions, drove)
         move(state, acceleration, steering, drove & self._taken_over, self.world.actuators, self.world.step_s)
         reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         self.reading = reading
-        self._take_back(reading, drove)
-        quantities = Quantities(self.world, state, self._bodies(state), *self._locate())
+        self._read_sumo_players(reading, drove)
+        bodies = self._bodies(state)
+        advanced_m, offset_m = self._locate()
+        quantities = Quantities(
+            world=self.world, state=state, bodies=bodies, advanced_m=advanced_m, lateral_offset_m=offset_m
+        )
         state.step = state.step + 1
         if self._limits.misjudges:
             self._limits.look(state)
         self._terminations(quantities, drove)
         payoff = self._payoffs(quantities, drove)
-        check_step(before, quantities, drove, payoff, self._slack_m)
+        check_step(before, quantities, drove=drove, payoff=payoff, slack=self._slack_m)
         self._finish(quantities, drove)
         check_observation(self.observation, self._all_games, state.step)
-        return Step(payoff, drove, quantities)
+        return Step(payoff=payoff, drove=drove, quantities=quantities)
 
     def close(self) -> None:
-        """Give SUMO back."""
+        """Close the SUMO simulation."""
         self.simulation.close()
 
     # --- the parts of a step -------------------------------------------------------------------------------------
@@ -166,11 +173,13 @@ class Arena:
             for member, seat in enumerate(seats):
                 if seat.driver is None:
                     continue
-                games = np.flatnonzero(drove[:, player] if len(seats) == 1 else self._theirs(drove, player, member))
+                games = np.flatnonzero(drove[:, player] if len(seats) == 1 else self._drove_as(drove, player, member))
                 if seat.driver.takes_over and len(games):
                     noise = self._noise[games, player, now[games]]
                     decided = seat.driver.decide(games, self.observation[games, player], noise)
-                    chosen[games, player] = checked_decisions(decided, seat.driver, player, games, state.step)
+                    chosen[games, player] = checked_decisions(
+                        decided, seat.driver, player=player, games=games, steps=state.step
+                    )
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)
         acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)
@@ -179,7 +188,7 @@ class Arena:
         state.lapsed = release_controls(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
         return acceleration, steering
 
-    def _take_back(self, reading: Reading, drove: BoolArray) -> None:
+    def _read_sumo_players(self, reading: Reading, drove: BoolArray) -> None:
         if reading.players is None:
             return
         state = self.state
@@ -192,7 +201,7 @@ class Arena:
             state.heading_rad[games, player], state.speed_mps[games, player] = heading, speed
 
     def _locate(self) -> tuple[FloatArray, FloatArray]:
-        """How far each player came along its route, and where it is across it."""
+        """[G, P] distance along the route in this step, and lateral offset from the route."""
         state, before = self.state, self.state.station_m
         state.station_m, offset = self.world.road.routes.locate(state.x_m, state.y_m, before)
         return state.station_m - before, offset
@@ -208,31 +217,37 @@ class Arena:
         for player, seats in enumerate(self.seats):
             for member, seat in enumerate(seats):
                 if seat.payoff is not None:
-                    paid = drove[:, player] if len(seats) == 1 else self._theirs(drove, player, member)
+                    paid = drove[:, player] if len(seats) == 1 else self._drove_as(drove, player, member)
                     payoff[:, player] = np.where(paid, seat.payoff.total(quantities, player), payoff[:, player])
         return payoff
 
-    def _theirs(self, drove: BoolArray, player: int, member: int) -> BoolArray:
-        """[G] the games in which a player drove who is this one of its drivers."""
+    def _drove_as(self, drove: BoolArray, player: int, member: int) -> BoolArray:
+        """[G] the games in which the player drove with this one of its seats."""
         return drove[:, player] & (self._member[:, player] == member)
 
     def _finish(self, quantities: Quantities, drove: BoolArray) -> None:
-        """Who reached the goal leaves, who crashed stands; then everyone looks."""
+        """Remove players that reached their goal, stop those that crashed, and observe."""
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
         if not ended.any():
             self.observation = observe(quantities)
             return
-        for (game, player), how in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
-            if how == _GOAL:
+        for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
+            if reached == _GOAL:
                 self.simulation.remove(game, player)
             else:
                 self.simulation.halt(game, player)
-        self.state = self.state.copy()  # `quantities` keeps what was true at the end of the step
+        self.state = self.state.copy()  # `quantities` refers to the old state
         self._stop(ended)
-        # Everyone is in the same place, though some are slower, or gone.
-        there = (self._bodies(self.state), quantities.advanced_m, quantities.lateral_offset_m)
-        self.observation = observe(Quantities(self.world, self.state, *there))
+        # Positions are unchanged: only speeds are, and which players are present.
+        after = Quantities(
+            world=self.world,
+            state=self.state,
+            bodies=self._bodies(self.state),
+            advanced_m=quantities.advanced_m,
+            lateral_offset_m=quantities.lateral_offset_m,
+        )
+        self.observation = observe(after)
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
@@ -241,7 +256,7 @@ class Arena:
         state.acceleration_mps2[ended] = 0.0
         state.lapsed[ended] = False
 
-    # --- what the players see ------------------------------------------------------------------------------------
+    # --- observations ------------------------------------------------------------------------------------
 
     def _place(self, game: int, start: InitialState) -> None:
         state = self.state
@@ -254,30 +269,24 @@ class Arena:
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
             self._limits.reset(game, player, start.limits[player], state)
-        if self._asks_drivers:
+        if self._has_drivers:
             self._noise[game] = start.noise
 
     def _first_quantities(self, games: IntArray) -> Quantities:
-        """Of games [N] that start: nobody knows yet where along its route a player is."""
+        """Quantities of games [N] after a reset. The positions along the routes are searched, because none is known."""
         state, routes = self.state.of(games), self.world.road.routes
         start = routes.find(state.x_m, state.y_m)
         state.station_m, offset = routes.locate(state.x_m, state.y_m, start)
         self.state.station_m[games] = state.station_m
-        return Quantities(self.world, state, self._bodies(state, games), np.zeros_like(offset), offset)
+        return Quantities(
+            world=self.world,
+            state=state,
+            bodies=self._bodies(state, games),
+            advanced_m=np.zeros_like(offset),
+            lateral_offset_m=offset,
+        )
 
     def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
-        """Players first, then the others nearest to them: in all games, or in some, of which the state is."""
-        reading, motion = self.reading, (state.x_m, state.y_m, state.heading_rad, state.speed_mps)
-        players = Bodies(*motion, self._players_length[games], self._players_width[games], state.present.copy())
-        if reading is None or not reading.present.size:
-            return players
-        others = Bodies(
-            reading.x_m[games],
-            reading.y_m[games],
-            reading.heading_rad[games],
-            reading.speed_mps[games],
-            reading.length_m[games],
-            reading.width_m[games],
-            reading.present[games],
-        )
-        return players.with_nearest(others, NEAREST, NOTICED_M)
+        """The players and the background vehicles near them in `games`; `state` is that of the same games."""
+        lengths_m, widths_m = self._players_length[games], self._players_width[games]
+        return nearby_bodies(state, self.reading, games, length_m=lengths_m, width_m=widths_m)

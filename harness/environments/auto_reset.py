@@ -1,4 +1,4 @@
-"""Game after game on each tile of an arena, without end: as training plays."""
+"""Automatic resets: each tile of an arena plays one game after another, as training needs."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from harness.traffic.route_file import Departure
 
 
 class AutoReset:
-    """The games of an arena, each drawn from `parts`, the number of its tile and how many games that tile has had.
+    """The games of an arena. Each is drawn from `parts`, the number of its tile, and the count of that tile's games.
 
-    They are drawn for all tiles at once that have none in store: what it takes to draw a game is then in the
-    processor's caches, where in the middle of a step it is not.
+    A tile without a drawn game triggers a draw for all such tiles at once: code and data of the draw are then in the
+    processor's caches, which they are not in the middle of a step.
     """
 
     def __init__(self, arena: Arena, start_distribution: StartDistribution, *parts: str | int) -> None:
@@ -23,7 +23,7 @@ class AutoReset:
         self._store: dict[int, tuple[InitialState, list[Departure]]] = {}
 
     def reset(self, tiles: Iterable[int]) -> None:
-        """Start the next game of each of these tiles."""
+        """Reset these tiles, each to its next game."""
         games = {tile: self._take(tile) for tile in tiles}
         starts = {tile: start for tile, (start, _) in games.items()}
         self._arena.reset(starts, {tile: departures for tile, (_, departures) in games.items()})

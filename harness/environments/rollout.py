@@ -1,6 +1,7 @@
-"""Assessing one arm: its seeded games, one after the other, into records and traces.
+"""Assessment of one arm: its seeded games, one after the other, as records and traces.
 
-Each game has a simulation of its own load, seeded by the episode alone: episode k starts alike in every arm.
+SUMO is reloaded for each game with a seed that depends on the episode only: episode k has the same initial state in
+every arm.
 """
 
 from __future__ import annotations
@@ -22,24 +23,24 @@ from harness.game.seeding import generator_of
 from harness.game.state import EGO, NON_EGO, ROLES, Outcome
 from harness.traffic.scene import OpenScene
 
-_UNMEASURED = np.full((1, len(ROLES)), np.nan)  # [G, P] of one game
+_NOT_MEASURED = np.full((1, len(ROLES)), np.nan)  # [G, P] of one game
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Arm:
-    """A pairing that is assessed. A driver of None: the player does not take part; a mixture: several, in turn."""
+    """A pairing to assess. A driver of None: the player does not take part. A mixture: one of its members per game."""
 
     name: str
     scene: OpenScene
     drivers: tuple[Player, Player]
     personas: tuple[Persona, Persona]
-    """Of the drivers; each of a mixture has its own."""
+    """Of the drivers; a member of a mixture has a persona of its own."""
     seed: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Game:
-    """A game that was played: the cells of its record, and its trace as columns (None if it could not be played)."""
+    """A played game: the cells of its record, and its trace as columns (None if it could not be played)."""
 
     record: dict[str, Any]
     trace: Mapping[str, Sequence[Any]] | None
@@ -51,14 +52,16 @@ def assess(
     on_start: Callable[[int], None] = lambda episode: None,
     abandoned: Mapping[int, str] = MappingProxyType({}),
 ) -> Iterator[Game]:
-    """Play episodes: so many from 0 on, or those given. A game that can't be played, or has numbers that can't be
-    right, is a record with outcome `error`.
+    """Play episodes: numbers 0 to `episodes` - 1, or the given numbers. A game that can't be played, or that has
+    impossible numbers, is a record with outcome `error`.
 
     `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
     has the reason as its error.
-    Raises SimulationError if SUMO can't load the scene at all.
+    Raises SimulationError if SUMO can't load the scene.
     """
-    players = [mixture_of(each or _Absent(), persona) for each, persona in zip(arm.drivers, arm.personas, strict=True)]
+    players = [
+        mixture_of(each or _AbsentDriver(), persona) for each, persona in zip(arm.drivers, arm.personas, strict=True)
+    ]
     present = [0.0 if driver is None else 1.0 for driver in arm.drivers]
     start_distribution = arm.scene.start_distribution(
         [each.human_factors for each in players], present, [each.shares for each in players]
@@ -68,34 +71,34 @@ def assess(
     try:
         for episode in range(episodes) if isinstance(episodes, int) else episodes:
             if episode in abandoned:
-                yield Game(_failed(arm, episode, abandoned[episode]), None)
+                yield Game(record=_failed(arm, episode, abandoned[episode]), trace=None)
                 continue
             on_start(episode)
             try:
                 yield _play(arena, arm, start_distribution, episode)
             except MemoryError:
                 raise
-            except Exception as error:  # a driver may raise whatever it likes: the other games are played
-                yield Game(_failed(arm, episode, f"{type(error).__name__}: {error}"), None)
+            except Exception as error:  # a driver may raise any exception: the other games are played
+                yield Game(record=_failed(arm, episode, f"{type(error).__name__}: {error}"), trace=None)
     finally:
         arena.close()
 
 
-class _Absent:
-    """Nobody: has a seat, but never takes part."""
+class _AbsentDriver:
+    """Takes the seat of a player that is in no game."""
 
     takes_over = True
 
     def reset(self, games: Any) -> None:
-        """Nothing to forget."""
+        """Do nothing."""
 
     def decide(self, games: Any, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        """No player, no decisions."""
+        """Actions [N, 2] of zeros; N is 0."""
         return np.zeros((len(games), 2))
 
 
 def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
-    """What names the chance of an episode, in every arm."""
+    """The parts that name the random numbers of an episode, the same in every arm."""
     return ("assessment", seed, "episode", episode)
 
 
@@ -108,12 +111,12 @@ def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode
     trace.add_players(arena.state.present[0])
     steps: list[Step] = []
     while arena.state.running.any():
-        there = arena.state.present[0].copy()
+        present = arena.state.present[0].copy()
         step = arena.step()
         steps.append(step)
-        trace.add_players(there, step)
-        trace.add_others()
-    return Game(_record(arm, arena, episode, steps), trace.columns)
+        trace.add_players(present, step)
+        trace.add_background()
+    return Game(record=_record(arm, arena, episode, steps), trace=trace.columns)
 
 
 def _record(arm: Arm, arena: Arena, episode: int, steps: Sequence[Step]) -> dict[str, Any]:
@@ -122,30 +125,32 @@ def _record(arm: Arm, arena: Arena, episode: int, steps: Sequence[Step]) -> dict
     for player, metrics in ((EGO, OF_EGO), (NON_EGO, OF_NON_EGO)):
         takes_part = arm.drivers[player] is not None
         record[f"{ROLES[player]}_outcome"] = outcomes[player].word if takes_part else ""
-        drive = _drive(arm, steps, player, outcomes[player]) if takes_part else None
+        series = _series_of(arm, steps, player, outcomes[player]) if takes_part else None
         for name, metric in metrics.items():
-            record[name] = metric(drive) if drive is not None else None
+            record[name] = metric(series) if series is not None else None
     record["ego_failed"] = int(outcomes[EGO] is not Outcome.GOAL) if arm.drivers[EGO] is not None else None
     return record
 
 
-def _drive(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> PlayerSeries:
+def _series_of(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> PlayerSeries:
     driver = arm.drivers[player]
-    has_wheel = driver is not None and driver.takes_over  # SUMO steers nobody: its cars change lanes without a wheel
+    steers = driver is not None and driver.takes_over  # SUMO's cars change lanes without a steering angle
     drove = [step for step in steps if step.drove[0, player]]
 
     def series(value: Callable[[Step], FloatArray]) -> FloatArray:
         return np.array([value(step)[0, player] for step in drove], dtype=float)
 
     return PlayerSeries(
-        outcome,
-        arm.scene.world.step_s,
-        series(lambda step: step.quantities.state.speed_mps),
-        series(lambda step: step.quantities.state.acceleration_mps2),
-        series(lambda step: step.quantities.lateral_acceleration_mps2 if has_wheel else _UNMEASURED),
-        series(lambda step: step.quantities.leader_gap_m),
-        series(lambda step: step.quantities.time_to_collision_s),
-        series(lambda step: step.payoff),
+        outcome=outcome,
+        step_s=arm.scene.world.step_s,
+        speed_mps=series(lambda step: step.quantities.state.speed_mps),
+        acceleration_mps2=series(lambda step: step.quantities.state.acceleration_mps2),
+        lateral_acceleration_mps2=series(
+            lambda step: step.quantities.lateral_acceleration_mps2 if steers else _NOT_MEASURED
+        ),
+        leader_gap_m=series(lambda step: step.quantities.leader_gap_m),
+        time_to_collision_s=series(lambda step: step.quantities.time_to_collision_s),
+        payoff=series(lambda step: step.payoff),
     )
 
 
@@ -159,16 +164,16 @@ def _failed(arm: Arm, episode: int, error: str) -> dict[str, Any]:
 
 
 class _Trace:
-    """The recording of one game, column by column."""
+    """The trace of one game, as columns."""
 
     def __init__(self, arm: Arm, arena: Arena, episode: int) -> None:
         self._arm, self._arena, self._episode = arm, arena, episode
         self.columns: dict[str, list[Any]] = {name: [] for name in TRACE_COLUMNS}
 
-    def add_players(self, there: BoolArray, step: Step | None = None) -> None:
-        """A row for each player that was there, with the outcome it has reached."""
+    def add_players(self, present: BoolArray, step: Step | None = None) -> None:
+        """A row for each player in `present` [P], with its outcome so far."""
         state = step.quantities.state if step is not None else self._arena.state
-        for player in np.flatnonzero(there):
+        for player in np.flatnonzero(present):
             self._add(
                 ROLES[player],
                 self._arm.scene.vehicle(int(player)).vehicle_type,
@@ -177,8 +182,8 @@ class _Trace:
                 Outcome(int(state.outcome[0, player])).word,
             )
 
-    def add_others(self) -> None:
-        """A row for each road user that SUMO drives by itself."""
+    def add_background(self) -> None:
+        """A row for each vehicle of the background traffic."""
         reading = self._arena.reading
         if reading is None:
             return

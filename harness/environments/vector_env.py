@@ -1,4 +1,4 @@
-"""The arena as the vector environment Stable-Baselines3 trains on: one learner, G games, restarted as they end."""
+"""The arena as a vector environment for Stable-Baselines3: one learner, G games, automatic resets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OBSERVATION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (SIZE,), np.float32)
 ACTION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Finished:
     """A learner's finished game."""
 
@@ -32,10 +32,19 @@ class Finished:
 
 
 class ArenaVecEnv(VecEnv):
-    """G games of one learner, as SB3 wants them. A game ends with the learner's part in it.
+    """G games of one learner, as Stable-Baselines3's `VecEnv`. A game ends when the learner's part in it ends.
 
-    Each game is drawn from `parts`, the number of its tile and how many games that tile has had. Rewards are payoffs
-    times `payoff_scale`.
+    Observation: Box(-1, 1, (46,), float32) per game, [G, 46]; entries as in
+    `harness.environments.gymnasium_env.DrivingEnv`.
+
+    Action: Box(-1, 1, (2,), float32) per game, [G, 2]: pedals and wheel.
+
+    Reward: [G] float32, the step's payoff to the learner's persona times `payoff_scale`.
+
+    End: `done` [G] is true when the learner reaches its goal, touches a vehicle or a rail, or when the time limit is
+    up. The game is reset in the same step, and its last observation is `terminal_observation` in `infos`.
+
+    Each game is drawn from `parts`, the number of its tile, and the count of that tile's games.
     """
 
     render_mode = None
@@ -55,21 +64,21 @@ class ArenaVecEnv(VecEnv):
         self.sample_from(start_distribution, *parts)
 
     def sample_from(self, start_distribution: StartDistribution, *parts: str | int) -> None:
-        """Draw the games to come like this, from these named parts; `reset` starts them."""
+        """Draw the games of the next `reset` and after from `start_distribution` and `parts`."""
         self._games = AutoReset(self.arena, start_distribution, *parts)
         self._payoff = np.zeros(self.num_envs)
 
     def reset(self) -> FloatArray:
-        """Start every game anew: observations [G, SIZE]."""
+        """Reset every game. Returns observations [G, SIZE]."""
         self._games.reset(range(self.num_envs))
         return self.arena.observation[:, self._learner].copy()
 
     def step_async(self, actions: FloatArray) -> None:
-        """Take the learner's actions [G, 2]."""
+        """Store the learner's actions [G, 2] for `step_wait`."""
         self._actions[:, self._learner] = actions
 
     def step_wait(self) -> tuple[FloatArray, FloatArray, Any, list[dict[str, Any]]]:
-        """Play a step; ended games restart at once, their last observation in `infos` as SB3 expects it.
+        """Play a step, and reset the games that ended; their last observations are in `infos`.
 
         Raises as `Arena.step` does.
         """
@@ -87,35 +96,35 @@ class ArenaVecEnv(VecEnv):
         return self.arena.observation[:, self._learner].copy(), payoff * self._payoff_scale, done, infos
 
     def take_finished(self) -> list[Finished]:
-        """The games that ended since the last call."""
+        """The games that ended since the last call, removed from the list."""
         finished, self._finished = self._finished, []
         return finished
 
     def close(self) -> None:
-        """Give SUMO back."""
+        """Close the SUMO simulation."""
         self.arena.close()
 
     def _finish(self, game: int) -> None:
         state = self.arena.state
         outcome = Outcome(int(state.outcome[game, self._learner]))
-        self._finished.append(Finished(float(self._payoff[game]), int(state.step[game]), outcome))
+        self._finished.append(Finished(payoff=float(self._payoff[game]), steps=int(state.step[game]), outcome=outcome))
         self._payoff[game] = 0.0
 
-    # --- what SB3 asks of a vector environment and an arena has not ----------------------------------------------
+    # --- methods of VecEnv without a meaning for an arena ----------------------------------------------
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The attribute once for each game asked for."""
+        """The attribute, once for each game in `indices`."""
         return [getattr(self, attr_name) for _ in self._get_indices(indices)]
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Raises AttributeError: the games have nothing of their own to set."""
-        raise AttributeError(f"an arena's games share everything; {attr_name!r} can't be set for some of them")
+        """Raises AttributeError: games have no attributes of their own."""
+        raise AttributeError(f"the games of an arena share all attributes; {attr_name!r} can't be set for some of them")
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method once for each game asked for."""
+        """Call a method once for each game in `indices`."""
         method: Callable[..., Any] = getattr(self, method_name)
         return [method(*args, **kwargs) for _ in self._get_indices(indices)]
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Games are not wrapped."""
+        """False for each game: games are not wrapped."""
         return [False for _ in self._get_indices(indices)]

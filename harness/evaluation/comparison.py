@@ -1,9 +1,9 @@
-"""Paired comparisons of arms: is the persona's effect real, and did retraining mend it?
+"""Paired comparisons of arms: is the persona's effect significant, and does retraining reduce it?
 
-Pure: a table of games in, a table of comparisons out. Method: SafeDriveRL section 4.2, the paired-samples
+Pure functions from a table of games to a table of comparisons. Method: SafeDriveRL section 4.2, the paired-samples
 one-tailed t-test of H0 (mu_diff = 0) against H1 (mu_diff > 0). The paper writes H1 as mu_diff > 0 for both
-questions without saying what is subtracted from what; the direction is the one its sections 4.3.1 and
-4.3.2 report, so that in every row a positive `mean_difference` is in favour of H1:
+questions and does not state the order of the subtraction. The direction here is that of its sections 4.3.1
+and 4.3.2: in every row a positive `mean_difference` supports H1:
 
     question  arms (baseline -> treatment)                     metric      difference (H1: its mean > 0)
     RQ1       naive_alone -> naive_vs_<persona>                failure     treatment - baseline (fails more)
@@ -11,11 +11,11 @@ questions without saying what is subtracted from what; the direction is the one 
     RQ2       naive_vs_<persona> -> retrained_vs_<persona>     failure     baseline - treatment (fails less)
     RQ2                                                        mean_speed  treatment - baseline (faster)
 
-Beside the paper's test, in the same row: the two-sided 95 % t interval of the mean difference; the effect
+The same row also contains: the two-sided 95 % t interval of the mean difference; the effect
 size (Cohen's d_z, mean / standard deviation of the differences); for failures McNemar's exact test,
-one-tailed in the direction of H1 like the t-test (of the pairs in which only one side failed, are more than
-half on H1's side? Binomial with p = 1/2; 1 when there are none); and Holm's correction over all t-tests of
-the table, which is the whole campaign's.
+one-tailed in the direction of H1 like the t-test (of the pairs in which exactly one game failed, is H1 right
+in more than half? Binomial with p = 1/2; 1 when there are no such pairs); and Holm's correction over all
+t-tests of the table, which is that of the whole campaign.
 
 `rejects_h0` is the paper's criterion, the uncorrected p-value. The verdict is stricter: see `Verdict`.
 """
@@ -57,11 +57,11 @@ COMPARISON_COLUMNS = {
 """Columns of `comparisons.csv` in order, each with its pandas dtype."""
 
 CONFIDENCE = 0.95
-"""Of every interval in the tables, whatever the campaign's significance is."""
+"""The confidence of every interval in the tables; it does not depend on the campaign's significance."""
 
 ROUNDING = 1e-12
-"""Differences that spread less than this share of the largest value are equal but for rounding: without it
-0.3 - 0.2 against 0.2 - 0.1 would be a minute standard deviation and an enormous t."""
+"""Differences with a spread below this share of the largest value count as equal: otherwise the rounding of
+0.3 - 0.2 against 0.2 - 0.1 would give a tiny standard deviation and a huge t."""
 
 
 class Verdict(str, Enum):
@@ -80,9 +80,9 @@ class Verdict(str, Enum):
     """Fewer than two pairs could be compared."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Metric:
-    """What is compared, and its direction: `sign[question] * (treatment - baseline)` is > 0 under H1."""
+    """A compared quantity and its direction: `sign[question] * (treatment - baseline)` is > 0 under H1."""
 
     name: str
     column: str
@@ -90,19 +90,19 @@ class Metric:
 
 
 METRICS = (
-    Metric("failure", "ego_failed", {"RQ1": +1, "RQ2": -1}),
-    Metric("mean_speed", "ego_mean_speed_mps", {"RQ1": -1, "RQ2": +1}),
+    Metric(name="failure", column="ego_failed", sign={"RQ1": +1, "RQ2": -1}),
+    Metric(name="mean_speed", column="ego_mean_speed_mps", sign={"RQ1": -1, "RQ2": +1}),
 )
 
 
 def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
-    """Answer each question by each metric; a row for each, in that order, with `COMPARISON_COLUMNS`.
+    """A row for each question and metric, in that order, with `COMPARISON_COLUMNS`.
 
     `episodes` has the columns of episodes.csv: arm, seed, episode, ego_outcome, error, and the metrics'.
     Games are paired by seed and episode. A pair is left out, and counted in `pairs_left_out`, when either
-    game errored, has an empty value, or is missing. What can't be computed is NaN. Where all differences are
-    equal, or there are fewer than two pairs, there is no test: t, p-values, interval and effect size are NaN,
-    and the row is no member of Holm's family and rejects nothing.
+    game errored, has an empty value, or is missing. A value that can't be computed is NaN. Where all
+    differences are equal, or there are fewer than two pairs, there is no test: t, p-values, interval and effect
+    size are NaN, the row is not in Holm's family, and `rejects_h0` is false.
 
     Raises ValueError when significance is not in (0, 1), or when an arm has two games for one episode.
     """
@@ -118,10 +118,10 @@ def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance:
 
 
 def holm(p_values: Floats) -> Floats:
-    """Holm's step-down adjusted p-values [N]; NaN is no test: it stays NaN and does not count.
+    """Holm's step-down adjusted p-values [N]. NaN means no test: it stays NaN and is not counted.
 
     Source: S. Holm, "A simple sequentially rejective multiple test procedure", Scand. J. Statist. 6 (1979).
-    The i-th smallest of m p-values is multiplied by m - i + 1, kept from falling, and capped at 1.
+    The i-th smallest of m p-values is multiplied by m - i + 1, made no smaller than the previous one, and capped at 1.
     """
     adjusted = np.full(p_values.shape, np.nan)
     tests = np.flatnonzero(~np.isnan(p_values))
@@ -132,7 +132,7 @@ def holm(p_values: Floats) -> Floats:
 
 
 def mean_interval(values: Floats) -> tuple[float, float]:
-    """Two-sided 95 % t interval of the mean of values [N]; NaN, NaN if there is no spread to judge by."""
+    """Two-sided 95 % t interval of the mean of values [N]; NaN, NaN without a spread."""
     if len(values) < 2 or _all_equal(values, largest=float(np.abs(values).max())):
         return np.nan, np.nan
     mean, error = values.mean(), values.std(ddof=1) / np.sqrt(len(values))
@@ -168,8 +168,8 @@ def games_by_arm(episodes: pd.DataFrame) -> Mapping[Any, pd.DataFrame]:
 def pairs_of(
     games: Mapping[Any, pd.DataFrame], seed: int, baseline: str, treatment: str, columns: Sequence[str]
 ) -> tuple[Floats, Floats, int]:
-    """Baseline values [N, C], treatment values [N, C] of the same N episodes, and how many pairs were left out:
-    those of which a game errored, is missing, or lacks one of the columns [C].
+    """Baseline values [N, C], treatment values [N, C] of the same N episodes, and the number of pairs left out:
+    those with a game that errored, is missing, or lacks one of the columns [C].
 
     Raises ValueError when an arm has two games for one episode.
     """
@@ -197,7 +197,7 @@ def measured_values(rows: pd.DataFrame | None, columns: Sequence[str]) -> pd.Dat
 
 
 def paired_t_test(low: Floats, high: Floats) -> dict[str, float]:
-    """H1: the mean of `high - low`, [N] each, is > 0. Only what exists is in the answer, by the table's columns."""
+    """H1: the mean of `high - low`, [N] each, is > 0. The result has the table's columns that exist for these pairs."""
     differences = high - low
     if len(differences) == 0:
         return {}
@@ -218,7 +218,7 @@ def paired_t_test(low: Floats, high: Floats) -> dict[str, float]:
 
 
 def _all_equal(values: Floats, largest: float) -> bool:
-    """Whether values [N] are one number but for the rounding of numbers as large as `largest`."""
+    """Whether values [N] are equal up to the rounding of numbers as large as `largest`."""
     return bool(np.ptp(values) <= ROUNDING * largest or values.std(ddof=1) == 0)
 
 
@@ -230,7 +230,7 @@ def _mcnemar(low: Floats, high: Floats) -> float:
 
 
 def verdict_of(row: Mapping[Any, Any], significance: float) -> Verdict:
-    """What a row's pairs, p-values and mean difference come to."""
+    """The verdict of a row, from its pairs, p-values and mean difference."""
     if row["pairs"] < 2:
         return Verdict.NOT_ENOUGH_PAIRS
     if np.isnan(row["p_value"]):

@@ -1,6 +1,6 @@
-"""What is measured of a player in one game: from the recording of its steps to a value, or None if unscored.
+"""The metrics of a player in one game: from the recording of its steps to a value, or None if unscored.
 
-A value that can't be measured in a game (no leader to trail, no course to a collision) is unscored, never 0.
+A metric that can't be measured in a game (no leader, no collision course) is unscored, never 0.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from harness.game.state import Outcome
 
 @dataclass(frozen=True)
 class PlayerSeries:
-    """One player's game, step by step while it drove, [T]; gaps and times are inf where there is nothing."""
+    """One player's game, step by step while it drove, [T]; inf: no leader, or no collision course."""
 
     outcome: Outcome
     step_s: float
@@ -44,12 +44,12 @@ def trailing_distance_m(drive: PlayerSeries) -> float | None:
 
 
 def min_ttc_s(drive: PlayerSeries) -> float | None:
-    """Least time to collision (TTC), of oriented boxes that keep heading and speed; 0 at contact."""
+    """Least time to collision (TTC), of oriented boxes with constant heading and speed; 0 at contact."""
     return _finite(drive.time_to_collision_s, np.min)
 
 
 def max_deceleration_mps2(drive: PlayerSeries) -> float | None:
-    """Hardest braking; 0 if the player never slowed."""
+    """Hardest braking; 0 if the player never decelerated."""
     return _finite(np.maximum(-drive.acceleration_mps2, 0.0), np.max)
 
 

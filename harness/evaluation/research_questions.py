@@ -1,4 +1,4 @@
-"""What is asked of two arms. Planning asks it, and has no use for the statistics that answer it (`comparison`)."""
+"""The research questions on two arms. Separate from `comparison`, so that planning does not import the statistics."""
 
 from __future__ import annotations
 

@@ -109,6 +109,36 @@ class Arm:
         return pair if self.best_response_of is None else f"{pair}_{ROLES[self.best_response_of]}_response"
 
 
+NAIVE_ALONE = Arm(ego=NaiveEgo())
+NAIVE_VS_SUMO = Arm(ego=NaiveEgo(), non_ego=SumoNonEgo())
+
+
+def persona_alone(persona: str) -> Arm:
+    """The arm of a persona's non-ego of round 1 without the ego."""
+    return Arm(non_ego=PersonaNonEgo(persona=persona))
+
+
+def against_persona(ego: EgoStrategy, persona: str) -> Arm:
+    """The arm of an ego against a persona's non-ego of round 1, or against a population."""
+    return Arm(ego=ego, non_ego=PersonaNonEgo(persona=persona))
+
+
+def counterparts(arm: Arm) -> list[Arm]:
+    """The arms to compare an arm with: the ego of round 2 with the naive ego, against the persona of its training."""
+    match arm:
+        case Arm(ego=NaiveEgo(), non_ego=PersonaNonEgo(persona=persona, round=1), best_response_of=None):
+            round_2 = (RetrainedEgo(against=persona), ReconfiguredEgo(against=persona))
+            return [against_persona(ego, persona) for ego in round_2]
+        case Arm(
+            ego=RetrainedEgo(against=against, round=2) | ReconfiguredEgo(against=against),
+            non_ego=PersonaNonEgo(persona=persona, round=1),
+            best_response_of=None,
+        ) if against == persona:
+            return [against_persona(NaiveEgo(), persona)]
+        case _:
+            return []
+
+
 def strategy_name(strategy: Strategy) -> str:
     """The strategy's name in tables, stages and policy folders."""
     match strategy:

@@ -13,8 +13,8 @@ from harness.evaluation.tables import SUMMARY_COLUMNS, typed
 def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
     """A row for each arm (in order of first appearance) and training seed, with `SUMMARY_COLUMNS`.
 
-    `episodes` counts all games of the arm and `errors` those that could not be played; every other column
-    is over the games that were played and in which the quantity was measured, and empty if there were none.
+    `episodes` counts all games of the arm and `errors` those that could not be played. Every other column is
+    over the games that were played and in which the quantity was measured; it is empty without such games.
     Rates have 95 % Clopper-Pearson intervals, the mean speed a 95 % t interval (empty without spread); the
     other columns are means over games (min_ttc_s: the mean of each game's minimum).
     """
@@ -34,7 +34,7 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
     speeds = played["ego_mean_speed_mps"].dropna()
     speed_low, speed_high = mean_interval(speeds.to_numpy())
 
-    def times(outcome: str) -> int | None:
+    def count_of(outcome: str) -> int | None:
         return int((with_ego["ego_outcome"] == outcome).sum()) if len(with_ego) else None
 
     return {
@@ -44,9 +44,9 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
         "episodes": len(games),
         "errors": len(games) - len(played),
         **_rate("failure_rate", int(with_ego["ego_failed"].sum()), len(with_ego)),
-        "collisions": times("collision"),
-        "rails": times("rail"),
-        "timeouts": times("timeout"),
+        "collisions": count_of("collision"),
+        "rails": count_of("rail"),
+        "timeouts": count_of("timeout"),
         "mean_speed_mps": speeds.mean(),
         "mean_speed_low_mps": speed_low,
         "mean_speed_high_mps": speed_high,
@@ -62,7 +62,7 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
 
 
 def _rate(column: str, successes: int, games: int) -> dict[str, float]:
-    """The rate and its Clopper-Pearson interval, as three columns; empty if there were no games."""
+    """The rate and its Clopper-Pearson interval, as three columns; empty without games."""
     if games == 0:
         return {column: np.nan, f"{column}_low": np.nan, f"{column}_high": np.nan}
     interval = stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")

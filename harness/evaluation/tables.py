@@ -2,8 +2,8 @@
 
 An empty cell means "can't be measured", never 0. Equal tables are equal bytes: floats are written as the
 shortest text that reads back as the same number, whole numbers without a point, truth values as true/false,
-lines end in a line feed. A table is known by its columns, which are declared here and nowhere else (those of
-`comparisons.csv` and of the findings on equilibria beside what computes them).
+lines end in a line feed. A table is recognised by its columns, which are declared here only (those of
+`comparisons.csv` and of the findings on equilibria are declared beside their computation).
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ RECONFIGURATION_COLUMNS = {
     "chosen": "bool",
     "error": "object",
 }
-"""In order, each with its pandas dtype. `low` and `high` are what the parameter was searched between, `best_payoff` is
-the best mean payoff so far, `chosen` true of the trial that was taken; one that could not be played has an `error`."""
+"""Columns of `reconfiguration.csv`. `low` and `high` are the bounds of the search, `best_payoff` is the best mean
+payoff so far, `chosen` is true for the trial that was taken; a trial that could not be played has an `error`."""
 
 SUMMARY_COLUMNS = {
     "arm": "object",
@@ -131,7 +131,7 @@ POPULATION_COLUMNS = {
     "ego_payoff": "float64",
     "non_ego_payoff": "float64",
 }
-"""Columns of `populations.csv`: a population's arms by who drove."""
+"""Columns of `populations.csv`: the arms against a population, by the persona that drove."""
 
 TABLES = {
     "episodes": EPISODE_COLUMNS,
@@ -151,8 +151,8 @@ _TRUTH = {"true": True, "false": False}
 def typed(frame: pd.DataFrame) -> pd.DataFrame:
     """The frame as one of `TABLES`: columns in its order and of its dtypes, rows counted from 0.
 
-    Missing text becomes "". Raises ValueError when the columns are no table's, a whole number has a
-    fraction, or a cell that may not be empty is.
+    Missing text becomes "". Raises ValueError when the columns are not those of a table, a whole
+    number has a fraction, or a required cell is empty.
     """
     columns = _columns_of(frame.columns)
     return pd.DataFrame({name: _cast(frame[name], dtype) for name, dtype in columns.items()})
@@ -173,12 +173,12 @@ def _cast(column: pd.Series, dtype: str) -> pd.Series:
     try:
         if dtype == "object":
             text = column.astype(object).where(column.notna(), "")
-            # str.__str__: the text itself of an enum's member, and a TypeError for what is no text
+            # str.__str__ gives the text of an enum's member, and a TypeError for a value that is not text
             return pd.Series([str.__str__(cell) for cell in text], dtype=object)
         if dtype == "bool" and not all(cell in (True, False) for cell in column):
             raise ValueError("neither true nor false")
         if dtype == "int64":
-            column = column.astype("Int64")  # refuses a fraction, which the next cast would cut off
+            column = column.astype("Int64")  # refuses a fraction, which the next cast would truncate
         if dtype == "float64":
             column = column.astype("Float64")  # takes every kind of missing number
         return column.astype(dtype)
@@ -187,7 +187,7 @@ def _cast(column: pd.Series, dtype: str) -> pd.Series:
 
 
 def write_csv(frame: pd.DataFrame, path: Path) -> None:
-    """Write one of `TABLES` so that the file is, at every moment, either the old one or the new one, whole.
+    """Write one of `TABLES`. The replacement is atomic: the file is complete at every moment, old or new.
 
     Raises ValueError as `typed` does, and OSError when the folder can't be written.
     """
@@ -195,20 +195,20 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
     cells = [[_text(cell) for cell in table[name].tolist()] for name in table.columns]
     lines = [list(table.columns), *zip(*cells, strict=True)]
     text = "".join(",".join(line) + "\n" for line in lines)
-    # an error message from elsewhere may hold what is no Unicode: never lose a table to it
+    # an error message of another program may not be valid Unicode; it must not prevent the table
     write_atomically(path, text.encode("utf-8", errors="backslashreplace"))
 
 
 def join_csv(parts: Sequence[Path], path: Path) -> None:
-    """Put tables with the same columns, each a file of `write_csv`, under one another: as if written at once."""
+    """Concatenate tables with the same columns, each a file of `write_csv`. The bytes are those of one table."""
     scratch = scratch_beside(path)
     try:
-        with scratch.open("wb") as whole:
+        with scratch.open("wb") as target:
             for number, part in enumerate(parts):
                 with part.open("rb") as lines:
                     header = lines.readline()
-                    whole.write(b"" if number else header)
-                    shutil.copyfileobj(lines, whole)
+                    target.write(b"" if number else header)
+                    shutil.copyfileobj(lines, target)
         replace_durably(scratch, path)
     finally:
         scratch.unlink(missing_ok=True)
@@ -226,9 +226,9 @@ def _text(cell: object) -> str:
 def read_csv(path: Path) -> pd.DataFrame:
     """The table `write_csv` wrote, equal to it in every value and dtype (empty text is "", not NaN).
 
-    Raises UsageError when the file is missing or is no such table.
+    Raises UsageError when the file is missing or is not such a table.
     """
-    remedy = "run the campaign again: it writes its tables anew"
+    remedy = "run the campaign again: it rewrites its tables"
     try:
         text = content_of(path, _MOST_BYTES).decode("utf-8")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
@@ -257,6 +257,6 @@ def _parse(cells: Iterable[str], dtype: str) -> pd.Series:
 
 
 def is_of_a_search(trials: pd.DataFrame) -> bool:
-    """Whether the ego as it was given is among the trials of a stage, and one of them was chosen."""
+    """Whether the trials of a stage contain the ego as given (trial 0) with a payoff, and exactly one chosen trial."""
     payoffs = trials.groupby("trial")["mean_payoff"].first()
     return 0 in payoffs.index and payoffs.notna()[0] and trials.loc[trials["chosen"], "trial"].nunique() == 1

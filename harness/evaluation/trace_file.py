@@ -1,7 +1,7 @@
-"""The traces of an arm as one Parquet file: the games of a segment are a row group of it.
+"""The traces of an arm as one Parquet file: the games of a segment are one of its row groups.
 
-A segment's file is such a file too, and an arm's is its segments' row groups one after the other: the same bytes
-whether the segments were played in one go or not.
+A segment's file has the same format, and an arm's file is the concatenation of its segments' row groups: the bytes do
+not depend on whether the segments were played in one run.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
 class TraceWriter:
-    """Writes the games of a segment; the file is there when all games are in it, or not at all."""
+    """Writes the games of a segment. The file appears only when all games are in it."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -67,13 +67,13 @@ class TraceWriter:
 
 
 def join_traces(parts: Sequence[Path], path: Path) -> None:
-    """Put the traces of segments into one file, one after the other."""
+    """Concatenate the traces of segments in one file."""
     _write((group for part in parts for group in _row_groups(part)), path)
 
 
 def read_trace(path: Path, episode: int) -> pd.DataFrame:
-    """One game's trace; empty if the file has none of that episode. Raises UsageError if it is no file of traces, or
-    holds what no game can be."""
+    """One game's trace; empty if the file has none of that episode. Raises UsageError if it is not a file of traces,
+    or contains values that no game can have."""
     try:
         check_file(path, _MOST_BYTES)
         table = pq.read_table(path, filters=[("episode", "==", episode)])
@@ -82,11 +82,11 @@ def read_trace(path: Path, episode: int) -> pd.DataFrame:
         _check_game(frame)
     except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
         raise _damaged(path, error) from None
-    return _worded(frame)
+    return _with_strings(frame)
 
 
 def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
-    """The games of a file in order, each with its episode, as `read_trace` gives them; read a segment at a time."""
+    """The games of a file in order, each with its episode, as of `read_trace`. Reads one segment at a time."""
     rest = SCHEMA.empty_table().to_pandas()
     for group in _row_groups(path):
         rows = _frame(group)
@@ -94,7 +94,7 @@ def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
         games = [(int(episode), game) for episode, game in rows.groupby("episode", sort=False)]
         for episode, game in games[:-1]:
             yield episode, game.reset_index(drop=True)
-        rest = games[-1][1] if games else rows  # the next row group may go on with it
+        rest = games[-1][1] if games else rows  # the next row group may continue this game
     if len(rest):
         yield int(rest["episode"].iloc[0]), rest.reset_index(drop=True)
 
@@ -118,17 +118,17 @@ def _row_groups(path: Path) -> Iterator[pa.Table]:
 
 
 def _frame(table: pa.Table) -> pd.DataFrame:
-    return _worded(table.to_pandas())
+    return _with_strings(table.to_pandas())
 
 
-def _worded(frame: pd.DataFrame) -> pd.DataFrame:
+def _with_strings(frame: pd.DataFrame) -> pd.DataFrame:
     for name in ("player", "vehicle_type", "outcome"):
         frame[name] = frame[name].astype(str)
     return frame
 
 
 def check_traces(path: Path, episodes: Iterable[int]) -> None:
-    """Raise UsageError unless this is a file of traces, whose numbers can be a game's, with all these episodes."""
+    """Raise UsageError unless this is a file of traces with plausible numbers and all these episodes."""
     missing = set(episodes)
     try:
         check_file(path, _MOST_BYTES)
@@ -145,26 +145,24 @@ def check_traces(path: Path, episodes: Iterable[int]) -> None:
 
 def _check_schema(schema: pa.Schema) -> None:
     if not schema.equals(SCHEMA):
-        wrong = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]
-        raise ValueError(f"its columns are not those of a trace: {', '.join(wrong)[:200]}")
+        different = sorted(set(schema.names) ^ set(SCHEMA.names)) or ["types"]
+        raise ValueError(f"its columns are not those of a trace: {', '.join(different)[:200]}")
 
 
 def _check_game(frame: pd.DataFrame) -> None:
     _check_numbers(frame[_NUMBERS].to_numpy(float))
     steps = frame["step"]
     if frame.isna().any(axis=None) or (len(frame) and not (0 <= steps.min() <= steps.max() <= _MOST_STEPS)):
-        raise ValueError("it has empty cells, or steps that no game has")
+        raise ValueError("it has empty cells, or steps out of range")
     if frame.duplicated(["step", "player"]).any():
-        raise ValueError("somebody is in two places at once")
+        raise ValueError("a road user has two rows in one step")
 
 
 def _check_numbers(numbers: FloatArray) -> None:
     if not (np.abs(numbers) <= _LARGEST).all():  # never true of NaN
-        raise ValueError("it holds numbers that are none, or too large to be of a game")
+        raise ValueError("it contains numbers that are missing or out of range")
 
 
 def _damaged(path: Path, error: Exception) -> UsageError:
     text = (error.strerror or error) if isinstance(error, OSError) else error
-    return UsageError.of(
-        path, "", f"is not a file of traces: {text}", "run the campaign again: it plays its games anew"
-    )
+    return UsageError.of(path, "", f"is not a file of traces: {text}", "run the campaign again: it replays the games")

@@ -1,7 +1,7 @@
-"""What a recorded game's quantities were, step by step: from its trace, all steps at once.
+"""The quantities of a recorded game in every step, computed from its trace for all steps at once.
 
-The steps of the game take the place of the games' axis: row t of the arrays [T, P] is what `game.quantities`, which
-payoffs and metrics are made of, says of step t.
+The games' axis of `game.quantities`, on which payoffs and metrics are based, is the steps' axis here: row t of the
+arrays [T, P] is step t.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from harness.game.road import MARGIN_M, SPACING_M, Routes
 from harness.game.state import ROLES, Bodies, State
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Series:
-    """[T, P] of the players while they drove, NaN when they did not; inf where nobody leads, or none would touch."""
+    """[T, P] of the players while they drove, NaN otherwise; inf without a leader or a collision course."""
 
     leader_gap_m: FloatArray
     time_to_collision_s: FloatArray
@@ -32,15 +32,16 @@ def series_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[flo
     quantities = quantities_of(trace, world, sizes_m)
     drove = drove_in(trace)
     return Series(
-        np.where(drove, quantities.leader_gap_m, np.nan), np.where(drove, quantities.time_to_collision_s, np.nan)
+        leader_gap_m=np.where(drove, quantities.leader_gap_m, np.nan),
+        time_to_collision_s=np.where(drove, quantities.time_to_collision_s, np.nan),
     )
 
 
 def quantities_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]]) -> Quantities:
-    """The quantities of every step of one game. Nothing in them is of the step before (advanced_m is 0).
+    """The quantities of every step of one game. They do not depend on the previous step (advanced_m is 0).
 
-    Where a player is along its route is looked for anew in each step: on a route that crosses itself, a player on
-    the crossing may be taken to be on the other branch.
+    The position along the route is located separately in each step: on a route that crosses itself, a player on the
+    crossing may be located on the other branch.
     """
     names = [*ROLES, *sorted(set(trace["player"]) - set(ROLES))]
     players, places = len(ROLES), _places(trace, names)
@@ -66,7 +67,7 @@ def quantities_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple
 
 
 def drove_in(trace: pd.DataFrame) -> BoolArray:
-    """[T, P] whether each player was driving: it was there, and nothing had ended its game a step before."""
+    """[T, P] whether each player was driving: it was present, and its game had not ended in an earlier step."""
     places = _places(trace, ROLES)
     there = _filled(places, np.ones(len(trace), dtype=bool))
     running = _filled(places, (trace["outcome"] == "").to_numpy())
@@ -78,7 +79,7 @@ _Places = tuple[tuple[int, int], BoolArray, IntArray, IntArray]
 
 
 def _places(trace: pd.DataFrame, names: list[str] | tuple[str, ...]) -> _Places:
-    """The shape [T, names] that a trace fills, which of its rows are of `names`, and the place of each of those."""
+    """The shape [T, names] of a trace, which of its rows are of `names`, and the step and column of each of those."""
     column = trace["player"].map({name: place for place, name in enumerate(names)})
     known = column.notna().to_numpy()
     steps = trace["step"].to_numpy(dtype=np.int64)

@@ -1,1 +1,4 @@
-"""The game itself, in NumPy and compiled loops, over arrays with a leading axis G (games) and P (players)."""
+"""The game: state, dynamics, road, observations and payoffs, in NumPy and compiled loops over arrays [G, P].
+
+G is the number of games, P the number of players.
+"""

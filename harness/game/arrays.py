@@ -1,4 +1,4 @@
-"""Array types, spelled once."""
+"""Array types of the package."""
 
 from __future__ import annotations
 

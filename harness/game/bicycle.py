@@ -1,11 +1,11 @@
-"""How a player's car answers its pedals and wheel: a kinematic bicycle inside a friction circle.
+"""Vehicle dynamics of a player's car: a kinematic bicycle inside a friction circle.
 
 Kinematic bicycle about the centre of the wheelbase (Rajamani, Vehicle Dynamics and Control, 2nd ed., section 2.2):
 
     slip = atan(tan(steering) / 2)          x' = v cos(heading + slip)
     heading' = v cos(slip) tan(steering) / wheelbase          y' = v sin(heading + slip)
 
-integrated like SUMO's Euler update (displacement = new speed times step), with the heading at mid-step.
+Integration follows SUMO's Euler update (displacement = new speed times step), with the heading at mid-step.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from harness.game.jit import compiled
 from harness.game.state import State
 
 GRAVITY_MPS2 = 9.81
-WHEEL_CENTRE = 0.25  # gain of the wheel about its centre: small corrections are gentle, full lock is in reach
+WHEEL_CENTRE = 0.25  # gain of the wheel near its centre; at full deflection the gain is 1
 
 
 class Actuators(NamedTuple):
-    """What the players' cars can do. Arrays are [P]; `friction` is the road's, as a share of g."""
+    """Limits of the players' cars. Arrays are [P]; `friction` is the friction coefficient of the road."""
 
     max_acceleration_mps2: FloatArray
     max_braking_mps2: FloatArray
@@ -36,7 +36,7 @@ class Actuators(NamedTuple):
 
 @compiled
 def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArray:
-    """[G, P] largest steering angle of use at this speed: the car's lock, or where the tyres would let go."""
+    """[G, P] largest useful steering angle at a speed [G, P]: the lock, or the angle at which the tyres lose grip."""
     grip = actuators.friction * GRAVITY_MPS2
     return np.minimum(
         actuators.max_steering_rad,
@@ -46,15 +46,14 @@ def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArra
 
 @compiled
 def requests(action: FloatArray, speed_mps: FloatArray, actuators: Actuators) -> tuple[FloatArray, FloatArray]:
-    """What a driver's action asks of the car.
+    """The accelerations (m/s^2) and steering angles (rad), [G, P], that actions request of the cars.
 
-    action [G, P, 2] in [-1, 1]: the pedals (-1 full brake, 0 coast, 1 full throttle) and the wheel (-1 as far
-    right, 1 as far left as is of use at this speed; gentle about the centre). Returns acceleration (m/s^2) and
-    steering angle (rad), [G, P].
+    action [G, P, 2] in [-1, 1]: the pedals (-1 full brake, 0 coast, 1 full throttle) and the wheel (-1 and 1: the
+    largest useful angle to the right and left at speeds [G, P]; progressive from the centre).
     """
     acceleration, steering = np.empty(speed_mps.shape), steering_range_rad(speed_mps, actuators)
     for g, p in np.ndindex(speed_mps.shape):
-        pedals, wheel = _within(action[g, p, 0], 1.0), _within(action[g, p, 1], 1.0)
+        pedals, wheel = _clamped(action[g, p, 0], 1.0), _clamped(action[g, p, 1], 1.0)
         strongest = actuators.max_acceleration_mps2[p] if pedals >= 0.0 else actuators.max_braking_mps2[p]
         acceleration[g, p] = pedals * strongest
         steering[g, p] *= wheel * (WHEEL_CENTRE + (1.0 - WHEEL_CENTRE) * wheel**2)
@@ -64,11 +63,13 @@ def requests(action: FloatArray, speed_mps: FloatArray, actuators: Actuators) ->
 def actions(
     acceleration_mps2: FloatArray, steering_rad: FloatArray, speed_mps: FloatArray, actuators: Actuators
 ) -> FloatArray:
-    """The action [..., 2] whose `requests` ask this acceleration (m/s^2) and steering angle (rad) of the car, or as
-    much of them as it can. Arguments [..., P]; the result is in [-1, 1]."""
+    """[..., P, 2] actions in [-1, 1]: the inverse of `requests`.
+
+    acceleration_mps2, steering_rad and speed_mps are [..., P]. Requests beyond the car's limits are clipped.
+    """
     strongest = np.where(acceleration_mps2 >= 0.0, actuators.max_acceleration_mps2, actuators.max_braking_mps2)
     share = np.clip(steering_rad / steering_range_rad(speed_mps, actuators), -1.0, 1.0)
-    # the real root of share = wheel (c + (1 - c) wheel^2), a depressed cubic with one
+    # the only real root of the depressed cubic share = wheel (c + (1 - c) wheel^2)
     stretch = np.sqrt(WHEEL_CENTRE / (3.0 * (1.0 - WHEEL_CENTRE)))
     wheel = 2.0 * stretch * np.sinh(np.arcsinh(1.5 * share / (WHEEL_CENTRE * stretch)) / 3.0)
     return np.clip(np.stack((acceleration_mps2 / strongest, wheel), axis=-1), -1.0, 1.0)
@@ -82,10 +83,11 @@ def move(
     actuators: Actuators,
     step_s: float,
 ) -> None:
-    """Advance the players marked in `moving` [G, P] by one step, in place, by the requests [G, P].
+    """Move the players marked in `moving` [G, P] by one step, in place.
 
-    Steering follows its request as fast as the rack allows; what grip the curve uses is missing for speeding up and
-    braking (friction circle), and where the grip is not enough for the curve the car runs wide.
+    acceleration_mps2 and steering_rad [G, P] are requests. The steering angle follows its request at the rate of the
+    steering rack. The grip used by the curve is not available to the pedals (friction circle). If the grip is too
+    small for the curve, the car runs wide.
     """
     motion = (state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad)
     _move(*motion, acceleration_mps2, steering_rad, moving, actuators, step_s)
@@ -99,8 +101,8 @@ def _move(
     speed_mps: FloatArray,
     acceleration_mps2: FloatArray,
     steering_rad: FloatArray,
-    wanted_acceleration_mps2: FloatArray,
-    wanted_steering_rad: FloatArray,
+    requested_acceleration_mps2: FloatArray,
+    requested_steering_rad: FloatArray,
     moving: BoolArray,
     actuators: Actuators,
     step_s: float,
@@ -109,20 +111,20 @@ def _move(
     for g, p in np.ndindex(moving.shape):
         if moving[g, p]:
             rack = actuators.max_steering_rate_radps[p] * step_s
-            turn = _within(wanted_steering_rad[g, p] - steering_rad[g, p], rack)
-            steering = _within(steering_rad[g, p] + turn, actuators.max_steering_rad[p])
-            wanted = curvature_per_m(steering, actuators.wheelbase_m[p])
+            turn = _clamped(requested_steering_rad[g, p] - steering_rad[g, p], rack)
+            steering = _clamped(steering_rad[g, p] + turn, actuators.max_steering_rad[p])
+            requested_curvature = curvature_per_m(steering, actuators.wheelbase_m[p])
 
             before = speed_mps[g, p]
-            left_for_pedals = _rest_of(grip, wanted * before**2)
-            most_up = min(actuators.max_acceleration_mps2[p], left_for_pedals)
-            most_down = min(actuators.max_braking_mps2[p], left_for_pedals)
-            acceleration = min(max(wanted_acceleration_mps2[g, p], -most_down), most_up)
+            pedal_grip = _remaining_grip(grip, requested_curvature * before**2)
+            most_up = min(actuators.max_acceleration_mps2[p], pedal_grip)
+            most_down = min(actuators.max_braking_mps2[p], pedal_grip)
+            acceleration = min(max(requested_acceleration_mps2[g, p], -most_down), most_up)
             speed = min(max(before + acceleration * step_s, 0.0), actuators.max_speed_mps[p])
             acceleration = (speed - before) / step_s
 
-            curvature = _within(wanted, _rest_of(grip, acceleration) / max(speed, 0.1) ** 2)
-            slip = np.arcsin(_within(0.5 * curvature * actuators.wheelbase_m[p], 1.0))
+            curvature = _clamped(requested_curvature, _remaining_grip(grip, acceleration) / max(speed, 0.1) ** 2)
+            slip = np.arcsin(_clamped(0.5 * curvature * actuators.wheelbase_m[p], 1.0))
             turned = curvature * speed * step_s
             course = heading_rad[g, p] + 0.5 * turned + slip
             x_m[g, p] += speed * step_s * np.cos(course)
@@ -133,12 +135,12 @@ def _move(
 
 @compiled
 def curvature_per_m(steering_rad: FloatArray, wheelbase_m: FloatArray) -> FloatArray:
-    """[...] curvature of the path of the centre of the wheelbase at a steering angle."""
+    """[...] curvature (1/m) of the path of the wheelbase's centre at a steering angle."""
     return np.cos(np.arctan(0.5 * np.tan(steering_rad))) * np.tan(steering_rad) / wheelbase_m
 
 
 def lateral_acceleration_mps2(state: State, actuators: Actuators) -> FloatArray:
-    """[G, P] lateral acceleration at this steering and speed, bounded by the grip that the pedals leave."""
+    """[G, P] lateral acceleration (m/s^2) at the state's steering and speed, bounded by the grip left by the pedals."""
     return _lateral_acceleration_mps2(state.steering_rad, state.speed_mps, state.acceleration_mps2, actuators)
 
 
@@ -147,16 +149,16 @@ def _lateral_acceleration_mps2(
     steering_rad: FloatArray, speed_mps: FloatArray, acceleration_mps2: FloatArray, actuators: Actuators
 ) -> FloatArray:
     sideways = curvature_per_m(steering_rad, actuators.wheelbase_m) * speed_mps**2
-    return _within(sideways, _rest_of(actuators.friction * GRAVITY_MPS2, acceleration_mps2))
+    return _clamped(sideways, _remaining_grip(actuators.friction * GRAVITY_MPS2, acceleration_mps2))
 
 
 @compiled
-def _rest_of(grip_mps2: float, used_mps2: FloatArray) -> FloatArray:
-    """[...] what the friction circle leaves in one direction when so much is used in the other."""
+def _remaining_grip(grip_mps2: float, used_mps2: FloatArray) -> FloatArray:
+    """[...] grip that the friction circle leaves in one direction when `used_mps2` is used in the other."""
     return np.sqrt(np.maximum(grip_mps2**2 - used_mps2**2, 0.0))
 
 
 @compiled
-def _within(value: FloatArray, most: FloatArray | float) -> FloatArray:
-    """[...] a value kept between -most and most."""
+def _clamped(value: FloatArray, most: FloatArray | float) -> FloatArray:
+    """[...] the value, clamped to -most ... most."""
     return np.minimum(np.maximum(value, -most), most)

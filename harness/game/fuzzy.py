@@ -1,7 +1,7 @@
-"""Fuzzy terms declared by their membership functions (zero-order Sugeno inference).
+"""Fuzzy functions, declared by membership functions (zero-order Sugeno inference).
 
-The output is the average of the sets' values, weighted by how much the input belongs to each set
-(Sugeno, An introductory survey of fuzzy control, Information Sciences 36, 1985).
+The output is the average of the sets' values, weighted by the input's membership in each set (Sugeno, An introductory
+survey of fuzzy control, Information Sciences 36, 1985).
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from harness.game.arrays import FloatArray
 from harness.game.jit import compiled
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FuzzySet:
-    """Membership rises and falls linearly between points (input, membership in 0..1); constant outside."""
+    """A membership function through points (input, membership from 0 to 1), linear between them, constant outside."""
 
     name: str
     inputs: tuple[float, ...]
@@ -27,19 +27,19 @@ class FuzzySet:
 
 @dataclass(frozen=True)
 class FuzzyFunction:
-    """A function of one quantity of the game, given by fuzzy sets."""
+    """A function of one quantity of the game, defined by fuzzy sets."""
 
     quantity: str
     sets: tuple[FuzzySet, ...]
 
     def __call__(self, value: FloatArray) -> FloatArray:
-        """[...] value of the function; 0 where the input belongs to no set, NaN where it is NaN."""
+        """[...] values of the function: 0 where the input belongs to no set, NaN where the input is NaN."""
         value = np.asarray(value, dtype=float)
-        return _inferred(value.ravel(), *self._points, self._values).reshape(value.shape)
+        return _infer(value.ravel(), *self._points, self._values).reshape(value.shape)
 
     @cached_property
     def _points(self) -> tuple[FloatArray, FloatArray]:
-        """[S, N] inputs and memberships of the sets' points; a set that has fewer repeats its last."""
+        """[S, N] inputs and memberships of the sets' points; a set with fewer points repeats its last point."""
         most = max(len(each.inputs) for each in self.sets)
         inputs, memberships = (
             [[*points, *[points[-1]] * (most - len(points))] for points in columns]
@@ -53,8 +53,8 @@ class FuzzyFunction:
 
 
 @compiled
-def _inferred(value: FloatArray, inputs: FloatArray, memberships: FloatArray, values: FloatArray) -> FloatArray:
-    found = np.zeros(value.shape)
+def _infer(value: FloatArray, inputs: FloatArray, memberships: FloatArray, values: FloatArray) -> FloatArray:
+    result = np.zeros(value.shape)
     for n in range(len(value)):
         total, weighted = 0.0, 0.0
         for k in range(len(values)):
@@ -62,5 +62,5 @@ def _inferred(value: FloatArray, inputs: FloatArray, memberships: FloatArray, va
             total += membership
             weighted += membership * values[k]
         if not total <= 0.0:
-            found[n] = weighted / total
-    return found
+            result[n] = weighted / total
+    return result

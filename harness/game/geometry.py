@@ -1,7 +1,7 @@
-"""Exact geometry of oriented boxes and line segments. Nothing here knows of games or roads.
+"""Exact geometry of oriented boxes and line segments, independent of games and roads.
 
-Everything is worked out in a box's own frame, where a box is |u| <= half length, |v| <= half width: for convex shapes
-the distance is that of a corner of one to the other, and they touch unless an axis of either separates them.
+Computations use a box's own frame, in which the box is |u| <= half length, |v| <= half width. The distance of two
+convex shapes is the distance of a corner of one to the other. The shapes touch unless an axis of one separates them.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from harness.game.jit import compiled
 
 
 class Box(NamedTuple):
-    """Oriented boxes by centre, heading and size: numbers, or arrays of the shape that who takes them says."""
+    """Oriented boxes by centre, heading and size: numbers, or arrays of the shapes that the function documents."""
 
     x_m: Any
     y_m: Any
@@ -30,7 +30,7 @@ class Box(NamedTuple):
 
 @compiled
 def box_distance(a: Box, b: Box) -> float:
-    """Distance between two boxes; 0 where they share a point (separating axis theorem)."""
+    """Distance (m) between two boxes; 0 if they share a point (separating axis theorem)."""
     from_a, apart_in_a = _distance_in_frame(a, b)
     from_b, apart_in_b = _distance_in_frame(b, a)
     return min(from_a, from_b) if apart_in_a or apart_in_b else 0.0
@@ -38,7 +38,7 @@ def box_distance(a: Box, b: Box) -> float:
 
 @compiled
 def _distance_in_frame(frame: Box, box: Box) -> tuple[float, bool]:
-    """Distance of a box's nearest corner to the frame's box, and whether an axis of the frame separates the two."""
+    """Distance of a box's nearest corner to the box `frame`, and whether an axis of `frame` separates the two boxes."""
     u, v = _in_frame(frame, box.x_m, box.y_m)
     turned = box.heading_rad - frame.heading_rad
     cosine, sine = cos(turned), sin(turned)
@@ -55,9 +55,9 @@ def _distance_in_frame(frame: Box, box: Box) -> tuple[float, bool]:
 
 @compiled
 def time_to_contact(a: Box, b: Box, velocity_x_mps: float, velocity_y_mps: float) -> float:
-    """Seconds until box b, moving at that velocity relative to a, touches a; inf if never.
+    """Seconds until box b, moving at a velocity relative to a, touches a: 0 if they touch now, inf if never.
 
-    Exact for boxes that keep heading and velocity (separating axes, swept in time): 0 where they touch.
+    Exact for boxes of constant heading and velocity (separating axes, swept in time).
     """
     enter, leave = _overlap_in_frame(a, b, velocity_x_mps, velocity_y_mps)
     enter_b, leave_b = _overlap_in_frame(b, a, -velocity_x_mps, -velocity_y_mps)
@@ -67,7 +67,7 @@ def time_to_contact(a: Box, b: Box, velocity_x_mps: float, velocity_y_mps: float
 
 @compiled
 def _overlap_in_frame(frame: Box, box: Box, velocity_x_mps: float, velocity_y_mps: float) -> tuple[float, float]:
-    """From when to when no axis of the frame separates its box and one that moves at a velocity relative to it."""
+    """The time interval (s) in which no axis of `frame` separates it from a box moving relative to it."""
     u, v = _in_frame(frame, box.x_m, box.y_m)
     rate_u, rate_v = _in_frame(Box(0.0, 0.0, frame.heading_rad, 0.0, 0.0), velocity_x_mps, velocity_y_mps)
     turned = box.heading_rad - frame.heading_rad
@@ -79,7 +79,7 @@ def _overlap_in_frame(frame: Box, box: Box, velocity_x_mps: float, velocity_y_mp
 
 @compiled
 def _overlap(place: float, rate: float, reach: float) -> tuple[float, float]:
-    """From when to when |place + rate * t| <= reach."""
+    """The interval of t in which |place + rate * t| <= reach."""
     if abs(rate) <= 1e-9:
         return (-inf, inf) if abs(place) <= reach else (inf, -inf)
     middle, half = -place / rate, reach / abs(rate)
@@ -88,7 +88,7 @@ def _overlap(place: float, rate: float, reach: float) -> tuple[float, float]:
 
 @compiled
 def _in_frame(frame: Box, x_m: float, y_m: float) -> tuple[float, float]:
-    """u, v of a point in a box's frame."""
+    """Coordinates u, v of a point in the frame of a box."""
     cosine, sine = cos(frame.heading_rad), sin(frame.heading_rad)
     dx, dy = x_m - frame.x_m, y_m - frame.y_m
     return dx * cosine + dy * sine, dy * cosine - dx * sine
@@ -96,7 +96,7 @@ def _in_frame(frame: Box, x_m: float, y_m: float) -> tuple[float, float]:
 
 @compiled
 def _reach(box: Box, cosine: float, sine: float) -> tuple[float, float]:
-    """How far a box that is turned by an angle reaches from its centre along either axis."""
+    """Extent of a rotated box from its centre along each axis; cosine and sine of its angle to the frame."""
     half_length, half_width = 0.5 * box.length_m, 0.5 * box.width_m
     return (
         half_length * abs(cosine) + half_width * abs(sine),
@@ -109,13 +109,13 @@ def _reach(box: Box, cosine: float, sine: float) -> tuple[float, float]:
 
 @compiled
 def box_segment_distance(box: Box, segment: FloatArray) -> float:
-    """Distance of a box to a segment [2, 2] (start and end, x and y); 0 where they touch."""
+    """Distance (m) of a box to a segment [2, 2] (start and end, x and y); 0 if they touch."""
     return _box_segment_distance(box, cos(box.heading_rad), sin(box.heading_rad), segment, inf)
 
 
 @compiled
 def _box_segment_distance(box: Box, cosine: float, sine: float, segment: FloatArray, limit_m: float) -> float:
-    """The distance where it is below a limit, else something not below it; with cosine and sine of the heading."""
+    """The distance if it is below the limit, else a value not below it; cosine and sine are those of the heading."""
     dx, dy = segment[0, 0] - box.x_m, segment[0, 1] - box.y_m
     u0, v0 = dx * cosine + dy * sine, dy * cosine - dx * sine
     dx, dy = segment[1, 0] - box.x_m, segment[1, 1] - box.y_m
@@ -142,49 +142,49 @@ def _box_segment_distance(box: Box, cosine: float, sine: float, segment: FloatAr
 
 
 # --- many of them ----------------------------------------------------------------------------------------------------
-# Boxes `own` have places [N, P] and sizes [P], `others` are [N, B]: each is looked at against those of its own row
-# that are marked in `among` [N, P, B].
+# Boxes `own` have places [N, P] and sizes [P], boxes `others` are [N, B]. Each own box is compared with the others of
+# its row that are marked in `among` [N, P, B].
 
 
 @compiled
 def distance_to_nearest_box(own: Box, others: Box, among: BoolArray, limit_m: float) -> FloatArray:
-    """[N, P] distance to the nearest of the others, never over a limit."""
-    found = np.full(own.x_m.shape, limit_m)
+    """[N, P] distance (m) to the nearest marked box, at most `limit_m`."""
+    nearest_m = np.full(own.x_m.shape, limit_m)
     for n, p, b in np.ndindex(among.shape):
         if among[n, p, b]:
             a, other = _own(own, n, p), _other(others, n, b)
             radii = 0.5 * (hypot(a.length_m, a.width_m) + hypot(other.length_m, other.width_m))
-            if hypot(a.x_m - other.x_m, a.y_m - other.y_m) - radii < found[n, p]:
-                found[n, p] = min(found[n, p], box_distance(a, other))
-    return found
+            if hypot(a.x_m - other.x_m, a.y_m - other.y_m) - radii < nearest_m[n, p]:
+                nearest_m[n, p] = min(nearest_m[n, p], box_distance(a, other))
+    return nearest_m
 
 
 @compiled
 def time_to_first_contact(
     own: Box, others: Box, own_speed_mps: FloatArray, speed_mps: FloatArray, among: BoolArray
 ) -> FloatArray:
-    """[N, P] seconds until the first contact with one of the others if all keep heading and speed; inf if none."""
-    found = np.full(own.x_m.shape, inf)
+    """[N, P] seconds until the first contact with a marked box at constant headings and speeds; inf if none."""
+    soonest_s = np.full(own.x_m.shape, inf)
     for n, p, b in np.ndindex(among.shape):
         if among[n, p, b]:
             a, other = _own(own, n, p), _other(others, n, b)
             velocity_x = speed_mps[n, b] * cos(other.heading_rad) - own_speed_mps[n, p] * cos(a.heading_rad)
             velocity_y = speed_mps[n, b] * sin(other.heading_rad) - own_speed_mps[n, p] * sin(a.heading_rad)
-            found[n, p] = min(found[n, p], time_to_contact(a, other, velocity_x, velocity_y))
-    return found
+            soonest_s[n, p] = min(soonest_s[n, p], time_to_contact(a, other, velocity_x, velocity_y))
+    return soonest_s
 
 
 @compiled
 def distance_to_nearest_segment(own: Box, segments: FloatArray, rows: IntArray, limit_m: float) -> FloatArray:
-    """[N, P] distance to the nearest of the segments [S, 2, 2] in rows [N, P, K], never over a limit."""
-    found = np.full(own.x_m.shape, limit_m)
+    """[N, P] distance (m) to the nearest of the segments [S, 2, 2] listed in rows [N, P, K], at most `limit_m`."""
+    nearest_m = np.full(own.x_m.shape, limit_m)
     for n, p in np.ndindex(own.x_m.shape):
         box = _own(own, n, p)
         cosine, sine = cos(box.heading_rad), sin(box.heading_rad)
         for k in range(rows.shape[2]):
-            distance = _box_segment_distance(box, cosine, sine, segments[rows[n, p, k]], found[n, p])
-            found[n, p] = min(found[n, p], distance)
-    return found
+            distance = _box_segment_distance(box, cosine, sine, segments[rows[n, p, k]], nearest_m[n, p])
+            nearest_m[n, p] = min(nearest_m[n, p], distance)
+    return nearest_m
 
 
 @compiled

@@ -1,7 +1,7 @@
-"""What a person's body can't do: act at once, see far and exactly, use all that the car can do.
+"""Limits of the human body: reaction time, limited and inexact sight, partial use of the car.
 
-A game's limits are drawn before it starts. Where nobody has any, the queue of decisions, the errors and the shares are
-left out altogether.
+The limits of a game are drawn before it starts. If no player of an arena has limits, the arena skips the queue of
+decisions, the estimation errors and the actuator shares.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.state import State
 
-PERSISTENCE_S = 20.0  # how long errors of estimation last (Treiber, Kesting and Helbing 2006, table 1)
+PERSISTENCE_S = 20.0  # correlation time of estimation errors (Treiber, Kesting and Helbing 2006, table 1)
 
 
 @dataclass(frozen=True)
 class Reaction:
-    """Decisions reach pedals and wheel so much later: drawn uniformly for each game."""
+    """The delay from a decision to pedals and wheel: the range of a uniform draw for each game."""
 
     delay_s: tuple[float, float] = (0.0, 0.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Sight:
-    """How far others are seen, and how far off what is seen of them is.
+    """The range of sight, and the errors of estimated distances and closing speeds.
 
     The errors are those of the human driver model (Treiber, Kesting and Helbing, Delays, inaccuracies and anticipation
-    in microscopic traffic models, Physica A 360, 2006, section 2.2): a distance s is taken for s exp(V w), a closing
-    speed is off by s sigma w', where V is `distance_error`, sigma `closing_error_per_s`, and w and w' are
+    in microscopic traffic models, Physica A 360, 2006, section 2.2): a distance s is estimated as s exp(V w), and the
+    error of a closing speed is s sigma w'. V is `distance_error`, sigma is `closing_error_per_s`, and w and w' are
     autocorrelated normal processes of variance 1 and correlation time `error_s`.
     """
 
@@ -40,36 +40,36 @@ class Sight:
     error_s: float = PERSISTENCE_S
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class LookedButFailedToSee:
-    """Looking and failing to see: in `share` of the games, others are noticed only within a distance."""
+    """Looked but failed to see: in `share` of the games, only road users within `within_m` are noticed."""
 
     share: float = 0.0
     within_m: float = np.inf
 
 
-@dataclass(frozen=True)
-class Uses:
-    """Shares of what the car can do that a person uses, with pedals and wheel as far as they go."""
+@dataclass(frozen=True, kw_only=True)
+class ActuatorShares:
+    """Shares of the car's acceleration, braking and steering that the driver uses at full pedals and wheel."""
 
     throttle: float = 1.0
     braking: float = 1.0
     steering: float = 1.0
 
 
-AT_ONCE, EXACT, NOBODY, ALL = Reaction(), Sight(), LookedButFailedToSee(), Uses()
-"""No limits: decisions count at once, sight is exact, nobody is missed, all of the car is used."""
+NO_DELAY, EXACT_SIGHT, ALL_NOTICED, FULL_SHARES = Reaction(), Sight(), LookedButFailedToSee(), ActuatorShares()
+"""No limits: no reaction delay, exact sight, every road user noticed, full use of the car."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Limits:
-    """One player's limits in one game of T steps, drawn before it starts."""
+    """The limits of one player in one game of T steps, drawn before the game starts."""
 
     delay_steps: int = 0
     sight_m: float = np.inf
-    misjudged: FloatArray | None = None
-    """[T, 2] how far off distances (as a share of them) and closing speeds (per second of distance) are."""
-    uses: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    estimation_errors: FloatArray | None = None
+    """[T, 2] errors of estimated distances (share of the distance) and closing speeds (per second of distance)."""
+    actuator_shares: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Shares of throttle, brake and wheel."""
 
 
@@ -77,71 +77,79 @@ NO_LIMITS = Limits()
 
 
 def draw_delay_steps(reaction: Reaction, step_s: float, generator: np.random.Generator) -> int:
-    """How many steps later a player's decisions reach pedals and wheel in one game."""
+    """Draw a player's reaction delay for one game, in steps."""
     return round(generator.uniform(*reaction.delay_s) / step_s)
 
 
-def draw_noticed_m(missing: LookedButFailedToSee, generator: np.random.Generator) -> float:
-    """Up to what distance others are noticed in one game; inf: as far as one sees."""
-    return missing.within_m if generator.random() < missing.share else np.inf
+def draw_noticed_m(failure: LookedButFailedToSee, generator: np.random.Generator) -> float:
+    """Draw the distance within which road users are noticed in one game; inf: no failure to see."""
+    return failure.within_m if generator.random() < failure.share else np.inf
 
 
-def draw_misjudged(sight: Sight, steps: int, step_s: float, generator: np.random.Generator) -> FloatArray:
-    """[T, 2] by how much distances (as a share) and closing speeds (per second of distance) are misjudged: they begin
-    as the processes are in the long run, and change slowly."""
-    slow = _autocorrelated(generator.standard_normal((steps, 2)), np.exp(-step_s / sight.error_s))
-    return np.stack((np.expm1(sight.distance_error * slow[:, 0]), sight.closing_error_per_s * slow[:, 1]), axis=1)
+def draw_estimation_errors(sight: Sight, steps: int, step_s: float, generator: np.random.Generator) -> FloatArray:
+    """[T, 2] errors of estimated distances (share) and closing speeds (per second of distance) for T = `steps`.
+
+    Both processes start in their stationary distribution and have the correlation time `sight.error_s`.
+    """
+    processes = _autocorrelated(generator.standard_normal((steps, 2)), np.exp(-step_s / sight.error_s))
+    distance = np.expm1(sight.distance_error * processes[:, 0])
+    return np.stack((distance, sight.closing_error_per_s * processes[:, 1]), axis=1)
 
 
 @compiled
-def _autocorrelated(noise: FloatArray, kept: float) -> FloatArray:
-    """[T, N] a stationary process of order 1 and variance 1 of each column: x' = kept x + sqrt(1 - kept^2) noise."""
-    found = noise.copy()
-    fresh = np.sqrt(1.0 - kept * kept)
+def _autocorrelated(noise: FloatArray, correlation: float) -> FloatArray:
+    """[T, N] stationary processes of order 1 and variance 1: x' = c x + sqrt(1 - c^2) noise, c the correlation."""
+    processes = noise.copy()
+    innovation = np.sqrt(1.0 - correlation * correlation)
     for step in range(1, noise.shape[0]):
         for column in range(noise.shape[1]):
-            found[step, column] = kept * found[step - 1, column] + fresh * noise[step, column]
-    return found
+            processes[step, column] = correlation * processes[step - 1, column] + innovation * noise[step, column]
+    return processes
 
 
 class PlayersLimits:
-    """The limits of the players of G games that are played together; what nobody has need not be asked for."""
+    """The limits of the players of G games that are played together."""
 
     def __init__(self, games: int, players: int, steps: int) -> None:
         self._games, self._players = np.arange(games)[:, None], np.arange(players)
         self._delay_steps: IntArray = np.zeros((games, players), dtype=np.int64)
-        self._decided = np.zeros((games, players, steps, 2))
-        self._misjudged = np.zeros((games, players, steps, 2))
-        self._uses = np.ones((games, players, 3))
+        self._decisions = np.zeros((games, players, steps, 2))
+        self._estimation_errors = np.zeros((games, players, steps, 2))
+        self._actuator_shares = np.ones((games, players, 3))
         self.delays = self.misjudges = self.spares = False
-        """Whether anybody's decisions were ever late, others misjudged, the car not used in full."""
+        """Whether any player so far had a reaction delay, estimation errors, or actuator shares below 1."""
 
     def reset(self, game: int, player: int, limits: Limits, state: State) -> None:
-        """A player's limits in a game that starts."""
+        """Set a player's limits for a game that starts, and its sight in the state."""
         self._delay_steps[game, player] = limits.delay_steps
-        self._uses[game, player] = limits.uses
-        self._misjudged[game, player] = 0.0 if limits.misjudged is None else limits.misjudged
+        self._actuator_shares[game, player] = limits.actuator_shares
+        errors = limits.estimation_errors
+        self._estimation_errors[game, player] = 0.0 if errors is None else errors
         state.sight_m[game, player] = limits.sight_m
-        state.distance_error[game, player], state.closing_error_per_s[game, player] = self._misjudged[game, player, 0]
+        first = self._estimation_errors[game, player, 0]
+        state.distance_error[game, player], state.closing_error_per_s[game, player] = first
         self.delays |= limits.delay_steps > 0
-        self.misjudges |= limits.misjudged is not None
-        self.spares |= limits.uses != NO_LIMITS.uses
+        self.misjudges |= errors is not None
+        self.spares |= limits.actuator_shares != NO_LIMITS.actuator_shares
 
     def arriving(self, decided: FloatArray, now: IntArray) -> FloatArray:
-        """[G, P, 2] the decisions that reach pedals and wheel in the steps `now` [G], in which these are made. Before
-        the first arrives, pedals are let go and the wheel stands straight."""
-        self._decided[self._games, self._players, now[:, None]] = decided
-        made = now[:, None] - self._delay_steps
-        arrived = self._decided[self._games, self._players, np.maximum(made, 0)]
-        return np.where(made[..., None] >= 0, arrived, 0.0)
+        """[G, P, 2] decisions that reach pedals and wheel in the steps `now` [G].
+
+        `decided` [G, P, 2] are the decisions of these steps. Until a player's first decision arrives, its pedals are
+        released and its wheel is straight.
+        """
+        self._decisions[self._games, self._players, now[:, None]] = decided
+        decided_in = now[:, None] - self._delay_steps
+        arrived = self._decisions[self._games, self._players, np.maximum(decided_in, 0)]
+        return np.where(decided_in[..., None] >= 0, arrived, 0.0)
 
     def within(self, acceleration: FloatArray, steering: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """[G, P] what is asked of the car, as far as the players use it."""
-        throttle, braking, wheel = np.moveaxis(self._uses, -1, 0)
+        """[G, P] requested accelerations and steering angles, scaled by the players' actuator shares."""
+        throttle, braking, wheel = np.moveaxis(self._actuator_shares, -1, 0)
         return acceleration * np.where(acceleration >= 0.0, throttle, braking), steering * wheel
 
     def look(self, state: State) -> None:
-        """Put into a state by how much its players misjudge others."""
-        now = np.minimum(state.step, self._misjudged.shape[2] - 1)
-        misjudged = self._misjudged[self._games, self._players, now[:, None]]
-        state.distance_error, state.closing_error_per_s = misjudged[..., 0].copy(), misjudged[..., 1].copy()
+        """Set the players' current estimation errors in the state."""
+        now = np.minimum(state.step, self._estimation_errors.shape[2] - 1)
+        errors = self._estimation_errors[self._games, self._players, now[:, None]]
+        state.distance_error, state.closing_error_per_s = errors[..., 0].copy(), errors[..., 1].copy()

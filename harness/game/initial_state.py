@@ -1,7 +1,7 @@
-"""How a game starts, and all the chance in it: drawn before its first step, from seeds hashed from named parts.
+"""The initial state of a game. All randomness of a game is drawn here, before its first step.
 
-Since nothing is drawn later, two games with the same parts have the same start, lapses and decision noise, whoever
-drives in them: arms pair by construction.
+Every draw has a seed hashed from named parts. Two games with the same parts have the same start, lapses and decision
+noise, independent of their drivers. Arms are therefore paired.
 """
 
 from __future__ import annotations
@@ -17,92 +17,94 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.attention import Attention, HumanFactors, Lapses, draw_lapses, unseen_behind_m
 from harness.game.human_limits import (
-    ALL,
-    AT_ONCE,
-    EXACT,
+    ALL_NOTICED,
+    EXACT_SIGHT,
+    FULL_SHARES,
+    NO_DELAY,
     NO_LIMITS,
-    NOBODY,
     Limits,
     draw_delay_steps,
-    draw_misjudged,
+    draw_estimation_errors,
     draw_noticed_m,
 )
 from harness.game.seeding import between, generator_of, seed_of
 
-_UNLIMITED = (NOBODY, AT_ONCE, EXACT, ALL)  # the defaults themselves: compared at once
+_UNLIMITED = (ALL_NOTICED, NO_DELAY, EXACT_SIGHT, FULL_SHARES)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StartRange:
-    """Where a player may start: ranges along a lane's centre line [n, 2], of its front bumper and of its speed."""
+    """The range of a player's start: positions of its front bumper along a lane, and speeds."""
 
-    line: FloatArray
+    line: FloatArray  # [n, 2] the lane's centre line
     position_m: tuple[float, float]
-    beside_ego: bool  # the position is relative to the ego's
+    beside_ego: bool  # whether `position_m` is relative to the ego's position
     speed_mps: tuple[float, float]
-    scale: float = 1.0  # metres of the line per metre of the lane, which SUMO may count otherwise
+    scale: float = 1.0  # metres of the line per metre of the lane: SUMO's lane length may differ from its shape
 
     def pose(self, position_m: float, length_m: float) -> tuple[float, float, float]:
-        """x_m, y_m of the body's centre and heading_rad with the front bumper at that position of the lane."""
-        points, along = self._points
+        """x_m and y_m of the body's centre and heading_rad, for a front bumper at this position along the lane."""
+        points, stations = self._points
         position_m *= self.scale
-        segment = min(max(bisect_right(along, position_m) - 1, 0), len(along) - 2)
+        segment = min(max(bisect_right(stations, position_m) - 1, 0), len(stations) - 2)
         (x, y), (end_x, end_y) = points[segment : segment + 2]
         length = hypot(end_x - x, end_y - y)
-        onward = (position_m - along[segment] - 0.5 * length_m) / length
-        return x + onward * (end_x - x), y + onward * (end_y - y), atan2(end_y - y, end_x - x)
+        share = (position_m - stations[segment] - 0.5 * length_m) / length
+        return x + share * (end_x - x), y + share * (end_y - y), atan2(end_y - y, end_x - x)
 
     @cached_property
     def _points(self) -> tuple[list[list[float]], list[float]]:
-        """The points of the line, and how far along it each is."""
+        """The points of the line, and the distance of each along the line."""
         lengths = np.hypot(*np.diff(self.line, axis=0).T)
         return self.line.tolist(), [0.0, *np.cumsum(lengths).tolist()]
 
 
-class Noise:
-    """Standard normal numbers, the last that a game's chance has, drawn when they are first asked for."""
+class LazyNoise:
+    """Standard normal numbers, drawn on first use. They are the last draws of their generator."""
 
-    def __init__(self, chance: np.random.Generator, shape: tuple[int, ...]) -> None:
-        self._chance, self._shape = chance, shape
+    def __init__(self, generator: np.random.Generator, shape: tuple[int, ...]) -> None:
+        self._generator, self._shape = generator, shape
 
     @cached_property
-    def drawn(self) -> FloatArray:
-        """The numbers, of that shape."""
-        return self._chance.standard_normal(self._shape)
+    def values(self) -> FloatArray:
+        """The numbers, in the shape given."""
+        return self._generator.standard_normal(self._shape)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class InitialState:
-    """One game's start. Arrays are [P], or [P, T, ...] over its T steps."""
+    """The initial state of one game. Arrays are [P], or [P, T, ...] over its T steps."""
 
     x_m: FloatArray
     y_m: FloatArray
     heading_rad: FloatArray
     speed_mps: FloatArray
-    position_m: FloatArray  # front bumper, along the start lane
+    position_m: FloatArray  # of the front bumper, along the start lane
     present: BoolArray
-    variation: Noise
+    lazy_noise: LazyNoise
     lapses: tuple[Lapses, ...]
-    unseen_behind_m: FloatArray  # how far ahead of a player others must be to be seen by it
+    unseen_behind_m: FloatArray  # least distance ahead of a player at which it sees road users
     limits: tuple[Limits, ...]
-    member: tuple[int, ...]  # who of a player's drivers drives in this game
-    parts: tuple[str | int, ...]  # what names all this chance
+    member: tuple[int, ...]  # index of the driver that each player has in this game
+    parts: tuple[str | int, ...]  # parts of the seeds
 
     @property
     def noise(self) -> FloatArray:
-        """[P, T, 2] standard normal, for drivers whose decisions vary."""
-        return self.variation.drawn
+        """[P, T, 2] standard normal numbers, for drivers with random decisions."""
+        return self.lazy_noise.values
 
     @property
     def seed(self) -> int:
-        """Of the traffic that SUMO drives."""
+        """The seed of the background traffic."""
         return seed_of(*self.parts, "traffic") % 2**31
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class StartDistribution:
-    """What is drawn for a game: places [P], lengths [P], the chance that each player takes part [P]; and of each
-    player's drivers one, by their shares, with its human factors."""
+    """The distribution of initial states: start ranges [P], lengths [P] and probabilities of taking part [P].
+
+    A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
+    """
 
     places: Sequence[StartRange]
     length_m: FloatArray
@@ -114,48 +116,46 @@ class StartDistribution:
 
 
 def draw_initial_state(start_distribution: StartDistribution, *parts: str | int) -> InitialState:
-    """Draw one game from named parts."""
-    chance = generator_of(*parts, "start")
+    """Draw the initial state of one game, with seeds hashed from the named parts."""
+    generator = generator_of(*parts, "start")
     players = range(len(start_distribution.places))
-    luck = iter(chance.random(4 * len(players)).tolist())  # one by one they would be the same
+    draws = iter(generator.random(4 * len(players)).tolist())  # the same numbers as drawn one by one
     poses: list[tuple[float, ...]] = []
     for place, length in zip(start_distribution.places, start_distribution.length_m.tolist(), strict=True):
-        position = between(place.position_m, next(luck)) + (poses[0][-1] if place.beside_ego else 0.0)
-        speed = between(place.speed_mps, next(luck))
+        position = between(place.position_m, next(draws)) + (poses[0][-1] if place.beside_ego else 0.0)
+        speed = between(place.speed_mps, next(draws))
         poses.append((*place.pose(position, length), speed, position))
-    present = [next(luck) < share for share in start_distribution.present_share]
+    present = [next(draws) < share for share in start_distribution.present_share]
     member = [
-        0 if len(of) == 1 else draw_member(of, player, *parts) for player, of in enumerate(start_distribution.shares)
+        0 if len(shares) == 1 else draw_member(shares, player, *parts)
+        for player, shares in enumerate(start_distribution.shares)
     ]
     human_factors = [start_distribution.human_factors[player][member[player]] for player in players]
-    overlooked = [unseen_behind_m(each.no_blind_spot_check, next(luck)) for each in human_factors]
-    limits = [
-        NO_LIMITS
-        if (of.looked_but_failed_to_see, of.reaction, of.sight, of.uses) == _UNLIMITED
-        else _limits(of, start_distribution, p, *parts)
-        for p, of in enumerate(human_factors)
+    unseen = [unseen_behind_m(each.no_blind_spot_check, next(draws)) for each in human_factors]
+    limits = [_limits(each, start_distribution, player, *parts) for player, each in enumerate(human_factors)]
+    lapses = [
+        _lapses(human_factors[player].attention, start_distribution, player, limits[player].delay_steps, *parts)
+        for player in players
     ]
     x, y, heading, speeds, positions = np.array(poses).T
     return InitialState(
-        x,
-        y,
-        heading,
-        speeds,
-        positions,
-        np.array(present),
-        Noise(chance, (len(players), start_distribution.steps, 2)),
-        tuple(
-            _lapses(human_factors[p].attention, start_distribution, p, limits[p].delay_steps, *parts) for p in players
-        ),
-        np.array(overlooked),
-        tuple(limits),
-        tuple(member),
-        parts,
+        x_m=x,
+        y_m=y,
+        heading_rad=heading,
+        speed_mps=speeds,
+        position_m=positions,
+        present=np.array(present),
+        lazy_noise=LazyNoise(generator, (len(players), start_distribution.steps, 2)),
+        lapses=tuple(lapses),
+        unseen_behind_m=np.array(unseen),
+        limits=tuple(limits),
+        member=tuple(member),
+        parts=parts,
     )
 
 
 def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:
-    """Which of a player's drivers a game has: one draw, from a generator of its own, so that nothing else moves."""
+    """Draw the index of a player's driver by their shares, from a separate generator: other draws do not change."""
     upper = np.cumsum(shares)
     return int(np.searchsorted(upper, generator_of(*parts, "member", player).random() * upper[-1], side="right"))
 
@@ -168,29 +168,30 @@ def _lapses(
     lapses = draw_lapses(
         attention, start_distribution.steps, start_distribution.step_s, generator_of(*parts, "attention", player)
     )
-    return lapses.until_hands_obey(delay_steps) if delay_steps else lapses
+    return lapses.with_reaction_delay(delay_steps) if delay_steps else lapses
 
 
 def _limits(
     human_factors: HumanFactors, start_distribution: StartDistribution, player: int, *parts: str | int
 ) -> Limits:
-    """Each limit from a generator of its own, which nobody needs who does not have it."""
+    """The limits of a player. Each limit has its own generator, which is made only if the limit exists."""
+    failure, reaction = human_factors.looked_but_failed_to_see, human_factors.reaction
+    sight, shares = human_factors.sight, human_factors.actuator_shares
+    if (failure, reaction, sight, shares) == _UNLIMITED:  # common, and much faster than the rest
+        return NO_LIMITS
 
-    def chance(of: str) -> np.random.Generator:
-        return generator_of(*parts, of, player)
+    def generator(name: str) -> np.random.Generator:
+        return generator_of(*parts, name, player)
 
-    sight, step_s = human_factors.sight, start_distribution.step_s
-    delay_steps = (
-        draw_delay_steps(human_factors.reaction, step_s, chance("reaction"))
-        if any(human_factors.reaction.delay_s)
-        else 0
-    )
-    noticed_m = (
-        draw_noticed_m(human_factors.looked_but_failed_to_see, chance("missing"))
-        if human_factors.looked_but_failed_to_see.share
-        else np.inf
-    )
+    step_s = start_distribution.step_s
+    delay_steps = draw_delay_steps(reaction, step_s, generator("reaction")) if any(reaction.delay_s) else 0
+    noticed_m = draw_noticed_m(failure, generator("missing")) if failure.share else np.inf
     exact = sight.distance_error == sight.closing_error_per_s == 0.0
-    misjudged = None if exact else draw_misjudged(sight, start_distribution.steps, step_s, chance("sight"))
-    uses = (human_factors.uses.throttle, human_factors.uses.braking, human_factors.uses.steering)
-    return Limits(delay_steps, min(sight.range_m, noticed_m), misjudged, uses)
+    return Limits(
+        delay_steps=delay_steps,
+        sight_m=min(sight.range_m, noticed_m),
+        estimation_errors=(
+            None if exact else draw_estimation_errors(sight, start_distribution.steps, step_s, generator("sight"))
+        ),
+        actuator_shares=(shares.throttle, shares.braking, shares.steering),
+    )

@@ -1,6 +1,6 @@
-"""Loops over numbers, written in Python and run as machine code (numba), which is kept on disk for the next process.
+"""Compilation of numeric loops to machine code (numba), cached on disk for later processes.
 
-Sums stay in the order they are written in (no "fast math"): a game's numbers depend on nothing but the game.
+Floating-point operations keep the order of the source (no "fast math"): results depend only on the game.
 """
 
 from __future__ import annotations
@@ -16,29 +16,27 @@ from typing import Any, TypeVar, cast
 import numba
 import platformdirs
 
-try:
-    import fcntl
-except ImportError:  # Windows: processes may compile the same
-    fcntl = None  # type: ignore[assignment]
-
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
 
 def compiled(function: _Function) -> _Function:
-    """Compile a function when it is first called. Processes take turns, so that what one compiles the others find on
-    disk; where nothing can be kept there, every process compiles anew."""
+    """Compile a function on its first call.
+
+    Processes compile in turns, so that each finds the machine code of the others on disk. If no folder is writable,
+    every process compiles for itself.
+    """
     config: Any = numba.config
-    usual = config.CACHE_DIR
-    config.CACHE_DIR = usual or _folder()
+    default = config.CACHE_DIR
+    config.CACHE_DIR = default or _folder()
     options: dict[str, Any] = {"error_model": "numpy"}
     try:
-        kept: Any = numba.njit(cache=True, **options)(function)
-        kept.compile = _in_turn(kept.compile)  # which looks on disk first
-    except RuntimeError:  # numba found no folder that can be written to
-        kept = numba.njit(**options)(function)
+        dispatcher: Any = numba.njit(cache=True, **options)(function)
+        dispatcher.compile = _in_turn(dispatcher.compile)  # `compile` reads the cache on disk first
+    except RuntimeError:  # numba found no writable folder
+        dispatcher = numba.njit(**options)(function)
     finally:
-        config.CACHE_DIR = usual
-    return cast(_Function, kept)
+        config.CACHE_DIR = default
+    return cast(_Function, dispatcher)
 
 
 def _in_turn(work: Callable[..., object]) -> Callable[..., object]:
@@ -50,20 +48,18 @@ def _in_turn(work: Callable[..., object]) -> Callable[..., object]:
 
 
 _threads = threading.RLock()
-_depth = 0  # one function's compilation may need another's
+_depth = 0  # compiling a function may compile the functions that it calls
 
 
 @contextlib.contextmanager
 def _turn() -> Iterator[None]:
-    """Only this thread of this process compiles meanwhile. The system ends the turn of a process that dies."""
+    """Only this thread of this process compiles in the block. The turn of a process that dies ends with it."""
     global _depth
-    with _threads, contextlib.ExitStack() as held:
-        if _depth == 0 and fcntl is not None:
-            with contextlib.suppress(OSError):  # no place to meet
-                folder = Path(_folder())
-                folder.mkdir(parents=True, exist_ok=True)
-                lock = held.enter_context((folder / "turn").open("a"))
-                fcntl.flock(lock, fcntl.LOCK_EX)
+    with _threads, contextlib.ExitStack() as stack:
+        if _depth == 0:
+            # a file system without locks is no error; a lock made of a file's existence would outlive its process
+            with contextlib.suppress(OSError, NotImplementedError):
+                stack.enter_context(_lock())
         _depth += 1
         try:
             yield
@@ -71,10 +67,21 @@ def _turn() -> Iterator[None]:
             _depth -= 1
 
 
+def _lock() -> contextlib.AbstractContextManager[object]:
+    """The lock of all processes that use the same cache. Entering it raises OSError if it can't be written."""
+    from filelock import FileLock  # imports asyncio and sqlite3: only for processes that run compiled code
+
+    folder = Path(_folder())
+    folder.mkdir(parents=True, exist_ok=True)
+    return FileLock(folder / "turn", fallback_to_soft=False)
+
+
 @cache
 def _folder() -> str:
-    """Where machine code is kept. The name tells of all sources: numba alone would look at a function's own file, and
-    take no notice when one that it calls, or a constant, changes in another."""
+    """The cache's folder, named by a digest of all sources of this package.
+
+    numba invalidates its cache by a function's own file only, not by the functions and constants that it uses.
+    """
     sources = sorted((Path(__file__).parent).glob("*.py"))
     digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:24]
     return str(Path(platformdirs.user_cache_dir("harness")) / "compiled" / digest)

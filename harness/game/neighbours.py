@@ -1,4 +1,4 @@
-"""Which of the others are near enough to a player to matter to the game."""
+"""Selection of the background vehicles that are near enough to a player to affect the game."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 
-NOTICED_M = 120.0  # nobody farther than this from every player matters to the game
+NOTICED_M = 120.0  # a vehicle farther than this from every player does not affect the game
 
 
 @compiled
-def who_is_near(
+def near_players(
     due: IntArray,
     fronts_m: FloatArray,
     due_in: IntArray,
@@ -20,31 +20,35 @@ def who_is_near(
     offsets_m: FloatArray,
     players_x_m: FloatArray,
     players_y_m: FloatArray,
-    players_there: BoolArray,
+    players_present: BoolArray,
     fastest_player_mps: float,
     step: int,
     step_s: float,
     longest_wait: int,
-    everyone: bool,
+    all_vehicles: bool,
 ) -> IntArray:
-    """Those of the vehicles `due` [n] for a look, by their places in a table [G, N], that are near a player [G, P] of
-    their game; or everyone.
+    """[m] indices into `due` of the vehicles near a player of their game; all indices with `all_vehicles`.
 
-    In place: the y of their fronts [n, 2] loses the offset of the game's tile [G]; and in the table `due_in`, the step
-    in which to look again: the next at who is near, at the others the first in which they may have come near, and never
-    more than the longest wait from now.
+    due [n] are flat positions in a table [G, N], fronts_m [n, 2] the vehicles' front bumpers; length_m and
+    max_speed_mps [G, N] are the table's columns, offsets_m [G] the y offsets of the games' tiles; players_x_m,
+    players_y_m and players_present are [G, P].
+
+    In place: the y of `fronts_m` loses the offset of the game's tile; `due_in` [G, N] becomes the step in which to read
+    each vehicle again. A near vehicle is due in the next step, any other in the first step in which it may have come
+    near, at most `longest_wait` steps from now.
     """
     near, count, room = np.empty(len(due), dtype=np.int64), 0, due_in.shape[1]
     for k in range(len(due)):
         game, place = due[k] // room, due[k] % room
         fronts_m[k, 1] -= offsets_m[game]
-        away_m = np.inf
-        for p in range(players_there.shape[1]):
-            if players_there[game, p]:
+        distance_m = np.inf
+        for p in range(players_present.shape[1]):
+            if players_present[game, p]:
                 dx, dy = fronts_m[k, 0] - players_x_m[game, p], fronts_m[k, 1] - players_y_m[game, p]
-                away_m = min(away_m, np.hypot(dx, dy))
-        spare_m = away_m - NOTICED_M - length_m[game, place]  # it is the middle of a vehicle that is near or not
-        if everyone or spare_m <= 0.0:
+                distance_m = min(distance_m, np.hypot(dx, dy))
+        # distances count from a vehicle's centre, which is behind its front by less than its length
+        spare_m = distance_m - NOTICED_M - length_m[game, place]
+        if all_vehicles or spare_m <= 0.0:
             near[count] = k
             count += 1
         closing_mps = max_speed_mps[game, place] + fastest_player_mps
@@ -53,17 +57,19 @@ def who_is_near(
 
 
 @compiled
-def by_game(games: IntArray, count: int, columns: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """[C, G, M] columns [C, n] of vehicles that are sorted by their games [n], with a row for each of so many games;
-    and which places in the rows are taken."""
+def rows_by_game(games: IntArray, count: int, columns: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """[C, G, M] the columns [C, n] of n vehicles, one row for each of G = `count` games, and [G, M] the places taken.
+
+    `games` [n] are the vehicles' games, in ascending order. M is the largest number of vehicles in a game.
+    """
     first = np.searchsorted(games, np.arange(count + 1))
     most = 0
     for g in range(count):
         most = max(most, first[g + 1] - first[g])
-    spread, present = np.zeros((len(columns), count, most)), np.zeros((count, most), dtype=np.bool_)
+    rows, present = np.zeros((len(columns), count, most)), np.zeros((count, most), dtype=np.bool_)
     for g in range(count):
         for slot in range(first[g + 1] - first[g]):
             present[g, slot] = True
             for column in range(len(columns)):
-                spread[column, g, slot] = columns[column, first[g] + slot]
-    return spread, present
+                rows[column, g, slot] = columns[column, first[g] + slot]
+    return rows, present

@@ -1,13 +1,13 @@
-"""What a driver sees of the game: own motion, the road ahead, and the nearest others, in the driver's own frame.
+"""Observations of the players: own motion, the road ahead and the nearest other bodies, in the player's own frame.
 
-Only what a person behind the wheel could see: nobody's intentions, persona, payoff or plan. Every entry is scaled
-to [-1, 1]; `LAYOUT` names them in order and is written beside every policy.
+An observation holds only what a driver can see: no intentions, personas, payoffs or plans. Every entry is scaled to
+[-1, 1]. `LAYOUT` names the entries in order and is stored with every policy.
 
-Who misjudges distances sees others so much farther away or nearer, in the direction they are in; who misjudges closing
-speeds sees them come nearer or move away as well (`game.limits`).
+An error of estimated distances scales the distance of other bodies in their true direction. An error of closing speeds
+adds a radial velocity to theirs (`game.human_limits`).
 
-The free width at a distance ahead reaches to the nearest surface on either side, rail or vehicle alike (the paper's
-ego "seeks to maintain a large distance between itself and nearby objects", section 4.3.2).
+The free width at a distance ahead ends at the nearest surface on either side, rail or vehicle (paper, section 4.3.2:
+the ego "seeks to maintain a large distance between itself and nearby objects").
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from harness.game.jit import compiled
 from harness.game.quantities import PATH_M, Quantities, along_route, row_ahead
 from harness.game.road import Routes, lane_at, row_at
 
-_BEHIND = int(np.searchsorted(PATH_M, 0.0))  # how many of them are not ahead
+_BEHIND = int(np.searchsorted(PATH_M, 0.0))  # number of entries of PATH_M behind the player
 AHEAD_M = PATH_M[_BEHIND:]
-OTHERS = 3  # how many of the nearest others are seen
+OTHERS = 3  # number of other bodies in an observation
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
-# what each kind of entry is divided by
+# divisors of the entries
 _SPEED_MPS, _ACCELERATION_MPS2, _SIDE_M, _FAR_M = 30.0, 10.0, 8.0, 100.0
 _AHEAD_M, _CLOSING_MPS, _CROSSING_MPS = 50.0, 10.0, 5.0
 _OTHER = ("seen", "ahead_m", "left_m", "ahead_mps", "left_mps", "turned_sin", "turned_cos")
@@ -47,7 +47,7 @@ LAYOUT: tuple[str, ...] = (
 )
 SIZE = len(LAYOUT)
 _COUNT = len(AHEAD_M)
-_TURNED = 6  # where the entries of each kind begin
+_TURNED = 6  # first entry of each kind
 _LEFT = _TURNED + _COUNT + 1
 _RIGHT = _LEFT + _COUNT
 _FIRST_OTHER = _RIGHT + _COUNT
@@ -65,17 +65,19 @@ _LOCK = LAYOUT.index("steering_rad")
 
 
 def in_units(observation: FloatArray, max_steering_rad: float) -> FloatArray:
-    """[..., SIZE] float64: what is seen, in the units that the entries' names in `LAYOUT` say. An entry that is at
-    its bound stands for whatever lies beyond it as well: a goal 200 m ahead may be farther."""
-    seen = np.asarray(observation, dtype=np.float64) * _SCALES
-    seen[..., _LOCK] *= max_steering_rad
-    return seen
+    """[..., SIZE] float64: observations [..., SIZE] in the units named in `LAYOUT`.
+
+    An entry at its bound stands for all values beyond it: a goal at 200 m may be farther away.
+    """
+    values = np.asarray(observation, dtype=np.float64) * _SCALES
+    values[..., _LOCK] *= max_steering_rad
+    return values
 
 
 def observe(q: Quantities) -> FloatArray:
-    """[G, P, SIZE] float32 in [-1, 1]: what each player sees. Players that are not there see zeros."""
+    """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present."""
     state, bodies, actuators = q.state, q.bodies, q.world.actuators
-    return _view(
+    return _observe(
         *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
         *(state.station_m, q.lateral_offset_m, state.present),
         (state.unseen_behind_m, state.sight_m, state.distance_error, state.closing_error_per_s),
@@ -85,7 +87,7 @@ def observe(q: Quantities) -> FloatArray:
 
 
 @compiled
-def _view(
+def _observe(
     x_m: FloatArray,
     y_m: FloatArray,
     heading_rad: FloatArray,
@@ -106,10 +108,10 @@ def _view(
     max_steering_rad: FloatArray,
     table: tuple[Any, ...],
 ) -> FloatArray:
-    """All of it at once: in games that begin anew there is too little to look at for the price of several calls."""
+    """One compiled pass: for the few games of a reset, several calls would cost more than their work."""
     routes = Routes(*table)
     unseen_behind_m, sight_m, distance_error, closing_error_per_s = sight
-    bounded = np.zeros((*present.shape, SIZE), dtype=np.float32)
+    observation = np.zeros((*present.shape, SIZE), dtype=np.float32)
     view = np.empty(SIZE)
     bodies = body_present.shape[1]
     seen, distance_m = np.empty(bodies, dtype=np.bool_), np.empty(bodies)
@@ -139,18 +141,18 @@ def _view(
                 dx, dy = body_x_m[g, b] - x_m[g, p], body_y_m[g, b] - y_m[g, p]
                 ahead_m[b], left_m[b] = dx * cosine + dy * sine, dy * cosine - dx * sine
                 distance_m[b] = np.hypot(dx, dy)
-                looked_at = ahead_m[b] >= unseen_behind_m[g, p] and distance_m[b] <= sight_m[g, p]
-                seen[b] = body_present[g, b] and b != p and looked_at
+                in_view = ahead_m[b] >= unseen_behind_m[g, p] and distance_m[b] <= sight_m[g, p]
+                seen[b] = body_present[g, b] and b != p and in_view
                 if seen[b]:
-                    off = distance_error[g, p]
-                    pose = (body_x_m[g, b] + off * dx, body_y_m[g, b] + off * dy, body_heading_rad[g, b])
-                    room = along_route(row, station, offset, p, routes, *pose, body_length_m[g, b], body_width_m[g, b])
-                    _narrow(view, *room)
+                    error = distance_error[g, p]
+                    pose = (body_x_m[g, b] + error * dx, body_y_m[g, b] + error * dy, body_heading_rad[g, b])
+                    size = (body_length_m[g, b], body_width_m[g, b])
+                    _narrow(view, *along_route(row, station, offset, p, routes, *pose, *size))
             for k in range(_COUNT):
                 view[_LEFT + k] /= _SIDE_M
                 view[_RIGHT + k] /= _SIDE_M
-            last_seen, last_m = -1, -1.0  # whom the entry before is of
-            for k in range(OTHERS):  # nearest first; zeros stay where there are fewer
+            last_seen, last_m = -1, -1.0  # the body of the previous entry
+            for k in range(OTHERS):  # nearest first; missing bodies stay zeros
                 nearest = _next_nearest(seen, distance_m, last_seen, last_m)
                 if nearest < 0:
                     break
@@ -158,22 +160,22 @@ def _view(
                 turned, speed = body_heading_rad[g, nearest] - heading, body_speed_mps[g, nearest]
                 entry = view[_FIRST_OTHER + k * _ENTRIES :]
                 entry[0] = 1.0
-                off, closing = distance_error[g, p], closing_error_per_s[g, p]
+                error, closing = distance_error[g, p], closing_error_per_s[g, p]
                 ahead, left = ahead_m[nearest], left_m[nearest]
-                entry[1] = (ahead + off * ahead) / _AHEAD_M
-                entry[2] = (left + off * left) / _SIDE_M
+                entry[1] = (ahead + error * ahead) / _AHEAD_M
+                entry[2] = (left + error * left) / _SIDE_M
                 entry[3] = (speed * np.cos(turned) - speed_mps[g, p] + closing * ahead) / _CLOSING_MPS
                 entry[4] = (speed * np.sin(turned) + closing * left) / _CROSSING_MPS
                 entry[5] = np.sin(turned)
                 entry[6] = np.cos(turned)
             for k in range(SIZE):
-                bounded[g, p, k] = min(max(view[k], -1.0), 1.0)
-    return bounded
+                observation[g, p, k] = min(max(view[k], -1.0), 1.0)
+    return observation
 
 
 @compiled
 def _narrow(view: FloatArray, ahead_m: float, left_m: float, half_length_m: float, half_width_m: float) -> None:
-    """Take the room that a body takes along the route from the free width beside it."""
+    """Reduce the free widths in `view` by a body, given in route coordinates."""
     near, far = ahead_m - half_length_m, ahead_m + half_length_m
     for k in range(_COUNT):
         if far > _EDGES[k] and near < _EDGES[k + 1]:
@@ -185,10 +187,10 @@ def _narrow(view: FloatArray, ahead_m: float, left_m: float, half_length_m: floa
 
 @compiled
 def _next_nearest(seen: BoolArray, distance_m: FloatArray, last: int, last_m: float) -> int:
-    """The nearest body that is farther away than the last one, or as far and listed behind it; -1: there is none."""
+    """The nearest body after the last one, by distance and then by index; -1 if there is none."""
     nearest, nearest_m = -1, _FAR_M
     for b in range(len(seen)):
-        away = distance_m[b]
-        if seen[b] and away < nearest_m and (away > last_m or (away == last_m and b > last)):
-            nearest, nearest_m = b, away
+        distance = distance_m[b]
+        if seen[b] and distance < nearest_m and (distance > last_m or (distance == last_m and b > last)):
+            nearest, nearest_m = b, distance
     return nearest

@@ -2,9 +2,9 @@
 
     payoff = a0 * sum(safety terms) + a1 * sum(operational terms) + a2 * sum(human terms)
 
-added up over every step of the game. Every term is of the player's own doing and faring: none knows another's
-payoff, and weights are not negative, so no document can reward a player for harm to another (nor can a fuzzy term:
-contact must be the worst of its distances).
+summed over all steps of a game. Terms depend only on the player's own actions and results, not on another player's
+payoff, and weights are not negative. A persona can therefore not reward harm to another player. This holds for fuzzy
+terms as well: contact must be the worst of the distances.
 """
 
 from __future__ import annotations
@@ -35,30 +35,30 @@ FUZZY_QUANTITIES: Mapping[str, str] = {
     "lane_end_m": "distance until the lane the car is in ends; infinite if it goes on",
     "goal_m": "distance to the goal, along the route",
 }
-"""The quantities that a fuzzy term can be a function of, in words."""
-NEARNESS = ("time_gap_s", "clearance_m")  # those of them that are 0 at contact
+"""The quantities that a fuzzy term can use, with their descriptions."""
+NEARNESS = ("time_gap_s", "clearance_m")  # the fuzzy quantities that are 0 at contact
 
 
 class Form(IntEnum):
-    """What a term makes of its quantity."""
+    """The function that a term applies to its quantity."""
 
-    BELOW = 0  # 0 at the parameter and above, falling to -1 at zero
-    OVER = 1  # how far it is above zero, negative
-    UNDER = 2  # how far it is below zero, negative
-    LESS = 3  # negative
-    LESS_SQUARED = 4  # as a share of 10 m/s2, squared, negative
-    PER_100 = 5
-    GAINED = 6  # 1 where it is the parameter
-    LOST = 7  # -1 where it is the parameter
+    BELOW = 0  # 0 at the parameter and above, linear to -1 at zero
+    OVER = 1  # minus the positive part
+    UNDER = 2  # the negative part
+    LESS = 3  # minus the quantity
+    LESS_SQUARED = 4  # minus the square, in units of 10 m/s2
+    PER_100 = 5  # a hundredth of the quantity
+    GAINED = 6  # 1 if equal to the parameter
+    LOST = 7  # -1 if equal to the parameter
     ALWAYS = 8  # -1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Term:
     """A named term of equation 1.
 
-    `quantity` names the one of `Quantities` that it is made of, [G, P]. `per_second` terms are rates and are multiplied
-    by the step length; the others are events, counted in the step they happen.
+    `quantity` is the name of its quantity [G, P] in `Quantities`. `per_second` terms are rates and are multiplied by
+    the step length. The other terms are events and count in the step in which they occur.
     """
 
     group: str
@@ -67,114 +67,156 @@ class Term:
     form: Form
     per_second: bool = False
     parameter: str = ""
-    """The name of the form's parameter, where a persona gives it: a limit in the quantity's unit."""
+    """The name of the form's parameter, if a persona sets it: a limit in the quantity's unit."""
     outcome: Outcome = Outcome.RUNNING
-    """The form's parameter, where it is an outcome."""
+    """The form's parameter, if it is an outcome."""
 
 
-def _ended(group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
-    return Term(group, meaning, "state.outcome", form, outcome=outcome)
+def _outcome_term(*, group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
+    return Term(group=group, meaning=meaning, quantity="state.outcome", form=form, outcome=outcome)
 
 
 TERMS: Mapping[str, Term] = {
-    "collision": _ended("safety", "touching a vehicle or person, once", Form.LOST, Outcome.COLLISION),
-    "rail": _ended("safety", "touching the edge of the road, once", Form.LOST, Outcome.RAIL),
+    "collision": _outcome_term(
+        group="safety", meaning="touching a vehicle or person, once", form=Form.LOST, outcome=Outcome.COLLISION
+    ),
+    "rail": _outcome_term(
+        group="safety", meaning="touching the edge of the road, once", form=Form.LOST, outcome=Outcome.RAIL
+    ),
     "clearance": Term(
-        "safety",
-        "nearness to the nearest surface, rail or vehicle",
-        "clearance_m",
-        Form.BELOW,
-        True,
-        "within_m",
+        group="safety",
+        meaning="nearness to the nearest surface, rail or vehicle",
+        quantity="clearance_m",
+        form=Form.BELOW,
+        per_second=True,
+        parameter="within_m",
     ),
     "vehicle_clearance": Term(
-        "safety",
-        "nearness to the nearest vehicle",
-        "vehicle_clearance_m",
-        Form.BELOW,
-        True,
-        "within_m",
+        group="safety",
+        meaning="nearness to the nearest vehicle",
+        quantity="vehicle_clearance_m",
+        form=Form.BELOW,
+        per_second=True,
+        parameter="within_m",
     ),
-    "time_gap": Term("safety", "following closer than a time gap", "time_gap_s", Form.BELOW, True, "within_s"),
+    "time_gap": Term(
+        group="safety",
+        meaning="following closer than a time gap",
+        quantity="time_gap_s",
+        form=Form.BELOW,
+        per_second=True,
+        parameter="within_s",
+    ),
     "time_to_collision": Term(
-        "safety",
-        "being on a course to contact sooner than this",
-        "time_to_collision_s",
-        Form.BELOW,
-        True,
-        "within_s",
+        group="safety",
+        meaning="being on a course to contact sooner than this",
+        quantity="time_to_collision_s",
+        form=Form.BELOW,
+        per_second=True,
+        parameter="within_s",
     ),
-    "speed_over_limit": Term("safety", "speed over the limit, as a share of it", "speed_over_limit", Form.OVER, True),
-    "goal": _ended("operational", "reaching the goal, once", Form.GAINED, Outcome.GOAL),
-    "timeout": _ended("operational", "not reaching the goal in time, once", Form.LOST, Outcome.TIMEOUT),
-    "progress": Term("operational", "way along the route, per 100 m", "advanced_m", Form.PER_100),
+    "speed_over_limit": Term(
+        group="safety",
+        meaning="speed over the limit, as a share of it",
+        quantity="speed_over_limit",
+        form=Form.OVER,
+        per_second=True,
+    ),
+    "goal": _outcome_term(
+        group="operational", meaning="reaching the goal, once", form=Form.GAINED, outcome=Outcome.GOAL
+    ),
+    "timeout": _outcome_term(
+        group="operational", meaning="not reaching the goal in time, once", form=Form.LOST, outcome=Outcome.TIMEOUT
+    ),
+    "progress": Term(
+        group="operational",
+        meaning="way along the route, per 100 m",
+        quantity="advanced_m",
+        form=Form.PER_100,
+    ),
     "speed_under_limit": Term(
-        "operational", "speed under the limit, as a share of it", "speed_over_limit", Form.UNDER, True
+        group="operational",
+        meaning="speed under the limit, as a share of it",
+        quantity="speed_over_limit",
+        form=Form.UNDER,
+        per_second=True,
     ),
-    "lane_offset": Term("operational", "distance from the nearest lane's centre, m", "lane_offset_m", Form.LESS, True),
+    "lane_offset": Term(
+        group="operational",
+        meaning="distance from the nearest lane's centre, m",
+        quantity="lane_offset_m",
+        form=Form.LESS,
+        per_second=True,
+    ),
     "acceleration": Term(
-        "operational",
-        "squared acceleration or braking, as a share of 10 m/s2",
-        "state.acceleration_mps2",
-        Form.LESS_SQUARED,
-        True,
+        group="operational",
+        meaning="squared acceleration or braking, as a share of 10 m/s2",
+        quantity="state.acceleration_mps2",
+        form=Form.LESS_SQUARED,
+        per_second=True,
     ),
     "lateral_acceleration": Term(
-        "operational",
-        "squared lateral acceleration, as a share of 10 m/s2",
-        "lateral_acceleration_mps2",
-        Form.LESS_SQUARED,
-        True,
+        group="operational",
+        meaning="squared lateral acceleration, as a share of 10 m/s2",
+        quantity="lateral_acceleration_mps2",
+        form=Form.LESS_SQUARED,
+        per_second=True,
     ),
-    "time_pressure": Term("human", "every second on the way", "state.speed_mps", Form.ALWAYS, True),
+    "time_pressure": Term(
+        group="human",
+        meaning="every second on the way",
+        quantity="state.speed_mps",
+        form=Form.ALWAYS,
+        per_second=True,
+    ),
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Weighted:
-    """A term with its weight and, where it takes one, its parameter."""
+    """A term of a payoff: its name, its weight and its parameter (None if it has none)."""
 
     name: str
     weight: float
     parameter: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Payoff:
-    """One player's equation 1."""
+    """Equation 1 of one player."""
 
     alpha: Mapping[str, float]  # by group: a0, a1, a2
     terms: tuple[Weighted, ...]
-    fuzzy: Mapping[str, tuple[float, FuzzyFunction]]  # human terms declared by membership functions, per second
+    fuzzy: Mapping[str, tuple[float, FuzzyFunction]]  # human terms, per second: weight and function
 
     def evaluate(self, q: Quantities, player: int) -> dict[str, FloatArray]:
-        """Each term's share of the step's payoff, [G], weights applied; their sum is the payoff."""
-        shares, _ = self._weighed(q, player)
-        fuzzy = self._fuzzy_shares(q, player)
-        return dict(zip((*(each.name for each in self.terms), *self.fuzzy), (*shares, *fuzzy), strict=True))
+        """The weighted value [G] of each term in this step, by name; the sum is the step's payoff."""
+        values, _ = self._term_values(q, player)
+        fuzzy = self._fuzzy_values(q, player)
+        return dict(zip((*(each.name for each in self.terms), *self.fuzzy), (*values, *fuzzy), strict=True))
 
     def total(self, q: Quantities, player: int) -> FloatArray:
-        """[G] the step's payoff of one player."""
-        _, total = self._weighed(q, player)
-        for share in self._fuzzy_shares(q, player):
-            total += share
+        """[G] one player's payoff of the step."""
+        _, total = self._term_values(q, player)
+        for value in self._fuzzy_values(q, player):
+            total += value
         return total
 
-    def _weighed(self, q: Quantities, player: int) -> tuple[FloatArray, FloatArray]:
-        """[T, G] the shares of the terms that are not fuzzy, and [G] their sum."""
-        values = np.empty((len(self._quantities), len(q.state.step)))
+    def _term_values(self, q: Quantities, player: int) -> tuple[FloatArray, FloatArray]:
+        """[T, G] weighted values of the terms without the fuzzy ones, and [G] their sum."""
+        quantities = np.empty((len(self._quantities), len(q.state.step)))
         for row, quantity in enumerate(self._quantities):
-            values[row] = quantity(q)[:, player]
-        return _weighed(values, *self._weights, q.world.step_s)
+            quantities[row] = quantity(q)[:, player]
+        return _term_values(quantities, *self._weights, q.world.step_s)
 
-    def _fuzzy_shares(self, q: Quantities, player: int) -> Iterator[FloatArray]:
-        """[G] the share of each fuzzy term."""
+    def _fuzzy_values(self, q: Quantities, player: int) -> Iterator[FloatArray]:
+        """[G] weighted value of each fuzzy term."""
         for weight, function in self.fuzzy.values():
             yield self.alpha["human"] * weight * q.world.step_s * function(getattr(q, function.quantity)[:, player])
 
     @cached_property
     def _quantities(self) -> list[Callable[[Quantities], NDArray[Any]]]:
-        """What the terms that are not fuzzy are made of, each once."""
+        """Getters of the quantities that the terms without the fuzzy ones use, each once."""
         return [attrgetter(name) for name in self._quantity_names]
 
     @cached_property
@@ -183,8 +225,8 @@ class Payoff:
 
     @cached_property
     def _weights(self) -> tuple[IntArray, IntArray, FloatArray, FloatArray, BoolArray]:
-        """Of each term that is not fuzzy: the row of its quantity, form, the form's parameter, weight with alpha, and
-        whether it is a rate."""
+        """[T] for each term without the fuzzy ones: row of its quantity, form, the form's parameter, weight times
+        alpha, whether it is a rate."""
         terms = [TERMS[each.name] for each in self.terms]
         parameters = [
             float(term.outcome if each.parameter is None else each.parameter)
@@ -198,8 +240,8 @@ class Payoff:
 
 
 @compiled
-def _weighed(
-    values: FloatArray,
+def _term_values(
+    quantities: FloatArray,
     row: IntArray,
     form: IntArray,
     parameter: FloatArray,
@@ -207,20 +249,20 @@ def _weighed(
     per_second: BoolArray,
     step_s: float,
 ) -> tuple[FloatArray, FloatArray]:
-    """[T, G] terms' shares of the payoff, made of their quantities' values [Q, G], and [G] their sum from the first
-    to the last."""
-    shares, total = np.empty((len(form), values.shape[1])), np.zeros(values.shape[1])
+    """[T, G] weighted values of T terms of quantities [Q, G], and [G] their sum, added in the order of the terms."""
+    values, total = np.empty((len(form), quantities.shape[1])), np.zeros(quantities.shape[1])
     for term in range(len(form)):
         scale = weight[term] * (step_s if per_second[term] else 1.0)
-        for g in range(values.shape[1]):
-            share = scale * _worth(values[row[term], g], form[term], parameter[term])
-            shares[term, g] = share
-            total[g] += share
-    return shares, total
+        for g in range(quantities.shape[1]):
+            value = scale * _unweighted(quantities[row[term], g], form[term], parameter[term])
+            values[term, g] = value
+            total[g] += value
+    return values, total
 
 
 @compiled
-def _worth(value: float, form: int, parameter: float) -> float:
+def _unweighted(value: float, form: int, parameter: float) -> float:
+    """The form of a term, applied to its quantity."""
     if form == Form.BELOW:
         return np.minimum(value / parameter, 1.0) - 1.0
     if form == Form.OVER:

@@ -1,6 +1,6 @@
-"""What can be said of the players at one moment: the quantities that observations, payoffs and metrics share.
+"""The quantities of one moment that observations, payoffs and metrics share.
 
-Each is worked out when first asked for, once per step, so that a quantity nobody uses costs nothing.
+Each quantity is computed on first use, once per step. Unused quantities cost nothing.
 """
 
 from __future__ import annotations
@@ -18,15 +18,16 @@ from harness.game.jit import compiled
 from harness.game.road import MARGIN_M, SPACING_M, Along, Road, Routes, row_at
 from harness.game.state import Bodies, Outcome, State
 
-PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])  # where the way is looked at, from a player
-SIGHT_M = 60.0  # beyond it a body is not taken for a leader
-REACH_M = 10.0  # clearances are known up to here
+# distances ahead of a player at which its route is sampled
+PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])
+SIGHT_M = 60.0  # a body farther ahead than this is not a leader
+REACH_M = 10.0  # largest clearance that is computed
 _PATH_ROWS = np.rint(PATH_M / SPACING_M).astype(np.int64)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class World:
-    """What does not change during a game: road, cars, step length. Sizes are [P]."""
+    """The constants of a game: road, cars, step length, time limit. Sizes are [P]."""
 
     road: Road
     actuators: Actuators
@@ -37,12 +38,12 @@ class World:
 
     @property
     def steps(self) -> int:
-        """Steps until time is up."""
+        """Steps until the time limit."""
         return round(self.time_limit_s / self.step_s)
 
 
 class Path(NamedTuple):
-    """The route at `PATH_M` ahead of each player, [G, P, K]; edges are offsets from the route's line."""
+    """The route at the distances `PATH_M` ahead of each player, [G, P, K]; edges are offsets from the route's line."""
 
     heading_rad: FloatArray
     left_edge_m: FloatArray
@@ -50,7 +51,7 @@ class Path(NamedTuple):
 
 
 class OnPath(NamedTuple):
-    """Bodies along each player's route, [G, P, B]: centres from the player's, and half the room they take."""
+    """Bodies in route coordinates, [G, P, B]: centres relative to the player's centre, and half extents."""
 
     ahead_m: FloatArray
     left_m: FloatArray
@@ -60,19 +61,19 @@ class OnPath(NamedTuple):
 
 @dataclass
 class Quantities:
-    """The quantities of one moment. Arrays are [G, P], against every body [G, P, B], on the path [G, P, K]."""
+    """The quantities of one moment: [G, P], per body [G, P, B], per distance on the path [G, P, K]."""
 
     world: World
     state: State
     bodies: Bodies
-    advanced_m: FloatArray  # along the route since the step before
-    lateral_offset_m: FloatArray  # to the left of the route's line
+    advanced_m: FloatArray  # along the route since the previous step
+    lateral_offset_m: FloatArray  # from the route's line, left positive
 
-    # --- the way ahead -----------------------------------------------------------------------------------------
+    # --- the route ahead ---------------------------------------------------------------------------------------
 
     @cached_property
     def path_rows(self) -> IntArray:
-        """[G, P, K] the rows of the table of routes at `PATH_M`."""
+        """[G, P, K] rows of the table of routes at `PATH_M`."""
         routes = self.world.road.routes
         return _path_rows(routes.rows(self.state.station_m), routes.first_row, routes.last_row)
 
@@ -95,7 +96,7 @@ class Quantities:
 
     @cached_property
     def speed_over_limit(self) -> FloatArray:
-        """Speed over the limit as a share of it; negative below."""
+        """Excess over the speed limit as a share of the limit; negative below the limit."""
         return self.state.speed_mps / self.speed_limit_mps - 1.0
 
     @property
@@ -105,36 +106,36 @@ class Quantities:
 
     @cached_property
     def lane_end_m(self) -> FloatArray:
-        """Distance until the lane the player is in ends; inf if it goes on."""
+        """Distance to the end of the player's lane; inf if the lane does not end."""
         return np.maximum(self._along.lane_end_m - self.state.station_m, 0.0)
 
     @cached_property
     def goal_m(self) -> FloatArray:
-        """Distance to the goal along the route; 0 or less once it is reached."""
+        """Distance to the goal along the route; 0 or less after the goal."""
         return self.world.road.routes.goal_m - self.state.station_m
 
     @cached_property
     def lateral_acceleration_mps2(self) -> FloatArray:
         return lateral_acceleration_mps2(self.state, self.world.actuators)
 
-    # --- the others ----------------------------------------------------------------------------------------------
+    # --- other bodies --------------------------------------------------------------------------------------------
 
     @cached_property
     def visible(self) -> BoolArray:
-        """[G, P, B] bodies that are there and are not the player itself."""
+        """[G, P, B] bodies that are present and are not the player itself."""
         return _visible(self.state.present, self.bodies.present)
 
     @cached_property
     def on_path(self) -> OnPath:
-        """Bodies along the player's route, each seen from the nearest of the route's frames at `PATH_M`."""
+        """Bodies in route coordinates, each in the nearest frame of the route at `PATH_M`."""
         bodies = self.bodies
         boxes = (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
         return OnPath(*_on_path(self.state.station_m, self.lateral_offset_m, tuple(self.world.road.routes), *boxes))
 
     @cached_property
     def leader_gap_m(self) -> FloatArray:
-        """Trailing distance: gap to the nearest body ahead in the player's way, bumper to bumper along the route;
-        inf where nobody leads."""
+        """Trailing distance: gap, bumper to bumper along the route, to the nearest body ahead that overlaps the
+        player's width; inf without one."""
         path = self.on_path
         overlaps = np.abs(path.left_m) < path.half_width_m + 0.5 * self.world.width_m[:, None]
         leads = self.visible & overlaps & (path.ahead_m > 0.0) & (path.ahead_m < SIGHT_M)
@@ -143,7 +144,7 @@ class Quantities:
 
     @cached_property
     def time_gap_s(self) -> FloatArray:
-        """Time headway without the leader's length: gap over own speed; inf where nobody leads."""
+        """Time headway without the leader's length: gap over own speed; inf without a leader."""
         return self.leader_gap_m / np.maximum(self.state.speed_mps, 0.1)
 
     # --- surfaces ------------------------------------------------------------------------------------------------
@@ -161,12 +162,12 @@ class Quantities:
 
     @cached_property
     def vehicle_clearance_m(self) -> FloatArray:
-        """Distance to the nearest other body; 0 where they touch, never over `REACH_M`."""
+        """Distance to the nearest other body: 0 at contact, at most `REACH_M`."""
         return _vehicle_clearance_m(self._cars, self._boxes, self.state.present, self.bodies.present)
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
-        """Distance to the nearest edge of the drivable area; 0 where the car is on it, never over `REACH_M`."""
+        """Distance to the nearest edge of the drivable area: 0 on the edge, at most `REACH_M`."""
         return self.world.road.rails.distance_m(self._cars, REACH_M)
 
     @cached_property
@@ -184,7 +185,7 @@ class Quantities:
 
     @cached_property
     def time_to_collision_s(self) -> FloatArray:
-        """Seconds until contact with another body if all keep heading and speed; inf if none would touch."""
+        """Seconds until contact with another body at constant headings and speeds; inf without a contact."""
         return time_to_first_contact(self._cars, self._boxes, self.state.speed_mps, self.bodies.speed_mps, self.visible)
 
 
@@ -198,8 +199,8 @@ def terminations(
     vehicle_clearance_m: FloatArray,
     rail_clearance_m: FloatArray,
 ) -> None:
-    """How the game of each player that drove [G, P] ended, if it did, in place: a contact counts before the goal, and
-    the goal before time [G]. Players that SUMO drives [P] touch no rail."""
+    """Set the outcomes [G, P] of the players that drove [G, P], in place: contact before goal, goal before timeout
+    (time_is_up [G]). Contact with a rail counts only for players that the harness drives (taken_over [P])."""
     for g, p in np.ndindex(outcome.shape):
         if drove[g, p]:
             if vehicle_clearance_m[g, p] <= 0.0:
@@ -214,25 +215,25 @@ def terminations(
 
 @compiled
 def row_ahead(row: int, k: int, first_row: int, last_row: int) -> int:
-    """The row of a route at `PATH_M[k]` from a row of it."""
+    """The row of a route at the distance `PATH_M[k]` from another row, clamped to the route."""
     return min(max(row + _PATH_ROWS[k], first_row), last_row)
 
 
 @compiled
 def _path_rows(rows: IntArray, first_row: IntArray, last_row: IntArray) -> IntArray:
-    found = np.empty((*rows.shape, len(_PATH_ROWS)), dtype=rows.dtype)
+    path_rows = np.empty((*rows.shape, len(_PATH_ROWS)), dtype=rows.dtype)
     for g, p in np.ndindex(rows.shape):
         for k in range(len(_PATH_ROWS)):
-            found[g, p, k] = row_ahead(rows[g, p], k, first_row[p], last_row[p])
-    return found
+            path_rows[g, p, k] = row_ahead(rows[g, p], k, first_row[p], last_row[p])
+    return path_rows
 
 
 @compiled
 def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
-    found = np.empty((players.shape[0], players.shape[1], bodies.shape[1]), dtype=np.bool_)
-    for g, p, b in np.ndindex(found.shape):
-        found[g, p, b] = players[g, p] and bodies[g, b] and p != b
-    return found
+    visible = np.empty((players.shape[0], players.shape[1], bodies.shape[1]), dtype=np.bool_)
+    for g, p, b in np.ndindex(visible.shape):
+        visible[g, p, b] = players[g, p] and bodies[g, b] and p != b
+    return visible
 
 
 @compiled
@@ -259,8 +260,8 @@ def _on_path(
         row = row_at(station, routes.first_row[p], routes.last_row[p])
         for b in range(x_m.shape[1]):
             box = (x_m[g, b], y_m[g, b], heading_rad[g, b], length_m[g, b], width_m[g, b])
-            room = along_route(row, station, offset, p, routes, *box)
-            ahead[g, p, b], left[g, p, b], half_length[g, p, b], half_width[g, p, b] = room
+            extent = along_route(row, station, offset, p, routes, *box)
+            ahead[g, p, b], left[g, p, b], half_length[g, p, b], half_width[g, p, b] = extent
     return ahead, left, half_length, half_width
 
 
@@ -277,21 +278,21 @@ def along_route(
     length_m: float,
     width_m: float,
 ) -> tuple[float, float, float, float]:
-    """A body along the route of a player at a row, station and lateral offset: how far its centre is ahead and to the
-    left, and half the room it takes, in the nearest of the route's frames at `PATH_M`."""
+    """A body in route coordinates relative to a player (m): centre ahead and to the left, half length, half width.
+    The frame is the nearest one of the route at `PATH_M`."""
     first, last = routes.first_row[player], routes.last_row[player]
     nearest, nearest2 = 0, np.inf
     for k in range(len(_PATH_ROWS)):
-        there = row_ahead(row, k, first, last)
-        away2 = (x_m - routes.x_m[there]) ** 2 + (y_m - routes.y_m[there]) ** 2
-        if away2 < nearest2:
-            nearest, nearest2 = k, away2
-    there = row_ahead(row, nearest, first, last)
-    dx, dy = x_m - routes.x_m[there], y_m - routes.y_m[there]
-    cosine, sine = routes.cos[there], routes.sin[there]
+        sample = row_ahead(row, k, first, last)
+        distance2 = (x_m - routes.x_m[sample]) ** 2 + (y_m - routes.y_m[sample]) ** 2
+        if distance2 < nearest2:
+            nearest, nearest2 = k, distance2
+    frame = row_ahead(row, nearest, first, last)
+    dx, dy = x_m - routes.x_m[frame], y_m - routes.y_m[frame]
+    cosine, sine = routes.cos[frame], routes.sin[frame]
     ahead, left = dx * cosine + dy * sine + PATH_M[nearest], dy * cosine - dx * sine
-    to_row_m = (row - first) * SPACING_M - MARGIN_M - station_m  # the rounding of rows
-    turned = heading_rad - routes.heading_rad[there]
+    to_row_m = (row - first) * SPACING_M - MARGIN_M - station_m  # rows are rounded stations
+    turned = heading_rad - routes.heading_rad[frame]
     along, across = abs(np.cos(turned)), abs(np.sin(turned))
     half_length = 0.5 * (length_m * along + width_m * across)
     return ahead + to_row_m, left - offset_m, half_length, 0.5 * (length_m * across + width_m * along)

@@ -1,4 +1,4 @@
-"""Seeds hashed from named parts, so that nothing's numbers depend on what else there is or on any order."""
+"""Seeds hashed from named parts: random numbers do not depend on the order of draws or on other draws."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 def seed_of(*parts: str | int) -> int:
     """A 63-bit seed hashed from named parts, such as ("assessment", 1, "episode", 7)."""
-    text = "\x1f".join(f"{'str' if isinstance(part, str) else 'int'}:{part}" for part in parts)  # NumPy's ints too
+    text = "\x1f".join(f"{'str' if isinstance(part, str) else 'int'}:{part}" for part in parts)  # NumPy ints too
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little") >> 1
 
 
@@ -19,7 +19,9 @@ def generator_of(*parts: str | int) -> np.random.Generator:
 
 
 def between(bounds: tuple[float, float], share: float) -> float:
-    """What lies at a share of the way, from 0 to 1, between two bounds. Of a share that is drawn, NumPy's `uniform`
-    makes the same, at three times the price."""
+    """The point at a share, from 0 to 1, of the way between two bounds.
+
+    For a drawn share the result equals NumPy's `uniform`, which takes three times as long.
+    """
     low, high = bounds
     return low + (high - low) * share

@@ -1,4 +1,4 @@
-"""What is true of G games at one moment."""
+"""The state of G games at one time: players, and all bodies with an extent."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROLES = ("ego", "non_ego")
 
 
 class Outcome(IntEnum):
-    """How a player's game ended; `name.lower()` is the word in every file."""
+    """How a player's game ended. `name.lower()` is the value in every file."""
 
     RUNNING = 0
     GOAL = 1
@@ -27,18 +27,18 @@ class Outcome(IntEnum):
 
     @property
     def word(self) -> str:
+        """The outcome's value in files; empty while the game runs."""
         return "" if self is Outcome.RUNNING else self.name.lower()
 
 
-_RUNNING = int(Outcome.RUNNING)  # NumPy would ask the enumeration each time
+_RUNNING = int(Outcome.RUNNING)  # comparing arrays with an enumeration member is slow in NumPy
 
 
 @dataclass
 class State:
-    """The players of G games. Every array is [G, P] unless it says otherwise.
+    """The players of G games. Arrays are [G, P] unless noted.
 
-    Poses are of the body's centre in the scene's network coordinates, heading in radians
-    (0 east, counter-clockwise).
+    Poses are those of the body's centre in network coordinates. Headings are in radians (0 east, counter-clockwise).
     """
 
     x_m: FloatArray
@@ -49,16 +49,17 @@ class State:
     steering_rad: FloatArray
     station_m: FloatArray  # distance along the player's route
     outcome: IntArray
-    present: BoolArray  # takes part and has not left the scene
-    lapsed: BoolArray  # attention is elsewhere in this step
-    unseen_behind_m: FloatArray  # others are seen from this far ahead of the player on; -inf: all around
-    sight_m: FloatArray  # others are seen up to this far away
-    distance_error: FloatArray  # share by which others seem farther away (+) or nearer (-) than they are
-    closing_error_per_s: FloatArray  # what others seem to move away (+) or nearer (-), per distance
+    present: BoolArray  # takes part in the game and has not left the scene
+    lapsed: BoolArray  # has a lapse of attention in this step
+    unseen_behind_m: FloatArray  # least distance ahead at which road users are seen; -inf: all around
+    sight_m: FloatArray  # greatest distance at which road users are seen
+    distance_error: FloatArray  # error of estimated distances, as a share: + is farther than true
+    closing_error_per_s: FloatArray  # error of closing speeds, per distance: + is moving away
     step: IntArray  # [G]
 
     @classmethod
     def empty(cls, games: int, players: int) -> State:
+        """A state of zeros without human factors, in which no player is present."""
         shape = (games, players)
         return cls(
             x_m=np.zeros(shape),
@@ -80,20 +81,21 @@ class State:
 
     @property
     def running(self) -> BoolArray:
-        """[G, P] players that still drive."""
+        """[G, P] players that are present and whose game has not ended."""
         return self.present & (self.outcome == _RUNNING)
 
     def copy(self) -> State:
+        """A copy with its own arrays."""
         return State(**{name: array.copy() for name, array in vars(self).items()})
 
     def of(self, games: IntArray) -> State:
-        """A copy of some games [N]."""
+        """A copy of the games with indices [N]."""
         return State(**{name: array.take(games, axis=0) for name, array in vars(self).items()})
 
 
 @dataclass
 class Bodies:
-    """Everything with an extent in G games: the players first, then the nearest others. Arrays are [G, B]."""
+    """All bodies of G games: the players first, then the nearest background vehicles. Arrays are [G, B]."""
 
     x_m: FloatArray
     y_m: FloatArray
@@ -103,14 +105,17 @@ class Bodies:
     width_m: FloatArray
     present: BoolArray
 
-    def with_nearest(self, others: Bodies, most: int, within_m: float) -> Bodies:
-        """These, the players, and behind them so many of the others as are nearest to one of them, the nearest first;
-        who is farther from all players than `within_m` is not present."""
-        players, beside = (
+    def with_nearest(self, background: Bodies, most: int, within_m: float) -> Bodies:
+        """These bodies (the players), followed by the nearest background vehicles.
+
+        At most `most` vehicles are added, sorted by distance to the nearest player. A vehicle farther than `within_m`
+        from every player is not present.
+        """
+        players, vehicles = (
             (each.x_m, each.y_m, each.heading_rad, each.speed_mps, each.length_m, each.width_m)
-            for each in (self, others)
+            for each in (self, background)
         )
-        columns, present = _with_nearest(players, self.present, beside, others.present, most, within_m)
+        columns, present = _with_nearest(players, self.present, vehicles, background.present, most, within_m)
         x_m, y_m, heading_rad, speed_mps, length_m, width_m = columns
         return Bodies(x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
 
@@ -119,36 +124,37 @@ class Bodies:
 def _with_nearest(
     players: tuple[Any, ...],
     players_present: BoolArray,
-    others: tuple[Any, ...],
-    others_present: BoolArray,
+    vehicles: tuple[Any, ...],
+    vehicles_present: BoolArray,
     most: int,
     within_m: float,
 ) -> tuple[FloatArray, BoolArray]:
-    games, seats = players_present.shape
-    taken = min(most, others_present.shape[1])
-    columns = np.empty((len(players), games, seats + taken))
-    present = np.empty((games, seats + taken), dtype=np.bool_)
+    """[C, G, B] the columns of players and added vehicles, and [G, B] which are present."""
+    games, player_count = players_present.shape
+    added = min(most, vehicles_present.shape[1])
+    columns = np.empty((len(players), games, player_count + added))
+    present = np.empty((games, player_count + added), dtype=np.bool_)
     nearest, nearest_m = np.empty(most + 1, dtype=np.int64), np.empty(most + 1)
     for g in range(games):
         count = 0
-        for other in range(others_present.shape[1]):
-            away_m = np.inf
-            if others_present[g, other]:
-                for p in range(seats):
+        for vehicle in range(vehicles_present.shape[1]):
+            distance_m = np.inf
+            if vehicles_present[g, vehicle]:
+                for p in range(player_count):
                     if players_present[g, p]:
-                        dx, dy = others[0][g, other] - players[0][g, p], others[1][g, other] - players[1][g, p]
-                        away_m = min(away_m, np.hypot(dx, dy))
-            place = count  # behind those that are as near
-            while place > 0 and away_m < nearest_m[place - 1]:
+                        dx, dy = vehicles[0][g, vehicle] - players[0][g, p], vehicles[1][g, vehicle] - players[1][g, p]
+                        distance_m = min(distance_m, np.hypot(dx, dy))
+            place = count  # after vehicles at the same distance
+            while place > 0 and distance_m < nearest_m[place - 1]:
                 nearest[place], nearest_m[place] = nearest[place - 1], nearest_m[place - 1]
                 place -= 1
-            nearest[place], nearest_m[place] = other, away_m
+            nearest[place], nearest_m[place] = vehicle, distance_m
             count = min(count + 1, most)
-        present[g, :seats] = players_present[g]
-        for k in range(taken):
-            present[g, seats + k] = nearest_m[k] <= within_m
+        present[g, :player_count] = players_present[g]
+        for k in range(added):
+            present[g, player_count + k] = nearest_m[k] <= within_m
         for column in range(len(players)):
-            columns[column, g, :seats] = players[column][g]
-            for k in range(taken):
-                columns[column, g, seats + k] = others[column][g, nearest[k]]
+            columns[column, g, :player_count] = players[column][g]
+            for k in range(added):
+                columns[column, g, player_count + k] = vehicles[column][g, nearest[k]]
     return columns, present

@@ -1,4 +1,4 @@
-"""A recorded game as a folder that SUMO-GUI opens as it is, and which games are worth one."""
+"""A recorded game as a folder that SUMO-GUI opens, or as a film; and the choice of games to record."""
 
 from harness.replay.bundle import write_replay
 from harness.replay.film import write_film

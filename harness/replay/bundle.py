@@ -1,6 +1,6 @@
 """A recorded game as a folder that opens with `sumo-gui -c scene.sumocfg`: no Python, no harness.
 
-scene.sumocfg      what SUMO opens: names the files below
+scene.sumocfg      the configuration, which names the files below
 scene.net.xml      the scene's net, copied
 scene.add.xml      vehicle types in the colours of the game, rails, the place of contact
 episode.fcd.xml    every pose of every vehicle
@@ -38,19 +38,19 @@ def write_replay(
     step_length_s: float,
     rails: Sequence[FloatArray] = (),
 ) -> None:
-    """Write one game's replay, replacing what `folder` held; the folder appears whole or not at all.
+    """Write one game's replay to `folder`, which is replaced. The folder appears only when it is complete.
 
     `trace` is the game's rows (columns as in `traces/`), `route_file` defines its vehicle types, `rails` are
     polylines [n, 2] in net coordinates. The same arguments give the same bytes. Raises ValueError for a trace
-    that holds no row or more than one game.
+    with no row or with more than one game.
     """
     if trace["episode"].nunique() != 1:
         raise ValueError(f"a replay is of one game; the trace has {trace['episode'].nunique()}")
     trace = trace.astype({"player": str, "vehicle_type": str, "outcome": str})
     types = types_of_vehicles(trace, route_file)
     lanes = Lanes.read(net_file)
-    found = contacts(trace, types, rails)
-    view = choose_view(trace, found)
+    touches = contacts(trace, types, rails)
+    view = choose_view(trace, touches)
 
     folder.parent.mkdir(parents=True, exist_ok=True)
     partial = folder.with_name(f".{folder.name}.{os.getpid()}.partial")
@@ -58,12 +58,20 @@ def write_replay(
     partial.mkdir()
     try:
         shutil.copyfile(net_file, partial / "scene.net.xml")
-        write_xml(_scenery(types, rails, found, view, title), partial / "scene.add.xml")
-        write_recording(trace, types, lanes, step_length_s, partial / "episode.fcd.xml")
-        moments = [*(contact.time_s for contact in found), float(trace["time_s"].max())]
+        write_xml(
+            _scenery(types=types, rails=rails, touches=touches, view=view, title=title), partial / "scene.add.xml"
+        )
+        write_recording(
+            trace=trace,
+            types=types,
+            lanes=lanes,
+            step_length_s=step_length_s,
+            file=partial / "episode.fcd.xml",
+        )
+        moments = [*(contact.time_s for contact in touches), float(trace["time_s"].max())]
         halts_s = sorted({shown_at(moment, step_length_s) for moment in moments})
         write_xml(view_settings(view, halts_s, lanes), partial / "view.xml")
-        # one step beyond the one that shows the last sample: without an end SUMO would never stop
+        # one step after the one that shows the last sample: without an end SUMO would never stop
         write_xml(_configuration(title, halts_s[-1] + step_length_s, step_length_s), partial / "scene.sumocfg")
         shutil.rmtree(folder, ignore_errors=True)
         partial.rename(folder)
@@ -79,13 +87,13 @@ def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTre
         "input": {"net-file": "scene.net.xml", "additional-files": "scene.add.xml"},
         "time": {"begin": "0", "end": f"{end_s:.3f}", "step-length": f"{step_length_s:g}"},
         "processing": {
-            # SUMO must put every vehicle where and when it was, however wrong that is by its own rules
+            # SUMO must place every vehicle as recorded, even where its own rules forbid it
             "collision.action": "none",
             "insertion-checks": "none",
             "ignore-route-errors": "true",
             "time-to-teleport": "-1",
         },
-        # SUMO warns of what would be wrong if it drove: jumps, hard braking, ends of routes
+        # otherwise SUMO warns of jumps, hard braking and ends of routes in the recording
         "report": {"no-warnings": "true", "no-step-log": "true"},
         "device": {"device.fcd-replay.files": "episode.fcd.xml"},
         "gui_only": {
@@ -101,9 +109,10 @@ def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTre
 
 
 def _scenery(
+    *,
     types: Mapping[str, DrawnVehicle],
     rails: Sequence[FloatArray],
-    found: Sequence[Contact],
+    touches: Sequence[Contact],
     view: Viewport,
     title: str,
 ) -> ElementTree.Element:
@@ -112,13 +121,13 @@ def _scenery(
         ElementTree.SubElement(root, "vType", drawn.attributes())
     for number, rail in enumerate(rails):
         _line(root, f"rail_{number}", rail, colour="24,26,32", width_m=0.4, layer=5)
-    for number, contact in enumerate(found):
+    for number, contact in enumerate(touches):
         ring = [
             (contact.x_m + _RING_RADIUS_M * math.cos(a), contact.y_m + _RING_RADIUS_M * math.sin(a))
             for a in (2 * math.pi * k / 36 for k in range(37))
         ]
         _line(root, f"contact_{number}", ring, colour="220,20,20", width_m=0.24, layer=6)
-        side = -1 if number % 2 else 1  # two that are near each other stay legible
+        side = -1 if number % 2 else 1  # the labels of two near contacts do not overlap
         _text(root, f"contact_{number}_label", contact.label, contact.x_m, contact.y_m + side * 1.5 * _RING_RADIUS_M)
     _text(root, "title", title, view.x_m, view.y_m + 0.4 * view.height_m)
     return root
@@ -140,6 +149,6 @@ def _line(
 
 
 def _text(root: ElementTree.Element, name: str, text: str, x_m: float, y_m: float) -> None:
-    """SUMO-GUI has no text of its own; it can show the type of an (invisible) point of interest."""
+    """SUMO-GUI has no text element, but it shows the type of an (invisible) point of interest."""
     place = {"x": f"{x_m:.2f}", "y": f"{y_m:.2f}", "layer": "200"}
     ElementTree.SubElement(root, "poi", {"id": name, "type": text, "color": "0,0,0,0"} | place)

@@ -1,4 +1,4 @@
-"""When and where the players of a recorded game hit something."""
+"""The times and places at which the players of a recorded game touch something."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from harness.game.arrays import FloatArray
 from harness.replay.vehicles import DrawnVehicle
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Contact:
-    """The step at which players came to grief, and the place."""
+    """The time and place of a contact of players."""
 
     time_s: float
     x_m: float
@@ -26,10 +26,10 @@ class Contact:
 
 
 def contacts(trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], rails: Sequence[FloatArray]) -> list[Contact]:
-    """Every contact of one game, in the order of time; two players that hit each other make one."""
+    """Every contact of one game, in order of time; a collision of two players is one contact."""
     hit = trace[trace["outcome"].isin(["collision", "rail"])].sort_values("step", kind="stable")
     hit = hit.drop_duplicates("player")
-    found = []
+    touches = []
     for (step, outcome), rows in hit.groupby(["step", "outcome"]):
         frame = trace[trace["step"] == step]
         bodies = {row.player: _box(row, types[row.player]) for row in frame.itertuples()}
@@ -40,8 +40,9 @@ def contacts(trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], rails: Sequ
             against = [shapely.LineString(rail) for rail in rails]
         place = _touching_point(bodies[first], against)
         time_s = float(rows["time_s"].iloc[0])
-        found.append(Contact(time_s, place.x, place.y, f"{outcome} at {time_s:.1f} s"))
-    return found
+        label = f"{outcome} at {time_s:.1f} s"
+        touches.append(Contact(time_s=time_s, x_m=place.x, y_m=place.y, label=label))
+    return touches
 
 
 def _box(row: Any, drawn: DrawnVehicle) -> shapely.Polygon:
@@ -57,7 +58,7 @@ def _box(row: Any, drawn: DrawnVehicle) -> shapely.Polygon:
 
 
 def _touching_point(body: shapely.Polygon, against: Sequence[shapely.Geometry]) -> shapely.Point:
-    """Middle of what `body` shares with the nearest of `against`; its own middle where there is nothing."""
+    """Centre of the overlap of `body` with the nearest of `against`; centre of `body` where there is none."""
     if not against:
         return body.centroid
     nearest = against[int(np.argmin([body.distance(other) for other in against]))]

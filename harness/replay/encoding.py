@@ -1,4 +1,4 @@
-"""Pictures to a film: GIF by Pillow, MP4 by ffmpeg (the one on PATH, or that of the package imageio-ffmpeg)."""
+"""Encode pictures as a film: GIF by Pillow, MP4 by ffmpeg (on PATH, or that of the package imageio-ffmpeg)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _COLOURS = 64  # of a GIF: the road, the cars and their edges have far fewer
 
 
 def encoding_problem(file: Path) -> Problem | None:
-    """What is missing to write a film of this name."""
+    """The missing program for a film of this name; None if nothing is missing."""
     if file.suffix.lower() == ".mp4" and find_ffmpeg() is None:
         remedy = "apt-get install ffmpeg, or pip install imageio-ffmpeg; a .gif needs neither"
         return Problem("ffmpeg", "", "is not installed, and an .mp4 needs it", remedy)
@@ -27,7 +27,7 @@ def encoding_problem(file: Path) -> Problem | None:
 
 
 def find_ffmpeg() -> str | None:
-    """ffmpeg on PATH, or else that of imageio-ffmpeg, if that is installed."""
+    """ffmpeg on PATH, else that of imageio-ffmpeg, if it is installed."""
     found = shutil.which("ffmpeg")
     if found is None and importlib.util.find_spec("imageio_ffmpeg") is not None:
         try:
@@ -38,7 +38,7 @@ def find_ffmpeg() -> str | None:
 
 
 def encode(pictures: Iterator[Image.Image], file: Path, size_px: tuple[int, int], interval_s: float) -> None:
-    """Write pictures of one size as a film, `interval_s` apart. Raises HarnessError, with what ffmpeg said."""
+    """Write pictures of one size as a film, `interval_s` apart. Raises HarnessError with ffmpeg's message."""
     if file.suffix.lower() == ".gif":
         _gif(pictures, file, interval_s)
     else:
@@ -53,16 +53,16 @@ def _gif(pictures: Iterator[Image.Image], file: Path, interval_s: float) -> None
 
 def _mp4(pictures: Iterator[Image.Image], file: Path, size_px: tuple[int, int], interval_s: float) -> None:
     program = find_ffmpeg()
-    assert program is not None, "encoding_problem has looked for it"
+    assert program is not None, "encoding_problem has checked for it"
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size_px[0]}x{size_px[1]}", "-r", f"{1.0 / interval_s:g}"]
-    # yuv420p and the index in front: what browsers and presentations can play
+    # browsers and presentation programs need yuv420p and the index at the front
     coded = ["-pix_fmt", "yuv420p", "-movflags", "+faststart", str(file)]
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as log:
         ffmpeg = subprocess.Popen(
             [program, "-y", "-loglevel", "error", *raw, "-i", "-", *coded],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
-            stderr=said,
+            stderr=log,
         )
         assert ffmpeg.stdin is not None
         try:
@@ -70,11 +70,11 @@ def _mp4(pictures: Iterator[Image.Image], file: Path, size_px: tuple[int, int], 
                 ffmpeg.stdin.write(picture.tobytes())
             ffmpeg.stdin.close()
         except BrokenPipeError:
-            pass  # it says why below
+            pass  # ffmpeg's message is reported below
         except BaseException:
             ffmpeg.kill()
             ffmpeg.wait()
             raise
         if ffmpeg.wait() != 0:
-            said.seek(0)
-            raise HarnessError(f"ffmpeg can't write the film: {said.read().decode(errors='replace').strip()}")
+            log.seek(0)
+            raise HarnessError(f"ffmpeg can't write the film: {log.read().decode(errors='replace').strip()}")

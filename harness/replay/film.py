@@ -1,6 +1,6 @@
-"""A replay as a film: SUMO-GUI plays it where nobody has to look, and its pictures become a GIF or an MP4.
+"""A replay as a film: SUMO-GUI plays it on a virtual screen, and its pictures become a GIF or an MP4.
 
-The view follows the ego (where it has left, the other player), at the speed of life.
+The view follows the ego (after it has left, the other player), in real time.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from harness.replay.virtual_screen import find_xvfb, virtual_screen
 from harness.traffic.gui import WindowClosed, gui_environment, steered_gui
 
 SIZE_PX = (960, 480)
-WIDTH_M = 80.0  # of road that is seen: a car of 4.6 m is 55 pixels long
-MOST_PER_S = 25.0  # pictures; of a game with shorter steps not every one is shown
+WIDTH_M = 80.0  # of visible road: a car of 4.6 m is 55 pixels long
+MOST_PER_S = 25.0  # pictures; with shorter steps some steps are skipped
 _SCREEN_PX = (1280, 800)
 _CAPTION_PX = 16
 
 
 def film_problems(file: Path) -> list[Problem]:
-    """Everything that is in the way of writing a film to a file, each with its remedy."""
+    """Every problem that prevents a film in this file, each with its remedy."""
     problems = []
     if file.suffix.lower() not in FORMATS:
         problems.append(Problem(str(file), "", "is neither .gif nor .mp4", "name it film.gif or film.mp4"))
     elif missing := encoding_problem(file):
         problems.append(missing)
     if not file.parent.is_dir():
-        problems.append(Problem(str(file.parent), "", "is not a folder", "make it first"))
+        problems.append(Problem(str(file.parent), "", "is not a folder", "create it first"))
     if find_sumo_gui() is None:
         remedy = "pip install eclipse-sumo, or put SUMO's bin folder on PATH"
         problems.append(Problem("sumo-gui", "", "is not installed", remedy))
     if find_xvfb() is None and screen_problem("") is not None:
         remedy = "apt-get install xvfb libgl1 libgl1-mesa-dri libglu1-mesa libegl1, or film on a computer with a screen"
-        problems.append(Problem("Xvfb", "", "is not installed, and there is no other screen to film on", remedy))
+        problems.append(Problem("Xvfb", "", "is not installed, and there is no other screen", remedy))
     return problems
 
 
@@ -62,12 +62,12 @@ def write_film(
     *,
     title: str,
     step_length_s: float,
-    report: Callable[[int, int], None] = lambda done, total: None,
+    on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Film a replay folder, whose game has this trace, into a `.gif` or `.mp4`; says how many pictures it has.
+    """Film a replay folder with its game's trace into a `.gif` or `.mp4`; returns the number of pictures.
 
-    `report` is told of each picture. The file appears whole or not at all. Raises UsageError for what
-    `film_problems` lists, HarnessError if a program that is there does not work.
+    `on_progress` is called after each picture with the number done and the total. The file appears only when it is
+    complete. Raises UsageError for the problems that `film_problems` lists, HarnessError if an installed program fails.
     """
     if problems := film_problems(file):
         raise UsageError(problems)
@@ -78,44 +78,61 @@ def write_film(
             work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="harness-film-")))
             xvfb = find_xvfb()
             display = stack.enter_context(virtual_screen(xvfb, _SCREEN_PX)) if xvfb else None
-            pictures = _pictures(folder, trace, shown, step_length_s, title, work, display)
-            encode(_reported(pictures, len(shown), report), scratch, SIZE_PX, step_length_s * shown.step)
+            pictures = _pictures(
+                folder=folder,
+                trace=trace,
+                shown=shown,
+                step_length_s=step_length_s,
+                title=title,
+                work=work,
+                display=display,
+            )
+            encode(_reported(pictures, len(shown), on_progress), scratch, SIZE_PX, step_length_s * shown.step)
         os.replace(scratch, file)
     finally:
         scratch.unlink(missing_ok=True)
     return len(shown)
 
 
-def _reported(pictures: Iterator[Image.Image], total: int, report: Callable[[int, int], None]) -> Iterator[Image.Image]:
+def _reported(
+    pictures: Iterator[Image.Image], total: int, on_progress: Callable[[int, int], None]
+) -> Iterator[Image.Image]:
     for done, picture in enumerate(pictures, 1):
         yield picture
-        report(done, total)
+        on_progress(done, total)
 
 
 def _pictures(
-    folder: Path, trace: pd.DataFrame, shown: range, step_length_s: float, title: str, work: Path, display: str | None
+    *,
+    folder: Path,
+    trace: pd.DataFrame,
+    shown: range,
+    step_length_s: float,
+    title: str,
+    work: Path,
+    display: str | None,
 ) -> Iterator[Image.Image]:
-    """The pictures of the steps to be shown, one after the other."""
+    """The pictures of the shown steps, in order."""
     program = find_sumo_gui()
-    assert program is not None, "film_problems has looked for it"
-    options = ["-c", str(folder / "scene.sumocfg"), "--quit-on-end"]  # so it does at the end of a failure, too
+    assert program is not None, "film_problems has checked for it"
+    options = ["-c", str(folder / "scene.sumocfg"), "--quit-on-end"]  # also after a failure
     for option, name, left_out in (
-        ("--gui-settings-file", "view.xml", r"<(breakpoint|delay) [^>]*>"),  # nobody is there to press play
-        ("--additional-files", "scene.add.xml", r'<poi id="title"[^>]*>'),  # it stands in every picture instead
+        ("--gui-settings-file", "view.xml", r"<(breakpoint|delay) [^>]*>"),  # a halt would wait for the play button
+        ("--additional-files", "scene.add.xml", r'<poi id="title"[^>]*>'),  # the caption of each picture replaces it
     ):
         content = (folder / name).read_text(encoding="utf-8")
         (work / name).write_text(re.sub(left_out, "", content), encoding="utf-8")
         options += [option, str(work / name)]
-    middle, picture = _middles(trace), work / "picture.png"
+    centres, picture = _centres(trace), work / "picture.png"
     font = ImageFont.load_default(_CAPTION_PX)
     height_m = WIDTH_M * SIZE_PX[1] / SIZE_PX[0]
     environment = gui_environment(home_of(program), display)
     with steered_gui(program, options, environment, patient=False) as window:
         try:
-            # SUMO's first step only puts the vehicles in, and its first picture has not the size asked for
+            # SUMO's first step only inserts the vehicles, and its first picture has another size
             for step in range(-1, shown[-1] + 1):
                 if step == -1 or step in shown:
-                    x_m, y_m = middle[max(step, 0)].tolist()
+                    x_m, y_m = centres[max(step, 0)].tolist()
                     window.look_at(x_m, y_m, WIDTH_M, height_m)
                     window.photograph_next(picture, SIZE_PX)
                 window.step()
@@ -127,7 +144,7 @@ def _pictures(
 
 def _captioned(file: Path, text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont) -> Image.Image:
     if not file.is_file():
-        raise HarnessError("SUMO-GUI took no picture: does its screen have OpenGL (libgl1-mesa-dri)?")
+        raise HarnessError("SUMO-GUI took no picture: check that its screen has OpenGL (libgl1-mesa-dri)")
     with Image.open(file) as opened:
         picture = opened.convert("RGB")
     file.unlink()
@@ -135,10 +152,10 @@ def _captioned(file: Path, text: str, font: ImageFont.FreeTypeFont | ImageFont.I
     return picture
 
 
-def _middles(trace: pd.DataFrame) -> FloatArray:
-    """[T + 1, 2] what the view is centred on: the ego; where it is not there, the non-ego; else what it was on."""
-    middles = np.full((int(trace["step"].max()) + 1, 2), np.nan)
+def _centres(trace: pd.DataFrame) -> FloatArray:
+    """[T + 1, 2] the centre of the view: the ego; where it is absent, the non-ego; else the nearest known centre."""
+    centres = np.full((int(trace["step"].max()) + 1, 2), np.nan)
     for player in reversed(list(PLAYER_COLOURS)):
         rows = trace[trace["player"] == player]
-        middles[rows["step"].to_numpy()] = rows[["x_m", "y_m"]].to_numpy(float)
-    return pd.DataFrame(middles).ffill().bfill().to_numpy()
+        centres[rows["step"].to_numpy()] = rows[["x_m", "y_m"]].to_numpy(float)
+    return pd.DataFrame(centres).ffill().bfill().to_numpy()

@@ -1,15 +1,15 @@
 """A game's trace as the floating-car data that SUMO's replay device plays.
 
-What the device needs to be exact (measured on SUMO 1.28):
+Requirements of the device for an exact replay (measured on SUMO 1.28):
 
-- A vehicle's first record only puts it into the simulation, at the lane's centre. So each vehicle's first
-  sample is written twice, once a step earlier, and all times are a step later than the game's.
-- The device never takes a vehicle out: after its last record SUMO drives it on, to the end of its route. So
-  who leaves before the game ends is sent off with a last speed that brings it there within the next step.
-  This is the one number of a replay that is not the trace's.
-- Who is still there when the game ends gets one record more, beyond the end of the simulation.
-- Every record names a lane: the vehicle's route is made from them. The last one must be of an edge, or the
-  route would end before the junction that the vehicle leaves in.
+- A vehicle's first record only inserts it, at the lane's centre. So each vehicle's first sample is written twice,
+  once a step earlier, and all times are a step later than the game's.
+- The device never removes a vehicle: after its last record SUMO drives it to the end of its route. So a vehicle
+  that leaves before the game ends gets a last speed that takes it there within the next step. This is the only
+  number of a replay that is not in the trace.
+- A vehicle that is present when the game ends gets one more record, after the end of the simulation.
+- Every record names a lane, and the vehicle's route consists of these lanes. The last one must belong to an edge,
+  or the route would end before the junction in which the vehicle leaves.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ def shown_at(time_s: float, step_length_s: float) -> float:
 
 
 def write_recording(
-    trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], lanes: Lanes, step_length_s: float, file: Path
+    *, trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], lanes: Lanes, step_length_s: float, file: Path
 ) -> None:
-    """Write one game as plain XML: a few ten kB, the same bytes on any machine, and readable by a person."""
+    """Write one game as plain XML: some tens of kB, readable, and the same bytes on any machine."""
     records = _records(trace, types, lanes, step_length_s)
     last_step = records["step"].max()
     first = records.drop_duplicates("id").assign(step=lambda rows: rows["step"] - 1)
-    beyond = records[records["step"] == last_step].assign(step=last_step + 1)
-    written = pd.concat([first, records, beyond]).sort_values(["step", "id"], kind="stable")
+    after_end = records[records["step"] == last_step].assign(step=last_step + 1)
+    written = pd.concat([first, records, after_end]).sort_values(["step", "id"], kind="stable")
 
     root = ElementTree.Element("fcd-export")
     for step, frame in written.groupby("step"):
@@ -54,7 +54,7 @@ def write_recording(
 def _records(
     trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], lanes: Lanes, step_length_s: float
 ) -> pd.DataFrame:
-    """The trace's rows in SUMO's terms: the front bumper's middle, and degrees clockwise from north."""
+    """The trace's rows in SUMO's units: the centre of the front bumper, and degrees clockwise from north."""
     trace = trace.sort_values(["step", "player"], kind="stable")
     length = trace["player"].map(lambda player: types[player].length_m).to_numpy(float)
     heading = trace["heading_rad"].to_numpy(float)

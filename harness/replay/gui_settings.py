@@ -1,4 +1,4 @@
-"""What SUMO-GUI shows: which part of the road at which zoom, how fast, and where it halts."""
+"""SUMO-GUI's settings: the visible part of the road, the zoom, the speed, and the halts."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from harness.replay.lanes import Lanes
 from harness.replay.vehicles import PLAYER_COLOURS
 
 WINDOW_PX = (1280, 640)
-_CANVAS_PX = (WINDOW_PX[0] - 10, WINDOW_PX[1] - 190)  # without SUMO-GUI's tool bars and its message window
-_NET_MARGIN_M = 6.0  # that SUMO-GUI adds around a net when it calls its zoom 100
-_AROUND_M = 12.0  # of road beyond where the players were
+_CANVAS_PX = (WINDOW_PX[0] - 10, WINDOW_PX[1] - 190)  # without SUMO-GUI's tool bars and message window
+_NET_MARGIN_M = 6.0  # added around a net by SUMO-GUI at zoom 100
+_AROUND_M = 12.0  # of road beyond the places of the players
 _WIDEST_M = 220.0  # a car of 4.6 m is then 27 pixels long
-_WIDEST_WITH_CONTACT_M = 120.0  # 49 pixels: how they touch must be seen
+_WIDEST_WITH_CONTACT_M = 120.0  # 49 pixels: the contact must be visible
 _GROUND, _ASPHALT = "214,224,206", "96,98,104"
-# "Delay in milliseconds" is per simulated second (GUIRunThread.cpp), so 1000 is the speed of life.
+# "Delay in milliseconds" is per simulated second (GUIRunThread.cpp), so 1000 is real time.
 _DELAY_MS = 2000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Viewport:
     """The piece of road to show: its centre and size (m)."""
 
@@ -34,23 +34,23 @@ class Viewport:
     height_m: float
 
 
-def choose_view(trace: pd.DataFrame, found: Sequence[Contact]) -> Viewport:
-    """Where the players were; if that is too much to be legible, around a contact or the closest approach."""
+def choose_view(trace: pd.DataFrame, touches: Sequence[Contact]) -> Viewport:
+    """The part of the road with the players; if it is too large, around a contact or the closest approach."""
     players = trace[trace["player"].isin(PLAYER_COLOURS)]
     places = players[["x_m", "y_m"]].to_numpy(float)
     low, high = places.min(0) - _AROUND_M, places.max(0) + _AROUND_M
-    widest = _WIDEST_WITH_CONTACT_M if found else _WIDEST_M
+    widest = _WIDEST_WITH_CONTACT_M if touches else _WIDEST_M
     aspect = _CANVAS_PX[1] / _CANVAS_PX[0]
     width = float(min(max(high[0] - low[0], (high[1] - low[1]) / aspect), widest))
     size = np.array([width, width * aspect])
-    focus = np.array([found[-1].x_m, found[-1].y_m]) if found else _closest_approach(trace)
+    focus = np.array([touches[-1].x_m, touches[-1].y_m]) if touches else _closest_approach(trace)
     fits = high - low <= size
     centre = np.where(fits, 0.5 * (low + high), np.clip(focus, low + 0.5 * size, high - 0.5 * size))
-    return Viewport(float(centre[0]), float(centre[1]), float(size[0]), float(size[1]))
+    return Viewport(x_m=float(centre[0]), y_m=float(centre[1]), width_m=float(size[0]), height_m=float(size[1]))
 
 
 def _closest_approach(trace: pd.DataFrame) -> np.ndarray:
-    """Where a player was when another road user was nearest to it; halfway where it was alone."""
+    """The place of a player when another road user was nearest to it; halfway along its path if it was alone."""
     player = next(name for name in PLAYER_COLOURS if (trace["player"] == name).any())
     own, others = trace[trace["player"] == player], trace[trace["player"] != player]
     pairs = own.merge(others, on="step", suffixes=("", "_other"))
@@ -61,7 +61,7 @@ def _closest_approach(trace: pd.DataFrame) -> np.ndarray:
 
 
 def view_settings(view: Viewport, halts_s: Sequence[float], lanes: Lanes) -> ElementTree.Element:
-    """SUMO-GUI's settings file. It halts at these times of its own clock; "play" goes on from there."""
+    """SUMO-GUI's settings file. It halts at these times of its own clock, and continues with "play"."""
     left, bottom, right, top = lanes.bounds()
     net = (right - left + 2 * _NET_MARGIN_M, top - bottom + 2 * _NET_MARGIN_M)
     whole = min(_CANVAS_PX[0] / net[0], _CANVAS_PX[1] / net[1])  # pixels per metre at zoom 100

@@ -1,4 +1,4 @@
-"""Where on the net a point is: SUMO's replay wants a lane and a position beside the coordinates."""
+"""The lane and position of a point on the net, which SUMO's replay needs beside the coordinates."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 _NOT_FOR_VEHICLES = {"crossing", "walkingarea"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Lanes:
-    """The lanes of a net [L]: centre lines, lengths as SUMO counts them (m), and the lane of an edge that
-    each leads to: itself, or for a lane inside a junction the one behind it."""
+    """The lanes of a net [L]: centre lines, SUMO's lengths (m), and for each lane the lane of an edge that it leads to:
+    itself, or for a lane inside a junction the one after it."""
 
     ids: tuple[str, ...]
     centre_lines: tuple[FloatArray, ...]
@@ -37,12 +37,12 @@ class Lanes:
                     lengths.append(float(lane.get("length")))
         row = {name: number for number, name in enumerate(ids)}
         onward = np.arange(len(ids))
-        for way in root.iter("connection"):
-            inside = row.get(f"{way.get('from')}_{way.get('fromLane')}")
-            behind = row.get(f"{way.get('to')}_{way.get('toLane')}")
-            if inside is not None and behind is not None and ids[inside].startswith(":"):
-                onward[inside] = behind
-        return cls(tuple(ids), tuple(shapes), np.array(lengths), onward)
+        for connection in root.iter("connection"):
+            inside = row.get(f"{connection.get('from')}_{connection.get('fromLane')}")
+            after = row.get(f"{connection.get('to')}_{connection.get('toLane')}")
+            if inside is not None and after is not None and ids[inside].startswith(":"):
+                onward[inside] = after
+        return cls(ids=tuple(ids), centre_lines=tuple(shapes), length_m=np.array(lengths), onward=onward)
 
     def bounds(self) -> tuple[float, float, float, float]:
         """min x, min y, max x, max y of all centre lines (m)."""
@@ -53,20 +53,20 @@ class Lanes:
     def locate(self, points_m: FloatArray, starts: BoolArray) -> IntArray:
         """Nearest lane [N] (row of `ids`) of points [N, 2].
 
-        A point off the road gets the lane it is nearest to. A vehicle can only be put into the simulation
-        on a lane outside junctions: points that are `starts` [N] get one of those.
+        A point off the road gets the nearest lane. A vehicle can only be inserted on a lane outside junctions: points
+        that are `starts` [N] get one of those.
         """
         lines = self._lines()
         points = shapely.points(points_m)
         lane = np.empty(len(points), dtype=np.int64)
-        everywhere = np.arange(len(lines))
-        for chosen, usable in ((~starts, everywhere), (starts, everywhere[self.onward == everywhere])):
+        all_lanes = np.arange(len(lines))
+        for chosen, usable in ((~starts, all_lanes), (starts, all_lanes[self.onward == all_lanes])):
             if chosen.any():
                 lane[chosen] = usable[shapely.STRtree(lines[usable]).nearest(points[chosen])]
         return lane
 
     def position(self, lane: IntArray, points_m: FloatArray) -> FloatArray:
-        """How far along lanes [N] the nearest place to points [N, 2] is (m) [N]."""
+        """Position along lanes [N] of the place nearest to points [N, 2] (m) [N]."""
         share = shapely.line_locate_point(self._lines()[lane], shapely.points(points_m), normalized=True)
         return np.clip(share, 0.0, 1.0) * self.length_m[lane]
 

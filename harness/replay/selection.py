@@ -1,13 +1,13 @@
-"""Which games become a replay, what a replay is called, and in which order they are worth watching."""
+"""The choice of games that become replays, the names of replays, and the order from the worst game on."""
 
 from __future__ import annotations
 
 import pandas as pd
 
-MOST_FAILURES_PER_ARM = 100  # and training seed: a replay is a folder with a copy of the scene in it
-SAMPLE_PER_ARM = 2  # games that went well, per arm and training seed: what normal looks like
+MOST_FAILURES_PER_ARM = 100  # and training seed: a replay folder contains a copy of the scene
+SAMPLE_PER_ARM = 2  # games without a failure, per arm and training seed, for comparison
 _FAILURES = ("collision", "rail", "timeout")  # worst first
-_WELL, _UNPLAYED = len(_FAILURES), len(_FAILURES) + 1
+_NO_FAILURE, _UNPLAYED = len(_FAILURES), len(_FAILURES) + 1
 
 
 def replay_name(arm: str, seed: int, episode: int) -> str:
@@ -16,24 +16,27 @@ def replay_name(arm: str, seed: int, episode: int) -> str:
 
 
 def choose_games(episodes: pd.DataFrame) -> pd.DataFrame:
-    """The rows of `episodes` that become replays: of each arm and seed the failed games, the worst
-    `MOST_FAILURES_PER_ARM` of them if there are more, and a few others.
+    """The rows of `episodes` that become replays: of each arm and seed the failed games, at most the worst
+    `MOST_FAILURES_PER_ARM`, and `SAMPLE_PER_ARM` games without a failure.
 
-    Who is judged is the ego, or the non-ego where it drives alone. The others are those of the lowest episode
-    numbers. A game that could not be played has no trace and is left out. Rows keep their order and index.
+    The judged player is the ego, or the non-ego where it drives alone. The games without a failure are those with the
+    lowest episode numbers. A game that could not be played has no trace and is left out. Rows keep their order and
+    index.
     """
     severity = _severity(episodes)
-    worst = worst_first(episodes[severity < _WELL]).groupby(["arm", "seed"], sort=False).head(MOST_FAILURES_PER_ARM)
+    worst = (
+        worst_first(episodes[severity < _NO_FAILURE]).groupby(["arm", "seed"], sort=False).head(MOST_FAILURES_PER_ARM)
+    )
     failed = episodes.index.isin(worst.index)
-    well = episodes[severity == _WELL].sort_values(["arm", "seed", "episode"], kind="stable")
-    sample = well.groupby(["arm", "seed"], sort=False).head(SAMPLE_PER_ARM).index
+    without_failure = episodes[severity == _NO_FAILURE].sort_values(["arm", "seed", "episode"], kind="stable")
+    sample = without_failure.groupby(["arm", "seed"], sort=False).head(SAMPLE_PER_ARM).index
     return episodes[failed | episodes.index.isin(sample)]
 
 
 def worst_first(episodes: pd.DataFrame) -> pd.DataFrame:
-    """All rows of `episodes`, the ones to watch first on top.
+    """All rows of `episodes`, from the worst on.
 
-    Collisions, then rail contacts, timeouts, games that went well, games that could not be played; within
+    Collisions, then rail contacts, timeouts, games without a failure, games that could not be played; within
     each by the ego's smallest time to collision (not measured: last), then by arm, seed and episode.
     """
     order = episodes.assign(_severity=_severity(episodes), _ttc=pd.to_numeric(episodes["ego_min_ttc_s"]))
@@ -42,8 +45,8 @@ def worst_first(episodes: pd.DataFrame) -> pd.DataFrame:
 
 
 def _severity(episodes: pd.DataFrame) -> pd.Series:
-    """Rank of each game's outcome for the player that is judged: 0 is a collision."""
+    """Rank of each game's outcome for the judged player: 0 is a collision."""
     ego = episodes["ego_outcome"].fillna("")
     outcome = ego.where(ego != "", episodes["non_ego_outcome"].fillna(""))
     ranks = {name: rank for rank, name in enumerate(_FAILURES)} | {"error": _UNPLAYED}
-    return outcome.map(lambda name: ranks.get(name, _WELL))
+    return outcome.map(lambda name: ranks.get(name, _NO_FAILURE))

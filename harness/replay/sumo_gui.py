@@ -19,30 +19,28 @@ _END = re.compile(r'<(end|step-length) value="([0-9.]+)"')
 
 
 def open_in_sumo_gui(folder: Path) -> subprocess.Popen[bytes]:
-    """Start SUMO-GUI on a replay folder, as anyone can without us, and return without waiting for it.
+    """Start SUMO-GUI on a replay folder and return without waiting for it.
 
-    Raises UsageError, naming the remedy, when the folder is no replay, when there is no SUMO-GUI or when
-    there is no screen to show it on.
+    Raises UsageError, with the remedy, when the folder is not a replay, when there is no SUMO-GUI or no screen.
     """
-    program = _ready(folder)
+    program = _gui_for(folder)
     return subprocess.Popen(
         [str(program), "-c", str(folder / "scene.sumocfg")], env=os.environ | {"SUMO_HOME": str(home_of(program))}
     )
 
 
 def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) -> None:
-    """Play a replay folder in SUMO-GUI with the view following the ego; ends when its user closes SUMO-GUI.
+    """Play a replay folder in SUMO-GUI with the view following the ego; return when the user closes SUMO-GUI.
 
-    `opened` is called once it is there. A folder alone can't say what to follow: SUMO-GUI has no such setting, only
-    this command from outside. Raises
-    UsageError as `open_in_sumo_gui` does, SimulationError if SUMO-GUI can't start.
+    `opened` is called when the window is open. SUMO-GUI has no setting for the followed vehicle in a file, only a
+    command over TraCI. Raises UsageError as `open_in_sumo_gui` does, SimulationError if SUMO-GUI can't start.
     """
     from harness.traffic.gui import WindowClosed, gui_environment, steered_gui
 
-    program = _ready(folder)
+    program = _gui_for(folder)
     configuration = folder / "scene.sumocfg"
-    said = dict(_END.findall(configuration.read_text(encoding="utf-8")))
-    steps = round(float(said["end"]) / float(said["step-length"]))
+    options = dict(_END.findall(configuration.read_text(encoding="utf-8")))
+    steps = round(float(options["end"]) / float(options["step-length"]))
     with steered_gui(program, ["-c", str(configuration)], gui_environment(home_of(program))) as window:
         opened()
         try:
@@ -59,8 +57,8 @@ def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) 
         window.process.wait()
 
 
-def _ready(folder: Path) -> Path:
-    """SUMO-GUI, where all is there to play a folder in it."""
+def _gui_for(folder: Path) -> Path:
+    """The SUMO-GUI program for a replay folder. Raises UsageError for everything that is missing."""
     configuration = folder / "scene.sumocfg"
     program = find_sumo_gui()
     problems = []
@@ -70,7 +68,7 @@ def _ready(folder: Path) -> Path:
                 str(folder),
                 "",
                 "is not a replay: it has no scene.sumocfg",
-                "`harness replay RUN --list` names them",
+                "`harness replay RUN --list` lists the games",
             )
         )
     if program is None:
@@ -91,15 +89,15 @@ def _ready(folder: Path) -> Path:
 
 
 def screen_problem(remedy: str) -> Problem | None:
-    """Whether there is no screen to show SUMO-GUI on."""
+    """The problem that there is no screen for SUMO-GUI; None if there is one."""
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
-        return Problem("sumo-gui", "DISPLAY", "there is no screen to show it on", remedy)
+        return Problem("sumo-gui", "DISPLAY", "there is no screen for it", remedy)
     return None
 
 
 def find_sumo_gui() -> Path | None:
-    """SUMO-GUI of the installed `eclipse-sumo`, the one the game was played with; else the one on PATH."""
-    package = importlib.util.find_spec("sumo")  # not imported: that would change the environment
+    """SUMO-GUI of the installed package `eclipse-sumo`, the version of the game; else the one on PATH."""
+    package = importlib.util.find_spec("sumo")  # an import would change the environment
     for location in (package.submodule_search_locations or []) if package else []:
         found = shutil.which("sumo-gui", path=str(Path(location) / "bin"))
         if found:
@@ -109,6 +107,6 @@ def find_sumo_gui() -> Path | None:
 
 
 def home_of(program: Path) -> Path:
-    """SUMO's own folder, where it finds its data: the one above `bin`, but for a distribution's layout."""
+    """SUMO's folder with its data: the parent of `bin`, or another one in the layout of a Linux distribution."""
     home = program.resolve().parent.parent
     return home if (home / "data").is_dir() else Path(os.environ.get("SUMO_HOME", "/usr/share/sumo"))

@@ -1,4 +1,4 @@
-"""The vehicle types of a recorded game, with the colours it is watched in."""
+"""The vehicle types of a recorded game, with their colours in the replay."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import defusedxml.ElementTree as SafeXml
 import pandas as pd
 
 PLAYER_COLOURS = {"ego": "31,119,255", "non_ego": "255,127,14"}  # blue and orange, as in the paper's figure 2
-_OTHERS_COLOUR = "190,190,190"
+_BACKGROUND_COLOUR = "190,190,190"
 
-# Length and width (m) of a vType that states none: the defaults that SUMO 1.28 gives its vehicle classes.
+# Length and width (m) of a vType without them: the defaults of SUMO 1.28 for its vehicle classes.
 _DEFAULT_SIZES_M = {
     "pedestrian": (0.215, 0.478),
     "wheelchair": (1.2, 0.72),
@@ -38,9 +38,9 @@ _SHAPES = {name: name for name in _DEFAULT_SIZES_M} | {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DrawnVehicle:
-    """What is drawn of a vehicle; `name` is the type's id in the replay."""
+    """The drawing of a vehicle; `name` is the type's id in the replay."""
 
     name: str
     length_m: float
@@ -49,10 +49,10 @@ class DrawnVehicle:
     colour: str
 
     def attributes(self) -> dict[str, str]:
-        """Of a SUMO `<vType>`.
+        """The attributes of a SUMO `<vType>`.
 
-        The class is `ignoring`, so that no lane's permissions keep a recorded vehicle from being where it
-        was, and the limits are so wide that nothing it was recorded to do is worth a warning.
+        The class is `ignoring`, so that no lane's permissions exclude a recorded vehicle. The limits are so wide that
+        no recorded motion causes a warning.
         """
         return {
             "id": self.name,
@@ -67,10 +67,10 @@ class DrawnVehicle:
 
 
 def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, DrawnVehicle]:
-    """The type that each vehicle of one game is drawn as, by the vehicle's id.
+    """The drawing of each vehicle of one game, by the vehicle's id.
 
-    The players get a type of their own; the others keep theirs, grey where it has no colour. A type that the
-    route file doesn't define is SUMO's own default.
+    The players get types of their own. Background vehicles keep their type, in grey where it has no colour. A type that
+    the route file does not define is SUMO's default.
     """
     root = SafeXml.parse(route_file).getroot()
     defined = {str(element.get("id")): dict(element.attrib) for element in root.iter("vType")}
@@ -93,5 +93,5 @@ def _drawn(name: str, attributes: Mapping[str, str]) -> DrawnVehicle:
         length_m=float(attributes.get("length", length_m)),
         width_m=float(attributes.get("width", width_m)),
         shape=attributes.get("guiShape", _SHAPES.get(vehicle_class, "passenger/sedan")),
-        colour=PLAYER_COLOURS.get(name, attributes.get("color", _OTHERS_COLOUR)),
+        colour=PLAYER_COLOURS.get(name, attributes.get("color", _BACKGROUND_COLOUR)),
     )

@@ -1,4 +1,4 @@
-"""A screen of our own that nobody sees, for SUMO-GUI to draw on: Xvfb, started for the purpose and ended after it."""
+"""A virtual screen for SUMO-GUI: an Xvfb process that runs as long as the screen is needed."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ _STARTS_WITHIN_S = 30.0
 
 
 def find_xvfb() -> Path | None:
-    """The X server without a screen."""
+    """The path of Xvfb, the X server without a screen; None if it is not installed."""
     found = shutil.which("Xvfb")
     return Path(found) if found else None
 
 
 @contextlib.contextmanager
 def virtual_screen(program: Path, size_px: tuple[int, int]) -> Iterator[str]:
-    """The name of a new screen, such as ":1". Raises HarnessError, with what Xvfb said, if it can't start."""
+    """The name of a new screen, such as ":1". Raises HarnessError with Xvfb's message if it can't start."""
     read, write = os.pipe()
     screen = f"{size_px[0]}x{size_px[1]}x24"
-    # Xvfb looks for a free number itself, and tells it when it is ready
+    # Xvfb chooses a free number and writes it when it is ready
     command = [str(program), "-displayfd", str(write), "-screen", "0", screen, "-nolisten", "tcp", "+extension", "GLX"]
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as log:
         try:
-            server = subprocess.Popen(command, pass_fds=(write,), stdout=said, stderr=said)
+            server = subprocess.Popen(command, pass_fds=(write,), stdout=log, stderr=log)
         finally:
             os.close(write)
         try:
             ready, _, _ = select.select([read], [], [], _STARTS_WITHIN_S)
             number = os.read(read, 16).decode().strip() if ready else ""
             if not number:
-                said.seek(0)
-                raise HarnessError(f"{program} can't start: {said.read().decode(errors='replace').strip()}")
+                log.seek(0)
+                raise HarnessError(f"{program} can't start: {log.read().decode(errors='replace').strip()}")
             yield f":{number}"
         finally:
             os.close(read)

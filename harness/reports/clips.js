@@ -1,4 +1,4 @@
-// The cards' small animations: the worst game of a persona, over and over, while it can be seen.
+// The cards' small animations: the worst game of a persona, repeated while it is visible.
 
 const HOLD_S = 1.6;
 

@@ -1,9 +1,9 @@
-// What a person does with the player: buttons, lists, keys and addresses.
+// The controls of the player: buttons, lists, keys and addresses.
 
 function control(root) {
   const part = name => root.querySelector(`[data-is="${name}"]`);
   const button = name => root.querySelector(`[data-do="${name}"]`);
-  const [choice, beside, slider, clock, speed, said] = ["game", "with", "time", "time-text", "speed", "said"].map(part);
+  const [choice, beside, slider, clock, speed, status] = ["game", "with", "time", "time-text", "speed", "status"].map(part);
   const order = [...games.keys()];
   const player = new Player(root.querySelector(".screens"), show);
 
@@ -21,11 +21,11 @@ function control(root) {
     button("view").setAttribute("aria-pressed", player.follows);
   }
 
-  function say(text) {
-    said.textContent = text;
+  function report(text) {
+    status.textContent = text;
   }
 
-  /** The address bar follows, so that reloading comes back here; it is written when a person has come to rest. */
+  /** Write the address of this moment to the address bar, so that reloading returns to it. */
   function remember() {
     if (player.game) history.replaceState(null, "", player.address());
   }
@@ -35,8 +35,8 @@ function control(root) {
     choice.value = key;
     offer(player.game);
     beside.value = player.beside ? keyOf(player.beside) : "";
-    root.dataset.ready ??= Math.round(performance.now()); // milliseconds since the page was asked for
-    say("");
+    root.dataset.ready ??= Math.round(performance.now()); // milliseconds since the page was requested
+    report("");
     return true;
   }
 
@@ -62,9 +62,9 @@ function control(root) {
     remember();
     try {
       await navigator.clipboard.writeText(location.href);
-      say("The link to this moment is copied.");
+      report("The link to this moment is copied.");
     } catch {
-      say("The link to this moment is in the address bar.");
+      report("The link to this moment is in the address bar.");
     }
   }
 
@@ -90,12 +90,12 @@ function control(root) {
     view: () => player.look(!player.follows),
     in: () => player.zoom(1.25),
     out: () => player.zoom(0.8),
-    asItWas: () => player.eachCamera(camera => camera.reset()),
+    resetView: () => player.eachCamera(camera => camera.reset()),
     later: () => to(order[order.indexOf(choice.value) + 1]),
     earlier: () => to(order[order.indexOf(choice.value) - 1]),
     beside: () => {
       const other = player.beside ? undefined : counterpartOf(player.game);
-      if (!other && !player.beside) say("This episode of the other ego is not in this page.");
+      if (!other && !player.beside) report("This page does not contain this episode of the other ego.");
       else open(choice.value, other && keyOf(other), player.time).then(remember);
     },
     contact: nextTouch,
@@ -103,21 +103,21 @@ function control(root) {
   };
   const keys = {
     " ": "play", ",": "back", ".": "on", Home: "start", End: "end", ArrowLeft: "secondBack", ArrowRight: "secondOn",
-    ArrowUp: "faster", ArrowDown: "slower", "+": "in", "=": "in", "-": "out", 0: "asItWas", f: "view", n: "later",
+    ArrowUp: "faster", ArrowDown: "slower", "+": "in", "=": "in", "-": "out", 0: "resetView", f: "view", n: "later",
     p: "earlier", b: "beside", c: "contact", l: "link",
   };
 
   for (const each of root.querySelectorAll("[data-do]")) each.addEventListener("click", () => actions[each.dataset.do]());
   root.addEventListener("keydown", event => {
     if (event.ctrlKey || event.altKey || event.metaKey || event.target.matches("select, summary")) return;
-    if (event.key === " " && event.target.matches("button")) return; // it presses the button
+    if (event.key === " " && event.target.matches("button")) return; // the browser presses the button
     const action = actions[keys[event.key]];
     if (!action) return;
     event.preventDefault();
     action();
   });
   slider.addEventListener("input", () => {
-    const wanted = Number(slider.value); // before pausing, which shows where the clock is
+    const wanted = Number(slider.value); // before pausing, which resets the slider
     player.pause();
     player.seek(wanted);
   });
@@ -126,14 +126,14 @@ function control(root) {
   choice.addEventListener("change", () => to(choice.value));
   beside.addEventListener("change", () => open(choice.value, beside.value, player.time).then(remember));
 
-  /** Open what the address asks for; `moved`: somebody has just followed a link to it. */
+  /** Open the game of the address; `moved`: a link to it was just followed. */
   async function follow(moved) {
-    const wanted = asked(location.hash);
+    const wanted = parsed(location.hash);
     if (!wanted && moved) return;
     const found = wanted && await open(wanted.key, wanted.beside, wanted.time);
     if (!found && !player.game) await open(order[0]);
     if (!wanted) return;
-    if (!found) say("That game is not in this page. It is in the run folder: harness replay opens it.");
+    if (!found) report("This page does not contain that game. It is in the run folder: harness replay opens it.");
     root.scrollIntoView({ behavior: moved && !stillMotion.matches ? "smooth" : "auto" });
     root.focus({ preventScroll: true });
     if (found && moved && wanted.time === undefined && !stillMotion.matches) {

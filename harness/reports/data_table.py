@@ -1,4 +1,4 @@
-"""A table of the run as cells of the page: what is read, and beside it exactly what the CSV file holds."""
+"""A table of the run as cells of the page: the text that is shown, and beside it the exact text of the CSV file."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import pandas as pd
 
-from harness.reports.wording import number, p_number, trimmed
 from harness.evaluation.tables import typed
+from harness.reports.numbers import MISSING, number, p_number, trimmed
 
 UNITS = (("_mps2", "m/s²"), ("_mps", "m/s"), ("_m", "m"), ("_s", "s"))
 RATES = (
@@ -34,12 +34,12 @@ NAMES = {
     "pairs_left_out": "pairs left out",
     "episodes": "games",
 }
-"""Headings that the column's own name would not make clear."""
+"""Headings of the columns whose names are not clear."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Heading:
-    """A column: its name in the CSV file, what the page calls it, and its unit."""
+    """A column: its name in the CSV file, its label on the page, and its unit."""
 
     column: str
     label: str
@@ -48,15 +48,15 @@ class Heading:
     """Whether its cells are words."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Cell:
-    """`exact` is the text of the CSV file's cell, None where `text` is that already (text columns)."""
+    """`exact` is the text of the CSV file's cell, None where `text` is the same (text columns)."""
 
     text: str
     exact: str | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Table:
     """One CSV file as the page shows it."""
 
@@ -67,7 +67,7 @@ class Table:
 
 
 def table(name: str, caption: str, frame: pd.DataFrame) -> Table:
-    """The frame, one of `harness.evaluation.tables.TABLES`, as cells; `name` is the CSV file's, without ending."""
+    """The frame, one of `harness.evaluation.tables.TABLES`, as cells; `name` is the CSV file's without its suffix."""
     frame = typed(frame)
     metrics = frame["metric"].tolist() if "metric" in frame.columns else [""] * len(frame)
     columns = [
@@ -75,22 +75,23 @@ def table(name: str, caption: str, frame: pd.DataFrame) -> Table:
         for column in frame.columns
     ]
     headings = [heading(str(column), frame[column].dtype == object) for column in frame.columns]
-    return Table(name, caption, headings, list(zip(*columns, strict=True)))
+    rows = list(zip(*columns, strict=True))
+    return Table(name=name, caption=caption, headings=headings, rows=rows)
 
 
 def heading(column: str, text: bool) -> Heading:
-    """What the page calls a column, from its name and the unit in it."""
+    """The heading of a column, from its name and the unit in it."""
     if column in NAMES:
-        return Heading(column, NAMES[column], "", text=False)
+        return Heading(column=column, label=NAMES[column], unit="", text=False)
     stem, unit = column, "%" if column.startswith(RATES) else "points" if column.startswith(POINTS) else ""
     for ending, symbol in UNITS:
         if column.endswith(ending):
             stem, unit = column.removesuffix(ending), symbol
             break
-    words = stem.replace("_ttc", "_time_to_collision").replace("non_ego", "non-ego").replace("_", " ")
+    label = stem.replace("_ttc", "_time_to_collision").replace("non_ego", "non-ego").replace("_", " ")
     for end in ("low", "high"):
-        words = words.replace(f" {end}", f", 95 % {end}")
-    return Heading(column, words, unit, text)
+        label = label.replace(f" {end}", f", 95 % {end}")
+    return Heading(column=column, label=label, unit=unit, text=text)
 
 
 def exact(value: object) -> str:
@@ -104,13 +105,13 @@ def exact(value: object) -> str:
 
 def _cell(column: str, value: Any, metric: str) -> Cell:
     if isinstance(value, str):
-        return Cell(value, None)
-    return Cell(_text(column, value, metric), exact(value))
+        return Cell(text=value, exact=None)
+    return Cell(text=_text(column, value, metric), exact=exact(value))
 
 
 def _text(column: str, value: Any, metric: str) -> str:
     if pd.isna(value):
-        return "–"
+        return MISSING
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, int):

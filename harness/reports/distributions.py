@@ -11,6 +11,8 @@ import pandas as pd
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from harness.evaluation.strategies import NaiveEgo, against_persona
+from harness.reports.treatment import RETRAINED, Change
 from harness.reports.figures import INK, SERIES, figure_of, svg
 from harness.reports.player_data import FloatArray
 
@@ -25,13 +27,13 @@ QUANTITIES = {
 }
 PAIRED = ("ego_mean_speed_mps", "ego_min_ttc_s")
 MOST_DOTS = 600
-"""Games of an arm that are drawn one by one; of more, the middle half and the median alone."""
+"""The most games of an arm that are drawn one by one; of more, only the middle half and the median are drawn."""
 MOST_LINES = 300
-"""Pairs that are drawn; of more, so many, spread evenly over the episodes."""
+"""The most pairs that are drawn; of more, this many are chosen, evenly over the episodes."""
 _FAILED_ALPHA, _WELL_ALPHA = 0.95, 0.45
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Pairs:
     """One quantity of the same episodes before and after, each [N]; NaN where it was not measured."""
 
@@ -42,7 +44,7 @@ class Pairs:
     after_failed: NDArray[np.bool_]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Spread:
     """One quantity of every game of each arm [N], and which of them failed."""
 
@@ -51,13 +53,20 @@ class Spread:
     """Label, series, values and failures of each arm."""
 
 
-def pairs_of(persona: str, games: pd.DataFrame, made: str = "retrained") -> list[Pairs]:
-    """`PAIRED` of the episodes that both the naive ego and what round 2 made of it played against the persona."""
-    before, after = (games[games["arm"] == f"{ego}_vs_{persona}"] for ego in ("naive", made))
+def pairs_of(persona: str, games: pd.DataFrame, change: Change = RETRAINED) -> list[Pairs]:
+    """`PAIRED` of the episodes that the naive ego and the ego of round 2 both played against the persona."""
+    arms = (against_persona(ego, persona).name for ego in (NaiveEgo(), change.ego(against=persona)))
+    before, after = (games[games["arm"] == arm] for arm in arms)
     both = before.merge(after, on=["seed", "episode"], suffixes=("", "_after"))
-    failed = [_failed(both[column]) for column in ("ego_failed", "ego_failed_after")]
+    before_failed, after_failed = (_failed(both[column]) for column in ("ego_failed", "ego_failed_after"))
     return [
-        Pairs(QUANTITIES[column], both[column].to_numpy(float), both[f"{column}_after"].to_numpy(float), *failed)
+        Pairs(
+            label=QUANTITIES[column],
+            before=both[column].to_numpy(float),
+            after=both[f"{column}_after"].to_numpy(float),
+            before_failed=before_failed,
+            after_failed=after_failed,
+        )
         for column in PAIRED
     ]
 
@@ -67,8 +76,8 @@ def spreads_of(arms: Sequence[tuple[str, str, str]], games: pd.DataFrame) -> lis
     of_arm = [(label, series, games[games["arm"] == arm]) for label, series, arm in arms]
     return [
         Spread(
-            label,
-            [
+            label=label,
+            arms=[
                 (name, series, rows[column].to_numpy(float), _failed(rows["ego_failed"]))
                 for name, series, rows in of_arm
             ],
@@ -83,11 +92,11 @@ def _failed(column: pd.Series) -> NDArray[np.bool_]:
 
 
 def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str, made: str = "retrained") -> Markup:
-    """A line per episode, of `MOST_LINES` at most, from the naive ego's game to that of what round 2 `made` of it; a
-    cross is a failure."""
+    """A line per episode, at most `MOST_LINES`, from the game of the naive ego to that of the ego which round 2 `made`;
+    a cross is a failure."""
     with figure_of(4.8, 3.5) as figure:
         for axes, every in zip(figure.subplots(1, len(quantities), squeeze=False)[0], quantities, strict=True):
-            pairs = _some(every)
+            pairs = _drawn(every)
             both = np.isfinite(pairs.before) & np.isfinite(pairs.after)
             ends = np.stack((pairs.before, pairs.after))
             axes.plot([0, 1], ends[:, both], color=INK, linewidth=0.7, alpha=0.22)
@@ -104,13 +113,18 @@ def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str, made
         return svg(figure, name, alternative)
 
 
-def _some(pairs: Pairs) -> Pairs:
+def _drawn(pairs: Pairs) -> Pairs:
     count = len(pairs.before)
     if count <= MOST_LINES:
         return pairs
     drawn = np.arange(MOST_LINES) * count // MOST_LINES
-    columns = (pairs.before, pairs.after, pairs.before_failed, pairs.after_failed)
-    return Pairs(pairs.label, *(column[drawn] for column in columns))
+    return Pairs(
+        label=pairs.label,
+        before=pairs.before[drawn],
+        after=pairs.after[drawn],
+        before_failed=pairs.before_failed[drawn],
+        after_failed=pairs.after_failed[drawn],
+    )
 
 
 def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> Markup:
@@ -153,5 +167,5 @@ def _games(axes: Axes, x: FloatArray, values: FloatArray, failed: NDArray[np.boo
 
 
 def _beside(games: int) -> FloatArray:
-    """Offsets that keep the dots of an arm apart: the golden section, which never falls into rows."""
+    """Offsets that keep the dots of an arm apart: multiples of the golden section, which form no rows."""
     return (np.arange(games) * 0.6180339887498949 % 1.0 - 0.5) * 0.5

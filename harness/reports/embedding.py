@@ -1,8 +1,8 @@
-"""The recorded games as the page carries them: small numbers, packed, and as many as fit.
+"""The recorded games in the page: small numbers, packed, as many games as fit.
 
-A game's columns are whole numbers of centimetres, milliradians and so on (`SCALES`), each but a column's first the
-difference to the one before. Their bytes are laid out in four planes (all lowest bytes, all second ones, ...), which
-are mostly zeros but for the first, deflated, and written in base64. `recorded.js` reads them.
+A game's columns are whole numbers of centimetres, milliradians and so on (`SCALES`), each number but
+a column's first is the difference to the previous one. Their bytes are arranged in four planes (all lowest bytes, all
+second ones, ...), of which all but the first are mostly zeros, deflated, and written in base64. `recorded.js` reads them.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ SCALES = {
     "leader_gap_m": 0.01,
     "time_to_collision_s": 0.01,
 }
-"""What 1 is in each column of a player; other road users have the first four."""
-OF_OTHERS = 4
+"""The unit of each column of a player; background vehicles have the first `BACKGROUND_COLUMNS` of them."""
+BACKGROUND_COLUMNS = 4
 NOTHING = -1
-"""Stands for a gap or a time that there is not."""
+"""Stands for a missing gap or time."""
 LONGEST = 1e5
-"""Metres or seconds: more is nothing."""
+"""Metres or seconds; a longer gap or time counts as missing."""
 
 
 class Embedded:
-    """The games that fit into the page, in the order they were given."""
+    """The games that fit into the page, in the order of the input."""
 
     def __init__(
         self,
@@ -47,10 +47,10 @@ class Embedded:
         marks: Mapping[str, Sequence[Mapping[str, Any]]],
         budget_bytes: int,
     ) -> None:
-        """`games`, the ones to watch first on top, are taken until the budget is used up; `marks` are the manoeuvres
-        to mark in each, by `key`."""
+        """`games`, those to watch first at the front, are embedded until the budget is used up; `marks` are the
+        manoeuvres to mark in each, by `key`."""
         self.games: list[RecordedGame] = []
-        self._written: list[str] = []
+        self._texts: list[str] = []
         size = 0
         for game in games if scene is not None else ():
             text = _json(_game(game, marks.get(key(game.arm, game.seed, game.episode), ())))
@@ -58,7 +58,7 @@ class Embedded:
             if size > budget_bytes:
                 break
             self.games.append(game)
-            self._written.append(text)
+            self._texts.append(text)
         self._scene = scene
 
     def __contains__(self, name: str) -> bool:
@@ -66,18 +66,18 @@ class Embedded:
 
     @property
     def keys(self) -> set[str]:
-        """Of all games that are embedded."""
+        """The keys of all embedded games."""
         return {key(game.arm, game.seed, game.episode) for game in self.games}
 
     def document(self) -> Markup:
         """The games and the road as JSON that is safe inside a script element."""
         scales = _json(list(SCALES.values()))
-        columns = f'"scales":{scales},"ofOthers":{OF_OTHERS},"scene":{_json(_scene(self._scene))}'
-        return Markup("{" + columns + ',"games":[' + ",\n".join(self._written) + "]}")
+        columns = f'"scales":{scales},"backgroundColumns":{BACKGROUND_COLUMNS},"scene":{_json(_scene(self._scene))}'
+        return Markup("{" + columns + ',"games":[' + ",\n".join(self._texts) + "]}")
 
 
 def _json(value: Any) -> str:
-    """JSON in which nothing can end a script element, or be taken for anything but text."""
+    """JSON that cannot end a script element and contains no markup."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
@@ -113,7 +113,7 @@ def _game(game: RecordedGame, marks: Sequence[Mapping[str, Any]]) -> dict[str, A
         "players": [
             _track(player) | {"outcome": player.outcome, "ended": player.ended_step} for player in game.players
         ],
-        "others": [_track(other) for other in game.others],
+        "background": [_track(vehicle) for vehicle in game.background],
         "touches": [[round(each.time_s, 3), round(each.x_m, 2), round(each.y_m, 2)] for each in game.touches],
         "marks": list(marks),
         "packed": pack(columns_of(game)),
@@ -129,14 +129,14 @@ def columns_of(game: RecordedGame) -> list[FloatArray]:
     """A game's columns as whole numbers, track by track."""
     names = list(SCALES)
     tracks: list[tuple[Track, Sequence[str]]] = [(player, names) for player in game.players]
-    tracks += [(other, names[:OF_OTHERS]) for other in game.others]
+    tracks += [(vehicle, names[:BACKGROUND_COLUMNS]) for vehicle in game.background]
     return [_whole(getattr(track, name), SCALES[name]) for track, columns in tracks for name in columns]
 
 
 def _whole(values: Any, scale: float) -> FloatArray:
     numbers = np.asarray(values, dtype=float)
-    there = np.isfinite(numbers) & (np.abs(numbers) < LONGEST)
-    return np.where(there, np.rint(np.where(there, numbers, 0.0) / scale), NOTHING)
+    present = np.isfinite(numbers) & (np.abs(numbers) < LONGEST)
+    return np.where(present, np.rint(np.where(present, numbers, 0.0) / scale), NOTHING)
 
 
 def pack(columns: Sequence[FloatArray]) -> str:

@@ -1,7 +1,7 @@
 """The page's figures as inline SVG: text stays text, and every colour is one of the page's own.
 
-matplotlib draws with stand-in colours, which become `currentColor` and the custom properties of report.css, so
-that a figure reads in dark and light alike. matplotlib is imported when the first figure is drawn.
+matplotlib draws with stand-in colours, which become `currentColor` and the custom properties of report.css: a figure
+is legible on a dark and on a light page. matplotlib is imported when the first figure is drawn.
 """
 
 from __future__ import annotations
@@ -15,6 +15,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
+
+from harness.reports.numbers import short, steps_text
+from harness.reports.page_wording import NOT_PLAYED, stopped_at
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,7 +51,7 @@ _STYLE = {
 _LINES = ("-", "--", ":", "-.")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Point:
     """One training seed's value of an arm, with its 95 % interval (NaN: none)."""
 
@@ -60,7 +63,7 @@ class Point:
     """Quartiles over the games, where a value is a mean over games."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Column:
     """One arm in a figure. `series` is a key of SERIES."""
 
@@ -69,7 +72,7 @@ class Column:
     points: Sequence[Point]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Curve:
     """One training: values [N] at `steps` [N], and the step it stopped at, if it has."""
 
@@ -102,7 +105,7 @@ def speed_figure(columns: Sequence[Column], name: str, alternative: str) -> Mark
     """Average speed per arm: a pale bar from quartile to quartile of the games, the mean and its interval."""
     with figure_of(4.8, 3.3) as figure:
         axes = _arms(figure, columns)
-        axes.use_sticky_edges = False  # a pale bar does not stand on the axis
+        axes.use_sticky_edges = False  # the pale bars do not start at the axis
         for place, column in enumerate(columns):
             for offset, point in _beside(column.points):
                 if point.middle_half:
@@ -136,13 +139,12 @@ def learning_figure(curves: Sequence[Curve], series: str, name: str, alternative
         if len(curves) > 1:
             payoff.legend(frameon=False, fontsize=8)
         elif curves[0].stopped_at is not None:
-            words = "stopped early" if curves[0].stopped_early else "budget used"
             payoff.annotate(
-                f"{words}: {steps_text(curves[0].stopped_at)}", (curves[0].stopped_at, 1), (0, 3),
+                stopped_at(curves[0].stopped_at, curves[0].stopped_early), (curves[0].stopped_at, 1), (0, 3),
                 xycoords=("data", "axes fraction"), textcoords="offset points", ha="right", fontsize=9,
             )  # fmt: skip
         payoff.set_ylabel("mean payoff")
-        payoff.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", "\N{MINUS SIGN}"))
+        payoff.yaxis.set_major_formatter(lambda value, _: short(value))
         failure.set_ylabel("failure rate (%)")
         failure.yaxis.set_major_formatter(lambda share, _: f"{share * 100:.3g}")
         rates = [rate for curve in curves for rate in curve.failure_rates if math.isfinite(rate)]
@@ -154,23 +156,15 @@ def learning_figure(curves: Sequence[Curve], series: str, name: str, alternative
         return svg(figure, name, alternative)
 
 
-def steps_text(steps: float) -> str:
-    """A number of steps, e.g. "150 k" or "1.2 M"."""
-    for size, letter in ((1e6, "M"), (1e3, "k")):
-        if abs(steps) >= size:
-            return f"{steps / size:.3g} {letter}"
-    return f"{steps:.3g}"
-
-
 @contextmanager
 def figure_of(width_in: float, height_in: float) -> Iterator[Figure]:
-    """An empty figure in the page's style; the style holds until the end of the with block."""
+    """An empty figure in the page's style, which is active within the with block."""
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context():
-        matplotlib.rcdefaults()  # the user's matplotlibrc has no say in the report
+        matplotlib.rcdefaults()  # the user's matplotlibrc must not change the report
         matplotlib.rcParams.update(_STYLE | {"svg.hashsalt": "harness"})
         figure = Figure(figsize=(width_in, height_in))
         FigureCanvasSVG(figure)
@@ -180,7 +174,7 @@ def figure_of(width_in: float, height_in: float) -> Iterator[Figure]:
 def _arms(figure: Figure, columns: Sequence[Column]) -> Axes:
     axes = figure.subplots()
     axes.set_xticks(range(len(columns)), [""] * len(columns))
-    for place, column in enumerate(columns):  # a text of one line is anchored by its middle in any font
+    for place, column in enumerate(columns):  # only a text of one line has the same middle in any font
         for line, words in enumerate(column.label.split("\n")):
             below = (0, -14 - 12 * line)
             axes.annotate(
@@ -213,12 +207,12 @@ def _points(axes: Axes, columns: Sequence[Column], text: Callable[[float], str])
             if len(column.points) <= 2:
                 axes.annotate(text(point.value), (x, top), (0, 4), textcoords="offset points", ha="center", fontsize=9)
         if not any(math.isfinite(point.value) for point in column.points):
-            axes.annotate("not played", (place, 0), (0, 6), xycoords=("data", "axes fraction"),
+            axes.annotate(NOT_PLAYED, (place, 0), (0, 6), xycoords=("data", "axes fraction"),
                           textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
 
 
 def svg(figure: Figure, name: str, alternative: str) -> Markup:
-    """The figure as an element of the page. `name` keeps its ids apart from those of the other figures."""
+    """The figure as an element of the page. `name` is the prefix of its ids, which are unique on the page."""
     written = io.StringIO()
     figure.savefig(written, format="svg", transparent=True, metadata={"Date": None})
     drawn = written.getvalue()

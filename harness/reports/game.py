@@ -1,4 +1,4 @@
-"""The section on the game: what the findings on equilibria say, in words, small tables and heat maps."""
+"""The section on the game: verdicts on best responses, small tables, heat maps and the solutions of the game."""
 
 from __future__ import annotations
 
@@ -9,29 +9,33 @@ from dataclasses import dataclass
 import pandas as pd
 
 from harness.evaluation.comparison import Verdict
-from harness.reports.data_table import Table, table
-from harness.reports.game_wording import equilibrium_sentences, gap_verdicts, last_pairs, other_pairs
-from harness.reports.heatmaps import MatrixView, views
-from harness.reports.wording import Answer, Row, Conclusion, interval, number, p_number, percent, trimmed
-from harness.evaluation.tables import typed
 from harness.evaluation.game_theory.records import GameFindings
+from harness.evaluation.tables import typed
+from harness.reports.data_table import Table, table
+from harness.reports.game_wording import (
+    CAPTIONS,
+    NONE_FOUND,
+    equilibrium_sentences,
+    fewer_failures,
+    gap_verdicts,
+    last_pairs,
+    other_pairs,
+    pair_name,
+)
+from harness.reports.heatmaps import MatrixView, views
+from harness.reports.numbers import MISSING, interval, number, p_number, percent
+from harness.reports.wording import Answer, Conclusion, Row
 
-CAPTIONS = {
-    "gaps": "A row per best response.",
-    "crossplay": "A row per pairing of an ego and a non-ego.",
-    "equilibria": "A row per strategy of each solution of each game.",
-    "generalisation": "A row per retrained ego and non-ego of a persona it was not trained against.",
-}
 _CELL_BYTES, _REST_BYTES = 60, 50_000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Gap:
     """One best response of a last pair, as a row of the small table."""
 
     seed: int
     pair: str
-    who: str
+    player: str
     payoff: str
     best: str
     gap: str
@@ -42,12 +46,12 @@ class Gap:
     verdict: str
 
 
-@dataclass(frozen=True)
-class Stranger:
-    """An ego against a non-ego whose persona it was not trained against, over the seeds."""
+@dataclass(frozen=True, kw_only=True)
+class NewPersona:
+    """An ego against a non-ego of a persona it was not trained against, over the seeds."""
 
     ego: str
-    met: str
+    trained_against: str
     non_ego: str
     seeds: int
     rate: str
@@ -57,9 +61,9 @@ class Stranger:
     significant: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GameSection:
-    """All that the page says of the game."""
+    """The contents of the section on the game."""
 
     verdicts: Sequence[tuple[str, Conclusion]]
     others: Sequence[tuple[str, str, Answer]]
@@ -67,13 +71,13 @@ class GameSection:
     gaps: Sequence[Gap]
     views: Sequence[MatrixView]
     solutions: Sequence[tuple[int, str, Sequence[str]]]
-    """Of each seed and game, what its solutions say."""
-    strangers: Sequence[Stranger]
+    """Of each seed and game, its solutions in sentences."""
+    new_personas: Sequence[NewPersona]
     tables: dict[str, Table]
 
     @property
     def bytes(self) -> int:
-        """About as many as it takes on the page."""
+        """About its size on the page."""
         cells = sum(len(table.rows) * len(table.headings) for table in self.tables.values())
         return cells * _CELL_BYTES + sum(len(each.figure) for view in self.views for each in view.maps) + _REST_BYTES
 
@@ -82,16 +86,16 @@ def game_section(findings: GameFindings | None) -> GameSection | None:
     """The section of a run's findings; None where it has none."""
     if findings is None:
         return None
-    found = {name: typed(getattr(findings, name)) for name in CAPTIONS}
-    gaps, crossplay = found["gaps"], found["crossplay"]
+    frames = {name: typed(getattr(findings, name)) for name in CAPTIONS}
+    gaps = frames["gaps"]
     return GameSection(
-        gap_verdicts(gaps),
-        other_pairs(gaps),
-        [_gap(row) for name in dict.fromkeys(gaps["persona"]) for row in _last(gaps[gaps["persona"] == name])],
-        views(crossplay),
-        equilibrium_sentences(found["equilibria"]),
-        _strangers(found["generalisation"]),
-        {name: table(name, CAPTIONS[name], frame) for name, frame in found.items()},
+        verdicts=gap_verdicts(gaps),
+        others=other_pairs(gaps),
+        gaps=[_gap(row) for name in dict.fromkeys(gaps["persona"]) for row in _last(gaps[gaps["persona"] == name])],
+        views=views(frames["crossplay"]),
+        solutions=equilibrium_sentences(frames["equilibria"]),
+        new_personas=_new_personas(frames["generalisation"]),
+        tables={name: table(name, CAPTIONS[name], frame) for name, frame in frames.items()},
     )
 
 
@@ -104,54 +108,54 @@ def _gap(row: Row) -> Gap:
     if math.isfinite(row["ci_low"]):
         gap += f" ({number(row['ci_low'], 2)} to {number(row['ci_high'], 2)})"
     return Gap(
-        row["seed"],
-        f"{row['ego']} against {row['non_ego']}",
-        "ego" if row["role"] == "ego" else str(row["persona"]),
-        number(row["payoff"], 2),
-        number(row["payoff_best_response"], 2),
-        gap,
-        percent(row["gap_share"]) if not row["gap"] <= 0 else "none found",
-        p_number(row["p_holm"]),
-        _rate(row, "ego_failure_rate"),
-        _rate(row, "ego_failure_rate_best_response"),
-        str(row["verdict"]),
+        seed=row["seed"],
+        pair=pair_name(row),
+        player="ego" if row["role"] == "ego" else str(row["persona"]),
+        payoff=number(row["payoff"], 2),
+        best=number(row["payoff_best_response"], 2),
+        gap=gap,
+        share=percent(row["gap_share"]) if not row["gap"] <= 0 else NONE_FOUND,
+        p_holm=p_number(row["p_holm"]),
+        failures=_rate(row, "ego_failure_rate"),
+        failures_best=_rate(row, "ego_failure_rate_best_response"),
+        verdict=str(row["verdict"]),
     )
 
 
 def _rate(row: Row, name: str) -> str:
     if not math.isfinite(row[name]):
-        return "–"
+        return MISSING
     return f"{percent(row[name])} ({interval(row[f'{name}_low'], row[f'{name}_high'])})"
 
 
-def _strangers(generalisation: pd.DataFrame) -> list[Stranger]:
-    rows = []
-    for (ego, met, non_ego), of in generalisation.groupby(["ego", "met", "non_ego"], sort=False):
-        known = of[of["pairs"] > 0]
-        yes = int((known["verdict"] == Verdict.SIGNIFICANT.value).sum())
-        rate, naive = known["failure_rate"].mean(), known["naive_failure_rate"].mean()
-        span = ""
-        if len(known) == 1:
-            span = f" ({interval(known['failure_rate_low'].iloc[0], known['failure_rate_high'].iloc[0])})"
-        elif len(known):
-            span = f" ({interval(known['failure_rate'].min(), known['failure_rate'].max())})"
-        difference = known["fewer_failures"].mean()
-        less = f"{trimmed(abs(difference) * 100, 1)} points {'fewer' if difference > 0 else 'more'}"
-        if len(known) == 1 and math.isfinite(known["fewer_failures_low"].iloc[0]):
-            low, high = known["fewer_failures_low"].iloc[0] * 100, known["fewer_failures_high"].iloc[0] * 100
-            low, high = (low, high) if difference > 0 else (-high, -low)
-            less += f" ({trimmed(low, 1)} to {trimmed(high, 1)})"
-        rows.append(
-            Stranger(
-                str(ego),
-                str(met),
-                str(non_ego),
-                len(known),
-                f"{percent(rate)}{span}",
-                percent(naive),
-                percent(rate / naive) if naive else "–",
-                "–" if not len(known) else "none" if difference == 0 else less,
-                f"{yes} of {len(known)}",
-            )
-        )
-    return rows
+def _new_personas(generalisation: pd.DataFrame) -> list[NewPersona]:
+    return [
+        _new_persona(str(ego), str(trained_against), str(non_ego), rows[rows["pairs"] > 0])
+        for (ego, trained_against, non_ego), rows in generalisation.groupby(["ego", "met", "non_ego"], sort=False)
+    ]
+
+
+def _new_persona(ego: str, trained_against: str, non_ego: str, rows: pd.DataFrame) -> NewPersona:
+    """One row of the table; `rows` are the seeds that were played."""
+    significant = int((rows["verdict"] == Verdict.SIGNIFICANT.value).sum())
+    rate, naive_rate = rows["failure_rate"].mean(), rows["naive_failure_rate"].mean()
+    one_seed = rows.iloc[0] if len(rows) == 1 else None
+    span = ""
+    if one_seed is not None:
+        span = f" ({interval(one_seed['failure_rate_low'], one_seed['failure_rate_high'])})"
+    elif len(rows):
+        span = f" ({interval(rows['failure_rate'].min(), rows['failure_rate'].max())})"
+    ends = (math.nan, math.nan)
+    if one_seed is not None:
+        ends = one_seed["fewer_failures_low"], one_seed["fewer_failures_high"]
+    return NewPersona(
+        ego=ego,
+        trained_against=trained_against,
+        non_ego=non_ego,
+        seeds=len(rows),
+        rate=f"{percent(rate)}{span}",
+        naive_rate=percent(naive_rate),
+        share=percent(rate / naive_rate) if naive_rate else MISSING,
+        difference=fewer_failures(rows["fewer_failures"].mean(), *ends),
+        significant=f"{significant} of {len(rows)}",
+    )

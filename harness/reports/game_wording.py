@@ -1,6 +1,6 @@
-"""The game in words: who could still gain, what an equilibrium of the table says, whom to trust against strangers.
+"""The game in words: which player could still gain, what the equilibria are, how egos fare against other personas.
 
-Nothing here says "equilibrium" of players for whom merely nothing better was found: a gap is a lower bound.
+"Not refuted" is the best answer here: a gap is a lower bound, so no search can show an equilibrium between drivers.
 """
 
 from __future__ import annotations
@@ -11,27 +11,55 @@ from typing import Any
 
 import pandas as pd
 
-from harness.reports.wording import (NO_SPACE, Answer, Row, Tone, Conclusion, interval, left_out, number, p_text, percent, trimmed)
-from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
+from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
+from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, trimmed
+from harness.reports.wording import Answer, Conclusion, Row, Tone, left_out
 
 QUESTION = "Equilibrium"
 NO, NEAR, OPEN = "no", "not refuted", "not decided"
+MEANINGS = {
+    NO: "not an equilibrium",
+    NEAR: "this search found nothing against an equilibrium",
+    OPEN: "it is not decided whether this is an equilibrium",
+}
+"""The end of a pair's sentence, by its label."""
+CAPTIONS = {
+    "gaps": "A row per best response.",
+    "crossplay": "A row per pairing of an ego and a non-ego.",
+    "equilibria": "A row per strategy of each solution of each game.",
+    "generalisation": "A row per retrained ego and non-ego of a persona it was not trained against.",
+}
+HEAT_TITLES = {
+    "failure_rate": "Failure rate of the ego (%)",
+    "ego_payoff": "Payoff of the ego",
+    "non_ego_payoff": "Payoff of the non-ego",
+}
+_HEAT_CAPTIONS = {
+    "failure_rate": "Darker: fails more.",
+    "ego_payoff": "Darker: earns more.",
+    "non_ego_payoff": (
+        "Darker: earns more than other strategies of the same persona; payoffs of two personas are not comparable."
+    ),
+}
+NONE_FOUND = "none found"
+NOT_VERIFIED = "No equilibrium could be verified with the accuracy of the numbers."
+NO_GAME = "No ego was measured against all of these: there is no game to solve."
 
 
 def gap_verdicts(gaps: pd.DataFrame) -> list[tuple[str, Conclusion]]:
-    """Of each persona, whether its last pair is an equilibrium (equation 2), as the page and the terminal say it."""
-    found = []
+    """For each persona, whether its last pair is an equilibrium (equation 2), for the page and the terminal."""
+    verdicts = []
     for persona in dict.fromkeys(gaps["persona"]):
         last = last_pairs(gaps[gaps["persona"] == persona])
         answers = [pair_answer(rows) for rows in last]
         responders = [row for rows in last for row in rows if row["role"] == "non_ego" and row["pairs"]]
-        found.append((str(persona), _headline(str(persona), answers, responders)))
-    return found
+        verdicts.append((str(persona), _headline(str(persona), answers, responders)))
+    return verdicts
 
 
 def pairs(gaps: pd.DataFrame) -> list[list[Row]]:
-    """The rows of each pair of players: one for each side that was searched for a better response."""
+    """The rows of each pair of players: one for each side for which a best response was trained."""
     keys = ["seed", "persona", "round", "ego", "non_ego"]
     return [rows.to_dict("records") for _, rows in gaps.groupby(keys, sort=False)]
 
@@ -44,89 +72,104 @@ def last_pairs(gaps: pd.DataFrame) -> list[list[Row]]:
 
 def other_pairs(gaps: pd.DataFrame) -> list[tuple[str, str, Answer]]:
     """Persona, name and answer of every pair that is not of its seed's last round with that persona."""
-    found = []
+    answers = []
     for persona in dict.fromkeys(gaps["persona"]):
-        of = gaps[gaps["persona"] == persona]
-        last = of.groupby("seed")["round"].transform("max")
-        for rows in pairs(of[of["round"] < last]):
-            found.append((str(persona), f"{rows[0]['ego']} against {rows[0]['non_ego']}", pair_answer(rows)))
-    return found
+        of_persona = gaps[gaps["persona"] == persona]
+        last = of_persona.groupby("seed")["round"].transform("max")
+        for rows in pairs(of_persona[of_persona["round"] < last]):
+            answers.append((str(persona), pair_name(rows[0]), pair_answer(rows)))
+    return answers
+
+
+def pair_name(row: Row) -> str:
+    """The two players of a pair."""
+    return f"{row['ego']} against {row['non_ego']}"
 
 
 def pair_answer(rows: Sequence[Row]) -> Answer:
-    """Whether a pair is an equilibrium as far as was found, in a sentence, and what its best-responding persona
-    does to the ego."""
+    """Whether a pair is an equilibrium as far as was found, and how a best-responding persona affects the ego."""
     by_role = {row["role"]: row for row in rows}
     ego, non_ego = by_role.get("ego"), by_role.get("non_ego")
-    verdicts = [GapVerdict(row["verdict"]) for row in rows]
-    if GapVerdict.DISTINGUISHABLE in verdicts:
-        label, so = NO, "not an equilibrium"
-    elif ego is not None and non_ego is not None and NOTHING_TO_GAIN.issuperset(verdicts):
-        label, so = NEAR, "as near to an equilibrium as this search can tell"
-    else:
-        label, so = OPEN, "whether this is an equilibrium is not decided"
-    driver = f"the {rows[0]['persona']} driver"
-    both_gain = all(each is GapVerdict.DISTINGUISHABLE for each in verdicts) and len(rows) == 2
-    parts = [
-        _part("the ego", ego),
-        f"{driver} {_share(non_ego)}" if both_gain and non_ego is not None and _has_share(non_ego, ego)
-        else _part(driver, non_ego),
-    ]  # fmt: skip
-    sentence = "; ".join(parts) + f": {so}."
-    sentence = sentence[0].upper() + sentence[1:]
-    induced = "" if non_ego is None else induced_failures(non_ego)
+    label = _label([GapVerdict(row["verdict"]) for row in rows], both=ego is not None and non_ego is not None)
+    sentence = f"{_both_sides(str(rows[0]['persona']), ego, non_ego)}: {MEANINGS[label]}."
     harmful = non_ego is not None and non_ego["failure_difference_low"] > 0
-    tone: Tone = "harm" if harmful else "open"  # what is not refuted is no yes
-    return Answer(rows[0]["seed"], label == NEAR, label, tone, sentence + "".join(map(left_out, rows)), induced)
+    return Answer(
+        seed=rows[0]["seed"],
+        yes=label == NEAR,
+        label=label,
+        tone="harm" if harmful else "open",  # "not refuted" is no yes
+        sentence=sentence[0].upper() + sentence[1:] + "".join(map(left_out, rows)),
+        speed="" if non_ego is None else induced_failures(non_ego),
+    )
+
+
+def _label(verdicts: Sequence[GapVerdict], both: bool) -> str:
+    if GapVerdict.DISTINGUISHABLE in verdicts:
+        return NO
+    return NEAR if both and NOTHING_TO_GAIN.issuperset(verdicts) else OPEN
+
+
+def _both_sides(persona: str, ego: Row | None, non_ego: Row | None) -> str:
+    driver = f"the {persona} driver"
+    if ego is not None and non_ego is not None and _both_gain(ego, non_ego):
+        return f"{_side('the ego', ego)}; {driver} {_share(non_ego)}"
+    return f"{_side('the ego', ego)}; {_side(driver, non_ego)}"
+
+
+def _both_gain(*rows: Row) -> bool:
+    return all(
+        GapVerdict(row["verdict"]) is GapVerdict.DISTINGUISHABLE and math.isfinite(row["gap_share"]) for row in rows
+    )
 
 
 def induced_failures(row: Row) -> str:
-    """What a persona that is trained anew against this ego makes of it: the number that matters."""
+    """How often the ego fails against a persona that was newly trained against it."""
     games, rate = row["pairs"], row["ego_failure_rate_best_response"]
     if not games:
-        return f"What a {row['persona']} driver trained anew makes of this ego was not measured."
+        return f"The effect of a {row['persona']} driver newly trained against this ego was not measured."
     low, high = row["ego_failure_rate_best_response_low"], row["ego_failure_rate_best_response_high"]
-    counts = f"{round(rate * games)} of {games} games ({percent(rate)}; 95{NO_SPACE}%: {interval(low, high)})"
-    text = f"A {row['persona']} driver trained anew against this ego makes it fail in {counts}"
-    text += f" instead of {round(row['ego_failure_rate'] * games)}"
+    counts = f"{round(rate * games)} of {games} games ({percent(rate)}; {SURE}: {interval(low, high)})"
+    text = f"{_newly_trained(str(row['persona']))} {counts} instead of {round(row['ego_failure_rate'] * games)}"
     if GapVerdict(row["verdict"]) is GapVerdict.NONE_FOUND:
-        return f"{text}, though that driver earns no more by it."
+        return f"{text}, but this driver does not earn more by it."
     return f"{text}."
 
 
-def _induced_in_several(persona: str, responders: Sequence[Row], what: str) -> str:
+def _newly_trained(persona: str) -> str:
+    return f"A {persona} driver newly trained against this ego makes it fail in"
+
+
+def _induced_in_several(persona: str, responders: Sequence[Row], unit: str) -> str:
     if not responders:
         return ""
     rates = [row["ego_failure_rate_best_response"] for row in responders]
     before = sum(row["ego_failure_rate"] for row in responders) / len(rates)
-    text = f"A {persona} driver trained anew against this ego makes it fail in {percent(sum(rates) / len(rates))} of games "
-    return f"{text}(mean of {len(rates)} {what}: {interval(min(rates), max(rates))}) instead of {percent(before)}."
+    text = f"{_newly_trained(persona)} {percent(sum(rates) / len(rates))} of games "
+    return f"{text}(mean of {len(rates)} {unit}: {interval(min(rates), max(rates))}) instead of {percent(before)}."
 
 
-def _part(who: str, row: Row | None) -> str:
+def _side(player: str, row: Row | None) -> str:
+    """The gap of one side of a pair, as a clause."""
     if row is None:
-        return f"no best response of {who} was trained"
+        return f"no best response of {player} was trained"
     return {
-        GapVerdict.DISTINGUISHABLE: f"{who} could still gain {_share(row)} of its payoff",
+        GapVerdict.DISTINGUISHABLE: f"{player} could still gain {_share(row)} of its payoff",
         GapVerdict.BEFORE_HOLM_ONLY: (
-            f"{who} might gain {_share(row)} of its payoff, but not after Holm's correction ({p_text(row['p_holm'])})"
+            f"{player} might gain {_share(row)} of its payoff, "
+            f"but not after Holm's correction ({p_text(row['p_holm'])})"
         ),
         GapVerdict.NOT_DISTINGUISHABLE: (
-            f"for {who} a gain of {_share(row)} was measured, which can't be told from 0{_span(row)}"
+            f"for {player} a gain of {_share(row)} was measured, which is not distinguishable from 0{_span(row)}"
         ),
-        GapVerdict.NONE_FOUND: f"for {who} nothing better was found",
-        GapVerdict.NO_DIFFERENCE: f"the best response of {who} earns the same in every game",
-        GapVerdict.ALL_EQUAL: f"{who} gains {_share(row)} of its payoff, as much in every game, so that there is no test",
-        GapVerdict.NOT_ENOUGH_PAIRS: f"for {who} too few games could be compared",
+        GapVerdict.NONE_FOUND: f"for {player} nothing better was found",
+        GapVerdict.NO_DIFFERENCE: f"the best response of {player} earns the same in every game",
+        GapVerdict.ALL_EQUAL: f"{player} gains {_share(row)} of its payoff, the same in every game: there is no test",
+        GapVerdict.NOT_ENOUGH_PAIRS: f"for {player} too few games could be compared",
     }[GapVerdict(row["verdict"])]
 
 
-def _has_share(*rows: Row | None) -> bool:
-    return all(row is not None and math.isfinite(row["gap_share"]) for row in rows)
-
-
 def _share(row: Row) -> str:
-    """The gap as a share of the payoff; where that is 0, the gap itself."""
+    """The gap as a share of the payoff; where the payoff is 0, the gap itself."""
     if math.isfinite(row["gap_share"]):
         return percent(row["gap_share"])
     return f"{number(row['gap'], 2)} above the 0"
@@ -137,33 +180,37 @@ def _span(row: Row) -> str:
     if not (row["payoff"] and math.isfinite(row["ci_low"])):
         return ""
     low, high = (trimmed(row[end] / abs(row["payoff"]) * 100, 1) for end in ("ci_low", "ci_high"))
-    return f" (95{NO_SPACE}%: {low} to {high}{NO_SPACE}%)"
+    return f" ({SURE}: {low} to {high}{NO_SPACE}%)"
 
 
 def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]) -> Conclusion:
     if len(answers) == 1:
-        (only,) = answers
-        return Conclusion(QUESTION, only.label, only.tone, only.sentence, only.speed, ())
-    several, no = len(answers), sum(answer.label == NO for answer in answers)
-    near = sum(answer.label == NEAR for answer in answers)
-    what = "seeds" if len({answer.seed for answer in answers}) == several else "pairs"
-    tones = [answer.tone for answer in answers]
-    label = f"no in {no} of {several} {what}" if no else f"{NEAR} in {near} of {several} {what}" if near else OPEN
-    tone: Tone = "harm" if "harm" in tones else "open"
-    finding = {
-        NO: f"the ego or the {persona} driver could still gain by changing its strategy alone (after Holm's correction)",
-        NEAR: "no gain that can be told from 0 was found for either",
+        return Conclusion.of_one(QUESTION, answers[0])
+    several = len(answers)
+    unit = "seeds" if len({answer.seed for answer in answers}) == several else "pairs"
+    findings = {
+        NO: f"the ego or the {persona} driver could still gain by a change of strategy alone (after Holm's correction)",
+        NEAR: "no gain that is distinguishable from 0 was found for either side",
         OPEN: "it is not decided",
     }
-    counts = {each: sum(answer.label == each for answer in answers) for each in finding}
-    said = [f"in {count} of {several} {what} {finding[each]}" for each, count in counts.items() if count]
-    sentence = "; ".join(said)
-    sentence = f"{sentence[0].upper()}{sentence[1:]}."
-    return Conclusion(QUESTION, label, tone, sentence, _induced_in_several(persona, responders, what), answers)
+    counts = {label: sum(answer.label == label for answer in answers) for label in findings}
+    sentence = "; ".join(
+        f"in {count} of {several} {unit} {findings[label]}" for label, count in counts.items() if count
+    )
+    headline = next((label for label in (NO, NEAR) if counts[label]), OPEN)
+    tone: Tone = "harm" if "harm" in [answer.tone for answer in answers] else "open"
+    return Conclusion(
+        question=QUESTION,
+        label=OPEN if headline == OPEN else f"{headline} in {counts[headline]} of {several} {unit}",
+        tone=tone,
+        sentence=f"{sentence[0].upper()}{sentence[1:]}.",
+        speed=_induced_in_several(persona, responders, unit),
+        per_seed=answers,
+    )
 
 
 def equilibrium_sentences(equilibria: pd.DataFrame) -> list[tuple[int, str, list[str]]]:
-    """Of each seed and game: what its solutions say, the one to choose first."""
+    """For each seed and game: its solutions in sentences, the one to choose first."""
     return [
         (int(seed), str(game), list(filter(None, (_solution(game, rows), _dominated(rows), _left_out(rows)))))
         for (seed, game), rows in equilibria.groupby(["seed", "game"], sort=False)
@@ -173,15 +220,15 @@ def equilibrium_sentences(equilibria: pd.DataFrame) -> list[tuple[int, str, list
 def _solution(game: str, rows: pd.DataFrame) -> str:
     solved = rows[rows["solution"].isin([SolutionKind.NASH.value, SolutionKind.SAFEST.value])]
     if not len(solved):
-        if (rows["solution"] == SolutionKind.NOT_VERIFIED.value).any():
-            return "No equilibrium could be verified: its numbers got in the way."
-        return "No ego was measured against all of these: there is no game to solve."
+        return NOT_VERIFIED if (rows["solution"] == SolutionKind.NOT_VERIFIED.value).any() else NO_GAME
     if game == ALL:
         return _safest(solved.to_dict("records"))
     first = solved[solved["number"] == 1].to_dict("records")
     sides = {role: _mixture([row for row in first if row["role"] == role]) for role in ("ego", "non_ego")}
     rate = percent(first[0]["solution_failure_rate"])
-    text = f"In equilibrium the ego plays {sides['ego']}, the {game} driver {sides['non_ego']}: the ego fails in {rate} "
+    text = (
+        f"In equilibrium the ego plays {sides['ego']}, the {game} driver {sides['non_ego']}: the ego fails in {rate} "
+    )
     text += f"of games and earns {number(first[0]['solution_payoff'], 2)}."
     more = int(solved["number"].max()) - 1
     return text + (f" {more} more {'is' if more == 1 else 'are'} in the table." if more else "")
@@ -192,10 +239,10 @@ def _safest(rows: Sequence[Mapping[str, Any]]) -> str:
     most = egos[0]["solution_failure_rate"]
     worst = [row["player"] for row in rows if row["role"] == "non_ego" and row["failure_rate"] >= most - 1e-6]
     best = min(egos, key=lambda row: row["failure_rate"])
-    text = f"Whoever comes, the safest choice of egos is {_mixture(egos)}: it fails in {percent(most)} of games at worst"
+    text = f"The safest choice of egos is {_mixture(egos)}: in the worst case it fails in {percent(most)} of games"
     text += f" (against {', '.join(worst)})." if most > 0 else "."
     if sum(row["share"] > 0 for row in egos) > 1:
-        text += f" The safest single ego is {best['player']}, with {percent(best['failure_rate'])} at worst."
+        text += f" The safest single ego is {best['player']}, with {percent(best['failure_rate'])} in the worst case."
     return text
 
 
@@ -207,17 +254,39 @@ def _mixture(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _dominated(rows: pd.DataFrame) -> str:
-    """The egos that another ego or a mixture of egos is better than, whatever the other side does."""
+    """The egos that another ego, or a mixture of egos, is better than against every strategy of the other side."""
     egos = rows[rows["role"] == "ego"].drop_duplicates("player").to_dict("records")
-    said = []
+    texts = []
     for row in egos:
-        by = {"in payoff": row["dominated_in_payoff"], "in failures": row["dominated_in_failures"]}
-        how = [f"{where} by {name}" for where, name in by.items() if name]
-        if how:
-            said.append(f"{row['player']} ({', '.join(how)})")
-    return f"Dominated: {'; '.join(said)}." if said else ""
+        dominators = {"in payoff": row["dominated_in_payoff"], "in failures": row["dominated_in_failures"]}
+        clauses = [f"{measure} by {name}" for measure, name in dominators.items() if name]
+        if clauses:
+            texts.append(f"{row['player']} ({', '.join(clauses)})")
+    return f"Dominated: {'; '.join(texts)}." if texts else ""
 
 
 def _left_out(rows: pd.DataFrame) -> str:
     names = rows.loc[rows["solution"] == SolutionKind.NOT_PLAYED.value, "player"]
     return f"Left out, because not played against all: {', '.join(names)}." if len(names) else ""
+
+
+def fewer_failures(difference: float, low: float, high: float) -> str:
+    """A difference of failure rates against the naive ego's, with its interval if it is finite."""
+    if math.isnan(difference):
+        return MISSING
+    if difference == 0:
+        return "none"
+    text = f"{trimmed(abs(difference) * 100, 1)} points {'fewer' if difference > 0 else 'more'}"
+    if math.isfinite(low):
+        low, high = (low * 100, high * 100) if difference > 0 else (-high * 100, -low * 100)
+        text += f" ({trimmed(low, 1)} to {trimmed(high, 1)})"
+    return text
+
+
+def heat_caption(quantity: str, *, is_rate: bool, is_mean: bool, unpaid: bool) -> str:
+    """The caption of a heat map; `is_mean`: over seeds, `unpaid`: a column has no payoff."""
+    spread = "least to most of the seeds that played it"
+    if not is_mean:
+        spread = f"95 % interval ({'Wilson' if is_rate else 't'})"
+    note = " SUMO’s own driver has no payoff." if unpaid else ""
+    return f"{_HEAT_CAPTIONS[quantity]}{note} Below each mean: {spread}."

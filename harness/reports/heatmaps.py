@@ -1,27 +1,33 @@
-"""Cross-play as heat maps: a cell for each ego and non-ego, its number written in it, shaded by its size."""
+"""Cross-play as heat maps: a cell for each ego and non-ego, with its number, shaded by the number's size."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
 from markupsafe import Markup
 
-from harness.reports.figures import INK, SERIES, figure_of, svg
-from harness.reports.wording import number, trimmed
 from harness.evaluation.game_theory.crossplay import Matrices, matrices
+from harness.reports.figures import INK, SERIES, figure_of, svg
+from harness.reports.game_wording import HEAT_TITLES, heat_caption
+from harness.reports.numbers import MISSING, number, trimmed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Floats = npt.NDArray[np.float64]
 
 PALEST, DARKEST = 0.04, 0.5
-"""Opacity of the least and the greatest value: what is written on it stands out in dark and light."""
+"""Opacity of the least and the greatest value: text on them is legible on a dark and on a light page."""
 COLUMN_IN, ROW_IN, LETTER_IN = 0.8, 0.46, 0.085
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class HeatMap:
     """One figure of a view."""
 
@@ -32,11 +38,11 @@ class HeatMap:
 
     @property
     def wide(self) -> bool:
-        """Whether it needs the page for itself."""
+        """Whether it takes the whole width of the page."""
         return self.width_in > 5.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MatrixView:
     """The heat maps of one training seed, or of the mean over all."""
 
@@ -44,25 +50,19 @@ class MatrixView:
     maps: Sequence[HeatMap]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Quantity:
+    """A column of `crossplay`, with its colour."""
+
     name: str
-    title: str
-    caption: str
     series: str
     per_cent: bool
 
 
 QUANTITIES = (
-    _Quantity("failure_rate", "Failure rate of the ego (%)", "Darker: fails more.", "persona", True),
-    _Quantity("ego_payoff", "Payoff of the ego", "Darker: earns more.", "alone", False),
-    _Quantity(
-        "non_ego_payoff",
-        "Payoff of the non-ego",
-        "Darker: earns more than others of the same persona; people of two personas do not count in one currency.",
-        "retrained",
-        False,
-    ),
+    _Quantity(name="failure_rate", series="persona", per_cent=True),
+    _Quantity(name="ego_payoff", series="alone", per_cent=False),
+    _Quantity(name="non_ego_payoff", series="retrained", per_cent=False),
 )
 
 
@@ -73,13 +73,13 @@ def views(crossplay: pd.DataFrame) -> list[MatrixView]:
     if len(seeds) > 1:
         shown.insert(0, (f"mean over {len(seeds)} seeds", _mean(crossplay)))
     return [
-        MatrixView(label, [_map(quantity, found, label, place) for quantity in QUANTITIES])
-        for place, (label, found) in enumerate(shown)
+        MatrixView(label=label, maps=[_map(quantity, rows, label, place) for quantity in QUANTITIES])
+        for place, (label, rows) in enumerate(shown)
     ]
 
 
 def _mean(crossplay: pd.DataFrame) -> pd.DataFrame:
-    """Each cell's mean over the seeds that have it, and the least and the most in place of an interval."""
+    """Each cell's mean over the seeds that have it, with the least and the most in place of an interval."""
     cells = crossplay.groupby(["ego", "non_ego", "persona"], sort=False)
     means = {quantity.name: cells[quantity.name].mean() for quantity in QUANTITIES}
     means |= {f"{quantity.name}_low": cells[quantity.name].min() for quantity in QUANTITIES}
@@ -87,17 +87,17 @@ def _mean(crossplay: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(means).reset_index()
 
 
-def _map(quantity: _Quantity, found: pd.DataFrame, label: str, place: int) -> HeatMap:
-    table = _by_persona(matrices(found))
-    cells = {(row["ego"], row["non_ego"]): row for row in found.to_dict("records")}
+def _map(quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int) -> HeatMap:
+    """One heat map; `place` makes its ids unique."""
+    table = _by_persona(matrices(crossplay))
+    cells = {(row["ego"], row["non_ego"]): row for row in crossplay.to_dict("records")}
     values = {
         "failure_rate": table.failure_rates,
         "ego_payoff": table.ego_payoffs,
         "non_ego_payoff": table.non_ego_payoffs,
     }[quantity.name]
-    between = "least to most of the seeds that played it" if label.startswith("mean") else "95 % interval"
-    kind = "" if label.startswith("mean") else (" (Wilson)" if quantity.per_cent else " (t)")
-    said = [
+    title = f"{HEAT_TITLES[quantity.name]}, {label}"
+    numbers = [
         f"{ego} against {non_ego} {_text(quantity, values[row, column])}"
         for row, ego in enumerate(table.egos)
         for column, non_ego in enumerate(table.non_egos)
@@ -105,39 +105,60 @@ def _map(quantity: _Quantity, found: pd.DataFrame, label: str, place: int) -> He
     longest = max(map(len, table.egos)), max(map(len, table.non_egos))
     width_in = LETTER_IN * longest[0] + COLUMN_IN * len(table.non_egos) + 0.1 * min(longest[1], 12) * 0.5
     height_in = ROW_IN * len(table.egos) + 0.35 + LETTER_IN * longest[1] * 0.55
-    name = f"heat-{quantity.name.replace('_', '-')}-{place}"
     with figure_of(width_in, height_in) as figure:
-        axes = figure.subplots()
-        axes.grid(False)
-        for spine in axes.spines.values():
-            spine.set_visible(False)
-        axes.set(xlim=(0, len(table.non_egos)), ylim=(len(table.egos), 0))
-        axes.xaxis.tick_top()
-        axes.set_xticks(
-            [column + 0.5 for column in range(len(table.non_egos))], table.non_egos,
-            rotation=30, ha="left", rotation_mode="anchor",
-        )  # fmt: skip
-        axes.set_yticks([row + 0.5 for row in range(len(table.egos))], table.egos)
-        axes.tick_params(length=0)
-        shades = _shades(quantity, table, values)
-        for row, ego in enumerate(table.egos):
-            for column, non_ego in enumerate(table.non_egos):
-                if not np.isfinite(values[row, column]):
-                    axes.text(column + 0.5, row + 0.5, "–", ha="center", va="center")
-                    continue
-                axes.bar(
-                    column + 0.5, 0.92, 0.95, bottom=row + 0.04, linewidth=0,
-                    color=SERIES[quantity.series], alpha=PALEST + (DARKEST - PALEST) * shades[row, column],
-                )  # fmt: skip
-                axes.text(column + 0.5, row + 0.46, _text(quantity, values[row, column]), ha="center", color=INK)
-                span = _span(quantity, cells[ego, non_ego])
-                axes.text(column + 0.5, row + 0.82, span, ha="center", fontsize=8, color=INK)
-        for cell in (*axes.texts, *axes.patches):
-            cell.set_in_layout(False)  # they are within the axes, and would be measured again and again
-        drawn = svg(figure, name, f"{quantity.title}, {label}: {'; '.join(said)}")
-    unpaid = " SUMO’s own driver has no payoff." if quantity.name == "non_ego_payoff" and "" in table.personas else ""
-    caption = f"{quantity.caption}{unpaid} Below each mean: {between}{kind}."
-    return HeatMap(f"{quantity.title}, {label}", caption, drawn, round(width_in, 2))
+        axes = _axes(figure, table)
+        _draw_cells(axes, quantity, table, values, cells)
+        for drawing in (*axes.texts, *axes.patches):
+            drawing.set_in_layout(False)  # they are within the axes; to measure them again is slow
+        name = f"heat-{quantity.name.replace('_', '-')}-{place}"
+        element = svg(figure, name, f"{title}: {'; '.join(numbers)}")
+    caption = heat_caption(
+        quantity.name,
+        is_rate=quantity.per_cent,
+        is_mean=label.startswith("mean"),
+        unpaid=quantity.name == "non_ego_payoff" and "" in table.personas,
+    )
+    return HeatMap(title=title, caption=caption, figure=element, width_in=round(width_in, 2))
+
+
+def _axes(figure: Figure, table: Matrices) -> Axes:
+    """Axes with a row for each ego and a column for each non-ego."""
+    axes = figure.subplots()
+    axes.grid(False)
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    axes.set(xlim=(0, len(table.non_egos)), ylim=(len(table.egos), 0))
+    axes.xaxis.tick_top()
+    axes.set_xticks(
+        [column + 0.5 for column in range(len(table.non_egos))], table.non_egos,
+        rotation=30, ha="left", rotation_mode="anchor",
+    )  # fmt: skip
+    axes.set_yticks([row + 0.5 for row in range(len(table.egos))], table.egos)
+    axes.tick_params(length=0)
+    return axes
+
+
+def _draw_cells(
+    axes: Axes,
+    quantity: _Quantity,
+    table: Matrices,
+    values: Floats,
+    cells: Mapping[tuple[str, str], Mapping[str, float]],
+) -> None:
+    """Shade each cell by its value, and write the value and its interval in it."""
+    shades = _shades(quantity, table, values)
+    for row, ego in enumerate(table.egos):
+        for column, non_ego in enumerate(table.non_egos):
+            if not np.isfinite(values[row, column]):
+                axes.text(column + 0.5, row + 0.5, MISSING, ha="center", va="center")
+                continue
+            axes.bar(
+                column + 0.5, 0.92, 0.95, bottom=row + 0.04, linewidth=0,
+                color=SERIES[quantity.series], alpha=PALEST + (DARKEST - PALEST) * shades[row, column],
+            )  # fmt: skip
+            axes.text(column + 0.5, row + 0.46, _text(quantity, values[row, column]), ha="center", color=INK)
+            span = _span(quantity, cells[ego, non_ego])
+            axes.text(column + 0.5, row + 0.82, span, ha="center", fontsize=8, color=INK)
 
 
 def _by_persona(table: Matrices) -> Matrices:
@@ -163,7 +184,7 @@ def _shades(quantity: _Quantity, table: Matrices, values: Floats) -> Floats:
 
 def _text(quantity: _Quantity, value: float) -> str:
     if not np.isfinite(value):
-        return "–"
+        return MISSING
     return f"{trimmed(value * 100, 1)} %" if quantity.per_cent else number(value, 1)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -10,13 +9,13 @@ from typing import Any
 import pandas as pd
 from markupsafe import Markup
 
+from harness.evaluation.strategies import NaiveEgo, Strategy, player_of
+from harness.game.state import EGO
 from harness.reports.figures import Curve, learning_figure
+from harness.reports.page_wording import curve_alternative, stop
+from harness.reports.run_tables import RunTables
 
-
-_OF_NON_EGO, _OF_EGO = re.compile(r"_non_ego_response\d+$"), re.compile(r"_ego_response\d+$")
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Learning:
     """One training stage's curves."""
 
@@ -25,47 +24,44 @@ class Learning:
     stops: Sequence[str]
 
 
-def learning(stages: Mapping[str, Any], training: pd.DataFrame) -> list[Learning]:
+def learning(tables: RunTables) -> list[Learning]:
     """A figure per training stage, in order of first appearance, with a curve per seed."""
-    figures = []
-    for place, stage in enumerate(training["stage"].unique(), 1):
-        curves, stops = [], []
-        rows = training[training["stage"] == stage]
-        for seed, windows in rows.groupby("seed", sort=True):
-            of_manifest = stages.get(f"{stage}-seed{seed}", {})
-            windows = windows.sort_values("steps")
-            curves.append(
-                Curve(
-                    int(seed),
-                    windows["steps"].tolist(),
-                    windows["mean_payoff"].tolist(),
-                    windows["failure_rate"].tolist(),
-                    of_manifest.get("steps"),
-                    of_manifest.get("stopped") == "converged",
-                )
+    training = tables.training
+    return [
+        _stage(str(stage), place, tables, training[training["stage"] == stage])
+        for place, stage in enumerate(training["stage"].unique(), 1)
+    ]
+
+
+def _stage(stage: str, place: int, tables: RunTables, rows: pd.DataFrame) -> Learning:
+    curves, stops = [], []
+    several = rows["seed"].nunique() > 1
+    for seed, windows in rows.groupby("seed", sort=True):
+        entry = tables.stages.get(f"{stage}-seed{seed}", {})
+        windows = windows.sort_values("steps")
+        curves.append(
+            Curve(
+                seed=int(seed),
+                steps=windows["steps"].tolist(),
+                payoffs=windows["mean_payoff"].tolist(),
+                failure_rates=windows["failure_rate"].tolist(),
+                stopped_at=entry.get("steps"),
+                stopped_early=entry.get("stopped") == "converged",
             )
-            if of_manifest.get("steps") is not None:
-                stop = f"{of_manifest['steps']:,} steps ({stopped(of_manifest)})"
-                stops.append(f"seed {seed}: {stop}" if rows["seed"].nunique() > 1 else stop)
-        series = _series(str(stage))
-        last = [f"seed {curve.seed} ends at mean payoff {curve.payoffs[-1]:.3g}" for curve in curves]
-        alternative = f"Learning curve of {stage}: mean payoff and failure rate over training steps; "
-        figures.append(
-            Learning(stage, learning_figure(curves, series, f"curve{place}", alternative + "; ".join(last)), stops)
         )
-    return figures
+        if entry.get("steps") is not None:
+            stops.append(stop(entry, int(seed), several))
+    alternative = curve_alternative(stage, {curve.seed: curve.payoffs[-1] for curve in curves})
+    figure = learning_figure(curves, _series(tables.strategies.get(stage)), f"curve{place}", alternative)
+    return Learning(stage=stage, figure=figure, stops=stops)
 
 
-def _series(stage: str) -> str:
-    """Whose curve it is: the naive ego's, an ego's that learns again, or a person's."""
-    if _OF_NON_EGO.search(stage):
-        return "persona"
-    if stage == "naive":
-        return "alone"
-    return "retrained" if stage.startswith(("retrained_", "robust")) or _OF_EGO.search(stage) else "persona"
-
-
-def stopped(stage: Mapping[str, Any]) -> str:
-    """Why a training stopped."""
-    why = stage.get("stopped")
-    return {"converged": "early: converged", "budget": "budget used", None: "–"}.get(why, str(why))
+def _series(strategy: Strategy | None) -> str:
+    """The colour of a curve: of the naive ego, of an ego of a later round, or of a non-ego."""
+    match strategy:
+        case NaiveEgo():
+            return "alone"
+        case None:
+            return "persona"
+        case _:
+            return "retrained" if player_of(strategy) == EGO else "persona"

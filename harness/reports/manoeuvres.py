@@ -1,4 +1,4 @@
-"""What the players did before a failure: the table of manoeuvre pairs, and the marks on the player's time axis."""
+"""The manoeuvres before failures: the table of manoeuvre pairs, and the marks on the player's time axis."""
 
 from __future__ import annotations
 
@@ -12,15 +12,16 @@ from harness.evaluation.manoeuvres import Manoeuvre, Pair, pairs_in
 from harness.reports.player_data import key
 
 NONE_NAMED = "–"
+"""Stands for no manoeuvre that has a name."""
 RUN_UP_S = 1.5
-"""A game is opened this long before the manoeuvre that led to the failure."""
+"""The player opens a game this long before the manoeuvre that led to the failure."""
 MOST_LISTED = 50
-"""Games that a pair lists."""
+"""The most games that a pair lists."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FailedGame:
-    """A failure of the ego: where to watch it."""
+    """A failure of the ego, and the time to watch it from."""
 
     arm: str
     seed: int
@@ -30,9 +31,9 @@ class FailedGame:
     text: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Failures:
-    """What the non-ego did and how the ego answered, and the failures that came of it."""
+    """A pair of manoeuvres, of the non-ego and of the ego, and the failures after it."""
 
     non_ego: str
     ego: str
@@ -41,14 +42,14 @@ class Failures:
     games: Sequence[FailedGame]
 
     def listed(self, embedded: Container[str], most: int) -> Sequence[FailedGame]:
-        """The games to list, at most so many: those that the page can play go first where not all can be listed."""
+        """The games to list, at most `most`: those that the page can play are preferred."""
         if len(self.games) <= most:
             return self.games
         return sorted(self.games, key=lambda game: key(game.arm, game.seed, game.episode) not in embedded)[:most]
 
 
 def words(manoeuvre: str) -> str:
-    """A manoeuvre as a person says it."""
+    """A manoeuvre's name as text."""
     return {"cut_in": "cut-in"}.get(manoeuvre, manoeuvre.replace("_", " "))
 
 
@@ -61,18 +62,29 @@ def failures_by_pair(manoeuvres: pd.DataFrame, episodes: pd.DataFrame) -> tuple[
     found = pairs_in(manoeuvres)
     grouped: dict[tuple[str, str], list[FailedGame]] = {}
     for game in failed.itertuples():
-        pair = found.get((game.arm, game.seed, game.episode), Pair(None, None))
-        led = [each for each in (pair.non_ego, pair.ego) if each]
-        begins_s = min((each.time_s for each in led), default=float(game.duration_s))
-        text = "; ".join(each.text for each in led if each.text)
-        shown = FailedGame(game.arm, game.seed, game.episode, game.ego_outcome, max(begins_s - RUN_UP_S, 0.0), text)
-        grouped.setdefault((_name(pair.non_ego), _name(pair.ego)), []).append(shown)
+        pair = found.get((game.arm, game.seed, game.episode), Pair(non_ego=None, ego=None))
+        named = [each for each in (pair.non_ego, pair.ego) if each]
+        begin_s = min((each.time_s for each in named), default=float(game.duration_s))
+        failure = FailedGame(
+            arm=game.arm,
+            seed=game.seed,
+            episode=game.episode,
+            outcome=game.ego_outcome,
+            time_s=max(begin_s - RUN_UP_S, 0.0),
+            text="; ".join(each.text for each in named if each.text),
+        )
+        grouped.setdefault((_name(pair.non_ego), _name(pair.ego)), []).append(failure)
     rows = [
-        Failures(non_ego, ego, [sum(game.arm == arm for game in games) for arm in arms], games)
+        Failures(
+            non_ego=non_ego,
+            ego=ego,
+            counts=[sum(game.arm == arm for game in games) for arm in arms],
+            games=games,
+        )
         for (non_ego, ego), games in grouped.items()
     ]
-    nameless = (NONE_NAMED, NONE_NAMED)
-    rows.sort(key=lambda row: ((row.non_ego, row.ego) == nameless, -len(row.games), row.non_ego, row.ego))
+    unnamed = (NONE_NAMED, NONE_NAMED)
+    rows.sort(key=lambda row: ((row.non_ego, row.ego) == unnamed, -len(row.games), row.non_ego, row.ego))
     return arms, rows
 
 
@@ -81,7 +93,7 @@ def _name(manoeuvre: Manoeuvre | None) -> str:
 
 
 def marks_of(manoeuvres: pd.DataFrame | None) -> Mapping[str, Sequence[Mapping[str, Any]]]:
-    """What the player marks on the time axis of each game, by the game's `key`."""
+    """The marks on the time axis of each game, by the game's `key`."""
     if manoeuvres is None:
         return {}
     marks: dict[str, list[Mapping[str, Any]]] = {}

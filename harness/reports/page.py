@@ -2,238 +2,171 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import Any
 
 import pandas as pd
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
 
-from harness.reports.cards import card
-from harness.reports.data_table import table
+from harness.evaluation.strategies import NaiveEgo, against_persona
+from harness.reports import page_wording
+from harness.reports.cards import Card, card
+from harness.reports.data_table import Table, table
 from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
-from harness.reports.figures import steps_text
-from harness.reports.game import game_section
-from harness.reports.player_data import RecordedGame, SceneDrawing, key
-from harness.reports.learning import learning, stopped
+from harness.reports.game import GameSection, game_section
+from harness.reports.learning import learning
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
+from harness.reports.page_template import environment_of, script
+from harness.reports.player_data import RecordedGame, SceneDrawing, key
 from harness.reports.provenance import mixed_versions
 from harness.reports.replays import failures, keys, replay_list, worst_game
-from harness.reports.results import results, unplayed
+from harness.reports.results import Results, results, unplayed
+from harness.reports.run_tables import RunTables
 from harness.reports.search import searches
-from harness.evaluation.tables import RECONFIGURATION_COLUMNS
-from harness.evaluation.tables import typed
-from harness.evaluation.game_theory.records import GameFindings
+from harness.reports.stage_table import stage_rows, unfinished
 
 MOST_ROWS = 3_000
-"""A table longer than this is left to its CSV file, and the page says so."""
+"""The page leaves out a longer table of games and refers to its CSV file."""
 GAMES_BYTES = 8_000_000
 PAGE_BYTES = 10_000_000
-"""The page is not to be longer: recorded games get what the rest leaves of it, and never more than GAMES_BYTES."""
+"""The largest page: recorded games get what the rest leaves of it, and at most GAMES_BYTES."""
 _ROW_BYTES, _REST_BYTES = 1_100, 1_200_000
 REPLAYS_SHOWN = 12
 """The rest of the replays is folded away."""
-SCRIPTS = tuple(
-    f"{name}.js"
-    for name in ("recorded", "road", "vehicles", "strips", "screen", "player", "controls", "clips", "tables")
-)
-"""In the order in which they use one another."""
-QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 
 
-@dataclass(frozen=True)
-class StageRow:
-    """One stage of the manifest, in words."""
-
-    name: str
-    kind: str
-    seed: str
-    status: str
-    steps: str
-    stopped: str
-    duration: str
-    message: str
-
-
-def render_page(
-    manifest: Mapping[str, Any],
-    episodes: pd.DataFrame,
-    summary: pd.DataFrame,
-    comparisons: pd.DataFrame,
-    training: pd.DataFrame,
-    replays: Sequence[str],
-    games: Iterable[RecordedGame] = (),
-    scene: SceneDrawing | None = None,
-    manoeuvres: pd.DataFrame | None = None,
-    game: GameFindings | None = None,
-    populations: pd.DataFrame | None = None,
-    reconfiguration: pd.DataFrame | None = None,
-) -> str:
+def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: SceneDrawing | None = None) -> str:
     """The report as HTML. Equal input gives equal text.
 
-    `manifest` is the content of manifest.json, the frames are those of the CSV files with the columns of
-    `harness.evaluation.tables.TABLES`, `replays` the names of the folders under `replays/`, in any order. `games`, the ones
-    to watch first on top, are taken until the page is full (`PAGE_BYTES`); without a `scene` there are none.
-    Without `manoeuvres` nothing is said of them, without `game` nothing of equilibria, without `reconfiguration`
-    nothing of searches.
-    Raises ValueError when a frame is none of those tables.
+    `games`, those to watch first at the front, are embedded until the page is full (`PAGE_BYTES`); without a `scene`
+    none is. Raises ValueError when a frame of `tables` does not have a table's columns.
     """
-    episodes, summary, comparisons, training = map(typed, (episodes, summary, comparisons, training))
-    manoeuvres = typed(manoeuvres) if manoeuvres is not None else None
-    searched = typed(pd.DataFrame(columns=list(RECONFIGURATION_COLUMNS)) if reconfiguration is None else reconfiguration)
-    found = results(manifest, episodes, summary, comparisons, populations)
-    named = (*manifest.get("personas", ()), *comparisons["persona"], *summary["persona"])
-    personas = [name for name in dict.fromkeys(named) if name]
-    stages = manifest.get("stages", {})
-    errored = episodes[unplayed(episodes)]
-    in_table = episodes if len(episodes) <= MOST_ROWS else episodes[:0]
-    section = game_section(game)
-    taken = _REST_BYTES + len(in_table) * _ROW_BYTES + (section.bytes if section else 0)
-    room = max(min(GAMES_BYTES, PAGE_BYTES - taken), 0)
-    embedded = Embedded(scene, games, marks_of(manoeuvres), room)
-    shown = embedded.keys
-    arms, pairs = failures_by_pair(manoeuvres, episodes) if manoeuvres is not None else ([], None)
-    tables = {
-        "comparisons": table("comparisons", "Every test of the campaign.", comparisons),
-        "summary": table("summary", "A row per arm and training seed.", summary),
-        "training": table("training", "A row per window of a learning curve.", training),
-        "episodes": table("episodes", "A row per game.", in_table),
-    }
-    if len(searched):
-        caption = "A row per trial and parameter of a search."
-        tables["reconfiguration"] = table("reconfiguration", caption, searched)
-    environment = Environment(
-        loader=PackageLoader("harness", "reports"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    tables = tables.with_types()
+    found, section = results(tables), game_section(tables.game)
+    listed = tables.episodes if len(tables.episodes) <= MOST_ROWS else tables.episodes[:0]
+    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), _room_for_games(len(listed), section))
+    environment = environment_of("reports")
     page = environment.get_template("report.html.jinja").render(
-        name=manifest.get("name", "campaign"),
-        quick=QUICK if manifest.get("quick") else "",
-        trained_before=manifest.get("campaign", {}).get("policies") or "",
-        unfinished=[_stage(name, stage) for name, stage in stages.items() if stage.get("status") not in ("done", "settled")],
-        mixed=mixed_versions(stages),
-        errored=errored.groupby(["arm", "seed"], sort=False).size().items(),
-        errors=len(errored),
-        facts=_facts(manifest, found.seeds, len(personas)),
-        several_seeds=len(found.seeds) > 1,
+        **_header(tables, found),
+        **_troubles(tables),
+        **_cards(tables, found, embedded.keys),
+        **_player(tables, embedded),
+        **_manoeuvres(tables),
+        **_learning(tables),
+        **_tables(tables, listed),
+        **_replays(tables, embedded.keys),
+        **_method(tables, found),
         game=section,
-        cards=[
-            card(persona, place, found, worst_game(f"naive_vs_{persona}", episodes, shown))
-            for place, persona in enumerate(personas, 1)
-        ],
-        learning=learning(stages, training),
-        searches=searches(searched),
-        change=found.change,
-        rules=sorted({stage["rule"] for stage in stages.values() if stage.get("rule")}),
-        stages=[_stage(name, stage) for name, stage in stages.items()],
-        tables=tables,
-        games=len(episodes),
-        most_rows=MOST_ROWS,
-        most_listed=MOST_LISTED,
-        most_dots=MOST_DOTS if episodes.groupby("arm").size().max() > MOST_DOTS else 0,
-        replays=replay_list(replays, episodes, shown),
-        replays_shown=REPLAYS_SHOWN,
-        unlisted=failures(episodes) - failures(episodes, replays),
-        embedded=shown,
-        left=len(episodes) - len(errored) - len(shown),
-        keys=keys(in_table),
-        key=key,
-        pairs=pairs,
-        pair_arms=arms,
-        recorded=embedded.document(),
-        script=Markup("\n").join(Markup(_source(environment, name)) for name in SCRIPTS),
-        versions=manifest.get("versions", {}),
-        glossary=_glossary(list(dict.fromkeys(summary["arm"])), personas),
-        significance=found.significance,
-        tests=int(comparisons["p_value"].notna().sum()),
+        script=script(environment),
     )
     return page.strip() + "\n"
 
 
-def _source(environment: Environment, name: str) -> str:
-    """A file beside the template, as it is: a script is no template."""
-    assert environment.loader is not None
-    return environment.loader.get_source(environment, name)[0].rstrip()
+def _room_for_games(rows: int, section: GameSection | None) -> int:
+    """Bytes that a page with this number of rows of games and this section leaves for recorded games."""
+    taken = _REST_BYTES + rows * _ROW_BYTES + (section.bytes if section else 0)
+    return max(min(GAMES_BYTES, PAGE_BYTES - taken), 0)
 
 
-def _facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
-    campaign = manifest.get("campaign", {})
-    stages = manifest.get("stages", {}).values()
-    assessment, training = campaign.get("assessment", {}), campaign.get("training", {})
-    ego = str(campaign.get("ego", {}).get("driver", ""))
-    facts = [
-        ("Scene", str(campaign.get("scene", "")).rstrip("/").rsplit("/", 1)[-1]),
-        ("Ego", str((manifest.get("ego_driver") or {}).get("in_words") or ego)),
-        ("Rounds", "" if ego in ("", "learned") else _rounds(stages)),
-        ("Personas", str(personas)),
-        ("Training seeds", ", ".join(map(str, manifest.get("seeds", seeds)))),
-        ("Games per arm and seed", f"{assessment['episodes']:,}" if "episodes" in assessment else ""),
-        ("Players", "trained before" if campaign.get("policies") else ""),
-        ("Training budget", f"{steps_text(training['steps'])} steps" if "steps" in training else ""),
-        ("Significance", f"{assessment['significance']:g}" if "significance" in assessment else ""),
-    ]
-    return [(label, value) for label, value in facts if value]
-
-
-def _rounds(stages: Iterable[Mapping[str, Any]]) -> str:
-    """The rounds of an ego that is not trained."""
-    if any(stage.get("kind") == "reconfiguration" for stage in stages):
-        return "0, 1 and 2: this ego is not trained, but its parameters are tuned"
-    return "0 and 1: there is nothing to train or to tune in this ego"
-
-
-def _stage(name: str, stage: Mapping[str, Any]) -> StageRow:
-    steps, budget = stage.get("steps"), stage.get("budget_steps")
-    return StageRow(
-        name,
-        str(stage.get("kind", "")),
-        str(stage.get("seed", "")),
-        str(stage.get("status", "")),
-        "–" if steps is None else f"{steps:,}" + (f" of {budget:,}" if budget is not None else ""),
-        stopped(stage),
-        duration(stage.get("seconds")),
-        str(stage.get("message") or ""),
-    )
-
-
-def duration(seconds: float | None) -> str:
-    """E.g. "1 h 02 min", "3 min 05 s" or "12.3 s"; "–" when not known."""
-    if seconds is None:
-        return "–"
-    whole = round(seconds)
-    if whole < 60:
-        return f"{seconds:.1f} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
-
-
-def _glossary(arms: Sequence[str], personas: Sequence[str]) -> list[tuple[str, str]]:
-    meanings = {
-        "naive_alone": "the naive ego on the road without the non-ego",
-        "naive_vs_sumo": "the naive ego, and an ordinary law-abiding SUMO driver in the non-ego's place",
+def _header(tables: RunTables, found: Results) -> dict[str, Any]:
+    manifest = tables.manifest
+    return {
+        "name": manifest.get("name", "campaign"),
+        "facts": page_wording.facts(manifest, found.seeds, len(tables.personas)),
+        "quick": page_wording.QUICK if manifest.get("quick") else "",
+        "trained_before": manifest.get("campaign", {}).get("policies") or "",
+        "several_seeds": len(found.seeds) > 1,
+        "change": found.change,
     }
-    for persona in personas:
-        meanings |= {
-            f"{persona}_alone": f"the non-ego {persona} without the ego",
-            f"naive_vs_{persona}": f"the naive ego against the non-ego {persona}",
-            f"reconfigured_vs_{persona}": f"the ego tuned against {persona}, against the same {persona}",
-            f"reconfigured_alone_{persona}": f"the ego tuned against {persona}, without the non-ego",
-            f"retrained_vs_{persona}": f"the ego retrained against {persona}, against the same {persona}",
-            f"retrained_alone_{persona}": f"the ego retrained against {persona}, without the non-ego",
-        }
-    return [(arm, meanings.get(arm) or _of_strategies(arm)) for arm in arms]
 
 
-def _of_strategies(arm: str) -> str:
-    """What an arm beside the paper's rounds is of, by its name."""
-    for ending, player in (("_non_ego_response", "the non-ego"), ("_ego_response", "the ego")):
-        if arm.endswith(ending):
-            return f"{arm.removesuffix(ending)}, {player} replaced by its best response"
-    ego, against, non_ego = arm.partition("_vs_")
-    return f"the ego {ego} against the non-ego {non_ego}" if against else f"{arm.removesuffix('_alone')} alone on the road"
+def _troubles(tables: RunTables) -> dict[str, Any]:
+    """The banners: unfinished stages, mixed versions, games that could not be played."""
+    errored = tables.episodes[unplayed(tables.episodes)]
+    return {
+        "unfinished": unfinished(tables.stages),
+        "mixed": mixed_versions(tables.stages),
+        "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
+        "errors": len(errored),
+    }
+
+
+def _cards(tables: RunTables, found: Results, embedded: Container[str]) -> dict[str, Any]:
+    """The verdicts, and the figures and tests below them."""
+    games_of_arm = tables.episodes.groupby("arm").size().max()
+    return {
+        "cards": [
+            _card(persona, place, found, tables.episodes, embedded) for place, persona in enumerate(tables.personas, 1)
+        ],
+        "most_dots": MOST_DOTS if games_of_arm > MOST_DOTS else 0,
+        "caution": page_wording.CAUTION,
+        "tests": int(tables.comparisons["p_value"].notna().sum()),
+    }
+
+
+def _card(persona: str, place: int, found: Results, episodes: pd.DataFrame, embedded: Container[str]) -> Card:
+    return card(persona, place, found, worst_game(against_persona(NaiveEgo(), persona).name, episodes, embedded))
+
+
+def _player(tables: RunTables, embedded: Embedded) -> dict[str, Any]:
+    played = len(tables.episodes) - int(unplayed(tables.episodes).sum())
+    return {
+        "embedded": embedded.keys,
+        "left": played - len(embedded.keys),
+        "key": key,
+        "recorded": embedded.document(),
+    }
+
+
+def _manoeuvres(tables: RunTables) -> dict[str, Any]:
+    if tables.manoeuvres is None:
+        return {"pairs": None, "pair_arms": [], "most_listed": MOST_LISTED}
+    arms, pairs = failures_by_pair(tables.manoeuvres, tables.episodes)
+    return {"pairs": pairs, "pair_arms": arms, "most_listed": MOST_LISTED}
+
+
+def _learning(tables: RunTables) -> dict[str, Any]:
+    """The learning curves, and the searches of egos that can't be trained."""
+    return {
+        "learning": learning(tables),
+        "searches": searches(tables.reconfiguration),
+    }
+
+
+def _tables(tables: RunTables, listed: pd.DataFrame) -> dict[str, Any]:
+    """The tables as cells; `listed` are the games that the page lists."""
+    frames = {
+        "comparisons": tables.comparisons,
+        "summary": tables.summary,
+        "training": tables.training,
+        "episodes": listed,
+    }
+    if len(tables.reconfiguration):
+        frames["reconfiguration"] = tables.reconfiguration
+    cells: Mapping[str, Table] = {
+        name: table(name, page_wording.CAPTIONS[name], frame) for name, frame in frames.items()
+    }
+    return {
+        "tables": cells,
+        "keys": keys(listed),
+        "games": len(tables.episodes),
+        "most_rows": MOST_ROWS,
+        "stages": stage_rows(tables.stages),
+    }
+
+
+def _replays(tables: RunTables, embedded: Container[str]) -> dict[str, Any]:
+    return {
+        "replays": replay_list(tables.replays, tables.episodes, embedded),
+        "replays_shown": REPLAYS_SHOWN,
+        "unlisted": failures(tables.episodes) - failures(tables.episodes, tables.replays),
+    }
+
+
+def _method(tables: RunTables, found: Results) -> dict[str, Any]:
+    return {
+        "significance": found.significance,
+        "rules": sorted({stage["rule"] for stage in tables.stages.values() if stage.get("rule")}),
+        "glossary": page_wording.glossary(list(dict.fromkeys(tables.summary["arm"])), tables.arms),
+        "versions": tables.manifest.get("versions", {}),
+    }

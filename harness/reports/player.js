@@ -1,4 +1,4 @@
-// The player: one clock, and one or two games that keep step with it.
+// The player: one clock, and one or two games that follow it.
 
 class Player {
   /** `screens` is the element the games are shown in; `changed` is called whenever the time or the games change. */
@@ -20,13 +20,13 @@ class Player {
     return Math.max(0, ...this.screens.map(screen => screen.game.duration));
   }
 
-  /** Show a game, or two, at a time; without one at the moment that matters. */
+  /** Show a game, or two, at a time; without a time at the last contact or the end. */
   async open(key, beside, time) {
     const turn = ++this.opening;
     if (!games.has(key)) return false;
     const chosen = [games.get(key), games.get(beside)].filter(Boolean);
     await Promise.all(chosen.map(opened));
-    if (turn !== this.opening) return true; // another game was asked for meanwhile
+    if (turn !== this.opening) return true; // another game was requested meanwhile
     this.pause();
     for (const screen of this.screens) screen.close();
     this.screens = chosen.map(game => new GameScreen(game, at => { this.pause(); this.seek(at); }));
@@ -35,7 +35,7 @@ class Player {
     const ranges = rangesOf(chosen);
     for (const screen of this.screens) {
       screen.camera.follows = this.follows;
-      screen.begin();
+      screen.start();
       screen.strips.align(ranges, this.duration);
     }
     this.seek(time ?? momentOf(chosen[0]));
@@ -48,7 +48,7 @@ class Player {
     this.changed();
   }
 
-  /** Go on by whole steps, from the step that is shown. */
+  /** Move by whole steps, from the step that is shown. */
   step(count) {
     this.pause();
     const { step } = this.game;
@@ -98,8 +98,8 @@ class Player {
   }
 }
 
-/** What an address asks for; null when it is no game's. */
-function asked(hash) {
+/** The game, time and second game of an address; null without a game. */
+function parsed(hash) {
   const parts = new Map(hash.replace(/^#/, "").split("&").map(part => [part.split("=", 1)[0], part.slice(part.indexOf("=") + 1)]));
   if (!parts.has("game")) return null;
   const time = Number.parseFloat(parts.get("t"));

@@ -1,4 +1,4 @@
-"""What the page's player needs of a recorded game and of the road, as plain data."""
+"""A recorded game and the road as plain data, for the player of the page."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.floating[Any]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Track:
-    """The way of one road user: arrays [n], a value per step from `first_step` on, of the body's centre."""
+    """The track of one road user: arrays [n], a value per step from `first_step` on, of the body's centre."""
 
     name: str
-    """`ego`, `non_ego`, or SUMO's id of another road user."""
+    """`ego`, `non_ego`, or SUMO's id of a background vehicle."""
     length_m: float
     width_m: float
     first_step: int
@@ -28,9 +28,9 @@ class Track:
     speed_mps: FloatArray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PlayerTrack(Track):
-    """The way of a player, and what was measured of it; gap and time are inf or NaN where there is nothing."""
+    """The track of a player with its measurements; gap and time are inf or NaN without a leader or a collision course."""
 
     acceleration_mps2: FloatArray
     steering_rad: FloatArray
@@ -38,14 +38,14 @@ class PlayerTrack(Track):
     leader_gap_m: FloatArray
     time_to_collision_s: FloatArray
     outcome: str
-    """goal, collision, rail, timeout; empty if it was still driving when the game ended."""
+    """goal, collision, rail, timeout; empty if it was still driving at the end of the game."""
     ended_step: int | None
-    """The step at which it came to that."""
+    """The step of the outcome."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Touch:
-    """Where and when players came to grief."""
+    """The place and time of a contact."""
 
     time_s: float
     x_m: float
@@ -53,7 +53,7 @@ class Touch:
     label: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RecordedGame:
     """One game, step 0 to step `steps`."""
 
@@ -64,23 +64,23 @@ class RecordedGame:
     step_s: float
     steps: int
     outcome: str
-    """Of the player that is judged: the ego, or the non-ego where it drives alone."""
+    """Of the judged player: the ego, or the non-ego where it drives alone."""
     players: Sequence[PlayerTrack]
-    others: Sequence[Track]
+    background: Sequence[Track]
     touches: Sequence[Touch]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SceneDrawing:
     """The road as lines in the scene's coordinates (m), each [n, 2]."""
 
     surfaces: Sequence[Sequence[FloatArray]]
-    """Polygons of the drivable area, each its outline and its holes."""
+    """Polygons of the drivable area, each with its outline and its holes."""
     lane_marks: Sequence[FloatArray]
     rails: Sequence[FloatArray]
     goal: Sequence[FloatArray]
 
 
 def key(arm: str, seed: int, episode: int) -> str:
-    """A game's name in addresses."""
+    """The name of a game in addresses."""
     return f"{quote(arm, safe='')},{seed},{episode}"

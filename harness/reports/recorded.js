@@ -1,4 +1,4 @@
-// The recorded games of the page: unpacked when they are first watched (harness/reports/embedding.py packs them).
+// The recorded games of the page: unpacked when they are first opened (harness/reports/embedding.py packs them).
 
 const recorded = JSON.parse(document.getElementById("recorded").textContent);
 const COLUMNS = ["x", "y", "heading", "speed", "acceleration", "steering", "lapsed", "gap", "time"];
@@ -9,7 +9,7 @@ function keyOf(game) {
   return `${encodeURIComponent(game.arm)},${game.seed},${game.episode}`;
 }
 
-// Python and browsers do not escape quite the same characters: keys are compared in this form.
+// Python and browsers escape different characters: keys are compared in this form.
 function normal(key) {
   const [, arm, seed, episode] = /^(.*),(-?\d+),(\d+)$/.exec(key) ?? [];
   try {
@@ -22,7 +22,7 @@ function normal(key) {
 const games = new Map(recorded.games.map(game => [keyOf(game), game]));
 const severalSeeds = new Set(recorded.games.map(game => game.seed)).size > 1;
 
-/** The game, with the columns of its tracks, once they are unpacked. */
+/** A promise of the game with the unpacked columns of its tracks. */
 function opened(game) {
   game.promise ??= inflate(game.packed).then(numbers => {
     let at = 0;
@@ -33,7 +33,7 @@ function opened(game) {
       }
     };
     for (const track of game.players) columns(track, COLUMNS);
-    for (const track of game.others) columns(track, COLUMNS.slice(0, recorded.ofOthers));
+    for (const track of game.background) columns(track, COLUMNS.slice(0, recorded.backgroundColumns));
     game.duration = game.steps * game.step;
     game.touches = game.touches.map(([time, x, y]) => ({ time, x, y }));
     game.packed = null;
@@ -55,7 +55,7 @@ async function inflate(text) {
   return numbers;
 }
 
-/** Differences of whole numbers, as the values they stand for; what is missing is NaN. */
+/** The values of differences of whole numbers; a missing value is NaN. */
 function column(differences, scale, mayMiss) {
   const values = new Float64Array(differences.length);
   let whole = 0;
@@ -66,7 +66,7 @@ function column(differences, scale, mayMiss) {
   return values;
 }
 
-/** Where a road user is at a time between the steps; null when it is not there. */
+/** The pose of a road user at a time, interpolated between the steps; null when it is absent. */
 function poseAt(game, track, time) {
   let place = Math.min(Math.max(time, 0), game.duration) / game.step - track.first;
   if (Math.abs(place - Math.round(place)) < 1e-6) place = Math.round(place);
@@ -80,7 +80,7 @@ function poseAt(game, track, time) {
   };
 }
 
-/** The step of a track that is shown at a time; null when the road user is not there. */
+/** The step of a track that is shown at a time; null when the road user is absent. */
 function stepAt(game, track, time) {
   const step = Math.floor(Math.min(time, game.duration) / game.step + 1e-6) - track.first;
   return step < 0 || step >= track.count ? null : step;
@@ -92,7 +92,7 @@ function valueAt(game, track, name, time) {
   return step === null ? NaN : track[name][step];
 }
 
-/** When the players came to grief, or else the end. */
+/** The time of the last contact, or the end of the game. */
 function momentOf(game) {
   return game.touches.length ? game.touches[game.touches.length - 1].time : game.duration;
 }
@@ -114,7 +114,7 @@ function describe(game) {
   return `game ${game.episode}${severalSeeds ? `, seed ${game.seed}` : ""}: ${OUTCOMES[game.outcome] ?? game.outcome}${nearest}`;
 }
 
-/** The same episode with the other ego; undefined when it is not in the page. */
+/** The same episode with the other ego; undefined when the page does not contain it. */
 function counterpartOf(game) {
   const others = { naive: ["retrained", "reconfigured"], retrained: ["naive"], reconfigured: ["naive"] };
   const ego = game.arm.match(/^(naive|retrained|reconfigured)(?=_vs_)/)?.[1];

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import shlex
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,14 +9,15 @@ from typing import Any
 
 import pandas as pd
 
-from harness.reports import wording
+from harness.reports import page_wording
+from harness.reports.numbers import MISSING, number
 from harness.reports.player_data import key
 
 FAILURES = ("collision", "rail", "timeout")
-"""Outcomes in the order they are worth watching; games that went well follow."""
+"""Failures from the worst on."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Replay:
     """A recorded game and how to watch it."""
 
@@ -32,7 +32,7 @@ class Replay:
 
 
 def failures(episodes: pd.DataFrame, among: Sequence[str] | None = None) -> int:
-    """How many games the judged player failed; only those with a replay of these names, if they are given."""
+    """How many games the judged player failed; only those with a replay named in `among`, if it is given."""
     ego = episodes["ego_outcome"]
     failed = episodes[ego.where(ego != "", episodes["non_ego_outcome"]).isin(FAILURES)]
     if among is None:
@@ -41,7 +41,7 @@ def failures(episodes: pd.DataFrame, among: Sequence[str] | None = None) -> int:
 
 
 def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[Replay]:
-    """The replays, worst first, in the order of `harness.replay.selection.worst_first`, which reports can't import.
+    """The replays, worst first, in the order of `harness.replay.selection.worst_first`, which reports may not import.
 
     `embedded` are the keys of the games that the page can play.
     """
@@ -50,20 +50,21 @@ def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Containe
     known = [(name, games[name]) for name in names if name in games]
     known.sort(key=lambda pair: _worst(pair[1]))
     shown = [_replay(name, game, several_seeds, embedded) for name, game in known]
-    strangers = sorted(set(names) - set(games))
-    return shown + [Replay(name, name, "–", "–", "", _scene(name), "") for name in strangers]
+    unknown = sorted(set(names) - set(games))
+    return shown + [
+        Replay(name=name, game=name, outcome=MISSING, min_ttc=MISSING, command="", scene=_scene(name), watch="")
+        for name in unknown
+    ]
 
 
 def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tuple[str, str] | None:
-    """Key and description of the game of an arm to watch first, of those that the page can play."""
+    """Key and description of the worst game of an arm, of those that the page can play; None where it can play none."""
     games = [game for game in episodes[episodes["arm"] == arm].to_dict("records") if _key(game) in embedded]
     if not games:
         return None
     game = min(games, key=_worst)
     outcome, ttc = game["ego_outcome"] or game["non_ego_outcome"], game["ego_min_ttc_s"]
-    ends = {"rail": "contact with the rail", "timeout": "out of time", "goal": "goal reached"}.get(outcome, outcome)
-    nearest = f", least time to collision {wording.number(ttc, 1)} s" if 0 < ttc < math.inf else ""
-    return _key(game), f"game {game['episode']}: {ends}{nearest}"
+    return _key(game), page_wording.worst_game(game["episode"], outcome, ttc)
 
 
 def keys(episodes: pd.DataFrame) -> list[str]:
@@ -89,13 +90,13 @@ def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: C
     arm, seed, episode = game["arm"], game["seed"], game["episode"]
     judged = "ego" if game["ego_outcome"] else "non-ego"
     return Replay(
-        name,
-        f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
-        f"{judged}: {game['ego_outcome'] or game['non_ego_outcome']}",
-        wording.number(game["ego_min_ttc_s"], 2),
-        f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
-        _scene(name),
-        _key(game) if _key(game) in embedded else "",
+        name=name,
+        game=f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
+        outcome=f"{judged}: {game['ego_outcome'] or game['non_ego_outcome']}",
+        min_ttc=number(game["ego_min_ttc_s"], 2),
+        command=f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
+        scene=_scene(name),
+        watch=_key(game) if _key(game) in embedded else "",
     )
 
 

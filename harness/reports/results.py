@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.strategies import ReconfiguredEgo
 from harness.reports import wording
+from harness.reports.run_tables import RunTables
 from harness.reports.treatment import ARMS, RECONFIGURED, RETRAINED, Change
-from harness.reports.wording import Row, Conclusion, played
+from harness.reports.wording import Conclusion, Row, played
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Results:
     """The tables as the cards look them up."""
 
@@ -28,8 +29,10 @@ class Results:
     significance: float | None
     planned: Collection[str]
     """Ids of the stages of the campaign, whether they are done or not."""
-    drove: Sequence[Row] = ()
-    """Rows of `populations`: each arm against a population by who drove."""
+    is_reconfigured: bool
+    """Whether round 2 searches the parameters of an external ego."""
+    by_driver: Sequence[Row]
+    """Rows of `populations`: each arm against a population, by the persona that drove."""
 
     def of(self, arm: str) -> dict[int, Row]:
         """The arm's rows by seed, where there are games that could be played."""
@@ -39,40 +42,44 @@ class Results:
     @property
     def change(self) -> Change:
         """What round 2 makes of the ego, if it is played."""
-        arms = {*self.planned, *(arm for arm, _ in self.arms)}
-        return RECONFIGURED if any(arm.startswith(f"{RECONFIGURED.made}_vs_") for arm in arms) else RETRAINED
+        return RECONFIGURED if self.is_reconfigured else RETRAINED
 
     def asked(self, question: str, persona: str) -> list[int]:
-        """The training seeds of which a question is asked: its treatment is played, or it is compared."""
+        """The training seeds of which a question is asked: its treatment is planned, or it is compared."""
         _, treatment = ARMS[question](persona, self.change)
-        compared = {row["seed"] for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)}
+        compared = {row["seed"] for row in self._rows(question, persona)}
         return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.planned or seed in compared]
 
     def verdicts(self, question: str, persona: str) -> Conclusion:
         """The answer to a question about a persona, in words."""
-        rows = [row for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)]
-        seeds = self.asked(question, persona)
-        return wording.verdicts(question, persona, seeds, rows, self.arms, self.significance, self.change)
+        return wording.verdicts(
+            question,
+            persona,
+            seeds=self.asked(question, persona),
+            rows=self._rows(question, persona),
+            arms=self.arms,
+            significance=self.significance,
+            change=self.change,
+        )
+
+    def _rows(self, question: str, persona: str) -> list[Row]:
+        return [row for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)]
 
 
-def results(
-    manifest: Mapping[str, Any],
-    episodes: pd.DataFrame,
-    summary: pd.DataFrame,
-    comparisons: pd.DataFrame,
-    populations: pd.DataFrame | None = None,
-) -> Results:
-    """The frames, looked up by arm and seed."""
-    good = episodes[~unplayed(episodes)]
+def results(tables: RunTables) -> Results:
+    """The frames of a run, looked up by arm and seed."""
+    manifest, summary, comparisons = tables.manifest, tables.summary, tables.comparisons
+    good = tables.episodes[~unplayed(tables.episodes)]
     return Results(
-        {(row["arm"], row["seed"]): row for row in summary.to_dict("records")},
-        comparisons.to_dict("records"),
-        {key: games.dropna() for key, games in good.groupby(["arm", "seed"])["ego_mean_speed_mps"]},
-        good,
-        sorted({*manifest.get("seeds", ()), *summary["seed"].tolist(), *comparisons["seed"].tolist()}),
-        manifest.get("campaign", {}).get("assessment", {}).get("significance"),
-        manifest.get("stages", {}),
-        populations.to_dict("records") if populations is not None else (),
+        arms={(row["arm"], row["seed"]): row for row in summary.to_dict("records")},
+        comparisons=comparisons.to_dict("records"),
+        speeds={key: games.dropna() for key, games in good.groupby(["arm", "seed"])["ego_mean_speed_mps"]},
+        games=good,
+        seeds=sorted({*manifest.get("seeds", ()), *summary["seed"].tolist(), *comparisons["seed"].tolist()}),
+        significance=manifest.get("campaign", {}).get("assessment", {}).get("significance"),
+        planned=tables.stages,
+        is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),
+        by_driver=tables.populations.to_dict("records"),
     )
 
 

@@ -1,4 +1,4 @@
-// The road from above, to scale, on a canvas: where the camera looks, and what does not move.
+// The road from above, to scale, on a canvas: the camera and the parts that do not move.
 
 const stillMotion = matchMedia("(prefers-reduced-motion: reduce)");
 const palette = {};
@@ -20,7 +20,7 @@ for (const query of ["(prefers-color-scheme: dark)", "print"]) {
   });
 }
 
-/** A canvas as sharp as the screen; `paint` draws it in CSS pixels, whenever its size or the page's colours change. */
+/** A canvas with the screen's resolution; `paint` draws it in CSS pixels when its size or the page's colours change. */
 class Sheet {
   constructor(canvas, paint) {
     this.canvas = canvas;
@@ -33,7 +33,7 @@ class Sheet {
     this.fit();
   }
 
-  /** Take the size that the canvas has in the page; whether it is another one. */
+  /** Take the size of the canvas in the page; returns whether it has changed. */
   fit() {
     const { width, height } = this.canvas.getBoundingClientRect();
     const ratio = window.devicePixelRatio || 1;
@@ -70,10 +70,10 @@ const ROAD = (() => {
   };
 })();
 
-/** Where a camera looks: the point in its middle, and how many pixels a metre is. */
+/** A camera: the point in its centre, and its pixels per metre. */
 class Camera {
   constructor(widest) {
-    this.widest = widest; // metres that are seen from left to right, when the players are near each other
+    this.widest = widest; // visible width in metres, when the players are near each other
     this.follows = true;
     this.reset();
   }
@@ -83,7 +83,7 @@ class Camera {
     this.moved = { x: 0, y: 0 };
   }
 
-  /** Look at a game at a time, on a canvas of that size. A function of the time alone, so that scrubbing is playing. */
+  /** Look at a game at a time, on a canvas of that size. It depends on the time alone, so that dragging and playing show the same. */
   look(game, time, width, height) {
     Object.assign(this, { width, height });
     if (!this.follows) {
@@ -108,7 +108,7 @@ class Camera {
     this.y += this.moved.y;
   }
 
-  /** A player who has left is let go within a second, so that the view does not jump. */
+  /** The weight of a player that has left falls to 0 within a second, so that the view does not jump. */
   seen(game, track, time) {
     const last = (track.first + track.count - 1) * game.step;
     const { x, y } = poseAt(game, track, Math.min(time, last));
@@ -161,7 +161,7 @@ function drawGoal(context) {
     context.fillStyle = palette.goal;
     for (let n = 0; n < count; n++) {
       const side = n % 2 ? 0 : -0.5, [ax, ay] = [x + dx * n / count, y + dy * n / count];
-      const [ux, uy] = [dy / long, -dx / long]; // the way of the traffic
+      const [ux, uy] = [dy / long, -dx / long]; // the direction of traffic
       context.beginPath();
       context.moveTo(ax + ux * side, ay + uy * side);
       context.lineTo(ax + ux * (side + 0.5), ay + uy * (side + 0.5));
@@ -172,7 +172,7 @@ function drawGoal(context) {
   }
 }
 
-/** A bar that is a round number of metres. */
+/** A bar with a length of a round number of metres. */
 function drawScaleBar(context, camera) {
   const metres = [1, 2, 5, 10, 20, 50, 100, 200].find(each => each * camera.scale >= 50) ?? 500;
   const [long, x, y] = [metres * camera.scale, 12, camera.height - 10];

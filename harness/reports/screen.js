@@ -1,6 +1,6 @@
 // One game on the screen: its title, the road from above, the values, and the curves.
 
-/** An element with a class, text and children: whatever comes from a document stays text. */
+/** An element with attributes, text and children. Text of a document stays text. */
 function make(tag, { text, ...attributes } = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
@@ -10,7 +10,7 @@ function make(tag, { text, ...attributes } = {}, ...children) {
 }
 
 class GameScreen {
-  /** `seek` is called with the time that the curves, or a manoeuvre, are clicked at. */
+  /** `seek` is called with the time of a click on the curves or on a manoeuvre. */
   constructor(game, seek) {
     this.game = game;
     this.camera = new Camera(46);
@@ -23,8 +23,8 @@ class GameScreen {
     this.seek = seek;
   }
 
-  /** Begin to draw; the element must be in the page. */
-  begin() {
+  /** Start drawing; the element must be in the page. */
+  start() {
     this.sheet = new Sheet(this.view, () => this.draw(this.time));
     this.strips = new Strips(this.curves, this.game, this.seek);
     let held = null;
@@ -39,7 +39,7 @@ class GameScreen {
       held = [event.clientX, event.clientY];
       this.draw(this.time);
     });
-    this.view.addEventListener("wheel", event => { // as on maps: the page scrolls unless Ctrl is held, or two fingers pinch
+    this.view.addEventListener("wheel", event => { // as on maps: zoom with Ctrl or a pinch, else the page scrolls
       if (!event.ctrlKey) return;
       event.preventDefault();
       this.camera.zoom = Math.min(Math.max(this.camera.zoom * Math.exp(-event.deltaY / 200), 0.2), 12);
@@ -58,7 +58,7 @@ class GameScreen {
     return `Speed, acceleration, steering, gap and time to collision over ${this.game.duration.toFixed(1)} s. ${ends.join("; ")}.`;
   }
 
-  /** The manoeuvres as a list: each goes to its moment. */
+  /** The manoeuvres as a list of buttons that seek to their times. */
   manoeuvres(seek) {
     const list = make("ol", { class: "marks" });
     for (const mark of this.game.marks) {
@@ -100,17 +100,17 @@ class GameScreen {
 
   /** The values of the moment as text. */
   say(time) {
-    const said = this.game.players.map(track => {
+    const values = this.game.players.map(track => {
       if (stepAt(this.game, track, time) === null) return [track.name, `${nameOf(this.game, track)}: has left`];
       const speed = `${valueAt(this.game, track, "speed", time).toFixed(1)} m/s`;
       const [gap, soon] = ["gap", "time"].map(name => valueAt(this.game, track, name, time));
       return [track.name, `${nameOf(this.game, track)} ${speed}`
         + (Number.isNaN(gap) ? "" : `, gap ${gap.toFixed(1)} m`) + (Number.isNaN(soon) ? "" : `, TTC ${soon.toFixed(1)} s`)];
     });
-    const text = said.map(each => each[1]).join("; ");
+    const text = values.map(each => each[1]).join("; ");
     if (text === this.text) return;
     this.text = text;
-    this.values.replaceChildren(...said.map(([name, words]) => make("span", { class: name === "ego" ? "of-ego" : "of-non-ego", text: words })));
+    this.values.replaceChildren(...values.map(([name, words]) => make("span", { class: name === "ego" ? "of-ego" : "of-non-ego", text: words })));
     this.view.setAttribute("aria-label", `The road from above at ${time.toFixed(1)} s. ${text}.`);
   }
 

@@ -1,22 +1,21 @@
-"""What the searches of a campaign found: the best payoff over their trials, and parameters as given and as found."""
+"""The searches of a campaign: the best payoff over their trials, and parameters as given and as found."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import pandas as pd
 from markupsafe import Markup
 
 from harness.reports.figures import INK, SERIES, figure_of, svg
-from harness.reports.wording import MINUS, number, trimmed
+from harness.reports.numbers import short
+from harness.reports.page_wording import search_alternative, search_summary
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One parameter of the ego: as it was given, as it was found, and between what it was searched."""
+    """One parameter of the ego: its given value, its found value, and the bounds of the search."""
 
     name: str
     given: str
@@ -25,8 +24,8 @@ class Parameter:
     high: str
 
 
-@dataclass(frozen=True)
-class Found:
+@dataclass(frozen=True, kw_only=True)
+class Search:
     """One search, in words and numbers."""
 
     stage: str
@@ -35,42 +34,45 @@ class Found:
     summary: str
     parameters: Sequence[Parameter]
     document: str
-    """Where the driver is that it found, from the run folder."""
+    """The path of the driver that it found, from the run folder."""
 
 
-def searches(reconfiguration: pd.DataFrame) -> list[Found]:
+def searches(reconfiguration: pd.DataFrame) -> list[Search]:
     """Each search of `reconfiguration`, the table, in order of first appearance."""
     several = reconfiguration["seed"].nunique() > 1
     return [
-        _found(f"{stage}-seed{seed}", f"{stage}, seed {seed}" if several else str(stage), rows, place)
+        _search(f"{stage}-seed{seed}", f"{stage}, seed {seed}" if several else str(stage), rows, place)
         for place, ((stage, seed), rows) in enumerate(reconfiguration.groupby(["stage", "seed"], sort=False), 1)
     ]
 
 
-def _found(folder: str, title: str, rows: pd.DataFrame, place: int) -> Found:
+def _search(stage_id: str, title: str, rows: pd.DataFrame, place: int) -> Search:
     trials = rows.drop_duplicates("trial").sort_values("trial")
     given, chosen = rows[rows["trial"] == 0], rows[rows["chosen"]]
-    first, best = given.iloc[0], chosen.iloc[0]
-    summary = f"{len(trials)} trials; best in trial {best['trial']}: {_came(best)}. As given: {_came(first)}."
-    if best["trial"] == first["trial"]:
-        summary = f"{len(trials)} trials, none better than the ego as given: {_came(first)}."
-    if unplayed := int(trials["mean_payoff"].isna().sum()):
-        summary += f" {unplayed} could not be played: {'; '.join(trials.loc[trials['error'] != '', 'error'].unique()[:3])}"
+    summary = search_summary(
+        trials=len(trials),
+        first=given.iloc[0],
+        best=chosen.iloc[0],
+        unplayed=int(trials["mean_payoff"].isna().sum()),
+        errors=trials.loc[trials["error"] != "", "error"].unique()[:3],
+    )
     both = given.merge(chosen[["parameter", "value"]], on="parameter", suffixes=("", "_found"))
-    parameters = [
-        Parameter(row.parameter, *map(_number, (row.value, row.value_found, row.low, row.high)))
-        for row in both.itertuples()
-    ]
-    drawn = _figure(trials, f"search{place}", f"Mean payoff of each trial of {title}, and the best so far. {summary}")
-    return Found(title, drawn, summary, parameters, f"policies/{folder}/driver.toml")
-
-
-def _came(trial: Any) -> str:
-    return f"mean payoff {number(trial['mean_payoff'], 2)}, failures in {trimmed(trial['failure_rate'] * 100, 1)} %"
-
-
-def _number(value: float) -> str:
-    return f"{value:.4g}".replace("-", MINUS) if math.isfinite(value) else "–"
+    return Search(
+        stage=title,
+        figure=_figure(trials, f"search{place}", search_alternative(title, summary)),
+        summary=summary,
+        parameters=[
+            Parameter(
+                name=row.parameter,
+                given=short(row.value),
+                found=short(row.value_found),
+                low=short(row.low),
+                high=short(row.high),
+            )
+            for row in both.itertuples()
+        ],
+        document=f"policies/{stage_id}/driver.toml",
+    )
 
 
 def _figure(trials: pd.DataFrame, name: str, alternative: str) -> Markup:
@@ -87,6 +89,6 @@ def _figure(trials: pd.DataFrame, name: str, alternative: str) -> Markup:
         )  # fmt: skip
         axes.set_xlabel("trial")
         axes.set_ylabel("mean payoff of the ego")
-        axes.yaxis.set_major_formatter(lambda value, _: f"{value:.4g}".replace("-", MINUS))
+        axes.yaxis.set_major_formatter(lambda value, _: short(value))
         axes.locator_params(axis="x", integer=True)
         return svg(figure, name, alternative)

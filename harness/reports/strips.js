@@ -9,7 +9,7 @@ const STRIPS = [
 ];
 const ROW = 58, LANE = 15, AXIS = 18, LEFT = 34, RIGHT = 10;
 
-/** The least and the most of each strip over some games, so that games side by side have the same axes. */
+/** The range of each strip over some games, so that games side by side have the same axes. */
 function rangesOf(shown) {
   return STRIPS.map(({ column, factor = 1, from = 0, to = 0.1, most = Infinity }) => {
     let [low, high] = [from, to];
@@ -37,11 +37,11 @@ class Strips {
     canvas.style.height = `${this.top + STRIPS.length * ROW + AXIS}px`;
     this.still = document.createElement("canvas");
     this.sheet = new Sheet(canvas, () => { this.drawStill(); this.draw(this.time); });
-    this.listen(canvas, seek);
+    this.onDrag(canvas, seek);
   }
 
-  /** Dragging over the curves is moving through time. */
-  listen(canvas, seek) {
+  /** Dragging over the curves moves through time. */
+  onDrag(canvas, seek) {
     const at = event => {
       const { left } = canvas.getBoundingClientRect();
       const share = (event.clientX - left - LEFT) / (this.sheet.width - LEFT - RIGHT);
@@ -66,7 +66,7 @@ class Strips {
     return bottom - (Math.min(Math.max(value, low), high) - low) / (high - low) * (bottom - top);
   }
 
-  /** All but the cursor, kept. */
+  /** Draw everything except the cursor to a canvas of its own. */
   drawStill() {
     const { width, height, ratio } = this.sheet;
     Object.assign(this.still, { width: Math.max(1, Math.round(width * ratio)), height: Math.max(1, Math.round(height * ratio)) });

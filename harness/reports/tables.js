@@ -1,14 +1,14 @@
-// Tables: sorted by a click on a heading, filtered, and each a CSV file to download.
+// Tables: sorting by a click on a heading, filters, and download as CSV.
 
 const MOST_CHOICES = 40;
 
-/** What a cell is in the CSV file. */
+/** The text of a cell in the CSV file. */
 function exactOf(cell) {
   const text = cell.dataset.value ?? cell.dataset.column ?? cell.textContent;
   return cell.closest(".data") ? text : text.trim().replace(/\s+/g, " ");
 }
 
-/** A cell as CSV writes it, as harness.evaluation.tables does. */
+/** A cell quoted for CSV, as in harness.evaluation.tables. */
 function quoted(text) {
   return /[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
 }
@@ -25,7 +25,7 @@ function download(name, text) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** Rows in the order of a column: numbers by size, words as a person sorts them, what is empty last. */
+/** Rows in the order of a column: numbers by size, words alphabetically, empty cells last. */
 function sorted(rows, place, down) {
   const values = new Map(rows.map(row => [row, exactOf(row.cells[place])]));
   const numeric = [...values.values()].every(value => value === "" || !Number.isNaN(Number(value)));
@@ -51,7 +51,7 @@ function makeSortable(table, rows) {
   });
 }
 
-/** Lists of an arm's and an outcome's names and a field for any text, above the table of games. */
+/** Filters of the table of games: lists of arms and outcomes, and a field for text. */
 function filters(table, rows) {
   const columns = [...table.tHead.rows[0].cells].map(exactOf);
   const bar = make("div", { class: "filters" }), count = make("output");
@@ -89,7 +89,7 @@ function filters(table, rows) {
   return bar;
 }
 
-/** What can be done with a table, once it is near enough to be seen. */
+/** Add download, sorting and filters to a table. */
 function equip(table) {
   const region = table.closest(".scroll"), rows = [...table.tBodies[0].rows];
   const save = make("button", { type: "button", text: "Download CSV" });
@@ -104,7 +104,7 @@ function equip(table) {
 
 for (const table of document.querySelectorAll(".scroll table")) equip(table);
 
-// A link to a list that is folded opens it.
+// A link to a folded list opens the list.
 document.addEventListener("click", event => {
   const target = event.target.closest('a[href^="#pair-"]')?.getAttribute("href").slice(1);
   if (target) document.getElementById(target).open = true;

@@ -4,20 +4,34 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from harness.evaluation.strategies import (
+    NAIVE_ALONE,
+    NaiveEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    against_persona,
+)
+
 
 class Change(NamedTuple):
     """What round 2 makes of the ego."""
 
     made: str
-    """What the ego is afterwards; its arms are called so."""
+    """The ego of round 2 in sentences."""
     doing: str
+    """What round 2 does, in sentences."""
+    ego: type[RetrainedEgo] | type[ReconfiguredEgo]
+    """The ego of round 2 as a strategy."""
 
 
-RETRAINED = Change("retrained", "retraining")
-RECONFIGURED = Change("reconfigured", "reconfiguration")
+RETRAINED = Change("retrained", "retraining", RetrainedEgo)
+RECONFIGURED = Change("reconfigured", "reconfiguration", ReconfiguredEgo)
 
 ARMS = {
-    "RQ1": lambda persona, change: ("naive_alone", f"naive_vs_{persona}"),
-    "RQ2": lambda persona, change: (f"naive_vs_{persona}", f"{change.made}_vs_{persona}"),
+    "RQ1": lambda persona, change: (NAIVE_ALONE.name, against_persona(NaiveEgo(), persona).name),
+    "RQ2": lambda persona, change: (
+        against_persona(NaiveEgo(), persona).name,
+        against_persona(change.ego(against=persona), persona).name,
+    ),
 }
-"""Baseline and treatment of each question, of a persona and what round 2 does."""
+"""Baseline and treatment of each question, by the persona and by what round 2 does."""

@@ -1,13 +1,13 @@
-// What moves on the road: cars as oriented boxes with their heading, their trails, lapses and contacts.
+// The moving parts of the road: cars as oriented boxes with heading, trails, lapses and contacts.
 
 const COLOURS = { ego: "ego", non_ego: "non-ego" };
 const TRAIL_S = 4, GHOSTS_S = 1, BURST_S = 0.35;
 
-/** A game at a time: trails under others under players under what has happened to them. */
+/** Draw a game at a time, from bottom to top: trails, background traffic, players, contacts. */
 function drawGame(context, camera, ratio, game, time, labels) {
   camera.inMetres(context, ratio, () => {
     for (const track of game.players) drawTrail(context, camera, game, track, time);
-    for (const track of game.others) {
+    for (const track of game.background) {
       const pose = poseAt(game, track, time);
       if (pose) drawBody(context, camera, track, pose, { colour: palette.other });
     }
@@ -22,7 +22,7 @@ function drawGame(context, camera, ratio, game, time, labels) {
   if (labels) drawLabels(context, camera, game, time);
 }
 
-/** How a player's car looks: brake lights, front wheels, a wreck, a lapse. */
+/** The look of a player's car: brake lights, front wheels, a contact, a lapse. */
 function lookOf(game, track, step, time) {
   const hit = ["collision", "rail"].includes(track.outcome) && time >= track.ended * game.step - 1e-6;
   return {
@@ -30,7 +30,7 @@ function lookOf(game, track, step, time) {
     brakes: track.acceleration[step] < -0.5,
     wheels: track.steering[step],
     lapsed: track.lapsed[step] > 0,
-    wrecked: hit,
+    touched: hit,
   };
 }
 
@@ -66,8 +66,8 @@ function drawBody(context, camera, track, pose, look) {
   context.fillStyle = look.colour;
   context.fill();
   context.lineWidth = Math.max(0.07, thin);
-  context.strokeStyle = look.wrecked ? palette.contact : "#0009";
-  if (look.wrecked) context.lineWidth = Math.max(0.2, 2 * thin);
+  context.strokeStyle = look.touched ? palette.contact : "#0009";
+  if (look.touched) context.lineWidth = Math.max(0.2, 2 * thin);
   context.stroke();
   if (fine && length > 3) drawGlass(context, length, width);
   drawHeading(context, length, width);
@@ -100,7 +100,7 @@ function drawHeading(context, length, width) {
   context.fill();
 }
 
-/** The way that a player has come: a line, thick where attention lapsed, and where it was each second before. */
+/** The last seconds of a player's path: a line, thick in lapses of attention, and outlines each second. */
 function drawTrail(context, camera, game, track, time) {
   const now = Math.min(Math.floor(time / game.step + 1e-6) - track.first, track.count - 1);
   const from = Math.max(0, Math.floor(now - TRAIL_S / game.step)), thin = 1 / camera.scale;
@@ -139,7 +139,7 @@ function drawTrail(context, camera, game, track, time) {
   context.globalAlpha = 1;
 }
 
-/** A contact: a star that flares up and stays. */
+/** A contact: a star that starts large and stays. */
 function drawBurst(context, camera, touch, since) {
   const grown = stillMotion.matches ? 1 : 1 + 0.6 * Math.max(0, 1 - since / BURST_S);
   const far = Math.max(2.1, 15 / camera.scale) * grown, near = Math.max(1.3, 9 / camera.scale) * grown;
@@ -154,7 +154,7 @@ function drawBurst(context, camera, touch, since) {
   context.stroke();
 }
 
-/** Names beside the players' cars: above the one that is further up, below the other. */
+/** Names beside the players' cars: above the upper car, below the other. */
 function drawLabels(context, camera, game, time) {
   const poses = game.players.map(track => ({ track, pose: poseAt(game, track, time) })).filter(each => each.pose);
   poses.sort((a, b) => b.pose.y - a.pose.y);

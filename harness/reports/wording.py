@@ -1,40 +1,48 @@
-"""Numbers as words: the answers to RQ1 and RQ2, taken from rows of `comparisons` and `summary` alone.
+"""The answers to RQ1 and RQ2 as sentences, taken from rows of `comparisons` and `summary` alone.
 
-A label says "yes" only for `Verdict.SIGNIFICANT`. Everything else says what is missing for a yes.
+A label says "yes" only for `Verdict.SIGNIFICANT`. Every other label says what is missing for a yes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from harness.evaluation.comparison import Verdict
+from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, p_text, trimmed
 from harness.reports.treatment import ARMS, RETRAINED, Change
 
 Row = Mapping[Any, Any]
-Number = Callable[[float], str]
 Tone = Literal["harm", "mended", "open"]
-"""RQ1 yes, in any seed: the persona hurts the ego. RQ2 yes, in all: retraining mends it. All else is open."""
+"""harm: RQ1 is yes in any seed; mended: RQ2 is yes in all seeds; open: everything else."""
 
-NO_SPACE = "\N{NO-BREAK SPACE}"
-MINUS = "\N{MINUS SIGN}"
 TONE_OF_YES: dict[str, Tone] = {"RQ1": "harm", "RQ2": "mended"}
-
+QUESTIONS = {
+    "RQ1": "Does the persona make the ego fail?",
+    "RQ2": "Does {doing} reduce the failures?",
+}
+NOT_ASKED, NOT_ANSWERED = "not asked", "not answered"
 LABELS = {
     Verdict.SIGNIFICANT: "yes",
     Verdict.BEFORE_HOLM_ONLY: "only before Holm's correction",
     Verdict.NOT_SIGNIFICANT: "not shown",
     Verdict.NO_DIFFERENCE: "no difference",
     Verdict.ALL_EQUAL: "no t statistic",
-    Verdict.NOT_ENOUGH_PAIRS: "not answered",
+    Verdict.NOT_ENOUGH_PAIRS: NOT_ANSWERED,
 }
+NO_ROUND_2 = "Round 2 was not played: this ego has nothing to train or to tune."
+NOT_COMPARED = "Not compared."
+FAILURES_NOT_COMPARED = "The failures were not compared."
+BEFORE_HOLM_ONLY = "without correction, but not after Holm's correction"
+NO_DIFFERENCE = "In each of the {pairs} pairs both games have the same result, so there is nothing to test."
+NO_T_STATISTIC = "all {pairs} pairs have the same difference, so there is no t statistic"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Answer:
-    """One research question, of one persona and training seed, answered by its failures."""
+    """One research question about one persona and training seed, answered by its failures."""
 
     seed: int
     yes: bool
@@ -42,12 +50,12 @@ class Answer:
     tone: Tone
     sentence: str
     speed: str
-    """What average speed says to the same question; empty when there is no such row."""
+    """The answer of average speed to the same question; empty when there is no such row."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Conclusion:
-    """One research question of one persona: the headline, and each seed's answer when there are several."""
+    """One research question about one persona: the headline, and each seed's answer when there are several."""
 
     question: str
     label: str
@@ -56,10 +64,23 @@ class Conclusion:
     speed: str
     per_seed: Sequence[Answer]
 
+    @classmethod
+    def of_one(cls, question: str, answer: Answer) -> Conclusion:
+        """The headline where there is one answer only."""
+        return cls(
+            question=question,
+            label=answer.label,
+            tone=answer.tone,
+            sentence=answer.sentence,
+            speed=answer.speed,
+            per_seed=(),
+        )
+
 
 def verdicts(
     question: str,
     persona: str,
+    *,
     seeds: Sequence[int],
     rows: Sequence[Row],
     arms: Mapping[tuple[str, int], Row],
@@ -68,32 +89,35 @@ def verdicts(
 ) -> Conclusion:
     """Answer `question` for the training seeds it is asked of, by `rows`: its comparisons of this persona.
 
-    `arms` are the rows of `summary` by arm and seed, `change` what round 2 does. A seed without rows is not answered yet.
+    `arms` are the rows of `summary` by arm and seed, `change` is the treatment of round 2. A seed without rows is not
+    answered yet.
     """
     answers = [
         _answer(question, persona, seed, [row for row in rows if row["seed"] == seed], arms, significance, change)
         for seed in seeds
     ]
     if not answers:
-        what = "Round 2 was not played: there is nothing to train or to tune in this ego."
-        what = what if question == "RQ2" else "Not compared."
-        return Conclusion(question, "not asked", "open", what, "", ())
-    if len(answers) == 1:
-        (only,) = answers
-        return Conclusion(question, only.label, only.tone, only.sentence, only.speed, ())
-    yes, several = sum(answer.yes for answer in answers), len(answers)
-    if question == "RQ1":
-        finding = f"the {persona} driver makes the naive ego fail significantly more often than it does alone"
-    else:
-        finding = f"{change.doing} makes the ego fail significantly less often against the {persona} driver"
-    label = f"yes in {yes} of {several} seeds" if yes else f"not shown in any of {several} seeds"
+        sentence = NO_ROUND_2 if question == "RQ2" else NOT_COMPARED
+        return Conclusion(question=question, label=NOT_ASKED, tone="open", sentence=sentence, speed="", per_seed=())
+    return (
+        Conclusion.of_one(question, answers[0]) if len(answers) == 1 else _of_seeds(question, persona, answers, change)
+    )
+
+
+def _of_seeds(question: str, persona: str, answers: Sequence[Answer], change: Change) -> Conclusion:
+    yes, seeds = sum(answer.yes for answer in answers), len(answers)
+    finding = {
+        "RQ1": f"the {persona} driver makes the naive ego fail significantly more often than it does alone",
+        "RQ2": f"{change.doing} makes the ego fail significantly less often against the {persona} driver",
+    }[question]
+    label = f"yes in {yes} of {seeds} seeds" if yes else f"not shown in any of {seeds} seeds"
     return Conclusion(
-        question,
-        "not answered" if all(answer.label == "not answered" for answer in answers) else label,
-        TONE_OF_YES[question] if yes == several or (yes and question == "RQ1") else "open",
-        f"In {yes} of {several} training seeds {finding} (after Holm's correction).",
-        "",
-        answers,
+        question=question,
+        label=NOT_ANSWERED if all(answer.label == NOT_ANSWERED for answer in answers) else label,
+        tone=TONE_OF_YES[question] if yes == seeds or (yes and question == "RQ1") else "open",
+        sentence=f"In {yes} of {seeds} training seeds {finding} (after Holm's correction).",
+        speed="",
+        per_seed=answers,
     )
 
 
@@ -109,56 +133,65 @@ def _answer(
     by_metric = {row["metric"]: row for row in rows}
     before_arm, after_arm = ARMS[question](persona, change)
     before, after = arms.get((before_arm, seed)), arms.get((after_arm, seed))
-    missing = [arm for arm, row in ((before_arm, before), (after_arm, after)) if played(row) == 0]
-    failure = by_metric.get("failure")
-    if missing or failure is None or before is None or after is None:
-        lacking = "The failures were not compared"
-        if missing:
-            lacking = f"The arm {missing[0]} was" if len(missing) == 1 else f"The arms {' and '.join(missing)} were"
-            lacking += " not played"
-        return Answer(seed, False, "not answered", "open", f"{lacking}.", "")
+    unplayed = [arm for arm, row in ((before_arm, before), (after_arm, after)) if played(row) == 0]
+    failure, speed = by_metric.get("failure"), by_metric.get("mean_speed")
+    if unplayed or failure is None or before is None or after is None:
+        sentence = arms_not_played(unplayed) if unplayed else FAILURES_NOT_COMPARED
+        return Answer(seed=seed, yes=False, label=NOT_ANSWERED, tone="open", sentence=sentence, speed="")
     verdict = Verdict(failure["verdict"])
     sentence = _failure_sentence(question, persona, verdict, failure, before, after, change)
     if verdict is Verdict.ALL_EQUAL and significance is not None:
-        below = "below" if failure["mcnemar_p"] < significance else "not below"
-        sentence += f" That is {below} the campaign's significance of {significance:g} (no correction applied)."
-    speed = by_metric.get("mean_speed")
-    beside = ""
+        sentence += _beside_significance(failure["mcnemar_p"], significance)
+    speed_sentence = ""
     if speed is not None:
-        beside = _speed_sentence(Verdict(speed["verdict"]), speed, before, after)
+        speed_sentence = _speed_sentence(Verdict(speed["verdict"]), speed, before, after)
         if speed["pairs_left_out"] != failure["pairs_left_out"]:
-            beside += left_out(speed)
+            speed_sentence += left_out(speed)
     yes = verdict is Verdict.SIGNIFICANT
-    tone: Tone = TONE_OF_YES[question] if yes else "open"
-    return Answer(seed, yes, LABELS[verdict], tone, sentence + left_out(failure), beside)
+    return Answer(
+        seed=seed,
+        yes=yes,
+        label=LABELS[verdict],
+        tone=TONE_OF_YES[question] if yes else "open",
+        sentence=sentence + left_out(failure),
+        speed=speed_sentence,
+    )
 
 
-def _failure_sentence(question: str, persona: str, verdict: Verdict, row: Row, before: Row, after: Row, change: Change) -> str:
-    was, now = failures_of(before), failures_of(after)
-    ps = p_values(row)
+def arms_not_played(arms: Sequence[str]) -> str:
+    """Which arms of a question are missing."""
+    if len(arms) == 1:
+        return f"The arm {arms[0]} was not played."
+    return f"The arms {' and '.join(arms)} were not played."
+
+
+def _beside_significance(p: float, significance: float) -> str:
+    below = "below" if p < significance else "not below"
+    return f" This is {below} the campaign's significance of {significance:g} (without correction)."
+
+
+def _failure_sentence(
+    question: str, persona: str, verdict: Verdict, row: Row, before: Row, after: Row, change: Change
+) -> str:
+    was, now, tests, pairs = failures_of(before), failures_of(after), p_values(row), row["pairs"]
     if question == "RQ1":
         claim = f"The {persona} driver makes the naive ego fail in {now} games instead of {was}"
-        plain = f"The naive ego fails in {now} games against the {persona} driver and in {was} alone"
+        counts = f"The naive ego fails in {now} games against the {persona} driver and in {was} alone"
         direction = "more often"
     else:
-        claim = f"{change.doing.capitalize()} brings the ego's failures against the {persona} driver down to {now} games from {was}"
-        plain = f"Against the {persona} driver the {change.made} ego fails in {now} games, the naive ego in {was}"
+        claim = f"{change.doing.capitalize()} reduces the ego's failures against the {persona} driver "
+        claim += f"from {was} games to {now}"
+        counts = f"Against the {persona} driver the {change.made} ego fails in {now} games, the naive ego in {was}"
         direction = "less often"
-    pairs = row["pairs"]
     return {
-        Verdict.SIGNIFICANT: f"{claim} ({ps}).",
-        Verdict.BEFORE_HOLM_ONLY: (
-            f"{plain}: significantly {direction} by itself, but not after Holm's correction ({ps})."
-        ),
-        Verdict.NOT_SIGNIFICANT: f"{plain}: not significantly {direction} ({ps}).",
-        Verdict.NO_DIFFERENCE: (
-            f"{plain}. In each of the {pairs} pairs both games ended alike, so there is nothing to test."
-        ),
+        Verdict.SIGNIFICANT: f"{claim} ({tests}).",
+        Verdict.BEFORE_HOLM_ONLY: f"{counts}: significantly {direction} {BEFORE_HOLM_ONLY} ({tests}).",
+        Verdict.NOT_SIGNIFICANT: f"{counts}: not significantly {direction} ({tests}).",
+        Verdict.NO_DIFFERENCE: f"{counts}. {NO_DIFFERENCE.format(pairs=pairs)}",
         Verdict.ALL_EQUAL: (
-            f"{plain}. All {pairs} pairs differ alike, so the t-test does not exist; McNemar's exact test, "
-            f"which does, gives {p_text(row['mcnemar_p'])}."
+            f"{counts}; {NO_T_STATISTIC.format(pairs=pairs)}. McNemar's exact test gives {p_text(row['mcnemar_p'])}."
         ),
-        Verdict.NOT_ENOUGH_PAIRS: f"{plain}, {_too_few(pairs)}.",
+        Verdict.NOT_ENOUGH_PAIRS: f"{counts}, {too_few(pairs)}.",
     }[verdict]
 
 
@@ -166,24 +199,23 @@ def _speed_sentence(verdict: Verdict, row: Row, before: Row, after: Row) -> str:
     was, now = (number(arm["mean_speed_mps"], 1) for arm in (before, after))
     if was == now:
         was, now = (number(arm["mean_speed_mps"], 3) for arm in (before, after))
-    speeds = f"Average speed: {now}{NO_SPACE}m/s instead of {was}{NO_SPACE}m/s"
-    slower = row["question"] == "RQ1"
-    direction = "slower" if slower else "faster"
-    ps, pairs = p_values(row), row["pairs"]
-    words = {
-        Verdict.SIGNIFICANT: f"significantly {direction} ({ps})",
-        Verdict.BEFORE_HOLM_ONLY: (f"significantly {direction} by itself, but not after Holm's correction ({ps})"),
-        Verdict.NOT_SIGNIFICANT: f"not significantly {direction} ({ps})",
+    direction = "slower" if row["question"] == "RQ1" else "faster"
+    tests, pairs = p_values(row), row["pairs"]
+    finding = {
+        Verdict.SIGNIFICANT: f"significantly {direction} ({tests})",
+        Verdict.BEFORE_HOLM_ONLY: f"significantly {direction} {BEFORE_HOLM_ONLY} ({tests})",
+        Verdict.NOT_SIGNIFICANT: f"not significantly {direction} ({tests})",
         Verdict.NO_DIFFERENCE: f"equal in each of the {pairs} pairs",
-        Verdict.ALL_EQUAL: f"all {pairs} pairs differ alike, so the t-test does not exist",
-        Verdict.NOT_ENOUGH_PAIRS: _too_few(pairs),
-    }
-    return f"{speeds}: {words[verdict]}."
+        Verdict.ALL_EQUAL: NO_T_STATISTIC.format(pairs=pairs),
+        Verdict.NOT_ENOUGH_PAIRS: too_few(pairs),
+    }[verdict]
+    return f"Average speed: {now}{NO_SPACE}m/s instead of {was}{NO_SPACE}m/s: {finding}."
 
 
-def _too_few(pairs: int) -> str:
-    some = {0: "no pair of games", 1: "only one pair of games"}.get(pairs, f"only {pairs} pairs of games")
-    return f"but {some} could be compared: too few for a test"
+def too_few(pairs: int) -> str:
+    """Why there is no test of so few pairs."""
+    count = {0: "no pair of games", 1: "only one pair of games"}.get(pairs, f"only {pairs} pairs of games")
+    return f"but {count} could be compared: too few for a test"
 
 
 def left_out(row: Row) -> str:
@@ -191,15 +223,14 @@ def left_out(row: Row) -> str:
     out = row["pairs_left_out"]
     if not out:
         return ""
-    are = "is" if out == 1 else "are"
-    return f" {out} of {out + row['pairs']} pairs {are} left out: not played or not measured."
+    return f" {out} of {out + row['pairs']} pairs {'is' if out == 1 else 'are'} left out: not played or not measured."
 
 
 def effect(row: Row) -> str:
-    """The mean difference and its interval in words that hold for its sign, e.g. "25 points more failures"."""
+    """The mean difference and its interval, worded by its sign, e.g. "25 points more failures"."""
     mean, low, high = row["mean_difference"], row["ci_low"], row["ci_high"]
     if not math.isfinite(mean):
-        return "–"
+        return MISSING
     failure = row["metric"] == "failure"
     scale, digits, unit = (100, 1, " points") if failure else (1, 2, f"{NO_SPACE}m/s")
     more_is_h1 = (row["question"] == "RQ1") == failure  # RQ1: fails more, drives slower; RQ2: the reverse
@@ -211,36 +242,16 @@ def effect(row: Row) -> str:
     if mean == 0:
         text = "none"
     if math.isfinite(low):
-        text += f" (95{NO_SPACE}%: {trimmed(low * scale, digits)} to {trimmed(high * scale, digits)})"
+        text += f" ({SURE}: {trimmed(low * scale, digits)} to {trimmed(high * scale, digits)})"
     return text
 
 
 def p_values(row: Row) -> str:
-    """The test's p-value, and what Holm's correction makes of it."""
+    """The test's p-value without and with Holm's correction."""
     p, corrected = p_text(row["p_value"]), p_text(row["p_holm"])
     if not math.isfinite(row["p_holm"]) or row["p_holm"] == row["p_value"]:
         return p
-    if corrected == p:
-        return f"{p}, also after Holm's correction"
-    return f"{p}; {corrected} after Holm's correction"
-
-
-def p_text(p: float) -> str:
-    """A p-value with its sign, never rounded to 0 or 1."""
-    if not math.isfinite(p):
-        return "no p-value"
-    return f"p{NO_SPACE}{p_number(p) if p_number(p)[0] in '<>' else f'={NO_SPACE}{p_number(p)}'}"
-
-
-def p_number(p: float) -> str:
-    """A p-value to three digits; "< 0.0001" and "> 0.999" at the ends."""
-    if not math.isfinite(p):
-        return "–"
-    if p < 0.0001:
-        return f"<{NO_SPACE}0.0001"
-    if 0.999 < p < 1:
-        return f">{NO_SPACE}0.999"
-    return f"{p:.4f}".rstrip("0") if p < 0.001 else f"{p:.3g}"
+    return f"{p}, also after Holm's correction" if corrected == p else f"{p}; {corrected} after Holm's correction"
 
 
 def played(row: Row | None) -> int:
@@ -254,33 +265,5 @@ def failures_of(row: Row) -> str:
 
 
 def failures(row: Row) -> int:
-    """How many of the arm's games the ego failed."""
+    """How many games of the arm the ego failed."""
     return int(row["collisions"] + row["rails"] + row["timeouts"])
-
-
-def percent(share: float) -> str:
-    """A share as per cent, with a decimal where it has one."""
-    return f"{trimmed(share * 100, 1)}{NO_SPACE}%" if math.isfinite(share) else "–"
-
-
-def interval(low: float, high: float) -> str:
-    """Two shares as per cent, e.g. "16.9–34.7 %"."""
-    if not (math.isfinite(low) and math.isfinite(high)):
-        return "–"
-    return f"{trimmed(low * 100, 1)}–{trimmed(high * 100, 1)}{NO_SPACE}%"
-
-
-def number(value: float, digits: int) -> str:
-    """A number with a minus that is one; "–" when it can't be measured."""
-    if not math.isfinite(value):
-        return "–"
-    text = f"{value:,.{digits}f}"
-    if not text.strip("-0.,"):  # no negative zero
-        text = text.lstrip("-")
-    return text.replace("-", MINUS)
-
-
-def trimmed(value: float, digits: int) -> str:
-    """The same without zeros at the end of a fraction."""
-    text = number(value, digits)
-    return text.rstrip("0").rstrip(".") if "." in text else text

@@ -1,1 +1,1 @@
-"""SUMO, and the only place that imports it."""
+"""The SUMO simulation and its files. Only this package imports SUMO."""

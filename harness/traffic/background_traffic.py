@@ -1,7 +1,7 @@
-"""The road users that SUMO drives beside the players: when they depart, where they are, when they have arrived.
+"""Background traffic: departures, motion and arrivals of the vehicles that SUMO drives beside the players.
 
-To ask libsumo for a vehicle's motion costs up to half of what it costs SUMO to move it. So an other that is far from
-every player is looked up again only when it may have come near, at the fastest that it and the players can go.
+Reading a vehicle's motion from libsumo costs up to half of SUMO's own work on it. A vehicle that is far from every
+player is therefore read again only when it may have come near, at the top speeds of vehicle and players.
 """
 
 from __future__ import annotations
@@ -12,36 +12,36 @@ from typing import Any
 
 import libsumo
 import numpy as np
-from libsumo import _libsumo  # its functions without the Python function around each: for what is called most
+from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
 
 from harness.errors import SimulationError
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.neighbours import by_game, who_is_near
+from harness.game.neighbours import near_players, rows_by_game
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.route_file import Departure
 from harness.traffic.simulation import Reading
 
 _LONGEST_WAIT = 50  # steps
 _NEVER = -1
-_ROOM = 8  # others in a game that there is room for at first
+_ROOM = 8  # initial number of vehicles per game
 
 
 class _Table:
-    """What is known of every other, [G, N]: a row for each game, in it a place for each vehicle that departed in it."""
+    """The background vehicles of all games, [G, N]: a row for each game, a place for each vehicle that departed."""
 
     def __init__(self, games: int) -> None:
         shape = (games, _ROOM)
-        self.count = [0] * games  # places that are taken
-        self.due = np.full(shape, _NEVER)  # the step to look it up in; never: not in the traffic, or no more
-        self.known = np.empty(shape, dtype=object)  # its name in SUMO
-        self.name = np.empty(shape, dtype=object)
+        self.count = [0] * games  # places taken
+        self.due = np.full(shape, _NEVER)  # the step in which to read it; _NEVER while it is not in the traffic
+        self.sumo_name = np.empty(shape, dtype=object)
+        self.name = np.empty(shape, dtype=object)  # without the prefix of the tile
         self.kind = np.empty(shape, dtype=object)
         self.length_m = np.zeros(shape)
         self.width_m = np.zeros(shape)
         self.max_speed_mps = np.zeros(shape)
 
     def add(self, game: int, **values: Any) -> int:
-        """The place of one more vehicle in a game, which is not to be looked up yet."""
+        """Add a vehicle that is not in the traffic yet to a game. Returns its place."""
         place = self.count[game]
         if place == self.due.shape[1]:
             self._grow()
@@ -52,12 +52,12 @@ class _Table:
         return place
 
     def clear(self, game: int) -> None:
-        """Forget all vehicles of a game."""
+        """Remove all vehicles of a game."""
         self.count[game] = 0
         self.due[game] = _NEVER
 
     def _grow(self) -> None:
-        """Twice the room, in whose second half nobody is due."""
+        """Double the number of places; the new ones are empty."""
         for column, values in vars(self).items():
             if column != "count":
                 setattr(self, column, np.concatenate((values, values), axis=1))
@@ -65,69 +65,70 @@ class _Table:
 
 
 class BackgroundTraffic:
-    """All others of all games. `enter` starts one in SUMO under a name."""
+    """The background traffic of all games. `insert` adds a vehicle of a game to SUMO under a name."""
 
     def __init__(
         self,
+        *,
         prefixes: Sequence[str],
         offsets_m: FloatArray,
         step_s: float,
         fastest_player_mps: float,
         recorded: bool,
-        enter: Callable[[int, str, Departure], None],
+        insert: Callable[[int, str, Departure], None],
     ) -> None:
         self._prefixes, self._offsets_m, self._step_s = prefixes, offsets_m, step_s
-        self._fastest_player_mps, self._recorded, self._enter = fastest_player_mps, recorded, enter
+        self._fastest_player_mps, self._recorded, self._insert = fastest_player_mps, recorded, insert
         self._step = 0
-        self._began = [0] * len(prefixes)
-        self._waiting: dict[int, list[Departure]] = {}  # by game, the next one last
-        self._there: dict[str, tuple[int, int]] = {}  # the rows and places of all in the traffic, by name in SUMO
+        self._first_step = [0] * len(prefixes)
+        self._waiting: dict[int, list[Departure]] = {}  # by game, the next departure last
+        self._places: dict[str, tuple[int, int]] = {}  # row and place of each vehicle in SUMO, by its name there
         self._table = _Table(len(prefixes))
-        self._nobody = self._reading(np.zeros(0, dtype=np.int64), np.zeros((4, 0)))
+        self._empty_reading = self._reading(np.zeros(0, dtype=np.int64), np.zeros((4, 0)))
 
     def reset(self, game: int, departures: Sequence[Departure]) -> None:
-        """A game starts anew: take away who is there, and let others depart as time goes by."""
+        """Reset a game: remove its vehicles, and insert the departures of the next game at their times."""
         if self._table.count[game]:
-            for known in self._table.known[game, : self._table.count[game]].tolist():
-                if self._there.pop(known, None) is not None:
-                    libsumo.vehicle.remove(known)
+            for sumo_name in self._table.sumo_name[game, : self._table.count[game]].tolist():
+                if self._places.pop(sumo_name, None) is not None:
+                    libsumo.vehicle.remove(sumo_name)
             self._table.clear(game)
-        self._began[game] = self._step
+        self._first_step[game] = self._step
         self._waiting.pop(game, None)
         if departures:
             self._waiting[game] = list(reversed(departures))
             self._depart(game)
 
     def advance(self) -> None:
-        """SUMO has made a step: see who arrived and who has come, and start who is due."""
+        """Process a step of SUMO: arrivals, vehicles that entered the traffic, and departures that are due."""
         self._step += 1
         due = self._table.due
         for name in libsumo.simulation.getArrivedIDList():
-            place = self._there.pop(name, None)
+            place = self._places.pop(name, None)
             if place is None:
-                raise SimulationError(f"SUMO took player {name!r} out of the game")
+                raise SimulationError(f"SUMO removed player {name!r} from the traffic")
             due[place] = _NEVER
-        if self._there:
+        if self._places:
             for name in libsumo.simulation.getDepartedIDList():
-                if name in self._there:
-                    due[self._there[name]] = self._step
+                if name in self._places:
+                    due[self._places[name]] = self._step
         for game in list(self._waiting):
             self._depart(game)
 
-    def read(self, players_x_m: FloatArray, players_y_m: FloatArray, players_there: BoolArray) -> Reading:
-        """Who is near the players [G, P] that are there, or everyone if games are recorded."""
-        if not self._there:
-            return self._nobody
+    def read(self, players_x_m: FloatArray, players_y_m: FloatArray, players_present: BoolArray) -> Reading:
+        """The vehicles near the players [G, P] that are present, or all vehicles if games are recorded."""
+        if not self._places:
+            return self._empty_reading
         table = self._table
-        due = np.flatnonzero(table.due == self._step)  # by game, and in a game as they departed
+        due = np.flatnonzero(table.due == self._step)  # by game, then by departure
         if not len(due):
-            return self._nobody
-        names = table.known.ravel()[due].tolist()
+            return self._empty_reading
+        names = table.sumo_name.ravel()[due].tolist()
         fronts = np.fromiter(chain.from_iterable(map(_libsumo.vehicle_getPosition, names)), float, 2 * len(due))
         fronts = fronts.reshape(-1, 2)
-        near = who_is_near(
+        near = near_players(
             *(due, fronts, table.due, table.length_m, table.max_speed_mps, self._offsets_m),
-            *(players_x_m, players_y_m, players_there, self._fastest_player_mps),
+            *(players_x_m, players_y_m, players_present, self._fastest_player_mps),
             *(self._step, self._step_s, 1 if self._recorded else _LONGEST_WAIT, self._recorded),
         )
         names = [names[k] for k in near.tolist()]
@@ -138,34 +139,34 @@ class BackgroundTraffic:
         return self._reading(due[near], motion)
 
     def _depart(self, game: int) -> None:
-        now = (self._step - self._began[game]) * self._step_s + 1e-9
+        now = (self._step - self._first_step[game]) * self._step_s + 1e-9
         waiting = self._waiting[game]
         while waiting and waiting[-1].depart_s <= now:
             departure = waiting.pop()
-            known, vehicle = self._prefixes[game] + departure.name, libsumo.vehicle
-            self._enter(game, known, departure)
+            sumo_name, vehicle = self._prefixes[game] + departure.name, libsumo.vehicle
+            self._insert(game, sumo_name, departure)
             place = self._table.add(
                 game,
-                known=known,
+                sumo_name=sumo_name,
                 name=departure.name,
-                kind=vehicle.getTypeID(known),
-                length_m=vehicle.getLength(known),
-                width_m=vehicle.getWidth(known),
-                max_speed_mps=vehicle.getMaxSpeed(known),
+                kind=vehicle.getTypeID(sumo_name),
+                length_m=vehicle.getLength(sumo_name),
+                width_m=vehicle.getWidth(sumo_name),
+                max_speed_mps=vehicle.getMaxSpeed(sumo_name),
             )
-            self._there[known] = (game, place)
+            self._places[sumo_name] = (game, place)
         if not waiting:
             del self._waiting[game]
 
-    def _reading(self, found: IntArray, motion: FloatArray) -> Reading:
-        """Of those found [n], by their places in the table: front x and y, SUMO's angle, and speed, [4, n]."""
+    def _reading(self, places: IntArray, motion: FloatArray) -> Reading:
+        """The reading of vehicles at flat places [n] of the table; motion [4, n] is front x, y, SUMO's angle, speed."""
         table, (front_x, front_y, angle, speed) = self._table, motion
-        length, width, heading = table.length_m.ravel()[found], table.width_m.ravel()[found], heading_rad_of(angle)
+        length, width, heading = table.length_m.ravel()[places], table.width_m.ravel()[places], heading_rad_of(angle)
         x = front_x - 0.5 * length * np.cos(heading)
         y = front_y - 0.5 * length * np.sin(heading)
         games, room = len(self._prefixes), table.due.shape[1]
-        columns, present = by_game(found // room, games, np.stack((x, y, heading, speed, length, width)))
+        columns, present = rows_by_game(places // room, games, np.stack((x, y, heading, speed, length, width)))
         names, types = (np.full(present.shape, None, dtype=object) for _ in range(2))
-        names[present], types[present] = table.name.ravel()[found], table.kind.ravel()[found]
+        names[present], types[present] = table.name.ravel()[places], table.kind.ravel()[places]
         x_m, y_m, heading_rad, speed_mps, length_m, width_m = columns
         return Reading(names, types, x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)

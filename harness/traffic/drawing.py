@@ -1,4 +1,4 @@
-"""What is drawn of a net: the surface of the road, the marks between its lanes, and the goal."""
+"""Shapes for drawings of a net: the road surface, the marks between lanes, and the goal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from harness.traffic.scene import OpenScene
 
 
 def surfaces(net: Net) -> list[list[FloatArray]]:
-    """The drivable area as polygons, each its outline and its holes as rings [n, 2]."""
+    """The drivable area as polygons. Each polygon is a list of rings [n, 2]: its outline, then its holes."""
     area = drivable_area(net)
     polygons = [part for part in getattr(area, "geoms", [area]) if part.geom_type == "Polygon"]
     return [[np.asarray(ring.coords) for ring in (part.exterior, *part.interiors)] for part in polygons]
@@ -36,7 +36,7 @@ def goal_line(scene: OpenScene, net: Net) -> list[FloatArray]:
     for lane in car_lanes(net.getEdge(scene.document.goal.edge)):
         line = shapely.LineString(lane_line(lane))
         place = min(scene.document.goal.position_m / lane.getLength(), 1.0) * line.length
-        here, before = (np.array(line.interpolate(at).coords[0]) for at in (place, max(place - 0.5, 0.0)))
+        here, before = (np.array(line.interpolate(each).coords[0]) for each in (place, max(place - 0.5, 0.0)))
         after = np.array(line.interpolate(place + 0.5).coords[0])
         along = (after - before) / max(float(np.hypot(*(after - before))), 1e-9)
         across = 0.5 * lane.getWidth() * np.array([-along[1], along[0]])

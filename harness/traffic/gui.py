@@ -1,7 +1,7 @@
-"""SUMO-GUI steered from here by TraCI: it plays a replay folder, follows a vehicle, takes pictures.
+"""Control of SUMO-GUI by TraCI: it plays a replay folder, follows a vehicle, takes screenshots.
 
-While a client that doesn't step keeps the connection, SUMO-GUI can't be closed by its user (1.28): so nothing here
-waits between steps. SUMO-GUI itself waits, as long as its delay says, at breakpoints, and when its user halts it.
+The user can't close SUMO-GUI 1.28 while a connected client does not step. This module therefore never waits between
+steps. SUMO-GUI itself waits for its delay, at breakpoints, and when its user pauses it.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from traci.exceptions import FatalTraCIError, TraCIException
 from harness.errors import SimulationError
 
 _CONNECTS_WITHIN_S = 60.0
-_TRIES_EVERY_S = 0.1
+_RETRIES_EVERY_S = 0.1
 _ANSWERS_WITHIN_S = 60.0
 _ENDS_WITHIN_S = 10.0
 
@@ -32,11 +32,11 @@ class WindowClosed(SimulationError):
 
 
 class GuiWindow:
-    """A SUMO-GUI that waits for steps."""
+    """A running SUMO-GUI that waits for steps."""
 
     def __init__(self, connection: Any, process: subprocess.Popen[bytes], patient: bool) -> None:
         self._connection, self.process = connection, process
-        # traci has no word for it: without, a SUMO-GUI that shows what is wrong in a dialogue is waited for for ever
+        # traci has no option for a timeout; a SUMO-GUI that shows an error dialogue never answers
         connection._socket.settimeout(_ANSWERS_WITHIN_S)
         with self._open():
             self._view = connection.gui.getIDList()[0]
@@ -44,22 +44,22 @@ class GuiWindow:
             connection._socket.settimeout(None)
 
     def step(self) -> None:
-        """Let it play a step, at its own pace. Raises WindowClosed when it has gone."""
+        """Play one step, at the pace of SUMO-GUI. Raises WindowClosed if SUMO-GUI has ended."""
         with self._open():
             self._connection.simulationStep()
 
     def has(self, vehicle: str) -> bool:
-        """Whether a vehicle is there."""
+        """Whether a vehicle is in the traffic."""
         with self._open():
             return vehicle in self._connection.vehicle.getIDList()
 
     def follow(self, vehicle: str) -> None:
-        """Keep a vehicle that is there in the middle."""
+        """Keep a vehicle of the traffic in the centre of the view."""
         with self._open():
             self._connection.gui.trackVehicle(self._view, vehicle)
 
     def look_at(self, x_m: float, y_m: float, width_m: float, height_m: float) -> None:
-        """Show a piece of road around a point."""
+        """Show an area around a point."""
         half_width, half_height = 0.5 * width_m, 0.5 * height_m
         with self._open():
             self._connection.gui.setBoundary(
@@ -67,12 +67,12 @@ class GuiWindow:
             )
 
     def photograph_next(self, file: Path, size_px: tuple[int, int]) -> None:
-        """Take a picture of what the next step shows; it is there when that step is done."""
+        """Take a screenshot of the next step. The file exists after that step."""
         with self._open():
             self._connection.gui.screenshot(self._view, str(file), *size_px)
 
     def release(self) -> None:
-        """End the simulation; the window stays, as long as its user wants."""
+        """End the simulation. The window stays open until its user closes it."""
         with contextlib.suppress(TraCIException, FatalTraCIError, OSError):
             self._connection.close(wait=False)
 
@@ -88,24 +88,24 @@ class GuiWindow:
 def steered_gui(
     program: Path, options: list[str], environment: Mapping[str, str], patient: bool = True
 ) -> Iterator[GuiWindow]:
-    """Start SUMO-GUI with these options and steer it; it is ended when the block is left.
+    """Start SUMO-GUI with options, and end it at the end of the block.
 
-    `patient`: a step may take as long as it likes, for a user may halt it. Raises SimulationError, with what
-    SUMO-GUI said, if it can't start.
+    With `patient`, a step has no time limit, because the user may pause SUMO-GUI. Raises SimulationError, with the
+    output of SUMO-GUI, if it can't start.
     """
     port = getFreeSocketPort()
-    with tempfile.TemporaryDirectory(prefix="harness-gui-") as folder, tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryDirectory(prefix="harness-gui-") as folder, tempfile.TemporaryFile() as output:
         errors = Path(folder) / "errors"
-        more = ["--remote-port", str(port), "--error-log", str(errors)]
-        process = subprocess.Popen([str(program), *options, *more], env=dict(environment), stdout=said, stderr=said)
+        command = [str(program), *options, "--remote-port", str(port), "--error-log", str(errors)]
+        process = subprocess.Popen(command, env=dict(environment), stdout=output, stderr=output)
         try:
             try:
                 window = GuiWindow(_connect(port, process), process, patient)
             except (OSError, WindowClosed) as error:
-                said.seek(0)
+                output.seek(0)
                 logged = errors.read_bytes() if errors.is_file() else b""
-                words = (logged or said.read()).decode(errors="replace").strip() or str(error)
-                raise SimulationError(f"SUMO-GUI can't start: {words}") from None
+                message = (logged or output.read()).decode(errors="replace").strip() or str(error)
+                raise SimulationError(f"SUMO-GUI can't start: {message}") from None
             yield window
         finally:
             end_process(process)
@@ -114,18 +114,18 @@ def steered_gui(
 def _connect(port: int, process: subprocess.Popen[bytes]) -> Any:
     until = time.monotonic() + _CONNECTS_WITHIN_S
     while True:
-        # traci's own retrying prints to the user's terminal
+        # retries by traci print to the user's terminal
         with contextlib.suppress(FatalTraCIError, TraCIException, OSError):
             return traci.connect(port, numRetries=0, proc=process)
         if process.poll() is not None:
             raise OSError(f"it ended with exit code {process.returncode}")
         if time.monotonic() > until:
             raise OSError(f"it did not answer within {_CONNECTS_WITHIN_S:.0f} s")
-        time.sleep(_TRIES_EVERY_S)
+        time.sleep(_RETRIES_EVERY_S)
 
 
 def end_process(process: subprocess.Popen[bytes]) -> None:
-    """End a program, by force if it does not end when asked."""
+    """Terminate a program, and kill it if it does not end in time."""
     process.terminate()
     try:
         process.wait(timeout=_ENDS_WITHIN_S)
@@ -135,6 +135,6 @@ def end_process(process: subprocess.Popen[bytes]) -> None:
 
 
 def gui_environment(home: Path, display: str | None = None) -> dict[str, str]:
-    """The environment for a SUMO-GUI of the SUMO at `home`, on the screen `display` (None: the user's)."""
+    """The environment for the SUMO-GUI of the SUMO at `home`, on the screen `display` (None: the user's)."""
     environment = os.environ | {"SUMO_HOME": str(home)}
     return environment | ({"DISPLAY": display} if display else {})

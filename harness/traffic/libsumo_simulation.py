@@ -1,13 +1,13 @@
-"""The simulation of this process: libsumo, which has room for one.
+"""The SUMO simulation of this process. libsumo allows one per process.
 
-A player that the harness takes over is placed with moveToXY: exactly where the arena says, on the road or off it.
-A player left to SUMO is started here and its state read back. At this border headings become SUMO's compass angles, and
-the reference point moves from the body's centre to the front bumper.
+A player that the harness drives is placed with moveToXY, exactly at the arena's pose, on the road or off it. A player
+that SUMO drives is inserted here, and its state is read back. This module converts headings to SUMO's angles, and the
+reference point from the body's centre to the front bumper.
 
-To take a car out of SUMO's traffic and add it anew costs as much as ten steps of it, and SUMO forgets the route of one
-that is only put back to its start. Where SUMO drives nobody there is nobody to whom that matters: players stay in the
-traffic from game to game, SUMO looks for their lanes along their routes only, and its models of following and changing
-lanes don't think for them (so that SUMO has their poses, but not always their speeds).
+Removing a vehicle from SUMO's traffic and adding it again takes as long as ten of its steps. A vehicle that is only
+moved back to its start loses its route in SUMO. If SUMO drives no vehicle, the lost route has no effect. In this case
+players stay in the traffic from game to game, SUMO looks for their lanes along their routes only, and SUMO's driver
+models are disabled for them. SUMO then has the poses of the players, but not always their speeds.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from pathlib import Path
 
 import libsumo
 import numpy as np
-from libsumo import _libsumo  # its functions without the Python function around each: for what is called most
+from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
@@ -36,44 +36,47 @@ from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
-# How moveToXY places a car: its keepRoute, and how far away it looks for a lane. keepRoute's bit 2: exactly there, on
-# the road or off it; its bit 1: of the lanes near it, only those of its route count.
+# Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
+# exactly, on the road or off it. Its bit 1 limits the search to lanes of the car's route.
 _ON_ANY_LANE = (2, 100.0)  # SUMO's default distance
-_ON_ITS_ROUTE = (2 | 1, 10.0)  # which is all that a car can be on
+_ON_ITS_ROUTE = (2 | 1, 10.0)
 _ANY_EDGE, _ANY_LANE = repeat(""), repeat(-1)
-_HARDLY_EVER_S = 1e6  # an action step, between two thoughts of SUMO's own models for a car
+_NO_ACTIONS_S = 1e6  # an action step longer than any game: disables SUMO's driver model for a car
 _LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
-_ANY_SPEED = 100.0  # a speed factor: SUMO would show the others no speed above the limit times this
+_ANY_SPEED = 100.0  # a speed factor: other vehicles see at most the speed limit times this
 _FAILURES = (libsumo.TraCIException, libsumo.FatalTraCIError)
 
 
-@dataclass
+@dataclass(kw_only=True)
 class _Tile:
-    """One game's corner of the simulation."""
+    """The part of the simulation that belongs to one game."""
 
     prefix: str
     offset_m: float
-    inside: set[int] = field(default_factory=set)  # players that SUMO knows
+    inside: set[int] = field(default_factory=set)  # players in SUMO's traffic
 
 
 class LibsumoSimulation:
-    """The simulation of this process. It is given back by `close`, or when nobody refers to it any more."""
+    """The SUMO simulation of this process. `close`, or the end of this object, releases libsumo."""
 
     @staticmethod
     def in_use() -> bool:
-        """Whether this process's libsumo is taken, by one of us or by the user's own code."""
+        """Whether libsumo is in use in this process, by the harness or by other code."""
         return libsumo.isLoaded()
 
     def __init__(
         self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
     ) -> None:
-        """Load SUMO with a tile for each game. Raises SimulationError if SUMO refuses, or is in use already."""
+        """Load SUMO with a tile for each game. Raises SimulationError if SUMO refuses or is in use.
+
+        The arguments are those of `open_simulation`.
+        """
         if self.in_use():
             raise SimulationError("this process has a libsumo simulation already")
         self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
         self._recorded = recorded
-        self._drives_nobody = all(self._taken_over) and not scene.has_background_traffic
-        self._placing = _ON_ITS_ROUTE if self._drives_nobody else _ON_ANY_LANE
+        self._players_only = all(self._taken_over) and not scene.has_background_traffic  # SUMO drives no vehicle
+        self._move_options = _ON_ITS_ROUTE if self._players_only else _ON_ANY_LANE
         self._half_length = 0.5 * scene.world.length_m
         offset = tile_offset_m(scene.net_file, games)
         self._offsets = offset * np.arange(games)
@@ -81,12 +84,12 @@ class LibsumoSimulation:
         types = Path(folder.name) / "types.rou.xml"
         types.write_text(scene.routes.types_xml, encoding="utf-8")
         document = scene.document
-        # Taken-over cars that leave a junction's lanes may kill SUMO 1.28 (SIGSEGV) if lane changes take time: they
-        # do so only where there is somebody whom SUMO drives.
-        duration_s = 0.0 if self._drives_nobody else document.lane_change_duration_s
+        # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take
+        # time only if SUMO drives a vehicle.
+        duration_s = 0.0 if self._players_only else document.lane_change_duration_s
         lateral = ["--lanechange.duration", str(duration_s)]
-        if self._by_sublanes():
-            lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO takes one of the two options
+        if self._needs_sublanes():
+            lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO accepts one of the two options
         self._options = [
             *("--net-file", str(tiled_net(scene.net_file, games)), "--route-files", str(types)),
             *("--step-length", str(document.step_length_s), "--collision.action", "none"),
@@ -100,8 +103,8 @@ class LibsumoSimulation:
             self.close()
             raise
 
-    def _by_sublanes(self) -> bool:
-        """Whether a player that SUMO drives changes lanes by SL2015, which without sublanes never would."""
+    def _needs_sublanes(self) -> bool:
+        """Whether a player that SUMO drives has the lane-change model SL2015, which requires sublanes."""
         types = self._scene.routes.types
         kinds = [
             types[self._scene.vehicle(player).vehicle_type] for player in np.flatnonzero(~np.array(self._taken_over))
@@ -109,146 +112,176 @@ class LibsumoSimulation:
         return any(kind.lane_changes == "SL2015" for kind in kinds)
 
     def _load(self, options: list[str], load: Callable[[list[str]], object]) -> None:
-        with self._asking(f"load scene {self._scene.document.name!r}"):
+        with self._sumo_call(f"load scene {self._scene.document.name!r}"):
             load(options)
-        self._tiles = [_Tile(tile_prefix(game, self._games), float(self._offsets[game])) for game in range(self._games)]
+        self._tiles = [
+            _Tile(prefix=tile_prefix(game, self._games), offset_m=float(self._offsets[game]))
+            for game in range(self._games)
+        ]
         self._routes: set[str] = set()
-        self._placed: dict[str, int] = {}  # players that stand and go as the arena says; their entry in [G, P]
-        self._self_driven: dict[str, tuple[int, int]] = {}  # the other players; their game and seat
-        self._there = np.zeros((self._games, len(self._taken_over)), dtype=bool)
-        self._entrances = [self._entrance(player) for player in range(len(self._taken_over))]
+        self._placed: dict[str, int] = {}  # players placed by the arena, by name in SUMO: index in a flat [G, P]
+        self._sumo_driven: dict[str, tuple[int, int]] = {}  # players that SUMO drives: game and player
+        self._present = np.zeros((self._games, len(self._taken_over)), dtype=bool)
+        self._insertions = [self._insertion(player) for player in range(len(self._taken_over))]
         world = self._scene.world
-        self._others = BackgroundTraffic(
-            [tile.prefix for tile in self._tiles],
-            self._offsets,
-            world.step_s,
-            float(world.actuators.max_speed_mps.max()),
-            self._recorded,
-            self._enter,
+        self._background = BackgroundTraffic(
+            prefixes=[tile.prefix for tile in self._tiles],
+            offsets_m=self._offsets,
+            step_s=world.step_s,
+            fastest_player_mps=float(world.actuators.max_speed_mps.max()),
+            recorded=self._recorded,
+            insert=self._insert,
         )
 
     def reload(self, seed: int) -> None:
-        """Start SUMO anew, with its random numbers from `seed`: every game has to be started again."""
+        """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._load([*self._options, "--seed", str(seed)], libsumo.load)
 
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
-        """Clear a game's tile and put its players at their start; others depart as time goes by."""
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
         tile = self._tiles[game]
-        with self._asking(f"start game {game}"):
+        with self._sumo_call(f"reset game {game}"):
             taking_part = {player for player, present in enumerate(start.present.tolist()) if present}
-            staying = tile.inside & taking_part if self._drives_nobody else set()
+            staying = tile.inside & taking_part if self._players_only else set()
             for player in tile.inside - staying:
-                self._take_out(game, player)
+                self._remove_vehicle(game, player)
             for player in sorted(taking_part - staying):
                 self._add_player(game, player, start)
-            self._others.reset(game, departures)
+            self._background.reset(game, departures)
 
     def halt(self, game: int, player: int) -> None:
-        """Whoever drove a player, from now on it stands where `step` says."""
+        """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
         if self._taken_over[player]:
             return
         name = self._name(game, player)
-        self._self_driven.pop(name, None)
+        self._sumo_driven.pop(name, None)
         self._placed[name] = game * len(self._taken_over) + player
 
     def remove(self, game: int, player: int) -> None:
-        """Take a player out of the traffic; where there is nobody else it stands there till the next game starts."""
-        if not self._drives_nobody:
-            with self._asking(f"remove a player from game {game}"):
-                self._take_out(game, player)
+        """Remove a player from the traffic. If SUMO drives no vehicle, it stays in place until the next reset."""
+        if not self._players_only:
+            with self._sumo_call(f"remove a player from game {game}"):
+                self._remove_vehicle(game, player)
 
-    def _take_out(self, game: int, player: int) -> None:
+    def _remove_vehicle(self, game: int, player: int) -> None:
         name = self._name(game, player)
         libsumo.vehicle.remove(name)
         self._tiles[game].inside.discard(player)
-        self._there[game, player] = False
-        self._self_driven.pop(name, None)
+        self._present[game, player] = False
+        self._sumo_driven.pop(name, None)
         self._placed.pop(name, None)
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
-        """Place the players that are taken over at poses [G, P] of their centres, let SUMO step, read the rest."""
+        """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
         seats = list(self._placed.values())
         front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel()[seats].tolist()
         front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel()[seats].tolist()
         angle = compass_deg_of(heading_rad).ravel()[seats].tolist()
-        with self._asking("step"):
-            where = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._placing))
-            deque(map(_libsumo.vehicle_moveToXY, self._placed, *where), maxlen=0)  # one after another, without a loop
+        with self._sumo_call("step"):
+            targets = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._move_options))
+            deque(map(_libsumo.vehicle_moveToXY, self._placed, *targets), maxlen=0)  # faster than a loop
             libsumo.simulationStep()
-            self._others.advance()
+            self._background.advance()
             players = self._read_players()
             if players is not None:
                 x_m = np.where(np.isnan(players[..., 0]), x_m, players[..., 0])
                 y_m = np.where(np.isnan(players[..., 1]), y_m, players[..., 1])
-            reading = self._others.read(x_m, y_m, self._there)
+            reading = self._background.read(x_m, y_m, self._present)
             return replace(reading, players=players) if players is not None else reading
 
     def close(self) -> None:
-        """Give libsumo back to the process. Closing twice is closing once."""
+        """Release libsumo. A second call has no effect."""
         self._release()
 
     @contextmanager
-    def _asking(self, what: str) -> Iterator[None]:
+    def _sumo_call(self, action: str) -> Iterator[None]:
+        """Turn libsumo's errors in the block into a SimulationError that names the action."""
         if not self._release.alive:
-            raise SimulationError(f"SUMO can't {what}: this simulation was closed")
+            raise SimulationError(f"SUMO can't {action}: this simulation was closed")
         try:
             yield
         except _FAILURES as error:
-            raise SimulationError(f"SUMO could not {what}: {error}") from error
+            raise SimulationError(f"SUMO could not {action}: {error}") from error
 
     def _name(self, game: int, player: int) -> str:
         return self._tiles[game].prefix + ROLES[player]
 
     def _add_player(self, game: int, player: int, start: InitialState) -> None:
         tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
-        kind, lane, fastest = self._entrances[player]
-        entering = (kind, lane, str(start.position_m[player]), str(min(speed, fastest)))
-        self._add(tile, name, self._scene.edges[player], *entering)
+        vehicle_type, lane, fastest = self._insertions[player]
+        self._add(
+            tile,
+            name,
+            edges=self._scene.edges[player],
+            vehicle_type=vehicle_type,
+            lane=lane,
+            position=str(start.position_m[player]),
+            speed=str(min(speed, fastest)),
+        )
         tile.inside.add(player)
-        self._there[game, player] = True
+        self._present[game, player] = True
         ahead = self._half_length[player]
         if self._taken_over[player]:
             self._placed[name] = game * len(self._taken_over) + player
-            if self._drives_nobody:
-                libsumo.vehicle.setActionStepLength(name, _HARDLY_EVER_S)
+            if self._players_only:
+                libsumo.vehicle.setActionStepLength(name, _NO_ACTIONS_S)
             else:
                 libsumo.vehicle.setSpeedFactor(name, _ANY_SPEED)
         else:
-            self._self_driven[name] = (game, player)
-            ahead += speed * self._scene.world.step_s  # SUMO moves nobody in the step it starts them
+            self._sumo_driven[name] = (game, player)
+            ahead += speed * self._scene.world.step_s  # SUMO does not move a vehicle in the step of its insertion
         heading = float(start.heading_rad[player])
         x = float(start.x_m[player] + ahead * np.cos(heading))
         y = float(start.y_m[player] + ahead * np.sin(heading) + tile.offset_m)
-        # Placed there it is in the traffic at once; only added, it would have to wait for room.
-        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), *self._placing)
+        # moveToXY puts the vehicle in the traffic at once; without it, the vehicle would wait for free space
+        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), *self._move_options)
 
-    def _entrance(self, player: int) -> tuple[str, str, float]:
-        """A player's type, the lane it starts on, and the speed above which SUMO refuses to start it: what its type
-        keeps to on the road there."""
+    def _insertion(self, player: int) -> tuple[str, str, float]:
+        """A player's vehicle type, its start lane, and the largest speed at which SUMO inserts it: the speed limit for
+        its type."""
         routes, types = self._scene.world.road.routes, libsumo.vehicletype
-        kind = self._scene.vehicle(player).vehicle_type
+        vehicle_type = self._scene.vehicle(player).vehicle_type
         lane = self._scene.document.players[player].lane.rsplit("_", 1)[1]
         legal = float(routes.speed_limit_mps[routes.first_row[player]])
-        return kind, lane, float(min(legal * min(1.0, types.getSpeedFactor(kind)), types.getMaxSpeed(kind)))
+        obeyed = legal * min(1.0, types.getSpeedFactor(vehicle_type))
+        return vehicle_type, lane, float(min(obeyed, types.getMaxSpeed(vehicle_type)))
 
-    def _enter(self, game: int, name: str, other: Departure) -> None:
-        self._add(self._tiles[game], name, other.edges, other.vehicle_type, other.lane, other.position, other.speed)
+    def _insert(self, game: int, name: str, departure: Departure) -> None:
+        self._add(
+            self._tiles[game],
+            name,
+            edges=departure.edges,
+            vehicle_type=departure.vehicle_type,
+            lane=departure.lane,
+            position=departure.position,
+            speed=departure.speed,
+        )
 
     def _add(
-        self, tile: _Tile, name: str, edges: Sequence[str], kind: str, lane: str, position: str, speed: str
+        self,
+        tile: _Tile,
+        name: str,
+        *,
+        edges: Sequence[str],
+        vehicle_type: str,
+        lane: str,
+        position: str,
+        speed: str,
     ) -> None:
         route = tile.prefix + "route " + " ".join(edges)
         if route not in self._routes:
             libsumo.route.add(route, [tile.prefix + edge for edge in edges])
             self._routes.add(route)
-        libsumo.vehicle.add(name, route, kind, "now", lane, position, speed)
+        libsumo.vehicle.add(
+            name, route, vehicle_type, depart="now", departLane=lane, departPos=position, departSpeed=speed
+        )
 
     def _read_players(self) -> FloatArray | None:
-        """[G, P, 4] where the players are that SUMO drives; None if it drives none."""
+        """[G, P, 4] x_m, y_m, heading_rad and speed_mps of the players that SUMO drives; None if it drives none."""
         if all(self._taken_over):
             return None
-        players = np.full((*self._there.shape, 4), np.nan)
-        for name, seat in self._self_driven.items():
+        players = np.full((*self._present.shape, 4), np.nan)
+        for name, seat in self._sumo_driven.items():
             x, y = libsumo.vehicle.getPosition(name)
             if x < -1e6:
                 raise SimulationError(f"SUMO has not inserted {name!r}")

@@ -1,6 +1,6 @@
-"""Looking through a net file before anything else reads it: its names, its numbers, and what refers to what.
+"""Checks of a net file before any other use: its names, its numbers and its references.
 
-SUMO takes the numbers of a net as they are, and may die of them (SIGSEGV) rather than complain.
+SUMO does not validate the numbers of a net, and invalid ones may crash it (SIGSEGV).
 """
 
 from __future__ import annotations
@@ -22,27 +22,28 @@ _REMEDY = "build it with netconvert or netedit"
 _MOST_PROBLEMS = 20
 _FARTHEST_M = 2e7  # from the origin of any map projection
 _WIDEST_M = 100_000.0
-_MOST_CELLS, _CELL_M = 4e6, 20.0  # of the grid that rails are found by
+_MOST_CELLS, _CELL_M = 4e6, 20.0  # of the grid of rails
 _MOST_LANES = 63
 
 
 def check_net(path: Path) -> None:
-    """Raise UsageError, with file and element, for a net that can't be one, or that makes SUMO use other files."""
+    """Raise UsageError, with file and element, for an invalid net, or one that makes SUMO use other files."""
     root = parse_xml(path)
     if root.tag != "net":
         raise UsageError.of(path, str(root.tag), "is not a SUMO net: its root is not net", _REMEDY)
-    named = list(problems_in(path, root, kinds("net_file.xsd"), "netType"))
-    if named:
-        raise UsageError(named)
-    found = chain(_numbers(root), _references(root))
-    problems = [Problem(str(path), key, message, _REMEDY) for key, message in islice(found, _MOST_PROBLEMS)]
+    unknown = list(problems_in(path, root, kinds("net_file.xsd"), "netType"))
+    if unknown:
+        raise UsageError(unknown)
+    faults = chain(_number_faults(root), _reference_faults(root))
+    problems = [Problem(str(path), key, message, _REMEDY) for key, message in islice(faults, _MOST_PROBLEMS)]
     if problems:
         raise UsageError(problems)
     if too_large := _too_large(root):
-        raise UsageError.of(path, "", too_large, "cut the part out of it that the scene is about")
+        raise UsageError.of(path, "", too_large, "cut out the part that the scene needs")
 
 
-def _numbers(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+def _number_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    """Key and message of each invalid number."""
     if not np.isfinite(number_of(root.get("version", ""))):
         yield "net.version", "is no number"
     location = root.find("location")
@@ -51,19 +52,19 @@ def _numbers(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
         yield "location.convBoundary", "is not four numbers"
     for lane in root.iter("lane"):
         key, internal = f"lane {lane.get('id')}", lane.get("id", "").startswith(":")
-        for name, usual, least, most in (
+        for name, default, least, most in (
             ("length", "", 0.0, _WIDEST_M),
             ("speed", "", 0.0, 1000.0),
             ("width", "3.2", 0.01, 200.0),
         ):
-            given = lane.get(name, usual)
-            if not least < number_of(given) <= most:
-                yield f"{key}.{name}", f"{given[:60]!r} is not above {least:g} and up to {most:g}"
+            value = lane.get(name, default)
+            if not least < number_of(value) <= most:
+                yield f"{key}.{name}", f"{value[:60]!r} is not above {least:g} and up to {most:g}"
         points = _points(lane.get("shape", ""))
         if points is None or len(points) < 2:
             yield f"{key}.shape", f"{lane.get('shape', '')[:60]!r} is not a line of points x,y"
         elif not internal and not np.ptp(points, axis=0).any():
-            yield f"{key}.shape", "is a single place: the lane has no length"
+            yield f"{key}.shape", "is a single point: the lane has no length"
     for junction in root.findall("junction"):
         key = f"junction {junction.get('id')}"
         if not np.isfinite([number_of(junction.get(name, "")) for name in "xy"]).all():
@@ -72,7 +73,8 @@ def _numbers(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
             yield f"{key}.shape", f"{junction.get('shape', '')[:60]!r} is not points x,y"
 
 
-def _references(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+def _reference_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    """Key and message of each name that is used twice, and each reference that has no target."""
     junctions = {each.get("id", "") for each in root.findall("junction")}
     lanes: dict[str, list[str]] = {}
     for edge in root.findall("edge"):
@@ -88,10 +90,11 @@ def _references(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
                     remedy = nearest(edge.get(end, ""), junctions or ["(there is no junction)"])
                     yield f"edge {name}.{end}", f"there is no junction {edge.get(end)!r}; {remedy}"
     known = set(chain.from_iterable(lanes.values()))
-    for beside in root.iter("neigh"):
-        if beside.get("lane") not in known:
-            yield "neigh.lane", f"there is no lane {beside.get('lane')!r}; {nearest(beside.get('lane', ''), known)}"
-    onward: dict[str, list[str]] = {}
+    for neighbour in root.iter("neigh"):
+        name = neighbour.get("lane", "")
+        if name not in known:
+            yield "neigh.lane", f"there is no lane {neighbour.get('lane')!r}; {nearest(name, known)}"
+    following: dict[str, list[str]] = {}
     for link in root.findall("connection"):
         key = f"connection from {link.get('from')} to {link.get('to')}"
         for end in ("from", "to"):
@@ -102,43 +105,44 @@ def _references(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
         if via and via not in known:
             yield f"{key}.via", f"there is no lane {via!r}; {nearest(via, known or ['(there is no lane)'])}"
         if via:
-            onward.setdefault(f"{link.get('from')}_{link.get('fromLane')}", []).append(via)
-    for first in onward:
-        if first.startswith(":") and _returns(first, onward):
+            following.setdefault(f"{link.get('from')}_{link.get('fromLane')}", []).append(via)
+    for first in following:
+        if first.startswith(":") and _returns(first, following):
             yield f"lane {first}", "leads back to itself inside a junction"
 
 
-def _returns(first: str, onward: dict[str, list[str]]) -> bool:
-    seen, waiting = set(), list(onward[first])
+def _returns(first: str, following: dict[str, list[str]]) -> bool:
+    """Whether a lane inside a junction leads back to itself."""
+    seen, waiting = set(), list(following[first])
     while waiting:
         lane = waiting.pop()
         if lane == first:
             return True
         if lane not in seen and lane.startswith(":"):
             seen.add(lane)
-            waiting += onward.get(lane, [])
+            waiting += following.get(lane, [])
     return False
 
 
 def _points(shape: str) -> FloatArray | None:
-    """[n, 2] the points of a shape; None if it holds anything but numbers that can be places."""
+    """[n, 2] the points of a shape; None if it has anything but valid coordinates."""
     parts = [point.split(",") for point in shape.split()]
     if not parts or not all(len(part) in (2, 3) for part in parts):
         return None
     numbers: Sequence[Sequence[float]] = [[number_of(each) for each in part] for part in parts]
     points = np.array([part[:2] for part in numbers])
-    within = all(abs(each) <= _FARTHEST_M for part in numbers for each in part)  # never true of NaN
+    within = all(abs(each) <= _FARTHEST_M for part in numbers for each in part)  # false for NaN
     return points if within else None
 
 
 def _too_large(root: ElementTree.Element) -> str:
+    """The message for a net whose grid of rails would be too large; empty if it is not."""
     lines = [_points(lane.get("shape", "")) for lane in root.iter("lane")]
-    drawn = [line for line in lines if line is not None]
-    if not drawn:
+    shapes = [line for line in lines if line is not None]
+    if not shapes:
         return ""
-    everywhere = np.concatenate(drawn)
-    width_m, height_m = np.ptp(everywhere, axis=0)
+    width_m, height_m = np.ptp(np.concatenate(shapes), axis=0)
     if width_m * height_m > _MOST_CELLS * _CELL_M**2 or max(width_m, height_m) > _WIDEST_M:
         return f"is too large for a scene: {width_m / 1e3:,.0f} by {height_m / 1e3:,.0f} km"
-    cells = sum(float(np.prod(np.abs(np.diff(line, axis=0)) / _CELL_M + 1.0, axis=1).sum()) for line in drawn)
+    cells = sum(float(np.prod(np.abs(np.diff(line, axis=0)) / _CELL_M + 1.0, axis=1).sum()) for line in shapes)
     return f"has lines that are too long for a scene: {cells:,.0f} fields of 20 m" if cells > _MOST_CELLS else ""

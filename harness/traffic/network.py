@@ -1,7 +1,7 @@
-"""From a SUMO net to the game's road: the drivable area and its rails.
+"""The drivable area of a SUMO net, and its rails.
 
-The drivable area is the union of the areas of all lanes a car may use and of the junctions between them; its outline
-is the rail, but for the openings where roads enter and leave the scene.
+The drivable area is the union of the areas of all lanes that cars may use and of the junctions between them. Its
+outline, without the openings where roads enter and leave the scene, is the rails.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from harness.game.arrays import FloatArray
 from harness.game.road import Rails
 
 _SEAM_M = 0.05  # gaps up to twice this between lanes and junctions are closed
-_OPENING_M = 0.3  # of the outline that belongs to an opening
+_OPENING_M = 0.3  # reach of an opening along the outline
 _SMOOTH_M = 0.01
 _CAR, _SHOULDER = "passenger", "emergency"  # a paved shoulder is a lane for emergency vehicles
 _TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
 
 
 def read_net(path: Path) -> Net:
-    """Read a `.net.xml` that is well-formed XML. Raises UsageError where SUMO's reader can't make a net of it."""
+    """Read a `.net.xml` that is well-formed XML. Raises UsageError if SUMO's reader fails, or no lane is for cars."""
     try:
         net = sumolib.net.readNet(str(path), withInternal=True)
-    except Exception as error:  # sumolib raises whatever its parsing stumbles on
+    except Exception as error:  # sumolib does not document its errors
         raise UsageError.of(path, "", f"is not a SUMO net: {error!r}", "build it with netconvert or netedit") from error
     if not any(car_lanes(edge) for edge in net.getEdges(withInternal=False)):
         raise UsageError.of(path, "", "has no lane that cars may use", "build it with netconvert or netedit")
@@ -47,23 +47,23 @@ def car_lanes(edge: Edge) -> list[Lane]:
 
 
 def _paved_lanes(edge: Edge) -> list[Lane]:
-    """The edge's lanes that a car can be on, whether it may or not: a hard shoulder counts, a pavement does not."""
+    """The edge's lanes that a car can physically use: hard shoulders count, pavements do not."""
     return [lane for lane in edge.getLanes() if lane.allows(_CAR) or lane.allows(_SHOULDER)]
 
 
 def lane_line(lane: Lane) -> FloatArray:
-    """[n, 2] the lane's centre line."""
+    """[n, 2] points of the lane's centre line."""
     return np.array([point[:2] for point in lane.getShape()], dtype=float)
 
 
 def drivable_area(net: Net) -> BaseGeometry:
-    """The area cars can drive on, hard shoulders included, in network coordinates."""
-    beyond = _turnarounds_beyond_the_scene(net)
+    """The area that cars can drive on, with hard shoulders, in network coordinates."""
+    outside = _turnarounds_outside(net)
     parts = [
         shapely.LineString(lane_line(lane)).buffer(lane.getWidth() / 2.0, cap_style="flat", join_style="mitre")
         for edge in net.getEdges(withInternal=True)
         for lane in _paved_lanes(edge)
-        if lane.getID() not in beyond and np.ptp(lane_line(lane), axis=0).any()
+        if lane.getID() not in outside and np.ptp(lane_line(lane), axis=0).any()
     ]
     for node in net.getNodes():
         if len(node.getShape()) > 2:
@@ -73,7 +73,7 @@ def drivable_area(net: Net) -> BaseGeometry:
 
 
 def rail_lines(net: Net, area: BaseGeometry) -> list[FloatArray]:
-    """The rails as polylines [n, 2]: the outline of the net's drivable area without its openings."""
+    """The rails as polylines [n, 2]: the outline of the net's drivable area without the openings."""
     openings = [
         shapely.LineString(_cross_section(lane, at_end)).buffer(_OPENING_M, cap_style="square")
         for edge in net.getEdges(withInternal=False)
@@ -88,13 +88,13 @@ def rail_lines(net: Net, area: BaseGeometry) -> list[FloatArray]:
 
 
 def rails(lines: Sequence[FloatArray], reach_m: float) -> Rails:
-    """Rails given as polylines, as segments found by place, up to `reach_m` away."""
+    """Rails of polylines [n, 2]. Look-ups find all segments within `reach_m` of a point."""
     segments = [np.stack((line[:-1], line[1:]), axis=1) for line in lines]
     return Rails.of(np.concatenate(segments) if segments else np.zeros((0, 2, 2)), reach_m)
 
 
 def find_edge(net: Net, path: Path, key: str, name: str) -> Edge:
-    """The edge of that name; UsageError with the nearest one otherwise."""
+    """The edge with this name. Raises UsageError with the most similar name if there is none."""
     if not net.hasEdge(name) or net.getEdge(name).isSpecial():
         names = [edge.getID() for edge in net.getEdges(withInternal=False)]
         raise UsageError.of(path, key, f"the net has no edge {name!r}", nearest(name, names))
@@ -102,7 +102,7 @@ def find_edge(net: Net, path: Path, key: str, name: str) -> Edge:
 
 
 def find_lane(net: Net, path: Path, key: str, name: str) -> Lane:
-    """The lane of that name; UsageError with the nearest one otherwise."""
+    """The lane with this name. Raises UsageError with the most similar name if there is none."""
     names = [lane.getID() for edge in net.getEdges(withInternal=False) for lane in edge.getLanes()]
     if name not in names:
         raise UsageError.of(path, key, f"the net has no lane {name!r}", nearest(name, names))
@@ -110,21 +110,21 @@ def find_lane(net: Net, path: Path, key: str, name: str) -> Lane:
 
 
 def _is_fringe(edge: Edge, at_end: bool) -> bool:
-    """Whether the scene stops at that end of the edge: nothing but the way back is connected there."""
+    """Whether the scene ends at this end of the edge: only the opposite edge is connected there."""
     if at_end:
-        return all(_is_way_back(edge, other) for other in edge.getToNode().getOutgoing() if not other.isSpecial())
-    return all(_is_way_back(other, edge) for other in edge.getFromNode().getIncoming() if not other.isSpecial())
+        return all(_is_opposite(edge, other) for other in edge.getToNode().getOutgoing() if not other.isSpecial())
+    return all(_is_opposite(other, edge) for other in edge.getFromNode().getIncoming() if not other.isSpecial())
 
 
-def _is_way_back(edge: Edge, other: Edge) -> bool:
-    """Whether the other edge leads back from the edge's end to its start, and only by turning round."""
+def _is_opposite(edge: Edge, other: Edge) -> bool:
+    """Whether the other edge leads from the edge's end back to its start, through turnarounds only."""
     if other.getToNode() is not edge.getFromNode():
         return False
     return all(link.getDirection() in _TURNAROUNDS for link in edge.getConnections(other))
 
 
-def _turnarounds_beyond_the_scene(net: Net) -> set[str]:
-    """The lanes on which SUMO lets vehicles turn round where a road leaves the scene: they bulge over its end."""
+def _turnarounds_outside(net: Net) -> set[str]:
+    """SUMO's turnaround lanes at roads that leave the scene. They extend beyond the end of the road."""
     return {
         link.getViaLaneID()
         for edge in net.getEdges(withInternal=False)
@@ -135,9 +135,9 @@ def _turnarounds_beyond_the_scene(net: Net) -> set[str]:
 
 
 def _cross_section(lane: Lane, at_end: bool) -> FloatArray:
-    """[2, 2] the line across a lane's start or end."""
+    """[2, 2] line across a lane's start or end."""
     line = lane_line(lane)
-    here, there = (line[-1], line[-2]) if at_end else (line[0], line[1])
-    along = (here - there) / max(float(np.linalg.norm(here - there)), 1e-9)
+    end, inner = (line[-1], line[-2]) if at_end else (line[0], line[1])
+    along = (end - inner) / max(float(np.linalg.norm(end - inner)), 1e-9)
     across = 0.5 * lane.getWidth() * np.array([-along[1], along[0]])
-    return np.stack((here - across, here + across))
+    return np.stack((end - across, end + across))

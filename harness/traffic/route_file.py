@@ -1,15 +1,15 @@
-"""What a SUMO route file says: vehicle types, routes, and who departs when.
+"""SUMO route files: vehicle types, routes and departures.
 
-The harness starts every vehicle itself, relative to the start of each game, so that all games of an arena, however
-often they restart, see the same traffic. XML is parsed with entities and external references refused.
+The harness inserts every vehicle itself, at its time after the start of a game. All games of an arena therefore have
+the same traffic, independent of earlier resets. The XML parser refuses entities and external references.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -26,7 +26,7 @@ _FLOW_RATES = ("number", "period", "vehsPerHour", "probability")
 _DEPARTS = ("type", "route", "departLane", "departPos", "departSpeed")
 _NAME = re.compile(r"[^\s|\\'\";,<>&:!?*]{1,200}")
 _LEAST_PERIOD_S = 0.05
-# What makes sense of each number: above (or from, where it may be 0) and up to
+# the range of each number: above the first value, up to the second
 _RANGES = {
     "length": (0.0, 100.0),
     "width": (0.0, 10.0),
@@ -36,24 +36,24 @@ _RANGES = {
     "probability": (-0.001, 1.0),
 }
 _TIMES = (-0.001, 1e7)
-_EMISSIONS = re.compile(r"(HBEFA[234]|Energy)/\w+|zero|default")  # others are read from files beside the scene
+_EMISSIONS = re.compile(r"(HBEFA[234]|Energy)/\w+|zero|default")  # SUMO reads other classes from files
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class VehicleType:
-    """Size and top speed of a vType; SUMO's defaults for passenger cars where it says nothing."""
+    """Size and top speed of a vType. The defaults are those of SUMO for passenger cars."""
 
     name: str
     length_m: float = 5.0
     width_m: float = 1.8
     max_speed_mps: float = 55.55
     lane_changes: str = ""
-    """Its laneChangeModel; empty: SUMO's default."""
+    """The vType's laneChangeModel; empty: SUMO's default."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Departure:
-    """One vehicle: when, where and how it departs, in SUMO's own words for lane, position and speed."""
+    """The departure of one vehicle. Lane, position and speed are SUMO's departLane, departPos and departSpeed."""
 
     name: str
     vehicle_type: str
@@ -64,9 +64,9 @@ class Departure:
     speed: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Flow:
-    """Vehicles departing again and again."""
+    """A flow of vehicles, by a period or by a probability per second."""
 
     departure: Departure
     end_s: float
@@ -75,36 +75,37 @@ class Flow:
     number: int | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RouteFile:
-    """A route file, read."""
+    """The content of a route file."""
 
     path: Path
     types: Mapping[str, VehicleType]
     vehicles: Mapping[str, Departure]
     flows: tuple[Flow, ...]
-    types_xml: str  # the file's vehicle types alone, as SUMO reads them
+    types_xml: str  # a route file with the vehicle types only, for SUMO
 
-    def departures(self, but: set[str], until_s: float, generator: np.random.Generator) -> list[Departure]:
-        """Everyone who departs in the first `until_s` seconds of a game, except the vehicles named in `but`."""
-        found = [each for name, each in self.vehicles.items() if name not in but]
+    def departures(self, excluded: set[str], until_s: float, generator: np.random.Generator) -> list[Departure]:
+        """The departures in the first `until_s` seconds of a game, by time, without the `excluded` vehicles."""
+        departures = [each for name, each in self.vehicles.items() if name not in excluded]
         for flow in self.flows:
-            found += _expand(flow, until_s, generator)
-        return sorted((each for each in found if each.depart_s < until_s), key=lambda each: (each.depart_s, each.name))
+            departures += _expand(flow, until_s, generator)
+        due = (each for each in departures if each.depart_s < until_s)
+        return sorted(due, key=lambda each: (each.depart_s, each.name))
 
 
 def read_route_file(path: Path) -> RouteFile:
-    """Read a `.rou.xml`. Raises UsageError for what can't be understood."""
+    """Read a `.rou.xml`. Raises UsageError for invalid or unsupported content."""
     root = parse_xml(path)
     _check_names(path, root)
     only_types = ElementTree.Element("routes")
     only_types.extend(element for element in root if element.tag in ("vType", "vTypeDistribution"))
     problems: list[Problem] = []
-    types = {_DEFAULT_TYPE: VehicleType(_DEFAULT_TYPE)}
+    types = {_DEFAULT_TYPE: VehicleType(name=_DEFAULT_TYPE)}
     for element in only_types.iter("vType"):
-        kind = collect(problems, lambda element=element: _vehicle_type(path, element))  # type: ignore[misc]
-        if kind is not None:
-            types[kind.name] = kind
+        vehicle_type = collect(problems, partial(_vehicle_type, path, element))
+        if vehicle_type is not None:
+            types[vehicle_type.name] = vehicle_type
     distributions = {_attribute(path, element, "id") for element in root.iter("vTypeDistribution")}
     routes = {
         _attribute(path, element, "id"): tuple(element.get("edges", "").split())
@@ -115,32 +116,29 @@ def read_route_file(path: Path) -> RouteFile:
     flows: dict[str, Flow] = {}
     for element in root:
         if element.tag in ("vehicle", "flow"):
-            departure = collect(
-                problems,
-                lambda element=element: _departure(path, element, routes, set(types) | distributions),  # type: ignore[misc]
-            )
+            departure = collect(problems, partial(_departure, path, element, routes, set(types) | distributions))
             if departure is None:
                 continue
             if departure.name in vehicles or departure.name in flows:
                 where = f"{element.tag} {departure.name}"
-                problems.append(Problem(str(path), where, "stands twice", "call one something else"))
+                problems.append(Problem(str(path), where, "stands twice", "rename one of the two"))
             elif element.tag == "vehicle":
                 vehicles[departure.name] = departure
             else:
-                flow = collect(problems, lambda e=element, d=departure: _flow(path, e, d))  # type: ignore[misc]
+                flow = collect(problems, partial(_flow, path, element, departure))
                 if flow is not None:
                     flows[departure.name] = flow
     if problems:
         raise UsageError(problems)
     types_xml = ElementTree.tostring(only_types, encoding="unicode")
-    return RouteFile(path, types, vehicles, tuple(flows.values()), types_xml)
+    return RouteFile(path=path, types=types, vehicles=vehicles, flows=tuple(flows.values()), types_xml=types_xml)
 
 
 def _check_names(path: Path, root: ElementTree.Element) -> None:
-    """Raise UsageError for every element and attribute that nothing here would act upon, and for odd names."""
+    """Raise UsageError for unsupported elements and attributes, and for names that SUMO does not allow."""
     if root.tag != "routes":
         raise UsageError.of(path, str(root.tag), "is not a SUMO route file: its root is not routes", "name a .rou.xml")
-    problems = list(problems_in(path, root, _understood(), "routesType"))
+    problems = list(problems_in(path, root, _supported_kinds(), "routesType"))
     for element in root.iter():
         name = element.get("id")
         if name and not _NAME.fullmatch(name):
@@ -154,15 +152,16 @@ def _check_names(path: Path, root: ElementTree.Element) -> None:
 
 
 @cache
-def _understood() -> Mapping[str, Kind]:
-    """Of SUMO's schema, what the harness acts upon or hands to SUMO; of that, nothing that names files."""
-    known = kinds("routes_file.xsd")
-    files = ("imgFile", "osgFile")
+def _supported_kinds() -> Mapping[str, Kind]:
+    """The part of SUMO's schema that the harness uses or passes on to SUMO, without attributes that name files."""
+    file_attributes = ("imgFile", "osgFile")
     types = {
-        name: Kind({each: must for each, must in kind.attributes.items() if each not in files}, kind.children)
-        for name, kind in known.items()
+        name: Kind(
+            {each: required for each, required in kind.attributes.items() if each not in file_attributes}, kind.children
+        )
+        for name, kind in kinds("routes_file.xsd").items()
     }
-    inside = {"route": "route within"}
+    children = {"route": "route within"}
     rates = dict.fromkeys(("begin", "end", *_FLOW_RATES), False)
     return types | {
         "routesType": Kind(
@@ -172,18 +171,18 @@ def _understood() -> Mapping[str, Kind]:
         "vTypeDistribution": types["vTypeDistributionType"],
         "route": Kind({"id": True, "edges": True, "color": False}),
         "route within": Kind({"edges": True}),
-        "vehicle": Kind({"id": True, "depart": False, **dict.fromkeys(_DEPARTS, False)}, inside),
-        "flow": Kind({"id": True, **rates, **dict.fromkeys(_DEPARTS, False)}, inside),
+        "vehicle": Kind({"id": True, "depart": False, **dict.fromkeys(_DEPARTS, False)}, children),
+        "flow": Kind({"id": True, **rates, **dict.fromkeys(_DEPARTS, False)}, children),
     }
 
 
 def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
     return VehicleType(
-        _attribute(path, element, "id"),
-        _number(path, element, "length", 5.0),
-        _number(path, element, "width", 1.8),
-        _number(path, element, "maxSpeed", 55.55),
-        element.get("laneChangeModel", ""),
+        name=_attribute(path, element, "id"),
+        length_m=_number(path, element, "length", VehicleType.length_m),
+        width_m=_number(path, element, "width", VehicleType.width_m),
+        max_speed_mps=_number(path, element, "maxSpeed", VehicleType.max_speed_mps),
+        lane_changes=element.get("laneChangeModel", ""),
     )
 
 
@@ -194,9 +193,9 @@ def _departure(
     kind = element.get("type", _DEFAULT_TYPE)
     if kind not in types:
         raise UsageError.of(path, f"{element.tag} {name}", f"unknown vehicle type {kind!r}", nearest(kind, types))
-    own = element.find("route")
-    if own is not None:
-        edges = tuple(own.get("edges", "").split())
+    own_route = element.find("route")
+    if own_route is not None:
+        edges = tuple(own_route.get("edges", "").split())
     else:
         route = _attribute(path, element, "route")
         if route not in routes:
@@ -205,41 +204,42 @@ def _departure(
     if not edges:
         raise UsageError.of(path, f"{element.tag} {name}", "its route has no edges", "give the route's edges")
     return Departure(
-        name,
-        kind,
-        edges,
-        _number(path, element, "begin" if element.tag == "flow" else "depart", 0.0),
-        element.get("departLane", "first"),
-        element.get("departPos", "base"),
-        element.get("departSpeed", "0"),
+        name=name,
+        vehicle_type=kind,
+        edges=edges,
+        depart_s=_number(path, element, "begin" if element.tag == "flow" else "depart", 0.0),
+        lane=element.get("departLane", "first"),
+        position=element.get("departPos", "base"),
+        speed=element.get("departSpeed", "0"),
     )
 
 
 def _flow(path: Path, element: ElementTree.Element, departure: Departure) -> Flow:
-    given = [name for name in _FLOW_RATES if element.get(name) is not None]
-    if not given or (given == ["number"] and element.get("end") is None):
+    rates = [name for name in _FLOW_RATES if element.get(name) is not None]
+    if not rates or (rates == ["number"] and element.get("end") is None):
         raise UsageError.of(path, f"flow {departure.name}", "has no rate", f"give one of {', '.join(_FLOW_RATES[1:])}")
-    if len(set(given) - {"number"}) > 1:
-        raise UsageError.of(path, f"flow {departure.name}", f"has its rate twice: {', '.join(given)}", "give one")
+    if len(set(rates) - {"number"}) > 1:
+        raise UsageError.of(path, f"flow {departure.name}", f"has its rate twice: {', '.join(rates)}", "give one")
     end = _number(path, element, "end", np.inf)
     if end <= departure.depart_s:
         raise UsageError.of(path, f"flow {departure.name}.end", "does not lie after its begin", "give a later end")
-    number = int(_number(path, element, "number", 0)) if "number" in given else None
+    number = int(_number(path, element, "number", 0)) if "number" in rates else None
     period = None
-    if "vehsPerHour" in given:
+    if "vehsPerHour" in rates:
         period = 3600.0 / _number(path, element, "vehsPerHour", 1.0)
-    elif "period" in given:
+    elif "period" in rates:
         period = _number(path, element, "period", 1.0)
-    elif "number" in given:
+    elif "number" in rates:
         period = (end - departure.depart_s) / max(number or 1, 1)
         if period < _LEAST_PERIOD_S:
-            text = f"one vehicle every {period:g} s is more than a lane takes"
-            raise UsageError.of(path, f"flow {departure.name}.number", text, "give a smaller number")
-    probability = _number(path, element, "probability", 0.0) if "probability" in given else None
-    return Flow(departure, end, period, probability, number)
+            message = f"one vehicle every {period:g} s is more than the capacity of a lane"
+            raise UsageError.of(path, f"flow {departure.name}.number", message, "give a smaller number")
+    probability = _number(path, element, "probability", 0.0) if "probability" in rates else None
+    return Flow(departure=departure, end_s=end, period_s=period, probability_per_s=probability, number=number)
 
 
 def _expand(flow: Flow, until_s: float, generator: np.random.Generator) -> list[Departure]:
+    """The departures of a flow before `until_s`, named as in SUMO: f.0, f.1 and so on."""
     first, end = flow.departure.depart_s, min(flow.end_s, until_s)
     if flow.period_s is not None:
         times: FloatArray = np.arange(first, end, flow.period_s)
@@ -248,19 +248,8 @@ def _expand(flow: Flow, until_s: float, generator: np.random.Generator) -> list[
         times = seconds[generator.random(len(seconds)) < (flow.probability_per_s or 0.0)]
     if flow.number is not None:
         times = times[: flow.number]
-    departure = flow.departure
-    return [
-        Departure(
-            f"{departure.name}.{k}",
-            departure.vehicle_type,
-            departure.edges,
-            float(time),
-            departure.lane,
-            departure.position,
-            departure.speed,
-        )
-        for k, time in enumerate(times)
-    ]
+    template = flow.departure
+    return [replace(template, name=f"{template.name}.{k}", depart_s=float(time)) for k, time in enumerate(times)]
 
 
 def _attribute(path: Path, element: ElementTree.Element, name: str) -> str:
@@ -281,7 +270,7 @@ def _number(path: Path, element: ElementTree.Element, name: str, default: float)
         raise UsageError.of(
             path,
             where,
-            f"{value[:60]!r} is not a number that makes sense here",
+            f"{value[:60]!r} is not a number that is possible here",
             f"give a number of seconds, metres or m/s, up to {most:g}",
         )
     return number

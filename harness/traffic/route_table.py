@@ -1,7 +1,7 @@
-"""From a SUMO route to the game's table of it: its line, and what lies beside the line at every station.
+"""The game's table of a SUMO route: its line, and the lanes and edges of the road at every station.
 
-The line follows the lanes that lead to the route's end. Where a route has to change lanes on an edge, its line moves
-over gradually; where a net has no lanes inside a junction, a curve takes their place.
+The line follows the lanes that lead to the route's end. If a route has to change lanes on an edge, its line moves over
+gradually. If a net has no lanes inside a junction, a curve replaces them.
 """
 
 from __future__ import annotations
@@ -25,20 +25,20 @@ _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Piece:
-    """A stretch of a route's line: over one of its edges, or over the junction behind it."""
+    """A section of a route's line: over one of its edges, or over the junction after it."""
 
     line: FloatArray  # [n, 2]
-    lanes: list[tuple[FloatArray, Lane]]  # lines [m, 2] side by side, and the lane of the route each leads along
-    edge: int  # of the route, that these lanes belong to
+    lanes: list[tuple[FloatArray, Lane]]  # lines [m, 2] side by side, with the lane that each belongs to
+    edge: int  # index of the route's edge with these lanes
     speed_mps: float
 
 
-def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], goal: Edge, goal_position_m: float) -> Route:
-    """The table of a route along connected edges, over the net's drivable area.
+def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Edge, goal_position_m: float) -> Route:
+    """The table of a route along connected edges; `area` is the net's drivable area.
 
-    Raises ValueError where consecutive edges are not connected, or the goal's edge is not on the route.
+    Raises ValueError if consecutive edges are not connected or the goal's edge is not on the route.
     """
     if goal not in edges:
         raise ValueError(f"does not pass the goal's edge {goal.getID()!r}")
@@ -55,10 +55,10 @@ def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], goal: Edge,
     lane_ends = np.full((len(stations), most), np.inf)
     for k, piece in enumerate(pieces):
         rows = np.flatnonzero(piece_at == k)
-        for column, (beside, lane) in enumerate(piece.lanes):
-            offsets[rows, column] = _offsets(points[rows], headings[rows], beside)
+        for column, (lane_points, lane) in enumerate(piece.lanes):
+            offsets[rows, column] = _offsets(points[rows], headings[rows], lane_points)
             lane_ends[rows, column] = ends[piece.edge][lane.getID()]
-    left, right = _edges_beside(area, points, headings)
+    left, right = _road_edges(area, points, headings)
     inside = (stations >= 0.0) & (stations <= line.length)
     row = 2 * list(edges).index(goal)
     return Route(
@@ -79,7 +79,7 @@ def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], goal: Edge,
 
 
 def _pieces(net: Net, edges: Sequence[Edge]) -> list[_Piece]:
-    """Edge, junction, edge, ..., edge."""
+    """The pieces of a route: edge, junction, edge, ..., edge."""
     links = _links(edges)
     entries = [link.getToLane() for link in links]
     exits = [link.getFromLane() for link in links]
@@ -87,54 +87,59 @@ def _pieces(net: Net, edges: Sequence[Edge]) -> list[_Piece]:
     exits.append(entries[-1])
     pieces = []
     for k, edge in enumerate(edges):
-        beside = [(lane_line(lane), lane) for lane in car_lanes(edge)]
-        pieces.append(_Piece(_between(entries[k], exits[k]), beside, k, entries[k].getSpeed()))
+        lanes = [(lane_line(lane), lane) for lane in car_lanes(edge)]
+        line = _between(entries[k], exits[k])
+        pieces.append(_Piece(line=line, lanes=lanes, edge=k, speed_mps=entries[k].getSpeed()))
         if k < len(links):
             line, speed = _over_junction(net, links[k])
-            across = [(_over_junction(net, link)[0], link.getToLane()) for link in _car_links(edge, edges[k + 1])]
-            pieces.append(_Piece(line, across, k + 1, speed))
+            lanes = [(_over_junction(net, link)[0], link.getToLane()) for link in _car_links(edge, edges[k + 1])]
+            pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed))
     return pieces
 
 
 def _car_links(edge: Edge, following: Edge) -> list[Connection]:
-    ours, theirs = car_lanes(edge), car_lanes(following)
+    starts, ends = car_lanes(edge), car_lanes(following)
     return [
-        link for link in edge.getConnections(following) if link.getFromLane() in ours and link.getToLane() in theirs
+        link for link in edge.getConnections(following) if link.getFromLane() in starts and link.getToLane() in ends
     ]
 
 
 def _links(edges: Sequence[Edge]) -> list[Connection]:
-    """The connections a route takes, one between each two edges: the leftmost that lead to its end, with as little
-    changing of lanes as greedily going back from the end finds."""
+    """The connections of a route, one between each two edges: the leftmost ones that lead to its end.
+
+    A greedy search from the end of the route keeps the number of lane changes small.
+    """
     chosen: list[Connection] = []
-    wanted = (car_lanes(edges[-1]) or edges[-1].getLanes())[-1]
+    target = (car_lanes(edges[-1]) or edges[-1].getLanes())[-1]
     for edge, following in zip(reversed(edges[:-1]), reversed(edges[1:]), strict=True):
         links = _car_links(edge, following)
         if not links:
             raise ValueError(f"has no connection from edge {edge.getID()!r} to {following.getID()!r}")
         best = min(
             links,
-            key=lambda link: (abs(link.getToLane().getIndex() - wanted.getIndex()), -link.getFromLane().getIndex()),
+            key=lambda link: (abs(link.getToLane().getIndex() - target.getIndex()), -link.getFromLane().getIndex()),
         )
         chosen.insert(0, best)
-        wanted = best.getFromLane()
+        target = best.getFromLane()
     return chosen
 
 
-def _between(entry: Lane, leave: Lane) -> FloatArray:
-    """[n, 2] the line over an edge that enters it in one lane and leaves it in another, moving over smoothly."""
-    if entry is leave:
+def _between(entry: Lane, exit_: Lane) -> FloatArray:
+    """[n, 2] line over an edge from its entry lane to its exit lane, with a smooth transition."""
+    if entry is exit_:
         return lane_line(entry)
     steps = max(int(np.ceil(entry.getLength())), 2)
     share = np.linspace(0.0, 1.0, steps + 1)
-    lines = [shapely.LineString(lane_line(lane)) for lane in (entry, leave)]
-    one, two = (shapely.get_coordinates(shapely.line_interpolate_point(line, share, normalized=True)) for line in lines)
-    over = (share**2 * (3.0 - 2.0 * share))[:, None]
-    return one + over * (two - one)
+    lines = [shapely.LineString(lane_line(lane)) for lane in (entry, exit_)]
+    first, second = (
+        shapely.get_coordinates(shapely.line_interpolate_point(line, share, normalized=True)) for line in lines
+    )
+    blend = (share**2 * (3.0 - 2.0 * share))[:, None]
+    return first + blend * (second - first)
 
 
 def _over_junction(net: Net, link: Connection) -> tuple[FloatArray, float]:
-    """[n, 2] the line from one lane to the next over the junction between them, and its speed limit."""
+    """[n, 2] line over the junction from one lane to the next, and its speed limit (m/s)."""
     before, after = lane_line(link.getFromLane()), lane_line(link.getToLane())
     inner: list[Lane] = []
     via = link.getViaLaneID()
@@ -148,7 +153,7 @@ def _over_junction(net: Net, link: Connection) -> tuple[FloatArray, float]:
 
 
 def _curve(before: FloatArray, after: FloatArray) -> FloatArray:
-    """[9, 2] a cubic Bezier curve that goes on from one segment [2, 2] and into another."""
+    """[9, 2] cubic Bezier curve that continues one segment [2, 2] and joins another one."""
     start, end = before[1], after[0]
     reach = 0.4 * float(np.linalg.norm(end - start))
     out = start + reach * _unit(before[1] - before[0])
@@ -166,7 +171,7 @@ def _length(line: FloatArray) -> float:
 
 
 def _join(lines: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
-    """[n, 2] the lines one after another, without repeated points, and the stations [len(lines)] where they start."""
+    """[n, 2] the lines joined, without repeated points, and the stations [len(lines)] of their starts."""
     points = np.concatenate(lines)
     steps = np.hypot(*np.diff(points, axis=0, prepend=points[:1]).T)
     first = np.cumsum([0, *(len(line) for line in lines[:-1])])
@@ -176,59 +181,59 @@ def _join(lines: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
 
 
 def _sample(line: shapely.LineString, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Points [N, 2] and headings [N] of a line at stations, going on straight before its start and after its end."""
+    """Points [N, 2] and headings [N] of a line at stations [N], extended straight at both ends."""
     within = np.clip(stations, 0.0, line.length)
 
     def at(station: FloatArray) -> FloatArray:
         return shapely.get_coordinates(shapely.line_interpolate_point(line, station))
 
-    way = at(np.minimum(within + SPACING_M, line.length)) - at(np.maximum(within - SPACING_M, 0.0))
-    headings = np.arctan2(way[:, 1], way[:, 0])
+    chord = at(np.minimum(within + SPACING_M, line.length)) - at(np.maximum(within - SPACING_M, 0.0))
+    headings = np.arctan2(chord[:, 1], chord[:, 0])
     beyond = stations - within
     return at(within) + beyond[:, None] * np.stack((np.cos(headings), np.sin(headings)), axis=1), headings
 
 
-# --- what lies beside it ---------------------------------------------------------------------------------------------
+# --- lanes and road edges --------------------------------------------------------------------------------------------
 
 
 def _lane_ends(edges: Sequence[Edge], end_of_edge_m: Sequence[float]) -> list[dict[str, float]]:
-    """By edge of the route: where each of its lanes ends for who wants to follow the route; inf where it goes on."""
+    """For each edge of the route: the station where each lane stops leading along the route; inf if it never does."""
     ends = [{lane.getID(): np.inf for lane in car_lanes(edges[-1])}]
     for k in reversed(range(len(edges) - 1)):
-        links, onward = _car_links(edges[k], edges[k + 1]), ends[0]
-        here = {}
+        links, following = _car_links(edges[k], edges[k + 1]), ends[0]
+        lane_ends = {}
         for lane in car_lanes(edges[k]):
-            reached = [onward[link.getToLane().getID()] for link in links if link.getFromLane() is lane]
-            here[lane.getID()] = max(reached, default=end_of_edge_m[k])
-        ends.insert(0, here)
+            reached = [following[link.getToLane().getID()] for link in links if link.getFromLane() is lane]
+            lane_ends[lane.getID()] = max(reached, default=end_of_edge_m[k])
+        ends.insert(0, lane_ends)
     return ends
 
 
-def _offsets(points: FloatArray, headings: FloatArray, beside: FloatArray) -> FloatArray:
-    """[N] how far to the left of points [N, 2] another line [n, 2] lies."""
-    line = shapely.LineString(beside)
-    near = shapely.line_interpolate_point(line, shapely.line_locate_point(line, shapely.points(points)))
-    dx, dy = (shapely.get_coordinates(near) - points).T
+def _offsets(points: FloatArray, headings: FloatArray, lane_points: FloatArray) -> FloatArray:
+    """[N] lateral offsets of a line [n, 2] from points [N, 2] with headings [N], left positive."""
+    line = shapely.LineString(lane_points)
+    nearest = shapely.line_interpolate_point(line, shapely.line_locate_point(line, shapely.points(points)))
+    dx, dy = (shapely.get_coordinates(nearest) - points).T
     return dy * np.cos(headings) - dx * np.sin(headings)
 
 
-def _edges_beside(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """[N] how far the drivable area reaches to the left (positive) and right (negative) of each point."""
+def _road_edges(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """[N] lateral offsets of the drivable area's left (positive) and right (negative) edges from each point."""
     shapely.prepare(area)
     left = np.stack((-np.sin(headings), np.cos(headings)), axis=1)
     sides = []
     for sign in (1.0, -1.0):
         rays = shapely.linestrings(np.stack((points, points + sign * _FAR_SIDE_M * left), axis=1))
         parts, row = shapely.get_parts(shapely.intersection(rays, area), return_index=True)
-        begins_here = shapely.distance(parts, shapely.points(points)[row]) < _ON_POINT_M
+        starts_at_point = shapely.distance(parts, shapely.points(points)[row]) < _ON_POINT_M
         reach = np.zeros(len(points))
-        np.maximum.at(reach, row, np.where(begins_here, shapely.length(parts), 0.0))
+        np.maximum.at(reach, row, np.where(starts_at_point, shapely.length(parts), 0.0))
         sides.append(sign * reach)
     return sides[0], sides[1]
 
 
 def _extend(values: FloatArray, inside: FloatArray) -> FloatArray:
-    """Before its start and beyond its end a route is as wide as where it begins and ends."""
+    """[N] values whose entries before the start and beyond the end of the route repeat those at its start and end."""
     rows = np.flatnonzero(inside)
     first, last = rows[0] + 1, rows[-1] - 1
     return values[np.clip(np.arange(len(values)), first, last)]

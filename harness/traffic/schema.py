@@ -1,8 +1,7 @@
-"""What SUMO's own schemas allow in its files: elements, their attributes, what may stand within them.
+"""Checks of files by SUMO's schemas: elements, their attributes and their children.
 
-SUMO without validation passes over what it doesn't know, and some of what it knows makes it read or write other files:
-an `<include>`, a detector, the device of a vehicle type. Here a file holds what its schema declares, and of that only
-what a scene needs.
+Without validation, SUMO ignores unknown elements, and some known elements make it read or write other files: an
+`<include>`, a detector, the device of a vehicle type. A file may hold only declared elements that a scene needs.
 """
 
 from __future__ import annotations
@@ -23,15 +22,15 @@ from harness.errors import Problem
 _XSD = "{http://www.w3.org/2001/XMLSchema}"
 _FOLDER = Path(sumo.SUMO_HOME) / "data" / "xsd"
 _MOST_PROBLEMS = 20
-_OF_OTHER_FILES = ("file", "output", "device", "has.")  # in a param's key: files and what writes them
+_FILE_KEYS = ("file", "output", "device", "has.")  # parts of a param's key that make SUMO read or write files
 _FOLLOWING = "carFollowing-"
-CLASSES = {*SUMO_VEHICLE_CLASSES, "all", "ignoring", "drone", "aircraft"}  # of vehicles, in permissions and types
-_OF_CLASSES = ("allow", "disallow", "prefer", "vClass")
+CLASSES = {*SUMO_VEHICLE_CLASSES, "all", "ignoring", "drone", "aircraft"}  # vehicle classes
+_CLASS_ATTRIBUTES = ("allow", "disallow", "prefer", "vClass")
 
 
 @dataclass(frozen=True)
 class Kind:
-    """What an element may hold: attributes (True: it must have it), and the kind of each element within."""
+    """The content of an element: its attributes (True: required), and the kind of each child by its tag."""
 
     attributes: Mapping[str, bool] = field(default_factory=dict)
     children: Mapping[str, str] = field(default_factory=dict)
@@ -39,7 +38,7 @@ class Kind:
 
 @cache
 def kinds(name: str) -> Mapping[str, Kind]:
-    """The kinds that one of SUMO's schemas declares, by name; that of the root element by the element's name."""
+    """The element kinds that one of SUMO's schemas declares, by name. Root elements are listed by their tags."""
     found: dict[str, Kind] = {}
     for file in _with_includes(_FOLDER / name):
         root = ElementTree.parse(file).getroot()
@@ -62,7 +61,7 @@ def kinds(name: str) -> Mapping[str, Kind]:
 
 
 def _with_includes(file: Path) -> list[Path]:
-    """A schema and what it includes, directly or not; what is included comes first, once."""
+    """A schema and all schemas that it includes, each once, included ones first."""
     files: dict[Path, None] = {}
     for include in ElementTree.parse(file).getroot().findall(f"{_XSD}include"):
         inner = Path(os.path.normpath(file.parent / include.get("schemaLocation", "")))
@@ -76,18 +75,16 @@ def _kind(declared: ElementTree.Element) -> Kind:
     return Kind(attributes, children)
 
 
-def problems_in(
-    path: Path, root: ElementTree.Element, known: Mapping[str, Kind], kind: str, within: str = ""
-) -> Iterator[Problem]:
-    """What is wrong with an element of this kind and all that it holds, as names go; the first few."""
-    for count, problem in enumerate(_problems(str(path), root, known, kind, within or root.tag)):
+def problems_in(path: Path, root: ElementTree.Element, known: Mapping[str, Kind], kind: str) -> Iterator[Problem]:
+    """The first problems with the names of an element of this kind and of its descendants."""
+    for count, problem in enumerate(_problems(str(path), root, known, kind=kind, where=root.tag)):
         if count == _MOST_PROBLEMS:
             return
         yield problem
 
 
 def _problems(
-    path: str, element: ElementTree.Element, known: Mapping[str, Kind], kind: str, where: str
+    path: str, element: ElementTree.Element, known: Mapping[str, Kind], *, kind: str, where: str
 ) -> Iterator[Problem]:
     allowed = known.get(kind, Kind())
     for name in element.attrib:
@@ -96,12 +93,12 @@ def _problems(
     for name, required in allowed.attributes.items():
         if required and name not in element.attrib:
             yield Problem(path, where, f"has no {name!r}", f"give every {element.tag} its {name}")
-    for name in _OF_CLASSES:
+    for name in _CLASS_ATTRIBUTES:
         for each in element.get(name, "").split():
             if each not in CLASSES:
-                message = f"SUMO knows no class of vehicles {each[:60]!r}"
+                message = f"SUMO has no vehicle class {each[:60]!r}"
                 yield Problem(path, f"{where}.{name}", message, nearest(each, CLASSES))
-    if element.tag == "param" and any(part in element.get("key", "").lower() for part in _OF_OTHER_FILES):
+    if element.tag == "param" and any(part in element.get("key", "").lower() for part in _FILE_KEYS):
         message = f"a param {element.get('key')!r} makes SUMO read or write other files"
         yield Problem(path, where, message, "leave it out: the harness records every game itself")
     for child in element:
@@ -111,7 +108,7 @@ def _problems(
         if not isinstance(child.tag, str) or child.tag not in allowed.children:
             yield Problem(path, str(child.tag), "is not understood here", _nearest(str(child.tag), allowed.children))
         else:
-            yield from _problems(path, child, known, allowed.children[child.tag], inner)
+            yield from _problems(path, child, known, kind=allowed.children[child.tag], where=inner)
 
 
 def _nearest(name: str, valid: Mapping[str, object]) -> str:

@@ -1,4 +1,4 @@
-"""A SUMO simulation that plays G games, as the arena knows it: a few verbs, wherever it runs."""
+"""The interface of a SUMO simulation that plays G games, in this process or in another one."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from harness.traffic.route_file import Departure
 
 @dataclass
 class Reading:
-    """What SUMO's own vehicles did. Others are [G, M], padded where not present; players that SUMO drives are [G, P],
-    None without any.
+    """The background vehicles [G, M] after a step, padded where not present, and the players that SUMO drives.
 
-    Of the others there are at least those within `nearby.NOTICED_M` of a player, and all where games are recorded.
+    A reading has at least the background vehicles within `neighbours.NOTICED_M` of a player, and all of them if games
+    are recorded. Poses are those of the body's centre.
     """
 
     names: NDArray[np.object_]
@@ -30,27 +30,28 @@ class Reading:
     length_m: FloatArray
     width_m: FloatArray
     present: BoolArray
-    players: FloatArray | None = None  # [G, P, 4] x_m, y_m, heading_rad, speed_mps; NaN where the harness drives
+    players: FloatArray | None = None
+    """[G, P, 4] x_m, y_m, heading_rad, speed_mps; NaN for players that the harness drives, None if it drives all."""
 
 
 class Simulation(Protocol):
-    """What the arena asks of SUMO. Every verb but `close` raises SimulationError if SUMO refuses or has died."""
+    """A SUMO simulation of G games. Every method but `close` raises SimulationError if SUMO refuses or has died."""
 
     def reload(self, seed: int) -> None:
-        """Start SUMO anew, with its random numbers from `seed`: every game has to be started again."""
+        """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
 
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
-        """Clear a game's tile and put its players at their start; others depart as time goes by."""
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
 
     def halt(self, game: int, player: int) -> None:
-        """Whoever drove a player, from now on it stands where `step` says."""
+        """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
 
     def remove(self, game: int, player: int) -> None:
-        """Take a player out of the traffic."""
+        """Remove a player from the traffic."""
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
-        """Place the players that are taken over at poses [G, P] of their centres, let SUMO step, read the rest."""
+        """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
         ...
 
     def close(self) -> None:
-        """Give SUMO back. Closing twice is closing once."""
+        """Release SUMO. A second call has no effect."""

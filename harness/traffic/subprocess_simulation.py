@@ -1,8 +1,8 @@
-"""A simulation in a child process, for when this process's libsumo is taken: one message each way per verb.
+"""A simulation in a child process, used if libsumo of this process is in use: one message each way per call.
 
-The child is this module run as a program, so that a user's script need not be one that can be imported again. Its
-standard input and output carry pickles, each with its length before it; they are trusted, being our own child's.
-What SUMO prints goes to standard error instead. The child ends when its input does: a parent's death leaves no orphan.
+The child runs this module as a program. A user's script therefore does not have to be importable. The child's standard
+input and output carry pickles, each preceded by its length; they are trusted, because the child is our own. Output that
+SUMO prints goes to standard error. The child ends at the end of its input, and so with its parent.
 """
 
 from __future__ import annotations
@@ -28,65 +28,65 @@ from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading
 
 _LENGTH = struct.Struct("<Q")
-_PATIENCE_S = 10.0  # how long a child may take to end
+_PATIENCE_S = 10.0  # time limit for a child to end
 
 
 class SubprocessSimulation:
-    """A `LibsumoSimulation` of a child process. The child ends with `close`, or when nobody refers to this any more."""
+    """A `LibsumoSimulation` in a child process. The child ends with `close`, or with this object."""
 
     def __init__(
         self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
     ) -> None:
-        """Start the child and load SUMO in it. Raises SimulationError if it can't be started, or SUMO refuses."""
+        """Spawn the child and load SUMO in it. Raises SimulationError if either fails."""
         try:
-            self._child = _start_child()
+            self._child = _spawn_child()
         except OSError as error:
-            raise SimulationError(f"no process could be started for another simulation: {error}") from error
-        self._end = weakref.finalize(self, _end, self._child)
+            raise SimulationError(f"the process of another simulation could not be started: {error}") from error
+        self._finalizer = weakref.finalize(self, _end_child, self._child)
         try:
-            self._ask(replace(scene, folder=scene.folder.resolve()), games, tuple(taken_over), seed, recorded)
+            self._call(replace(scene, folder=scene.folder.resolve()), games, tuple(taken_over), seed, recorded)
         except BaseException:
             self.close()
             raise
 
     def reload(self, seed: int) -> None:
-        """Start SUMO anew, with its random numbers from `seed`: every game has to be started again."""
-        self._ask("reload", seed)
+        """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
+        self._call("reload", seed)
 
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
-        """Clear a game's tile and put its players at their start; others depart as time goes by."""
-        self._ask("reset", game, start, departures)
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
+        self._call("reset", game, start, departures)
 
     def halt(self, game: int, player: int) -> None:
-        """Whoever drove a player, from now on it stands where `step` says."""
-        self._ask("halt", game, player)
+        """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
+        self._call("halt", game, player)
 
     def remove(self, game: int, player: int) -> None:
-        """Take a player out of the traffic."""
-        self._ask("remove", game, player)
+        """Remove a player from the traffic."""
+        self._call("remove", game, player)
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
-        """Place the players that are taken over at poses [G, P] of their centres, let SUMO step, read the rest."""
-        reading: Reading = self._ask("step", x_m, y_m, heading_rad)
+        """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
+        reading: Reading = self._call("step", x_m, y_m, heading_rad)
         return reading
 
     def close(self) -> None:
-        """End the child. Closing twice is closing once."""
-        self._end()
+        """End the child. A second call has no effect."""
+        self._finalizer()
 
-    def _ask(self, *message: Any) -> Any:
-        """The child's answer to a message. A child that was interrupted halfway is of no more use, and is ended."""
-        if not self._end.alive:
+    def _call(self, *message: Any) -> Any:
+        """The child's answer to a message. An interrupted exchange ends the child: its next answer would be old."""
+        if not self._finalizer.alive:
             raise SimulationError("this simulation was closed")
-        if self._child.poll() is not None:  # or an answer that it left behind would be taken for this one's
-            raise SimulationError(f"the process that SUMO ran in {_how_it_ended(self._child)}")
+        if self._child.poll() is not None:  # an old answer may still be in the pipe
+            raise SimulationError(f"SUMO's process {_ending_of(self._child)}")
         assert self._child.stdin is not None
         assert self._child.stdout is not None
         try:
             _send(self._child.stdin, message)
             answer, refusal = _receive(self._child.stdout)
         except (EOFError, OSError):
-            raise SimulationError(f"the process that SUMO ran in {_how_it_ended(self._child)}") from None
+            raise SimulationError(f"SUMO's process {_ending_of(self._child)}") from None
         except BaseException:
             self._child.kill()
             self._child.wait()
@@ -96,7 +96,7 @@ class SubprocessSimulation:
         return answer
 
 
-def _start_child() -> subprocess.Popen[bytes]:
+def _spawn_child() -> subprocess.Popen[bytes]:
     top = Path(__file__).resolve().parents[2]  # where `python -m` looks first
     path = os.pathsep.join(str(Path(each).resolve()) for each in sys.path)
     return subprocess.Popen(
@@ -105,14 +105,14 @@ def _start_child() -> subprocess.Popen[bytes]:
         stdout=subprocess.PIPE,
         cwd=top,
         env={**os.environ, "PYTHONPATH": path},
-        start_new_session=True,  # Ctrl-C is the parent's to answer
+        start_new_session=True,  # only the parent handles Ctrl-C
     )
 
 
-def _end(child: subprocess.Popen[bytes]) -> None:
+def _end_child(child: subprocess.Popen[bytes]) -> None:
     assert child.stdin is not None
     assert child.stdout is not None
-    with contextlib.suppress(OSError):  # it may have died before it read everything
+    with contextlib.suppress(OSError):  # the child may have died with input left
         child.stdin.close()
     try:
         child.wait(_PATIENCE_S)
@@ -122,7 +122,7 @@ def _end(child: subprocess.Popen[bytes]) -> None:
     child.stdout.close()
 
 
-def _how_it_ended(child: subprocess.Popen[bytes]) -> str:
+def _ending_of(child: subprocess.Popen[bytes]) -> str:
     try:
         code = child.wait(_PATIENCE_S)
     except subprocess.TimeoutExpired:
@@ -140,7 +140,7 @@ def _send(stream: IO[bytes], message: Any) -> None:
 
 
 def _receive(stream: IO[bytes]) -> Any:
-    """The next message. Raises EOFError where the stream ends."""
+    """The next message. Raises EOFError at the end of the stream."""
     (length,) = _LENGTH.unpack(_read(stream, _LENGTH.size))
     return pickle.loads(_read(stream, length))
 
@@ -156,7 +156,7 @@ def _read(stream: IO[bytes], count: int) -> bytes:
 
 
 def serve() -> None:
-    """Answer the parent: its first message is what a `LibsumoSimulation` is made of, each further one a verb."""
+    """Serve the parent: the first message has the arguments of a `LibsumoSimulation`, each other one a method call."""
     from harness.traffic.libsumo_simulation import LibsumoSimulation
 
     incoming = sys.stdin.buffer
@@ -164,14 +164,14 @@ def serve() -> None:
     os.dup2(2, 1)
     simulation: LibsumoSimulation | None = None
 
-    def answer(verb: Any, *arguments: Any) -> Any:
+    def answer(first: Any, *arguments: Any) -> Any:
         nonlocal simulation
         if simulation is None:
-            simulation = LibsumoSimulation(verb, *arguments)
+            simulation = LibsumoSimulation(first, *arguments)
             return None
-        return getattr(simulation, verb)(*arguments)
+        return getattr(simulation, first)(*arguments)
 
-    with contextlib.suppress(EOFError, BrokenPipeError):  # the parent has closed this simulation, or is gone
+    with contextlib.suppress(EOFError, BrokenPipeError):  # the parent has closed this simulation, or has ended
         while True:
             message = _receive(incoming)
             result, refusal = None, None

@@ -1,11 +1,13 @@
-"""G copies of a scene's net side by side in one net, so that one SUMO plays G games.
+"""Tiled nets: G copies of a scene's net side by side in one net, so that one SUMO plays G games.
 
-Each copy has its names prefixed and its coordinates shifted by netconvert; the merged net is cached by its content.
+netconvert prefixes the names and shifts the coordinates of each copy. The tiled net is cached by the net's content, the
+number of games and SUMO's version.
 """
 
 from __future__ import annotations
 
 import hashlib
+import importlib.metadata
 import os
 import shutil
 import subprocess
@@ -22,12 +24,12 @@ _GAP_M = 200.0
 
 
 def tile_prefix(game: int, games: int) -> str:
-    """What stands before every name in a game's tile; nothing if it is the only one."""
+    """The prefix of every name in a game's tile; empty if there is one game."""
     return f"g{game}_" if games > 1 else ""
 
 
 def tile_offset_m(net_file: Path, games: int) -> float:
-    """How far each tile lies north of the one before it."""
+    """Distance from each tile to the next one, in y; 0 for one game."""
     location = parse_xml(net_file).find("location")
     if games == 1 or location is None:
         return 0.0
@@ -36,10 +38,14 @@ def tile_offset_m(net_file: Path, games: int) -> float:
 
 
 def tiled_net(net_file: Path, games: int) -> Path:
-    """A net with G tiles of the scene's net: the net itself for one game, else from the cache."""
+    """A net with G = `games` tiles of the scene's net: the net itself for one game, else a file of the cache.
+
+    Raises SimulationError if netconvert fails.
+    """
     if games == 1:
         return net_file
-    digest = hashlib.sha256(net_file.read_bytes() + f"{games} {_GAP_M} {sumo.__file__}".encode()).hexdigest()[:24]
+    version = importlib.metadata.version("eclipse-sumo")  # `sumo.__version__` is 0.0.0
+    digest = hashlib.sha256(net_file.read_bytes() + f"{games} {_GAP_M} {version}".encode()).hexdigest()[:24]
     cache = Path(platformdirs.user_cache_dir("harness")) / "tiles"
     cache.mkdir(parents=True, exist_ok=True)
     merged = cache / f"{digest}.net.xml"
@@ -75,6 +81,6 @@ def _netconvert(*arguments: str) -> None:
     if program is None:
         raise SimulationError("netconvert is missing from the installed SUMO: install eclipse-sumo again")
     environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    done = subprocess.run([program, *arguments], capture_output=True, text=True, env=environment, check=False)
-    if done.returncode:
-        raise SimulationError(f"netconvert failed: {done.stderr.strip()[-500:]}")
+    run = subprocess.run([program, *arguments], capture_output=True, text=True, env=environment, check=False)
+    if run.returncode:
+        raise SimulationError(f"netconvert failed: {run.stderr.strip()[-500:]}")

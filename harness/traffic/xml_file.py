@@ -1,4 +1,4 @@
-"""Reading SUMO's XML files: UTF-8, no entities, no document type, nothing that names a schema of its own."""
+"""Reading SUMO's XML files: UTF-8, without entities, document types and schemas other than SUMO's."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
 
 
 def parse_xml(path: Path) -> ElementTree.Element:
-    """The root of an XML file. Raises UsageError where it is missing, malformed or carries entities."""
+    """The root of an XML file. Raises UsageError if the file is missing, malformed or has entities."""
     try:
         content = content_of(path, _MOST_BYTES)
     except FileNotFoundError:
@@ -32,11 +32,11 @@ def parse_xml(path: Path) -> ElementTree.Element:
     except OSError as error:
         raise UsageError.of(path, "", f"is not readable XML: {error.strerror}", _REMEDY) from None
     try:
-        # SUMO's parser must see what ours sees: in any other encoding the two could differ
+        # SUMO's parser and this one must read the same text: in other encodings they may differ
         text = content.decode("utf-8-sig")
         declared = _ENCODING.match(text)
         if declared and declared[1].lower() not in ("utf-8", "us-ascii"):
-            raise ValueError(f"it says that it is written in {declared[1]}")
+            raise ValueError(f"its declared encoding is {declared[1]}")
         root: ElementTree.Element = SafeElementTree.fromstring(content, forbid_dtd=True)
     except DefusedXmlException as error:
         message = f"carries XML entities or a document type: {error}"
@@ -50,16 +50,16 @@ def parse_xml(path: Path) -> ElementTree.Element:
 
 
 def _check_schema_names(path: Path, root: ElementTree.Element) -> None:
-    """A validating parser reads what these name: SUMO's own schemas, from the installed SUMO, and nothing else."""
+    """Raise UsageError for schemas other than SUMO's: a validating parser would read the files that they name."""
     for element in root.iter():
         for name, value in element.attrib.items():
-            ours = name == f"{_XSI}noNamespaceSchemaLocation" and element is root and _SCHEMA.fullmatch(value)
-            if name.startswith(_XSI) and not ours:
+            is_sumos = name == f"{_XSI}noNamespaceSchemaLocation" and element is root and _SCHEMA.fullmatch(value)
+            if name.startswith(_XSI) and not is_sumos:
                 key = f"{element.tag}.{name.removeprefix(_XSI)}"
                 raise UsageError.of(path, key, f"names the schema {value!r}", "leave it out, or name SUMO's own")
 
 
 def number_of(text: str) -> float:
-    """A number as SUMO reads one; NaN for what is none, is infinite or says that it is not a number."""
+    """The number that SUMO reads from a text; NaN if the text is not a finite number."""
     number = float(text) if _NUMBER.fullmatch(text.strip()) else math.nan
     return number if math.isfinite(number) else math.nan

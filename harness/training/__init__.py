@@ -1,1 +1,1 @@
-"""Learning a policy with PPO, and searching the parameters of a driver that does not learn."""
+"""Training a policy with PPO, and searching the parameters of a driver that is not trained."""

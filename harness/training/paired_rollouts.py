@@ -1,4 +1,4 @@
-"""The same seeded games for one ego after the other, many at once: what a search compares drivers by."""
+"""Paired rollouts: the same seeded games for each ego, many at once, so that a search can compare egos."""
 
 from __future__ import annotations
 
@@ -19,20 +19,21 @@ from harness.game.state import EGO, NON_EGO, Outcome
 from harness.traffic.scene import OpenScene
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RolloutTotals:
-    """What came of a driver's games: payoff [N] of each, and whether the ego failed [N]."""
+    """Results of a driver's games: payoff [N], and whether the ego failed [N]."""
 
     payoff: FloatArray
     failed: FloatArray
 
 
 class PairedRollouts:
-    """N seeded games, as many at once as are asked for. Game k is the same for every ego that plays it."""
+    """N seeded games, up to `at_once` of them at once. Game k is the same for every ego."""
 
     def __init__(
         self,
         scene: OpenScene,
+        *,
         personas: tuple[Persona, Persona],
         opponent: Driver | Mixture,
         games: int,
@@ -40,32 +41,32 @@ class PairedRollouts:
         alone_share: float,
         parts: Sequence[str | int],
     ) -> None:
-        """Load SUMO. `alone_share` of the games are without the opponent; `parts` name their random numbers.
+        """Load SUMO. `alone_share` is the share of games without the opponent; `parts` name the random numbers.
 
         Raises SimulationError if SUMO can't load the scene.
         """
         self._scene, self._games, self._parts = scene, games, tuple(parts)
         self._loads = ceil(games / at_once)
         self._tiles = ceil(games / self._loads)
-        self._ego = _InTurn()
-        other, ego = mixture_of(opponent, personas[NON_EGO]), personas[EGO]
-        human_factors, shares = [[ego.human_factors], other.human_factors], [[1.0], other.shares]
+        self._ego = _CurrentDriver()
+        non_ego, ego = mixture_of(opponent, personas[NON_EGO]), personas[EGO]
+        human_factors, shares = [[ego.human_factors], non_ego.human_factors], [[1.0], non_ego.shares]
         self._start_distribution = scene.start_distribution(human_factors, [1.0, 1.0 - alone_share], shares)
-        seats = [[Seat(self._ego, ego.payoff)], [Seat(member.driver) for member in other.members]]
+        seats = [[Seat(self._ego, ego.payoff)], [Seat(member.driver) for member in non_ego.members]]
         self._arena = Arena(scene, self._tiles, seats)
 
     def play(self, driver: Driver) -> RolloutTotals:
         """Play all games with this ego, each until the ego's part in it ends.
 
-        Raises whatever the driver does, and as `Arena.step` does. The games after that are played as if it hadn't.
+        Raises the exceptions of the driver and those of `Arena.step`. They have no effect on later calls.
         """
         self._ego.driver = driver
-        played = [self._play(load) for load in range(self._loads)]  # what fills the last load up does not count
+        played = [self._play(load) for load in range(self._loads)]  # games that only fill the last load are dropped
         payoff, failed = (np.concatenate(each)[: self._games] for each in zip(*played, strict=True))
-        return RolloutTotals(payoff, failed)
+        return RolloutTotals(payoff=payoff, failed=failed)
 
     def close(self) -> None:
-        """Give SUMO back."""
+        """Close the SUMO simulation."""
         self._arena.close()
 
     def _play(self, load: int) -> tuple[FloatArray, FloatArray]:
@@ -81,8 +82,8 @@ class PairedRollouts:
         return payoff, arena.state.outcome[:, EGO] != Outcome.GOAL
 
 
-class _InTurn:
-    """The ego's seat: whoever's turn it is drives."""
+class _CurrentDriver:
+    """The driver of the ego's seat: it calls `driver`, which `play` sets."""
 
     takes_over = True
 
@@ -90,11 +91,11 @@ class _InTurn:
         self.driver: Driver | None = None
 
     def reset(self, games: IntArray) -> None:
-        """Games [N] start anew."""
-        assert self.driver is not None, "games are played by a driver"
+        """Reset games [N] of the current driver."""
+        assert self.driver is not None, "play sets the driver"
         self.driver.reset(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        """As the driver whose turn it is."""
-        assert self.driver is not None, "games are played by a driver"
+        """The decisions of the current driver."""
+        assert self.driver is not None, "play sets the driver"
         return self.driver.decide(games, observation, noise)

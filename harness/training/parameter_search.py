@@ -1,8 +1,8 @@
-"""Reconfiguring an ego that can't be trained: its tunable parameters are searched on its own payoff.
+"""Reconfiguration of an ego that can't be trained: a search of its tunable parameters for its own payoff.
 
-Every trial plays the same games. The first has the parameters that the ego was given, so that what is found is never
-worse in them. Trials are kept on disk, and each is proposed from those before it and from seeds hashed from its number
-alone: a search that was interrupted and one that was not are the same search.
+Every trial plays the same games. The first trial has the ego's own parameters, so the best trial is never worse than
+the ego in these games. Trials are stored on disk. Each is proposed from the trials before it and from a seed that
+depends on its number only: an interrupted search gives the same trials as an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from harness.traffic.scene import OpenScene
 from harness.training.paired_rollouts import PairedRollouts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Search:
-    """What one search is made of: whose parameters, on what payoff, against whom."""
+    """The inputs of a search: the driver with its parameters, the personas, and the opponent."""
 
     scene: OpenScene
     driver: ExternalDriver
@@ -43,48 +43,57 @@ class Search:
     opponent: Driver | Mixture
     settings: Reconfiguration
     parts: tuple[str | int, ...]
-    """Names the search's random numbers."""
+    """They name the random numbers of the search."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Trial:
-    """One driver that was tried: the values of its parameters, and what came of its games."""
+    """One trial: the values of the parameters, and the results of the games."""
 
     values: Mapping[str, float]
     mean_payoff: float | None
-    """None: its games could not be played."""
+    """None: the games could not be played."""
     failure_rate: float | None
     error: str = ""
-    """Why they could not."""
+    """Why they could not be played; empty: they were."""
 
 
 def run_search(
     search: Search,
-    kept: Path,
+    file: Path,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     on_start: Callable[[int], None] = lambda trial: None,
 ) -> list[Trial]:
-    """Every trial of a search, those in the file `kept` taken as they are; each new one is added to it.
+    """All trials of a search. Trials in `file` are reused; each new trial is added to it.
 
-    `on_progress` gets the number of trials done and their total, `on_start` the number of each trial before it starts.
-    A driver that can't be made or can't play with some values is a trial without a payoff. Raises StageFailed where the
-    ego can't play as it was given, SimulationError where SUMO fails.
+    `on_progress` gets the number of finished trials and their total, `on_start` the number of each trial before it
+    starts. If a driver can't be made or can't play with some values, the trial has no payoff. Raises StageFailed if the
+    ego can't play with its own parameters, SimulationError if SUMO fails.
     """
-    trials, wanted = read_trials(kept)[: search.settings.trials], search.settings.trials
-    on_progress(len(trials), wanted)
-    if len(trials) == wanted:
-        return trials
     settings = search.settings
-    how = settings.games, settings.games_at_once, settings.alone_share, (*search.parts, "games")
-    with closing(PairedRollouts(search.scene, search.personas, search.opponent, *how)) as games:
-        while len(trials) < wanted:
+    trials, total = read_trials(file)[: settings.trials], settings.trials
+    on_progress(len(trials), total)
+    if len(trials) == total:
+        return trials
+    with closing(
+        PairedRollouts(
+            search.scene,
+            personas=search.personas,
+            opponent=search.opponent,
+            games=settings.games,
+            at_once=settings.games_at_once,
+            alone_share=settings.alone_share,
+            parts=(*search.parts, "games"),
+        )
+    ) as games:
+        while len(trials) < total:
             on_start(len(trials))
             values = propose(search.driver.searched, trials, *search.parts) if trials else search.driver.numbers
-            trials.append(_try(search, games, values))
+            trials.append(_run_trial(search, games, values))
             if trials[0].error:
-                raise StageFailed(f"the ego could not play as it was given: {trials[0].error}")
-            write_trials(trials, kept)
-            on_progress(len(trials), wanted)
+                raise StageFailed(f"the ego could not play with its own parameters: {trials[0].error}")
+            write_trials(trials, file)
+            on_progress(len(trials), total)
     return trials
 
 
@@ -95,51 +104,51 @@ def best(trials: Sequence[Trial]) -> int:
 
 
 def propose(tunable: Sequence[Tunable], trials: Sequence[Trial], *parts: str | int) -> dict[str, float]:
-    """What to try next, by a tree-structured Parzen estimator of the trials so far; at random for the first ten."""
+    """The values of the next trial: random for the first ten trials, then from a tree-structured Parzen estimator."""
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     ranges: dict[str, Any] = {key: optuna.distributions.FloatDistribution(low, high) for key, low, high in tunable}
     seed = seed_of(*parts, "trial", len(trials)) % 2**32
     study = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed))
     for trial in trials:
-        failed = optuna.trial.TrialState.FAIL if trial.mean_payoff is None else optuna.trial.TrialState.COMPLETE
+        state = optuna.trial.TrialState.FAIL if trial.mean_payoff is None else optuna.trial.TrialState.COMPLETE
         study.add_trial(
             optuna.trial.create_trial(
-                state=failed, params=dict(trial.values), distributions=ranges, value=trial.mean_payoff
+                state=state, params=dict(trial.values), distributions=ranges, value=trial.mean_payoff
             )
         )
     return dict(study.ask(ranges).params)
 
 
-def _try(search: Search, games: PairedRollouts, values: Mapping[str, float]) -> Trial:
+def _run_trial(search: Search, games: PairedRollouts, values: Mapping[str, float]) -> Trial:
     sampled = search.personas[EGO].decisions == "sampled"
     driver: Driver | None = None
     try:
-        given = search.driver if values == search.driver.numbers else search.driver.tuned(values)
-        driver = given.make(car_of(search.scene.world, EGO), sampled)
-        played = games.play(driver)
-        return Trial(values, float(played.payoff.mean()), float(played.failed.mean()))
+        external = search.driver if values == search.driver.numbers else search.driver.tuned(values)
+        driver = external.make(car_of(search.scene.world, EGO), sampled)
+        totals = games.play(driver)
+        return Trial(values=values, mean_payoff=float(totals.payoff.mean()), failure_rate=float(totals.failed.mean()))
     except (SimulationError, OSError):
         raise
-    except Exception as error:  # a driver may raise what it likes: others are tried
+    except Exception as error:  # a driver may raise any exception: the search continues
         if is_of_memory(error):
             raise
-        return Trial(values, None, None, f"{type(error).__name__}: {error}")
+        return Trial(values=values, mean_payoff=None, failure_rate=None, error=f"{type(error).__name__}: {error}")
     finally:
         if driver is not None and (close := getattr(driver, "close", None)):
             close()
 
 
 def write_trials(trials: Sequence[Trial], file: Path) -> None:
-    """Keep trials, so that they are read back bit for bit, or not at all."""
+    """Write trials with a checksum, which `read_trials` verifies."""
     rows = [asdict(trial) for trial in trials]
     write_atomically(file, (json.dumps({"sha256": _digest(rows), "trials": rows}, indent=1) + "\n").encode())
 
 
 def read_trials(file: Path) -> list[Trial]:
-    """The trials that were kept; none where the file is not there, or not as it was written."""
+    """The trials in a file; none if the file is missing or damaged."""
     try:
-        said = json.loads(file.read_bytes())
-        return [Trial(**row) for row in said["trials"]] if said["sha256"] == _digest(said["trials"]) else []
+        content = json.loads(file.read_bytes())
+        return [Trial(**row) for row in content["trials"]] if content["sha256"] == _digest(content["trials"]) else []
     except (OSError, ValueError, LookupError, TypeError):
         return []
 
@@ -149,5 +158,5 @@ def _digest(rows: Any) -> str:
 
 
 def version_of_search() -> dict[str, str]:
-    """The program that proposes trials: with another, they are not promised to be the same."""
+    """The version of the library that proposes trials: another version may propose other values."""
     return {"optuna": importlib.metadata.version("optuna")}

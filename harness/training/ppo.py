@@ -1,7 +1,7 @@
-"""Training one player on an arena with Stable-Baselines3's PPO, in segments.
+"""Training of one player on an arena with Stable-Baselines3's PPO, in segments.
 
-A segment starts from parameters, optimiser state and seeds hashed from its number alone, with every game started
-anew. So a training that was interrupted and one that was not are the same training.
+A segment starts from the parameters and the optimiser state of the segment before; its seeds depend on its number only,
+and every game is reset. So an interrupted training gives the same policy as an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -38,33 +38,37 @@ CURVE_WINDOW_STEPS = 16_384
 _GAE_LAMBDA = 0.95
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class TrainingSpec:
-    """What one training is made of: who learns, on what payoff, against whom, beginning from what."""
+    """The inputs of a training: learner, personas (payoff and human factors), opponent, initial policy, settings."""
 
     scene: OpenScene
     learner: int
     personas: tuple[Persona, Persona]  # of the ego's seat and of the non-ego's
     opponent: Player
-    """Who has the other seat; None: the learner is alone in every game."""
+    """The driver of the other player; None: the learner is alone in every game."""
     alone_share: float
+    """Share of the games without the opponent."""
     attentive_share: float
-    """Share of the budget in which nobody's attention lapses yet."""
+    """Share of the budget, from its start, without lapses of attention."""
     initial: Policy | None
+    """The policy that training starts from; None: random parameters."""
     settings: Training
     parts: tuple[str | int, ...]
-    """Names the lesson's random numbers."""
+    """They name the random numbers of the training."""
     as_it_drives: bool = False
-    """Learn with the habits of driving as well: a best response is best under the limits it is judged by."""
+    """Train with all human factors of the persona, as in assessment: a best response is computed under the limits under
+    which it is assessed."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Trained:
-    """What a training came to."""
+    """The result of a training."""
 
     policy: Policy
     progress: Progress
-    stopped: str  # "converged" or "budget"
+    stopped: str
+    """The reason for the end: "converged" or "budget"."""
 
 
 def train(
@@ -76,29 +80,31 @@ def train(
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     on_start: Callable[[int], None] = lambda segment: None,
 ) -> Trained:
-    """Train to convergence or to the end of the budget, going on from `checkpoint` if it was made with this `key`.
+    """Train until convergence or the end of the budget. Training continues from `checkpoint` if it has this `key`.
 
-    `on_progress` gets the steps done and their total, several times a second, `on_start` the number of each segment
-    before it starts.
-    Raises FloatingPointError where a parameter is not finite or a number of the game can't be right
-    (`game.plausibility`), SimulationError where SUMO fails, ValueError where the initial policy doesn't fit.
+    `card` is the metadata of the policy. `on_progress` gets the number of finished steps and their total after each
+    rollout, `on_start` the number of each segment before it starts.
+    Raises FloatingPointError if a parameter is not finite or a number of a game is impossible (`game.sanity_checks`),
+    SimulationError if SUMO fails, ValueError if the initial policy does not fit the network.
     """
     torch.set_num_threads(1)
     environment = _environment(spec)
     try:
         model = _learner(spec, environment, tensorboard)
-        progress = read_checkpoint(model, key, checkpoint) or Progress(0, 0, [], [])
-        while (stopped := _why_to_stop(spec, progress)) is None:
+        new = Progress(segments=0, steps=0, segment_payoffs=[], curve=[])
+        progress = read_checkpoint(model, key, checkpoint) or new
+        while (stopped := _stop_reason(spec, progress)) is None:
             on_start(progress.segments)
-            progress = _segment(spec, model, environment, progress, on_progress)
+            progress = _segment(spec, model, environment, progress=progress, on_progress=on_progress)
             write_checkpoint(model, progress, key, checkpoint)
-        return Trained(policy_of(model, card), progress, stopped)
+        return Trained(policy=policy_of(model, card), progress=progress, stopped=stopped)
     finally:
         environment.close()
 
 
-def _why_to_stop(spec: TrainingSpec, progress: Progress) -> str | None:
-    """Asked before each segment, so that one who goes on from a finished training's checkpoint is told as well."""
+def _stop_reason(spec: TrainingSpec, progress: Progress) -> str | None:
+    """The reason to stop, or None. It is checked before each segment, so that a training continued from a finished
+    training's checkpoint stops as well."""
     settings = spec.settings
     attentive = ceil(_attentive_steps(spec) / settings.segment_steps)
     if settings.early_convergence and has_converged(progress.segment_payoffs[attentive:]):
@@ -107,47 +113,48 @@ def _why_to_stop(spec: TrainingSpec, progress: Progress) -> str | None:
 
 
 def _environment(spec: TrainingSpec) -> ArenaVecEnv:
-    others = _others(spec)
-    nobody = [Seat(None)]  # and is in no game
-    seats = [[Seat(each.driver) for each in others.members] if others is not None else nobody] * 2
+    opponent = _opponent(spec)
+    empty = [Seat(None)]  # of a player that is in no game
+    seats = [[Seat(each.driver) for each in opponent.members] if opponent is not None else empty] * 2
     seats[spec.learner] = [Seat(None, spec.personas[spec.learner].payoff)]
     seed = seed_of(*spec.parts, "sumo") % 2**31
-    arena = Arena(spec.scene, spec.settings.games, seats, seed)
+    arena = Arena(spec.scene, spec.settings.games, seats, seed=seed)
     scale = spec.settings.payoff_scale
     return ArenaVecEnv(arena, spec.learner, _start_distribution(spec, 0), *spec.parts, payoff_scale=scale)
 
 
 def _start_distribution(spec: TrainingSpec, steps: int) -> StartDistribution:
-    """What the games are drawn from, `steps` into the training."""
+    """The start distribution of the games, `steps` after the start of the training."""
     present = [0.0 if spec.opponent is None else 1.0 - spec.alone_share] * 2
     present[spec.learner] = 1.0
-    theirs, their_shares = _of_other(spec)
-    human_factors, shares = [theirs, theirs], [their_shares, their_shares]
-    # Nobody learns from what was overlooked and went well: a driver learns with open eyes, and drives by habit. What
-    # the body can't do is there from the first lesson on.
+    opponent_factors, opponent_shares = _opponent_factors(spec)
+    human_factors, shares = [opponent_factors, opponent_factors], [opponent_shares, opponent_shares]
+    # A learner that overlooks a vehicle without harm learns nothing from it. So it trains with blind-spot checks and
+    # without looked-but-failed-to-see errors; its persona's own values apply when it drives. Its other limits
+    # (reaction, sight, controls) apply from the start of the training.
     own = spec.personas[spec.learner].human_factors
-    eyes_open = own if spec.as_it_drives else own.with_open_eyes
-    human_factors[spec.learner], shares[spec.learner] = [eyes_open], [1.0]
+    own_factors = own if spec.as_it_drives else own.with_open_eyes
+    human_factors[spec.learner], shares[spec.learner] = [own_factors], [1.0]
     if steps < _attentive_steps(spec):
         human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
     return spec.scene.start_distribution(human_factors, present, shares)
 
 
-def _others(spec: TrainingSpec) -> Mixture | None:
-    opponent = spec.opponent
-    return mixture_of(opponent, spec.personas[1 - spec.learner]) if opponent is not None else None
+def _opponent(spec: TrainingSpec) -> Mixture | None:
+    return mixture_of(spec.opponent, spec.personas[1 - spec.learner]) if spec.opponent is not None else None
 
 
-def _of_other(spec: TrainingSpec) -> tuple[list[HumanFactors], list[float]]:
-    """HumanFactors and shares of who has the other seat."""
-    others = _others(spec)
-    if others is None:
+def _opponent_factors(spec: TrainingSpec) -> tuple[list[HumanFactors], list[float]]:
+    """Human factors and shares of the opponent's members; those of the persona if the learner is alone."""
+    opponent = _opponent(spec)
+    if opponent is None:
         return [spec.personas[1 - spec.learner].human_factors], [1.0]
-    return others.human_factors, others.shares
+    return opponent.human_factors, opponent.shares
 
 
 def _attentive_steps(spec: TrainingSpec) -> float:
-    human_factors, _ = _of_other(spec)
+    """Steps at the start of the training without lapses of attention; 0 if no persona has lapses."""
+    human_factors, _ = _opponent_factors(spec)
     lapses = any(each.attention is not None for each in (spec.personas[spec.learner].human_factors, *human_factors))
     return spec.attentive_share * spec.settings.steps if lapses else 0.0
 
@@ -176,12 +183,12 @@ def _learner(spec: TrainingSpec, environment: ArenaVecEnv, tensorboard: Path | N
     if spec.initial is not None:
         put_policy(model, spec.initial, settings.initial_deviation)
     else:
-        _ignore_others(model)
+        _zero_other_weights(model)
     return model
 
 
-def _ignore_others(model: PPO) -> None:
-    """What a learner has never met has no say: the entries of others begin without weight, and get it as they vary."""
+def _zero_other_weights(model: PPO) -> None:
+    """Set the weights of the entries of other road users to zero: a learner that is always alone ignores them."""
     extractor: Any = model.policy.mlp_extractor
     with torch.no_grad():
         for network in (extractor.policy_net, extractor.value_net):
@@ -192,6 +199,7 @@ def _segment(
     spec: TrainingSpec,
     model: PPO,
     environment: ArenaVecEnv,
+    *,
     progress: Progress,
     on_progress: Callable[[int, int], None],
 ) -> Progress:
@@ -200,12 +208,12 @@ def _segment(
     environment.sample_from(_start_distribution(spec, progress.steps), *parts)
     environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
     steps = min(spec.settings.segment_steps, spec.settings.steps - progress.steps)
-    curve = _Curve(environment, progress, on_progress, spec)
+    curve = _CurveRecorder(environment, progress, on_progress, spec)
     model.num_timesteps = progress.steps
-    model._last_obs = None  # the games start anew
+    model._last_obs = None  # SB3 then resets the games
     try:
-        keep = _KeepDeviation(spec.settings.max_deviation)
-        model.learn(steps, callback=[curve, keep], reset_num_timesteps=False)
+        bound = _DeviationBound(spec.settings.max_deviation)
+        model.learn(steps, callback=[curve, bound], reset_num_timesteps=False)
     except FloatingPointError as error:
         raise FloatingPointError(f"{error}, after {model.num_timesteps} steps") from error
     for name, value in model.policy.state_dict().items():
@@ -213,16 +221,21 @@ def _segment(
             raise FloatingPointError(f"parameter {name} is not finite after {model.num_timesteps} steps")
     payoffs = [game.payoff for game in curve.games]
     mean = float(np.mean(payoffs)) if payoffs else float("-inf")
-    return Progress(progress.segments + 1, model.num_timesteps, [*progress.segment_payoffs, mean], curve.windows)
+    return Progress(
+        segments=progress.segments + 1,
+        steps=model.num_timesteps,
+        segment_payoffs=[*progress.segment_payoffs, mean],
+        curve=curve.windows,
+    )
 
 
-class _KeepDeviation(BaseCallback):
-    """Keeps the deviation of actions below its bound. Actions end at ±1, so that beyond it the entropy term of PPO
-    goes on paying for a deviation which is no exploration any more, but full throttle and full brake in turn."""
+class _DeviationBound(BaseCallback):
+    """Bounds the standard deviation of actions. Actions are clipped at ±1: beyond the bound the entropy term of PPO
+    still rewards a larger deviation, which is no exploration any more, but full throttle and full brake in turn."""
 
-    def __init__(self, most: float) -> None:
+    def __init__(self, largest: float) -> None:
         super().__init__()
-        self._most = float(np.log(most))
+        self._largest_log = float(np.log(largest))
 
     def _on_step(self) -> bool:
         return True
@@ -231,16 +244,16 @@ class _KeepDeviation(BaseCallback):
         self._bound()
 
     def _on_training_end(self) -> None:
-        self._bound()  # what is kept is within it as well
+        self._bound()  # the stored policy is within the bound as well
 
     def _bound(self) -> None:
         deviation: Any = self.model.policy.log_std
         with torch.no_grad():
-            deviation.clamp_(max=self._most)
+            deviation.clamp_(max=self._largest_log)
 
 
-class _Curve(BaseCallback):
-    """Gathers the learning curve of a segment and tells how far it has come."""
+class _CurveRecorder(BaseCallback):
+    """Records the learning curve of a segment and reports progress."""
 
     def __init__(
         self,
@@ -250,7 +263,7 @@ class _Curve(BaseCallback):
         spec: TrainingSpec,
     ) -> None:
         super().__init__()
-        self._environment, self._report, self._lesson = environment, on_progress, spec
+        self._environment, self._on_progress, self._spec = environment, on_progress, spec
         self._window: list[Finished] = []
         self._window_start = progress.steps
         self.windows, self.games = list(progress.curve), list[Finished]()
@@ -264,10 +277,10 @@ class _Curve(BaseCallback):
         self.games += finished
         if self.num_timesteps - self._window_start >= CURVE_WINDOW_STEPS:
             self._close_window()
-        self._report(self.num_timesteps, self._lesson.settings.steps)
+        self._on_progress(self.num_timesteps, self._spec.settings.steps)
 
     def _on_training_end(self) -> None:
-        self._close_window()  # a segment's games are in its own windows, however short it was
+        self._close_window()  # a window contains games of one segment only, so a short segment has a short window
         self.logger.dump(self.num_timesteps)
 
     def _close_window(self) -> None:
@@ -279,7 +292,7 @@ class _Curve(BaseCallback):
             mean_payoff=float(np.mean([game.payoff for game in games])),
             failure_rate=float(np.mean([game.outcome != Outcome.GOAL for game in games])),
             games=len(games),
-            mean_duration_s=float(np.mean([game.steps for game in games])) * self._lesson.scene.world.step_s,
+            mean_duration_s=float(np.mean([game.steps for game in games])) * self._spec.scene.world.step_s,
         )
         for name in ("mean_payoff", "failure_rate", "mean_duration_s"):
             self.logger.record(f"games/{name}", getattr(window, name))

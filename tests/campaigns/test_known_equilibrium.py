@@ -93,7 +93,7 @@ citation = "nobody, nowhere"
 [safety.terms]
 vehicle_clearance = {{ weight = {weight}, within_m = 10.0 }}
 """
-BLIND = "[perception]\noverlooks_share = 1.0\noverlooked_up_to_m = 100.0\n"
+BLIND = "[perception]\nno_blind_spot_check_share = 1.0\nunseen_behind_m = 100.0\n"
 TRAINING: dict[str, Any] = {
     "steps": 16_384,
     "segment_steps": 16_384,
@@ -347,20 +347,34 @@ class Coin:
 
     @property
     def player(self) -> Mixture:
-        return Mixture(tuple(Member(LearnedDriver(always(each), False), self.personas[1]) for each in (FAST, SLOW)))
+        drivers = (LearnedDriver(always(each), sampled=False) for each in (FAST, SLOW))
+        return Mixture(tuple(Member(driver=each, persona=self.personas[1]) for each in drivers))
 
     def games(self, arm: str, ego: Player, episodes: int = 40) -> pd.DataFrame:
-        played = assess(Arm(arm, self.scene, (ego, self.player), self.personas, 1), episodes)
+        played = assess(
+            Arm(name=arm, scene=self.scene, drivers=(ego, self.player), personas=self.personas, seed=1), episodes
+        )
         rows = pd.DataFrame([{"arm": arm, "persona": "blind", "seed": 1, **game.record} for game in played])
         return typed(rows.reindex(columns=list(EPISODE_COLUMNS)))
 
     def best_response(self, initial: Policy | None) -> LearnedDriver:
         how, named = settings(**TRAINING), ("coin", 1)
         spec = TrainingSpec(
-            self.scene, EGO, self.personas, self.player, 0.0, 0.0, initial, how, named, as_it_drives=True
+            scene=self.scene,
+            learner=EGO,
+            personas=self.personas,
+            opponent=self.player,
+            alone_share=0.0,
+            attentive_share=0.0,
+            initial=initial,
+            settings=how,
+            parts=named,
+            as_it_drives=True,
         )
         name = self.personas[EGO].name
-        return LearnedDriver(train(spec, self.folder / f"{name}.safetensors", name, {}).policy, False)
+        return LearnedDriver(
+            train(spec, checkpoint=self.folder / f"{name}.safetensors", key=name, card={}).policy, False
+        )
 
     def gap(self, response: Driver) -> pd.Series:
         asked = Response(1, "ego", "blind", 2, "pair", "response", "coin", "coin")

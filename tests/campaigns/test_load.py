@@ -38,10 +38,10 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.state import Outcome
 from harness.replay.selection import MOST_FAILURES_PER_ARM, choose_games, replay_name
 from harness.reports.manoeuvres import MOST_LISTED
-from harness.reports.page import PAGE_BYTES, render_page
+from harness.reports.page import PAGE_BYTES
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.chromium import launched, opener, until
-from tests.support.pages import campaign
+from tests.support.pages import campaign, rendered
 from tests.support.rollouts import Steady, arm, play
 from tests.support.scenes import build_scene, drawn
 from tests.support.shared import built_once
@@ -244,8 +244,8 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
     assert int((episodes["ego_failed"] == 1).sum()) > 1_000
     assert len(large["replays"]) < 3 * MOST_FAILURES_PER_ARM
 
-    games = recorded_games(episodes[episodes["arm"].isin(LARGE)], lambda arm, seed: traces, merge)
-    html = render_page(**large, games=games, scene=scene_drawing(merge))
+    games = recorded_games(episodes[episodes["arm"].isin(LARGE)], {}, lambda arm, seed: traces, merge)
+    html = rendered(**large, games=games, scene=scene_drawing(merge))
     assert PAGE_BYTES / 2 < len(html.encode()) <= PAGE_BYTES  # the room there is, is used
     assert f"{len(episodes)} games are too many for a page" in html
     assert "300 of the 10,000 episodes are drawn" in html
@@ -264,7 +264,7 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
         assert len(listed) >= 100
         intro = page.locator("#player-intro").inner_text()
         assert intro.startswith(f"{len(listed)} recorded games")
-        assert f"{len(episodes) - len(listed)} more games are too many for a page" in intro
+        assert f"{len(episodes) - len(listed)} more games do not fit into the page" in intro
         for outcome in ("collision", "goal"):  # the worst, and what went well
             assert any(outcome in each for each in listed), outcome
         names = page.locator("[data-is=game] option").evaluate_all("options => options.map(each => each.value)")
@@ -278,7 +278,7 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
 
 
 def test_report__a_pair_of_manoeuvres_lists_no_more_games_than_can_be_read(large: dict[str, Any]) -> None:
-    html = render_page(**large, manoeuvres=pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
+    html = rendered(**large, manoeuvres=pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
     listed = html.split('id="pair-1"')[1].split("</details>")[0]
     assert listed.count("<li>") == MOST_LISTED
     assert "more: <a" in listed

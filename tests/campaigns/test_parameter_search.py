@@ -18,7 +18,7 @@ import pytest
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import AssessmentStage, ReconfigurationStage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, SearchStage, TrainingStage
 from harness.campaign.preflight import QUICK_TRIALS, open_campaign
 from harness.config.driver import read_driver
 from harness.evaluation.tables import read_csv
@@ -63,7 +63,7 @@ def test_plan__of_an_ego_with_something_to_tune(tmp_path: Path) -> None:
     assert {id for id, stage in trained.items() if isinstance(stage, TrainingStage)} == {"speedy-seed1", "speedy-seed7"}
     for seed in (1, 7):
         search = trained[f"reconfigured_speedy-seed{seed}"]
-        assert isinstance(search, ReconfigurationStage)
+        assert isinstance(search, SearchStage)
         assert (search.needs, search.reads) == ((f"speedy-seed{seed}",), ())
         for arm in ("vs_speedy", "alone_speedy"):
             stage = trained[f"reconfigured_{arm}-seed{seed}"]
@@ -150,7 +150,7 @@ def test_check__a_persona_may_not_be_called_as_a_search_is(tmp_path: Path) -> No
 
 def test_check__says_what_will_be_searched(tmp_path: Path) -> None:
     told = harness("check", write(tmp_path)).stdout
-    assert "Round 2 searches it in 8 trials of 16 games: cruise.speed_share from 0.7 to 1, " in told
+    assert "Round 2 searches its parameters in 8 trials of 16 games: cruise.speed_share from 0.7 to 1, " in told
     assert f"  tune   {STAGE}  with speedy-seed1" in told
     assert "nothing is trained, 6 arms of 4 episodes" in told
 
@@ -227,14 +227,14 @@ def test_campaign__naive_and_reconfigured_are_compared_as_naive_and_retrained_ar
 @pytest.mark.slow
 def test_campaign__the_report_and_the_terminal_say_reconfigured(campaign: Path, run: Path) -> None:
     page = html.unescape((run / "report.html").read_text())
-    assert "Does reconfiguration mend it?" in page
+    assert "Does reconfiguration reduce the failures?" in page
     assert "reconfigured ego, against speedy" in page
     assert "0, 1 and 2: this ego is not trained, but its parameters are tuned" in page
     assert f'<a href="policies/{STAGE}/driver.toml">' in page
     assert re.search(
         r"<th scope=\"row\">cruise.time_gap_s</th><td>1.5</td><td>[\d.]+</td><td>0.8</td><td>2.5</td>", page
     )
-    assert re.search(r"8 trials; best in trial \d: mean payoff|8 trials, none better", page)
+    assert re.search(r"8 trials; the best is trial \d: mean payoff|8 trials, none better", page)
     assert 'id="reconfiguration"' in page
     words = re.sub(r"<[^>]*>", "", re.sub(r"<(script|style)>.*?</\1>", "", page, flags=re.DOTALL))
     assert all("retrained or reconfigured" in line for line in words.splitlines() if "retrain" in line.lower())

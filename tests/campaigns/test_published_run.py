@@ -1,4 +1,4 @@
-"""A run folder of which only the report and its tables were kept, as reports/merge is published."""
+"""A run folder with only the report and its tables, as reports/merge is published."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ def files_in(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
-def test_published__the_campaign_runs_over_it_as_over_an_empty_folder(published: Path, tmp_path: Path) -> None:
-    done = harness("campaign", write_campaign(tmp_path, **BY_SUMO), "--out", published, "--jobs", 1)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "done     speedy-seed1" in done.stdout
+def test_published__the_campaign_runs_on_it_as_on_an_empty_folder(published: Path, tmp_path: Path) -> None:
+    command = harness("campaign", write_campaign(tmp_path, **BY_SUMO), "--out", published, "--jobs", 1)
+    assert command.returncode == 0, command.stdout + command.stderr
+    assert "done     speedy-seed1" in command.stdout
     assert tables(published) == tables(sumo_run())
     assert (published / "policies" / "speedy-seed1" / "policy.safetensors").is_file()
 
 
 @pytest.mark.slow
-def test_published__report_says_what_is_missing_and_touches_nothing(published: Path) -> None:
+def test_published__report_names_what_is_missing_and_changes_nothing(published: Path) -> None:
     before = files_in(published)
-    said = harness("report", published)
-    assert said.returncode == 2
-    (line,) = said.stderr.strip().splitlines()
+    command = harness("report", published)
+    assert command.returncode == 2
+    (line,) = command.stderr.strip().splitlines()
     assert line.startswith(f"{published}: holds a report and its tables, but not what they are made of (")
     assert "report.html" in line
     assert files_in(published) == before
@@ -49,38 +49,37 @@ def test_published__report_says_what_is_missing_and_touches_nothing(published: P
 
 @pytest.mark.slow
 def test_published__replay_lists_the_games(published: Path) -> None:
-    said = harness("replay", published, "--list")
-    assert said.returncode == 0
-    assert said.stdout.count("naive_alone ") == 2
+    command = harness("replay", published, "--list")
+    assert command.returncode == 0
+    assert command.stdout.count("naive_alone ") == 2
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("more", [[], ["--film", "film.gif"]])
-def test_published__replay_of_a_game_says_where_it_can_be_watched(more: list[str], published: Path) -> None:
-    said = harness("replay", published, "naive_alone", 0, *more, cwd=published.parent)
-    assert said.returncode == 2
-    (line,) = said.stderr.strip().splitlines()
-    assert "naive_alone 0: was recorded, but the traces are not in this folder" in line
+def test_published__replay_of_a_game_names_the_report_that_shows_it(more: list[str], published: Path) -> None:
+    command = harness("replay", published, "naive_alone", 0, *more, cwd=published.parent)
+    assert command.returncode == 2
+    (line,) = command.stderr.strip().splitlines()
+    assert "naive_alone 0: was recorded, but this folder does not contain the traces" in line
     assert str(published / "report.html") in line
     assert not (published.parent / "film.gif").exists()
 
 
-def test_gitignore__lets_in_what_is_published_and_nothing_else_of_reports(repository: Path) -> None:
-    others = ("traces/naive_alone-seed1.parquet", "policies/naive-seed1/policy.json", ".stages/naive-seed1/done.json")
-    others += ("scene/scene.toml", "tensorboard/x", "replays/x/scene.sumocfg", ".episodes.csv.7.tmp", "other.csv")
-    names = [f"reports/merge/{name}" for name in (*PUBLISHED, *others)]
-    names += [
-        "reports/README.md",
-        "reports/merge-demo/report.html",
-        "reports/x.csv",
-        "policies/merge/x-seed1/README.md",
+def test_gitignore__only_published_files_of_reports_are_tracked(repository: Path) -> None:
+    unpublished = [
+        *("traces/naive_alone-seed1.parquet", "policies/naive-seed1/policy.json", ".stages/naive-seed1/done.json"),
+        *("scene/scene.toml", "tensorboard/x", "replays/x/scene.sumocfg", ".episodes.csv.7.tmp", "other.csv"),
     ]
+    published = [f"reports/merge/{name}" for name in PUBLISHED]
+    names = [*published, *(f"reports/merge/{name}" for name in unpublished)]
+    names += ["reports/README.md", "reports/merge-demo/report.html", "reports/x.csv"]
+    names += ["policies/merge/x-seed1/README.md"]
     if shutil.which("git") is None:
         pytest.skip("git is not installed")
-    given = subprocess.run(
+    ignored = subprocess.run(
         ["git", "check-ignore", "--no-index", *names], cwd=repository, capture_output=True, text=True, check=False
     )
-    if given.returncode not in (0, 1):
+    if ignored.returncode not in (0, 1):
         pytest.skip("not in a git repository")
-    let_in = {*(f"reports/merge/{name}" for name in PUBLISHED), "reports/README.md", "policies/merge/x-seed1/README.md"}
-    assert set(names) - set(given.stdout.splitlines()) == let_in
+    tracked = {*published, "reports/README.md", "policies/merge/x-seed1/README.md"}
+    assert set(names) - set(ignored.stdout.splitlines()) == tracked

@@ -1,4 +1,4 @@
-"""The published schemas: they are what the command writes, know every document, and refuse what no model accepts."""
+"""The published schemas: they are current, accept every shipped document, and refuse nothing that a model accepts."""
 
 from __future__ import annotations
 
@@ -13,7 +13,9 @@ import pytest
 from jsonschema import Draft202012Validator
 from pydantic import TypeAdapter, ValidationError
 
+from harness.cli import wording
 from harness.cli.schema_files import write_schemas
+from harness.config.campaign import Training
 from harness.config.json_schema import DIALECT, DOCUMENTS, UNITS, file_of, schema_of, schema_text
 from harness.errors import UsageError
 from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS
@@ -34,7 +36,7 @@ SHIPPED = [
 each_shipped = pytest.mark.parametrize(
     ("kind", "path"), SHIPPED, ids=[path.relative_to(REPOSITORY).as_posix() for _, path in SHIPPED]
 )
-NAMED_BY_ITS_AUTHOR = {"start", "inputs", "parameters"}  # tables whose keys are names in an FMU or a program
+TABLES_WITH_FREE_KEYS = {"start", "inputs", "parameters"}  # tables whose keys are names in an FMU or a program
 each_kind = pytest.mark.parametrize("kind", DOCUMENTS)
 
 Keys = tuple[str | int, ...]
@@ -45,7 +47,7 @@ def read(path: Path) -> Any:
 
 
 def accepts(kind: str, document: Any) -> bool:
-    """Whether the model does."""
+    """Whether the model of the kind accepts the document."""
     try:
         TypeAdapter(DOCUMENTS[kind]).validate_json(json.dumps(document))
     except ValidationError:
@@ -54,14 +56,14 @@ def accepts(kind: str, document: Any) -> bool:
 
 
 def nodes(node: Any, at: Keys = ()) -> Iterator[Keys]:
-    """Where there is something in a document, at any depth."""
+    """The path of every value in a document, at any depth."""
     for key, each in node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ():
         yield (*at, key)
         yield from nodes(each, (*at, key))
 
 
 def with_changed(document: Any, at: Keys, change: Any) -> Any:
-    """A copy in which `change(table, key)` was done to the table or list that holds the key."""
+    """A copy after `change(table, key)`, where the table or list contains the key."""
     changed = copy.deepcopy(document)
     table = changed
     for key in at[:-1]:
@@ -71,10 +73,9 @@ def with_changed(document: Any, at: Keys, change: Any) -> Any:
 
 
 def described(schema: Any) -> Iterator[tuple[str, Any]]:
-    """Every key of a schema with what is said of it, its table's words included."""
-    tables = [
-        each for each in (schema, *schema["$defs"].values()) if "properties" in each
-    ]  # a choice of tables has none
+    """Every key of a schema with its description, which can be that of its table."""
+    candidates = (schema, *schema["$defs"].values())
+    tables = [each for each in candidates if "properties" in each]  # a union of tables has no properties
     inner = [each for table in tables for key in table["properties"].values() if "properties" in (each := key)]
     inner += [each for table in inner for each in table["properties"].values() if "properties" in each]
     for table in (*tables, *inner):
@@ -82,10 +83,10 @@ def described(schema: Any) -> Iterator[tuple[str, Any]]:
             yield name, {**schema["$defs"].get(node.get("$ref", "").rpartition("/")[2], {}), **node}
 
 
-# --- what is published ---
+# --- published files ---
 
 
-def test_published__is_what_the_command_writes(tmp_path: Path) -> None:
+def test_published_schemas__are_what_the_command_writes(tmp_path: Path) -> None:
     written = write_schemas(tmp_path / "new" / "schemas")
     assert {each.name for each in written} == {each.name for each in PUBLISHED.iterdir()}, (
         "harness schema --out docs/schemas"
@@ -96,29 +97,29 @@ def test_published__is_what_the_command_writes(tmp_path: Path) -> None:
         )
 
 
-def test_one_schema__is_written_alone(tmp_path: Path) -> None:
+def test_write_schemas__writes_one_schema(tmp_path: Path) -> None:
     assert write_schemas(tmp_path, "persona") == [tmp_path / "persona.schema.json"]
     assert [each.name for each in tmp_path.iterdir()] == ["persona.schema.json"]
 
 
-def test_unknown_kind__names_the_nearest_and_writes_nothing(tmp_path: Path) -> None:
+def test_write_schemas__unknown_kind_names_the_nearest_and_writes_nothing(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"no kind of document 'persna'.*did you mean 'persona'"):
         write_schemas(tmp_path / "new", "persna")
     assert not (tmp_path / "new").exists()
 
 
-def test_folder__that_is_a_file_is_left_alone(tmp_path: Path) -> None:
+def test_write_schemas__refuses_a_file_as_folder(tmp_path: Path) -> None:
     (tmp_path / "notes").write_text("mine")
-    with pytest.raises(UsageError, match="is not a folder"):
+    with pytest.raises(UsageError, match=wording.NOT_A_FOLDER[0]):
         write_schemas(tmp_path / "notes")
     assert (tmp_path / "notes").read_text() == "mine"
 
 
-# --- what a schema says ---
+# --- content ---
 
 
 @each_kind
-def test_schema__is_one_of_the_dialect_it_names(kind: str) -> None:
+def test_schema__is_valid_in_its_dialect(kind: str) -> None:
     schema = json.loads(schema_text(kind))
     assert schema["$schema"] == DIALECT == Draft202012Validator.META_SCHEMA["$id"]
     Draft202012Validator.check_schema(schema)
@@ -127,9 +128,9 @@ def test_schema__is_one_of_the_dialect_it_names(kind: str) -> None:
 
 @each_kind
 def test_schema__every_key_is_described_with_its_unit(kind: str) -> None:
-    found = list(described(schema_of(kind)))
-    assert len(found) > 10
-    for name, node in found:
+    keys = list(described(schema_of(kind)))
+    assert len(keys) > 10
+    for name, node in keys:
         assert len(node.get("description", "")) > 10, f"{name} has no description: give its field a docstring"
         assert "\n" not in node["description"]
         ending = name.rpartition("_")[2]
@@ -139,15 +140,15 @@ def test_schema__every_key_is_described_with_its_unit(kind: str) -> None:
 
 
 @each_kind
-def test_schema__every_number_has_its_bounds(kind: str) -> None:
+def test_schema__every_number_has_bounds(kind: str) -> None:
     for name, node in described(schema_of(kind)):
-        if node.get("type") in ("number", "integer") and name != "position_m":  # along an edge of any length
+        if node.get("type") in ("number", "integer") and name != "position_m":  # an edge can have any length
             assert {"minimum", "exclusiveMinimum"} & set(node), name
             assert {"maximum", "exclusiveMaximum"} & set(node), name
 
 
 @each_kind
-def test_schema__knows_no_null(kind: str) -> None:
+def test_schema__has_no_null(kind: str) -> None:
     assert "null" not in schema_text(kind)
 
 
@@ -158,11 +159,11 @@ def test_schema__keeps_a_models_bounds_and_defaults() -> None:
         "exclusiveMinimum": 0.0,
         "maximum": 1.0,
         "type": "number",
-        "description": "Epsilon: how far an update may shift the odds of an action, as a share.",
+        "description": Training.model_fields["clip"].description,
     }
 
 
-def test_schema__of_a_persona_has_each_term_in_its_group() -> None:
+def test_persona_schema__has_each_term_in_its_group() -> None:
     schema = schema_of("persona")
     for group in GROUPS:
         table = schema["$defs"][schema["properties"][group]["$ref"].rpartition("/")[2]]
@@ -179,14 +180,14 @@ def test_schema__of_a_persona_has_each_term_in_its_group() -> None:
 
 
 @each_shipped
-def test_shipped_document__validates(kind: str, path: Path) -> None:
+def test_shipped_document__is_valid(kind: str, path: Path) -> None:
     assert [each.message for each in Draft202012Validator(schema_of(kind)).iter_errors(read(path))] == []
 
 
 @each_shipped
-def test_shipped_document__with_any_key_misspelt_does_not(kind: str, path: Path) -> None:
+def test_shipped_document__with_a_misspelt_key_is_not_valid(kind: str, path: Path) -> None:
     document, validator = read(path), Draft202012Validator(schema_of(kind))
-    keys = [at for at in nodes(document) if isinstance(at[-1], str) and not NAMED_BY_ITS_AUTHOR & set(at[:-1])]
+    keys = [at for at in nodes(document) if isinstance(at[-1], str) and not TABLES_WITH_FREE_KEYS & set(at[:-1])]
     assert keys
     for at in keys:
         misspelt = with_changed(document, at, lambda table, key: table.update({f"{key}x": table.pop(key)}))

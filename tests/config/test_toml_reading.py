@@ -1,4 +1,4 @@
-"""Mistakes in a document are named with file, key and remedy, all at once, and a document never changes."""
+"""Mistakes in a document are reported together, each with file, key and remedy; a document is immutable."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ import pytest
 from pydantic import ValidationError
 
 from harness.config.campaign import Campaign, resolve
+from harness.config.human_limits import AttentionLapses, Perception
 from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import Document, nearest, read_document
 from harness.errors import Problem, UsageError
-from harness.game.human_limits import Reaction, Sight, Uses
+from harness.game.human_limits import ActuatorShares, Reaction, Sight
 
 Write = Callable[[str], Path]
 
@@ -73,12 +74,12 @@ def problems(path: Path, model: type[Document]) -> list[Problem]:
 
 
 def only(path: Path, model: type[Document]) -> tuple[str, str]:
-    """Key of the one problem, and what is said about it."""
+    """Key and text of the only problem."""
     (problem,) = problems(path, model)
     return problem.key, f"{problem.message} ({problem.remedy})" if problem.remedy else problem.message
 
 
-def test_documents__of_this_repository_are_in_order(repository: Path) -> None:
+def test_documents__of_this_repository_are_valid(repository: Path) -> None:
     for folder, model in (("personas", Persona), ("campaigns", Campaign)):
         for path in sorted((repository / folder).glob("*.toml")):
             assert read_document(path, model)
@@ -88,8 +89,8 @@ def test_documents__of_this_repository_are_in_order(repository: Path) -> None:
 
 def test_campaign__defaults_are_the_papers_table_1(write: Write) -> None:
     training = read_document(write(CAMPAIGN), Campaign).training
-    given = (training.steps, training.early_convergence, training.discount, training.clip)
-    assert given == (3_000_000, True, 0.99, 0.1)
+    values = (training.steps, training.early_convergence, training.discount, training.clip)
+    assert values == (3_000_000, True, 0.99, 0.1)
     assert (training.entropy_coefficient, training.learning_rate, training.buffer) == (0.02, 1e-4, 2048)
 
 
@@ -97,13 +98,13 @@ def test_campaign__paths_are_relative_to_its_own_file() -> None:
     assert resolve(Path("/a/campaigns/c.toml"), "../personas/p.toml") == Path("/a/personas/p.toml")
 
 
-def test_number__a_whole_one_will_do_for_a_fraction(write: Write) -> None:
+def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
     assert read_document(write(SCENE), Scene).ego.speed_mps == (11.0, 14.0)
     assert read_document(write(PERSONA), Persona).payoff.terms[0].weight == 1.0
 
 
 @pytest.mark.parametrize(
-    ("model", "text", "key", "said"),
+    ("model", "text", "key", "message"),
     [
         # unknown keys, at every depth
         (Campaign, CAMPAIGN + "sede = [1]", "sede", "unknown key (did you mean 'seeds'?)"),
@@ -117,7 +118,7 @@ def test_number__a_whole_one_will_do_for_a_fraction(write: Write) -> None:
             "safety.terms.clearance.witin_s",
             "unknown key (did you mean 'within_s'?)",
         ),
-        # what is missing
+        # missing keys
         (Campaign, CAMPAIGN.replace('name = "c"', ""), "name", "is missing (add it)"),
         (Scene, SCENE.replace('edge = "exit"', ""), "goal.edge", "is missing (add it)"),
         (Persona, PERSONA + '[[sources]]\nstatistic = "many of them"', "sources[1].citation", "is missing (add it)"),
@@ -129,12 +130,12 @@ def test_number__a_whole_one_will_do_for_a_fraction(write: Write) -> None:
         (Campaign, CAMPAIGN + "seeds = []", "seeds", "this list is not possible (list should have at least 1 item"),
         (Campaign, CAMPAIGN + "[assessment]\nsignificance = 1.0", "assessment.significance", "1.0 is not possible ("),
         (Persona, PERSONA + "[attention]\nmean_attentive_s = 0\nlapse_s = [1, 2]", "attention.mean_attentive_s", "0 "),
-        # not a number at all
+        # not finite
         (Scene, "friction = nan" + SCENE, "friction", "nan is not possible (input should be a finite number)"),
         (Scene, "friction = inf" + SCENE, "friction", "inf is not possible (input should be a finite number)"),
         (Campaign, CAMPAIGN + "[training]\nlearning_rate = 1e400", "training.learning_rate", "inf is not possible"),
         (Scene, SCENE.replace("[30.0, 45.0]", "[30.0, nan]"), "ego.position_m[1]", "nan is not possible ("),
-        # of the wrong kind
+        # wrong types
         (Scene, 'friction = "dry"' + SCENE, "friction", "'dry' is not possible (input should be a valid number)"),
         (Scene, "friction = true" + SCENE, "friction", "True is not possible (input should be a valid number)"),
         (Campaign, CAMPAIGN + "seeds = 1", "seeds", "1 is not possible (input should be a valid array)"),
@@ -145,62 +146,62 @@ def test_number__a_whole_one_will_do_for_a_fraction(write: Write) -> None:
         (Persona, PERSONA + "[safety.terms]\nrail = true", "safety.terms.rail", "True is not possible ("),
         (Persona, 'decisions = "moody"' + PERSONA, "decisions", "'moody' is not possible (input should be 'mode' or"),
         # what does not fit together
-        (Scene, SCENE.replace("[-8.0, 8.0]", "[8.0, -8.0]"), "non_ego.beside_ego_m", "is empty: put the lower end"),
+        (Scene, SCENE.replace("[-8.0, 8.0]", "[8.0, -8.0]"), "non_ego.beside_ego_m", "is empty: write the lower end"),
         (Scene, SCENE.replace("[11, 14]", "[-1, 14]"), "ego", "speed_mps must not be negative"),
         (Scene, SCENE.replace("beside_ego_m = [-8.0, 8.0]", ""), "non_ego", "give either position_m or beside_ego_m"),
         (Scene, SCENE.replace("beside", "position_m = [0, 9]\nbeside"), "non_ego", "give either position_m or beside"),
         (Scene, SCENE.replace("position_m = [30.0, 45.0]", "beside_ego_m = [0, 1]"), "", "the ego can't start beside"),
-        (Campaign, CAMPAIGN + "seeds = [1, 2, 1]", "seeds", "a seed stands twice"),
+        (Campaign, CAMPAIGN + "seeds = [1, 2, 1]", "seeds", "a seed occurs twice"),
         (Campaign, CAMPAIGN + "[training]\nbuffer = 1000", "training", "must be a multiple of games (64)"),
         (Campaign, CAMPAIGN + "[training]\nminibatch = 4096", "training", "must not exceed buffer (2048)"),
         (Campaign, CAMPAIGN + "[training]\ninitial_deviation = 0.6", "training", "must not exceed max_deviation (0.5)"),
         (Persona, PERSONA + FUZZY.replace("thrill", "rail"), "human.fuzzy[0].name", "'rail' is a built-in term"),
-        (Persona, PERSONA + FUZZY + FUZZY, "human.fuzzy[1].name", "'thrill' stands twice"),
-        (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "-0.2, 1.0"), "human.fuzzy[0].sets[0].points", "must rise"),
+        (Persona, PERSONA + FUZZY + FUZZY, "human.fuzzy[1].name", "'thrill' occurs twice"),
+        (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "-0.2, 1.0"), "human.fuzzy[0].sets[0].points", "must increase"),
         (Persona, PERSONA + FUZZY.replace("0.2, 1.0", "0.2, 1.1"), "human.fuzzy[0].sets[0].points[1][1]", "1.1 is not"),
         (Persona, PERSONA + FUZZY.replace("speed_over_limit", "speed"), "human.fuzzy[0].quantity", "mean 'speed_mps'?"),
         (Persona, PERSONA + "[attention]\nmean_attentive_s = 5\nlapse_s = [0, 2]", "attention.lapse_s", "longer than"),
-        # names that become files and folders
+        # names of files and folders
         (Campaign, CAMPAIGN.replace('"c"', '"../c"'), "name", "'../c' is not possible (string should match pattern"),
         (Scene, SCENE.replace('"s.net.xml"', '"../s.net.xml"'), "net", "'../s.net.xml' is not possible (string should"),
     ],
 )  # fmt: skip
-def test_mistake__is_named_with_its_key_and_remedy(
-    write: Write, model: type[Document], text: str, key: str, said: str
+def test_mistake__is_reported_with_key_and_remedy(
+    write: Write, model: type[Document], text: str, key: str, message: str
 ) -> None:
-    found_key, found = only(write(text), model)
-    assert found_key == key
-    assert said in found
+    reported_key, reported = only(write(text), model)
+    assert reported_key == key
+    assert message in reported
 
 
-def test_mistakes__are_named_all_at_once(write: Write) -> None:
+def test_mistakes__are_reported_together(write: Write) -> None:
     text = CAMPAIGN.replace('name = "c"', "") + "seeds = [-1]\nsede = 1\n[training]\nclip = 2.0\n"
     assert [each.key for each in problems(write(text), Campaign)] == ["name", "sede", "seeds[0]", "training.clip"]
 
 
 @pytest.mark.parametrize("text", ['name = "c', "name = ", "[a\n", "a = 1\na = 2\n", "a = " + "[" * 3000])
-def test_file__that_is_not_toml(write: Write, text: str) -> None:
-    key, said = only(write(text), Campaign)
+def test_file__not_toml(write: Write, text: str) -> None:
+    key, message = only(write(text), Campaign)
     assert key == ""
-    assert said.startswith("is not valid TOML: ")
-    assert said.endswith("(mend it at the line named)")
+    assert message.startswith("is not valid TOML: ")
+    assert message.endswith("(correct the file at this line)")
 
 
-def test_file__that_is_not_utf_8(tmp_path: Path) -> None:
+def test_file__not_utf_8(tmp_path: Path) -> None:
     path = tmp_path / "a.toml"
     for content in (b"\xff\xfen\x00", 'name = "Zoë"'.encode("latin-1")):
         path.write_bytes(content)
-        key, said = only(path, Campaign)
+        key, message = only(path, Campaign)
         assert key == ""
-        assert said.startswith("cannot be read: ")
-        assert said.endswith("(a UTF-8 TOML file is needed)")
+        assert message.startswith("cannot be read: ")
+        assert message.endswith("(a UTF-8 TOML file is needed)")
 
 
-def test_file__that_is_a_folder(tmp_path: Path) -> None:
+def test_file__a_folder(tmp_path: Path) -> None:
     assert only(tmp_path, Campaign)[1].startswith("cannot be read: ")
 
 
-def test_file__that_is_missing_names_the_nearest(write: Write) -> None:
+def test_file__missing_names_the_nearest(write: Write) -> None:
     path = write(CAMPAIGN).with_name("speedy.toml")
     path.write_text("", encoding="utf-8")
     assert only(path.with_name("speddy.toml"), Campaign) == ("", "there is no such file (did you mean 'speedy.toml'?)")
@@ -208,7 +209,7 @@ def test_file__that_is_missing_names_the_nearest(write: Write) -> None:
     assert only(missing, Campaign)[1] == f"there is no such file (there is no folder {missing.parent})"
 
 
-def test_nearest__is_one_word_or_all_of_them() -> None:
+def test_nearest__is_one_word_or_all_words() -> None:
     assert nearest("colour", ["colours", "size"]) == "did you mean 'colours'?"
     assert nearest("xyz", ["b", "a"]) == "valid: a, b"
 
@@ -223,28 +224,84 @@ def test_document__is_frozen(write: Write) -> None:
         read_document(write(SCENE), Scene).ego.lane = "b"
 
 
-def test_persona__without_limits_is_written_as_before_there_were_any(write: Write) -> None:
-    """What stages are keyed by, and what a manifest holds."""
+def test_persona__without_later_limits_is_dumped_without_them(write: Write) -> None:
+    """The keys of stages, and a manifest, contain this dump."""
     plain = read_document(write(PERSONA), Persona).model_dump(mode="json")
     assert {"reaction", "actuators"}.isdisjoint(plain)
     assert plain["perception"] is None
-    perceives = "[perception]\noverlooks_share = 0.5\n"
-    written = read_document(write(PERSONA + perceives), Persona).model_dump(mode="json")
-    assert written["perception"] == {"overlooks_share": 0.5, "overlooked_up_to_m": 0.0}
+    perception = "[perception]\nno_blind_spot_check_share = 0.5\n"
+    written = read_document(write(PERSONA + perception), Persona).model_dump(mode="json")
+    assert written["perception"] == {"no_blind_spot_check_share": 0.5, "unseen_behind_m": 0.0}
 
 
-def test_persona__limits_are_written_and_read_again(write: Write) -> None:
+def test_persona__limits_survive_a_round_trip(write: Write) -> None:
     limits = (
-        "[perception]\nrange_m = 50.0\ndistance_error = 0.1\nerror_s = 5.0\n"
+        "[perception]\nrange_m = 50.0\ndistance_error = 0.1\nerror_correlation_time_s = 5.0\n"
         "[reaction]\ndelay_s = [0.2, 0.3]\n[actuators]\nbraking_share = 0.5\n"
     )
     person = read_document(write(PERSONA + limits), Persona)
     written = person.model_dump(mode="json")
     assert Persona.model_validate(written, strict=False) == person
-    assert person.human_factors.sight == Sight(50.0, 0.1, 0.0, 5.0)
-    assert person.human_factors.reaction == Reaction((0.2, 0.3))
-    assert person.human_factors.uses == Uses(braking=0.5)
+    assert person.human_factors.sight == Sight(range_m=50.0, distance_error=0.1, error_s=5.0)
+    assert person.human_factors.reaction == Reaction(delay_s=(0.2, 0.3))
+    assert person.human_factors.actuator_shares == ActuatorShares(braking=0.5)
     assert (
         person.human_factors.looked_but_failed_to_see
         is read_document(write(PERSONA), Persona).human_factors.looked_but_failed_to_see
     )
+
+
+# --- renamed keys -----------------------------------------------------------------------------------------------------
+
+RENAMED = [(model, *names) for model in (AttentionLapses, Perception) for names in model.renamed_keys().items()]
+
+
+def test_renamed_keys__are_those_of_the_persona() -> None:
+    assert {earlier: present for _, earlier, present in RENAMED} == {
+        "crown_rad": "crown_steering_rad",
+        "bumps_rad": "bump_steering_sd_rad",
+        "overlooks_share": "no_blind_spot_check_share",
+        "overlooked_up_to_m": "unseen_behind_m",
+        "misses_share": "looked_but_failed_to_see_share",
+        "error_s": "error_correlation_time_s",
+    }
+
+
+@pytest.mark.parametrize(("model", "earlier", "present"), RENAMED)
+def test_renamed_key__is_refused_with_the_present_name(
+    write: Write, model: type[Document], earlier: str, present: str
+) -> None:
+    table = "perception" if model is Perception else "attention"
+    required = "" if model is Perception else "mean_attentive_s = 5.0\nlapse_s = [1.0, 2.0]\n"
+    key, message = only(write(f"{PERSONA}[{table}]\n{required}{earlier} = 0.05\n"), Persona)
+    assert key == f"{table}.{earlier}"
+    assert message == f"is the earlier name of a key (rename it to {present})"
+
+
+@pytest.mark.parametrize("name", ["distracted", "impaired", "late_merger"])
+def test_renamed_keys__records_with_either_name_are_read(repository: Path, name: str) -> None:
+    persona = read_document(repository / "personas" / f"{name}.toml", Persona)
+    identity, dump = persona.identity(), persona.model_dump(mode="json")
+    assert identity != dump
+    assert Persona.from_record(identity) == Persona.from_record(dump) == persona
+
+
+def test_identity__has_the_earlier_names(write: Write) -> None:
+    limits = (
+        "[attention]\nmean_attentive_s = 5.0\nlapse_s = [1.0, 2.0]\n"
+        "[perception]\nlooked_but_failed_to_see_share = 0.1\nnoticed_within_m = 8.0\n"
+    )
+    identity = read_document(write(PERSONA + limits), Persona).identity()
+    assert set(identity["attention"]) == {"mean_attentive_s", "lapse_s", "crown_rad", "bumps_rad"}
+    assert identity["perception"] == {
+        "overlooks_share": 0.0,
+        "overlooked_up_to_m": 0.0,
+        "misses_share": 0.1,
+        "noticed_within_m": 8.0,
+    }
+
+
+def test_from_record__refuses_what_is_no_persona() -> None:
+    for record in (None, {}, {"name": "p"}, {"perception": "x"}):
+        with pytest.raises(ValidationError):
+            Persona.from_record(record)

@@ -1,4 +1,4 @@
-"""The script behind docs/game.md: what it prints of a run's tables, and that the page shows what it printed."""
+"""The script behind docs/game.md: its tables, and that the page shows them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def script() -> ModuleType:
 figures = script()
 
 
-def test_gaps__a_row_says_who_changes_what_it_earns_and_what_becomes_of_the_ego() -> None:
+def test_gaps__a_row_has_the_payoffs_the_gap_and_the_failures_of_the_ego() -> None:
     row = {
         "seed": 2,
         "persona": "speedy",
@@ -51,9 +51,9 @@ def test_gaps__a_row_says_who_changes_what_it_earns_and_what_becomes_of_the_ego(
     )
 
 
-def test_failures__a_cell_is_the_mean_over_seeds_and_empty_where_they_never_met() -> None:
-    met = [("naive", "anna", 0.2), ("naive", "anna", 0.4), ("naive", "bert", 0.0), ("robust", "anna", 0.1)]
-    table = pd.DataFrame(met, columns=["ego", "non_ego", "failure_rate"])
+def test_failures__a_cell_is_the_mean_over_seeds_and_a_dash_without_games() -> None:
+    rates = [("naive", "anna", 0.2), ("naive", "anna", 0.4), ("naive", "bert", 0.0), ("robust", "anna", 0.1)]
+    table = pd.DataFrame(rates, columns=["ego", "non_ego", "failure_rate"])
     assert figures.failures_table(table).splitlines() == [
         "| ego | `anna` | `bert` |",
         "| --- | ---: | ---: |",
@@ -62,7 +62,7 @@ def test_failures__a_cell_is_the_mean_over_seeds_and_empty_where_they_never_met(
     ]
 
 
-def test_strangers__a_row_has_the_naive_ego_beside_it() -> None:
+def test_strangers__a_row_compares_with_the_naive_ego() -> None:
     row = {
         "ego": "robust",
         "met": "anna + bert",
@@ -88,6 +88,6 @@ def test_strangers__a_row_has_the_naive_ego_beside_it() -> None:
         ("strangers_table", PUBLISHED / "generalisation.csv", "generalisation"),
     ],
 )
-def test_page__shows_what_the_script_prints(table: str, source: Path, name: str) -> None:
+def test_page__shows_the_output_of_the_script(table: str, source: Path, name: str) -> None:
     page = (REPOSITORY / "docs" / "game.md").read_text(encoding="utf-8")
     assert getattr(figures, table)(figures.read(source, name)) in page

@@ -1,4 +1,4 @@
-"""The script behind docs/personas.md's table: what it measures, by hand, and what it makes of a run folder."""
+"""The script of the table in docs/personas.md: its measures against values computed by hand, and its table of a run."""
 
 from __future__ import annotations
 
@@ -25,12 +25,17 @@ LANE_0_M, LANE_1_M = -4.8, -1.6  # lane 0 ends at x = 100, lane 1 goes on; cars 
 
 
 def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("personas_table", REPOSITORY / "docs" / "personas" / "table.py")
+    folder = REPOSITORY / "docs" / "personas"
+    spec = importlib.util.spec_from_file_location("personas_table", folder / "table.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules["personas_table"] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
+    sys.path.insert(0, str(folder))  # as for a script: the folder has the module `measures`
+    try:
+        spec.loader.exec_module(module)
+    finally:
+        sys.path.remove(str(folder))
     return module
 
 
@@ -38,20 +43,20 @@ table = script()
 
 
 def trace(*rows: dict[str, Any], ego_x_m: float | None = None) -> pd.DataFrame:
-    """A game in which the non-ego is as its rows say, step by step, and the ego so far along lane 1, if it is there."""
+    """A game with the given rows of the non-ego, and the ego at a constant place in lane 1 if `ego_x_m` is given."""
     usual = {"y_m": LANE_1_M, "heading_rad": 0.0, "speed_mps": 10.0, "acceleration_mps2": 0.0, "steering_rad": 0.0}
     usual |= {"lapsed": False, "outcome": "", "vehicle_type": "person_car", "player": "non_ego"}
-    found = []
+    rows_of_game = []
     for step, row in enumerate(rows):
         of_step = {"episode": 0, "step": step, "time_s": 0.1 * step}
         if ego_x_m is not None:
-            found.append({**usual, "x_m": ego_x_m, "player": "ego", "vehicle_type": "ego_car", **of_step})
-        found.append({**usual, "x_m": 50.0 + step, **row, **of_step})
-    return pd.DataFrame(found)[SCHEMA.names]
+            rows_of_game.append({**usual, "x_m": ego_x_m, "player": "ego", "vehicle_type": "ego_car", **of_step})
+        rows_of_game.append({**usual, "x_m": 50.0 + step, **row, **of_step})
+    return pd.DataFrame(rows_of_game)[SCHEMA.names]
 
 
 def measured(name: str, scene: OpenScene, *traces: pd.DataFrame) -> float:
-    return float(getattr(table, name)([table.Played.of(each, scene) for each in traces]))
+    return float(getattr(table, name)([table.RecordedGame.of(each, scene) for each in traces]))
 
 
 def test_speed__is_the_mean_against_the_limit_while_it_drives(merge: OpenScene) -> None:
@@ -61,13 +66,13 @@ def test_speed__is_the_mean_against_the_limit_while_it_drives(merge: OpenScene) 
     assert measured("speed_over_limit", merge, trace(*faster, *ended)) == pytest.approx(0.15)
 
 
-def test_time_gap__is_the_median_over_the_steps_with_somebody_ahead(merge: OpenScene) -> None:
-    # the ego's centre at 80 m: gaps of 30, 20, 10 m less 4.6 m, at 10 m/s; nobody leads who is past it
+def test_time_gap__is_the_median_over_the_steps_with_a_car_ahead(merge: OpenScene) -> None:
+    # the ego's centre at 80 m: gaps of 30, 20, 10 m less 4.6 m, at 10 m/s; a car behind does not count
     rows = [{"x_m": x} for x in (50.0, 60.0, 70.0, 95.0)]
     assert measured("time_gap_s", merge, trace(*rows, ego_x_m=80.0)) == pytest.approx(1.54)
 
 
-def test_reaction__is_the_time_to_the_first_movement_of_ones_own(merge: OpenScene) -> None:
+def test_reaction__is_the_time_to_the_first_movement_by_the_driver(merge: OpenScene) -> None:
     at_once = trace({}, {"acceleration_mps2": -1.0}, {})
     drifting = {"steering_rad": -0.01, "lapsed": True}
     late = trace({}, drifting, drifting, {}, {"steering_rad": 0.02}, {})  # in its fourth step
@@ -75,7 +80,7 @@ def test_reaction__is_the_time_to_the_first_movement_of_ones_own(merge: OpenScen
     assert measured("reaction_s", merge, at_once, late) == pytest.approx(0.15)
 
 
-def test_lapse__is_the_mean_of_whole_ones(merge: OpenScene) -> None:
+def test_lapse__is_the_mean_of_complete_lapses(merge: OpenScene) -> None:
     def game(lapses: str) -> pd.DataFrame:
         return trace(*({"lapsed": each == "x"} for each in lapses))
 
@@ -84,7 +89,7 @@ def test_lapse__is_the_mean_of_whole_ones(merge: OpenScene) -> None:
     assert np.isnan(measured("lapse_s", merge, game(".....")))
 
 
-def test_lane_left__is_to_the_end_of_the_lane_where_the_line_is_crossed(merge: OpenScene) -> None:
+def test_lane_left__is_the_rest_of_the_lane_at_the_crossing_of_the_line(merge: OpenScene) -> None:
     def crossing(at_m: float) -> pd.DataFrame:
         places = [(at_m - 20.0, LANE_0_M), (at_m - 1.0, -3.3), (at_m, -3.1), (at_m + 9.0, LANE_1_M)]
         return trace(*({"x_m": x, "y_m": y} for x, y in places))
@@ -94,7 +99,7 @@ def test_lane_left__is_to_the_end_of_the_lane_where_the_line_is_crossed(merge: O
     assert measured("lane_left_m", merge, crossing(70.0), crossing(80.0), crossing(99.0)) == pytest.approx(
         20.0, abs=0.3
     )
-    assert np.isnan(measured("lane_left_m", merge, trace({"y_m": LANE_1_M}, {"y_m": LANE_1_M})))  # its lane goes on
+    assert np.isnan(measured("lane_left_m", merge, trace({"y_m": LANE_1_M}, {"y_m": LANE_1_M})))  # the lane goes on
 
 
 def test_lateral_deviation__is_over_all_games_beyond_the_taper(merge: OpenScene) -> None:
@@ -117,24 +122,27 @@ def episode(arm: str, persona: str, failed: Any, speed: float = 10.0, non_ego: s
 
 @pytest.fixture
 def run(tmp_path: Path, merge: OpenScene) -> Path:
-    """A run folder in which a tailgater and somebody unheard of met four egos."""
+    """A run folder with a tailgater and a persona without a characteristic against four egos."""
     shutil.copytree(merge.folder, tmp_path / "scene")
     (tmp_path / "traces").mkdir()
     with TraceWriter(tmp_path / "traces" / "naive_vs_tailgater-seed1.parquet") as traces:
         traces.add(trace({"x_m": 60.0}, {"x_m": 60.0}, ego_x_m=70.0).to_dict("list"))
     games = [
         episode("naive_alone", None, False),
-        *(episode("tailgater_alone", "tailgater", None, np.nan, who) for who in ("goal", "rail", "goal", "goal")),
+        *(
+            episode("tailgater_alone", "tailgater", None, np.nan, outcome)
+            for outcome in ("goal", "rail", "goal", "goal")
+        ),
         episode("naive_vs_tailgater", "tailgater", True),
         episode("naive_vs_tailgater", "tailgater", False, 12.0),
         {**episode("naive_vs_tailgater", "tailgater", None, np.nan, "error"), "error": "the simulator died"},
         episode("adas_vs_tailgater", "tailgater", True, 5.0),
         episode("retrained_vs_tailgater", "tailgater", False, 9.0),
-        episode("retrained_anna_vs_tailgater", "tailgater", True, 1.0),  # cross-play has a page of its own
+        episode("retrained_anna_vs_tailgater", "tailgater", True, 1.0),  # cross-play is not in the table
         episode("naive_vs_anna", "anna", False),
     ]
-    elsewhere = {**episode("naive_vs_tailgater", "tailgater", True), "seed": 2}
-    pd.DataFrame([*games, elsewhere]).to_csv(tmp_path / "episodes.csv", index=False)
+    other_seed = {**episode("naive_vs_tailgater", "tailgater", True), "seed": 2}
+    pd.DataFrame([*games, other_seed]).to_csv(tmp_path / "episodes.csv", index=False)
     curve = [("tailgater", payoff) for payoff in (-10.0, 0.0, 3.0, 4.0, 5.0)] + [("retrained_tailgater", 99.0)]
     pd.DataFrame([{"stage": stage, "seed": 1, "mean_payoff": payoff} for stage, payoff in curve]).to_csv(
         tmp_path / "training.csv", index=False
@@ -142,16 +150,16 @@ def run(tmp_path: Path, merge: OpenScene) -> Path:
     return tmp_path
 
 
-def test_rows__say_what_the_run_says(run: Path) -> None:
+def test_rows__have_the_results_of_the_run(run: Path) -> None:
     tailgater, anna = table.rows(table.Run.read(run, 1))
     assert tailgater == {
         "persona": "tailgater",
-        "learns: payoff": "-10.0 → 4.0",
-        "trait": "median time gap behind the naive ego",
-        "is": "0.54 s",  # 10 m less 4.6 m, at 10 m/s
-        "itself": "yes",
-        "people": table.TRAITS["tailgater"].people,
-        "alone: fails": "25%",
+        "payoff in training": "-10.0 → 4.0",
+        "characteristic": "median time gap behind the naive ego",
+        "value": "0.54 s",  # 10 m less 4.6 m, at 10 m/s
+        "as expected": "yes",
+        "people": table.CHARACTERISTICS["tailgater"].people,
+        "fails alone": "25%",
         "naive ego": "50%, 11.00 m/s",
         "adas": "100%, 5.00 m/s",
         "retrained ego": "0%, 9.00 m/s",
@@ -160,21 +168,22 @@ def test_rows__say_what_the_run_says(run: Path) -> None:
 
 
 @pytest.mark.parametrize("with_careful", [True, False])
-def test_rows__a_trait_that_is_compared_needs_the_other(with_careful: bool, tmp_path: Path, merge: OpenScene) -> None:
+def test_value__needs_the_baseline(with_careful: bool, tmp_path: Path, merge: OpenScene) -> None:
     shutil.copytree(merge.folder, tmp_path / "scene")
     (tmp_path / "traces").mkdir()
     people = {"impaired": 0.2, "careful": 0.05} if with_careful else {"impaired": 0.2}
-    for persona, side_m in people.items():  # to the left and to the right in turns: a standard deviation of as much
+    for persona, side_m in people.items():  # alternately left and right: the standard deviation is side_m
         places = [{"x_m": 140.0 + k, "y_m": LANE_1_M + side_m * (-1) ** k} for k in range(6)]
         with TraceWriter(tmp_path / "traces" / f"{persona}_alone-seed1.parquet") as traces:
             traces.add(trace(*places).to_dict("list"))
     games = [episode(f"{persona}_alone", persona, None) for persona in people]
-    run = table.Run(tmp_path, 1, pd.DataFrame(games), pd.DataFrame({"stage": [], "mean_payoff": []}), merge)
-    over = run.measured(table.TRAITS["impaired"], "impaired")
-    assert over == pytest.approx(0.15 if with_careful else np.nan, abs=0.01, nan_ok=True)
+    training = pd.DataFrame({"stage": [], "mean_payoff": []})
+    run = table.Run(folder=tmp_path, seed=1, episodes=pd.DataFrame(games), training=training, scene=merge)
+    value = run.value(table.CHARACTERISTICS["impaired"], "impaired")
+    assert value == pytest.approx(0.15 if with_careful else np.nan, abs=0.01, nan_ok=True)
 
 
-def test_main__prints_markdown_and_writes_what_it_prints(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_main__prints_markdown_and_writes_the_same_as_csv(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     table.main(run, 1, run / "table.csv")
     printed = [line.strip("| ").split(" | ") for line in capsys.readouterr().out.splitlines()]
     written = pd.read_csv(run / "table.csv", dtype=str)
@@ -182,15 +191,15 @@ def test_main__prints_markdown_and_writes_what_it_prints(run: Path, capsys: pyte
     assert printed[2][:4] == written.iloc[0, :4].tolist()
 
 
-# --- who is in it -----------------------------------------------------------------------------------------------------
+# --- the personas -----------------------------------------------------------------------------------------------------
 
 
 def shipped() -> Sequence[Persona]:
     return [read_document(file, Persona) for file in sorted((REPOSITORY / "personas").glob("*.toml"))]
 
 
-def test_traits__every_person_of_the_campaign_has_one() -> None:
+def test_characteristics__every_persona_of_the_campaign_has_one() -> None:
     campaign = read_document(REPOSITORY / "campaigns" / "merge-personas.toml", Campaign)
     names = {Path(file).stem for file in campaign.personas}
-    assert names == {each.name for each in shipped()} == set(table.TRAITS)
+    assert names == {each.name for each in shipped()} == set(table.CHARACTERISTICS)
     assert campaign.training == read_document(REPOSITORY / "campaigns" / "merge.toml", Campaign).training

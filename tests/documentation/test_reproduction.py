@@ -1,4 +1,4 @@
-"""The scripts behind docs/reproduction.md: what they count, and that the page shows what they wrote."""
+"""The scripts behind docs/reproduction.md: their numbers, and that the page shows their output."""
 
 from __future__ import annotations
 
@@ -58,10 +58,10 @@ GAMES = [
 ]
 
 
-def found(what: str) -> tuple[float, bool]:
-    """What a row of the table comes to in `GAMES`, and whether it is as it was to be."""
+def found_in_games(what: str) -> tuple[float, bool]:
+    """The value of a row of the table in `GAMES`, and whether it is as expected."""
     rows = pd.DataFrame([{"question": "RQ1", "persona": "speedy", "metric": "failure", "p_value": 0.02, "p_holm": 0.1}])
-    tables = findings.Tables(pd.DataFrame(GAMES), rows, lawful_payoff=1.0, limit_mps=12.5)
+    tables = findings.Tables(episodes=pd.DataFrame(GAMES), comparisons=rows, lawful_payoff=1.0, limit_mps=12.5)
     finding = next(each for each in findings.findings() if each.what == what)
     value = finding.value(tables)
     return value, finding.holds(value)
@@ -71,7 +71,7 @@ def found(what: str) -> tuple[float, bool]:
     ("what", "value", "holds"),
     [
         ("naive_alone: failures", 0.0, True),
-        ("naive_vs_speedy: failures", 0.5, True),  # the game that could not be played is none of the four
+        ("naive_vs_speedy: failures", 0.5, True),  # the game with an error is not one of the four
         ("naive_vs_speedy: speed against naive_alone", -0.1, True),
         ("retrained_vs_speedy: speed against naive_alone", -0.06, False),
         ("naive_vs_speedy: its payoff less a law-abiding driver's", 2.0, True),
@@ -79,23 +79,23 @@ def found(what: str) -> tuple[float, bool]:
         ("RQ1 speedy: Holm-corrected p of failure", 0.1, False),
     ],
 )
-def test_finding__is_worked_out_from_the_games_that_were_played(what: str, value: float, holds: bool) -> None:
-    assert found(what) == (pytest.approx(value), holds)
+def test_finding__is_computed_from_the_games_without_errors(what: str, value: float, holds: bool) -> None:
+    assert found_in_games(what) == (pytest.approx(value), holds)
 
 
-def test_finding__a_goal_rate_counts_a_game_that_was_not_played_as_not_reached() -> None:
-    assert found("naive_vs_speedy: its own goal") == (pytest.approx(0.4), False)
+def test_finding__a_goal_rate_counts_a_game_with_an_error_as_not_reached() -> None:
+    assert found_in_games("naive_vs_speedy: its own goal") == (pytest.approx(0.4), False)
 
 
-def test_page__shows_the_findings_that_are_kept_beside_it() -> None:
-    kept = pd.read_csv(FOLDER / "findings.csv").set_index("what")
-    shown = {cells[0]: cells[1:] for cells in rows_of(PAGE) if cells[0] in kept.index}
-    assert set(shown) == set(kept.index) == {each.what for each in findings.findings()}
+def test_page__shows_the_stored_findings() -> None:
+    stored = pd.read_csv(FOLDER / "findings.csv").set_index("what")
+    shown = {cells[0]: cells[1:] for cells in rows_of(PAGE) if cells[0] in stored.index}
+    assert set(shown) == set(stored.index) == {each.what for each in findings.findings()}
     for each in findings.findings():
-        row = kept.loc[each.what]
-        seeds = [each.form.format(row[name]) for name in kept.columns if name.startswith("seed_")]
+        row = stored.loc[each.what]
+        seeds = [each.form.format(row[name]) for name in stored.columns if name.startswith("seed_")]
         assert shown[each.what] == [each.bound, *seeds, f"{row['held']} of {len(seeds)}"], each.what
-        assert row["held"] == sum(each.holds(row[name]) for name in kept.columns if name.startswith("seed_"))
+        assert row["held"] == sum(each.holds(row[name]) for name in stored.columns if name.startswith("seed_"))
 
 
 def rows_of(page: Path) -> list[list[str]]:
@@ -113,7 +113,7 @@ def levers() -> list[Any]:
 
 
 @pytest.mark.parametrize("setting", levers(), ids=lambda setting: setting.name)
-def test_sweep__every_setting_is_a_campaign_that_differs_by_its_one_key(setting: Any, tmp_path: Path) -> None:
+def test_sweep__each_setting_is_a_campaign_that_differs_in_one_key(setting: Any, tmp_path: Path) -> None:
     document = read_document(FOLDER / "levers.toml", sweep.Sweep)
     campaign = open_campaign(sweep._write_campaign(FOLDER, document, setting, tmp_path / "documents"))
     shipped = FOLDER / document.campaign
@@ -121,15 +121,15 @@ def test_sweep__every_setting_is_a_campaign_that_differs_by_its_one_key(setting:
     was |= flat(read_document(shipped.parent / "../personas/careful.toml", Persona), "ego.")
     was |= flat(read_document(FOLDER / setting.lever.persona, Persona), "")
     now = flat(campaign.document, "campaign.") | flat(campaign.ego_persona, "ego.") | flat(campaign.personas[0], "")
-    kept = {"campaign.name", "campaign.scene", "campaign.ego.persona", "campaign.training.steps"}
-    changed = {key for key in was | now if was.get(key) != now.get(key)} - kept
+    always_changed = {"campaign.name", "campaign.scene", "campaign.ego.persona", "campaign.training.steps"}
+    changed = {key for key in was | now if was.get(key) != now.get(key)} - always_changed
     assert {key.split("[")[0] for key in changed} - {"campaign.personas"} <= {setting.lever.key}
     assert now[setting.lever.key] == setting.value
     assert now["campaign.training.steps"] == document.steps
 
 
 def flat(document: Any, prefix: str) -> dict[str, Any]:
-    """Every plain value of a document by its dotted key."""
+    """All plain values of a document by their dotted keys."""
 
     def walk(key: str, value: Any) -> dict[str, Any]:
         if isinstance(value, dict):
@@ -140,7 +140,7 @@ def flat(document: Any, prefix: str) -> dict[str, Any]:
     return {k: v for name, each in dumped.items() for k, v in walk(f"{prefix}{name}", each).items()}
 
 
-def test_sweep__its_table_has_every_setting(tmp_path: Path) -> None:
-    kept = pd.read_csv(FOLDER / "levers.csv", dtype=str)
-    have = set(kept[["persona", "key", "value"]].itertuples(index=False, name=None))
-    assert have == {(Path(each.lever.persona).stem, each.lever.key, str(each.value)) for each in levers()}
+def test_sweep__the_table_has_all_settings(tmp_path: Path) -> None:
+    stored = pd.read_csv(FOLDER / "levers.csv", dtype=str)
+    settings = set(stored[["persona", "key", "value"]].itertuples(index=False, name=None))
+    assert settings == {(Path(each.lever.persona).stem, each.lever.key, str(each.value)) for each in levers()}

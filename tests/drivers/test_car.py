@@ -1,4 +1,4 @@
-"""A driver that thinks in metres, seconds and radians gets what it asks for."""
+"""Conversions between physical units and scaled observations and actions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def car(merge: OpenScene) -> Car:
     return car_of(merge.world, EGO)
 
 
-def seeing(**entries: float) -> np.ndarray:
+def observation_with(**entries: float) -> np.ndarray:
     view = np.zeros((1, SIZE), dtype=np.float32)
     for name, value in entries.items():
         view[0, LAYOUT.index(name)] = value
@@ -30,26 +30,28 @@ def seeing(**entries: float) -> np.ndarray:
 @pytest.mark.parametrize("speed_mps", [0.0, 3.0, 12.0, 29.0])
 @pytest.mark.parametrize("acceleration", [-7.9, -1.0, 0.0, 0.3, 2.9])
 @pytest.mark.parametrize("share", [-1.0, -0.3, 0.0, 0.001, 0.6])
-def test_car__is_asked_for_what_its_driver_wants(car: Car, speed_mps: float, acceleration: float, share: float) -> None:
-    view = seeing(speed_mps=speed_mps / 30.0)
-    speed = car.seen(view)[:, LAYOUT.index("speed_mps")]
-    _, most = requests(np.array([[[0.0, 1.0]]]), speed[None], car.actuators)
-    steering = share * most[0]
-    asked = requests(car.asked(np.array([acceleration]), steering, view)[:, None], speed[None], car.actuators)
-    assert asked[0] == pytest.approx(acceleration, abs=1e-9)
-    assert asked[1][0] == pytest.approx(steering, abs=1e-9)
+def test_actions__request_the_given_acceleration_and_steering(
+    car: Car, speed_mps: float, acceleration: float, share: float
+) -> None:
+    view = observation_with(speed_mps=speed_mps / 30.0)
+    speed = car.physical(view)[:, LAYOUT.index("speed_mps")]
+    _, largest = requests(np.array([[[0.0, 1.0]]]), speed[None], car.actuators)
+    steering = share * largest[0]
+    requested = requests(car.actions(np.array([acceleration]), steering, view)[:, None], speed[None], car.actuators)
+    assert requested[0] == pytest.approx(acceleration, abs=1e-9)
+    assert requested[1][0] == pytest.approx(steering, abs=1e-9)
 
 
-def test_car__gives_as_much_as_it_has(car: Car) -> None:
-    hardest = car.asked(np.array([-50.0]), np.array([2.0]), seeing(speed_mps=0.5))
+def test_actions__are_clipped_to_the_limits_of_the_car(car: Car) -> None:
+    hardest = car.actions(np.array([-50.0]), np.array([2.0]), observation_with(speed_mps=0.5))
     np.testing.assert_array_equal(hardest, [[-1.0, 1.0]])
 
 
-def test_seen__is_in_the_units_of_its_names(merge: OpenScene, car: Car, moment: Callable[..., Any]) -> None:
-    """Every quantity that can be read off the moment comes back as it is there."""
+def test_physical__has_the_units_of_the_names(merge: OpenScene, car: Car, moment: Callable[..., Any]) -> None:
+    """Each quantity of the moment is restored from the observation."""
     ego = {"x_m": 30.0, "y_m": -5.0, "speed_mps": 11.0, "acceleration_mps2": -2.5, "steering_rad": 0.05}
     quantities = moment(merge.world, [ego, {"x_m": 45.0, "y_m": -4.0, "speed_mps": 7.0, "heading_rad": 0.1}])
-    seen = dict(zip(LAYOUT, car.seen(observe(quantities)[:, EGO])[0], strict=True))
+    values = dict(zip(LAYOUT, car.physical(observe(quantities)[:, EGO])[0], strict=True))
     expected = {
         "speed_mps": 11.0,
         "speed_over_limit": quantities.speed_over_limit[0, EGO],
@@ -66,6 +68,6 @@ def test_seen__is_in_the_units_of_its_names(merge: OpenScene, car: Car, moment: 
         "other0_turned_cos": np.cos(0.1),
         "other1_seen": 0.0,
     }
-    assert {name: seen[name] for name in expected} == pytest.approx(expected, abs=1e-5)
-    assert seen["goal_m"] == pytest.approx(min(float(quantities.goal_m[0, EGO]), 200.0), rel=1e-5)
-    assert seen["free_left_m@0m"] > 0.0 > seen["free_right_m@0m"]
+    assert {name: values[name] for name in expected} == pytest.approx(expected, abs=1e-5)
+    assert values["goal_m"] == pytest.approx(min(float(quantities.goal_m[0, EGO]), 200.0), rel=1e-5)
+    assert values["free_left_m@0m"] > 0.0 > values["free_right_m@0m"]

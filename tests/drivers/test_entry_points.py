@@ -1,4 +1,4 @@
-"""Drivers of installed packages: found by their entry point, told apart by version and code, checked before a run."""
+"""Drivers of installed packages: found by entry point, identified by version and code, checked before a run."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.cli import wording
 from harness.config.campaign import LEARNED
 from harness.drivers.car import Car, car_of
 from harness.drivers.external import ExternalDriver, find_driver
@@ -40,24 +41,24 @@ def find(written: str, folder: Path) -> ExternalDriver:
     return find_driver(written, folder / "campaign.toml", "ego.driver", allow_code=False)
 
 
-def test_installed__is_found_by_name_and_needs_no_leave(site: Path, tmp_path: Path, car: Car) -> None:
+def test_installed__is_found_by_name_and_needs_no_permission(site: Path, tmp_path: Path, car: Car) -> None:
     found = find("steady", tmp_path)
     assert found.in_words == "steady of the package steady-driver 1.0"
-    view = np.zeros((1, SIZE), dtype=np.float32)
-    actions = found.make(car, sampled=False).decide(np.array([0]), view, np.zeros((1, 2)))
+    observation = np.zeros((1, SIZE), dtype=np.float32)
+    actions = found.make(car, sampled=False).decide(np.array([0]), observation, np.zeros((1, 2)))
     np.testing.assert_allclose(actions, [[2.0 / 3.0, 0.0]])
 
 
 def test_installed__a_document_gives_it_parameters(site: Path, tmp_path: Path, car: Car) -> None:
     shutil.copy(EXAMPLE / "slow.toml", tmp_path)
     found = find("slow.toml", tmp_path)
-    view = np.zeros((1, SIZE), dtype=np.float32)
-    view[0, 0] = 8.5 / 30.0
-    actions = found.make(car, sampled=False).decide(np.array([0]), view, np.zeros((1, 2)))
+    observation = np.zeros((1, SIZE), dtype=np.float32)
+    observation[0, 0] = 8.5 / 30.0
+    actions = found.make(car, sampled=False).decide(np.array([0]), observation, np.zeros((1, 2)))
     np.testing.assert_allclose(actions, [[-0.5 / 8.0, 0.0]], atol=1e-6)
 
 
-def test_installed__version_parameters_and_code_tell_it_apart(site: Path, tmp_path: Path) -> None:
+def test_installed__identity_has_version_parameters_and_code(site: Path, tmp_path: Path) -> None:
     shutil.copy(EXAMPLE / "slow.toml", tmp_path)
     identities = [find("steady", tmp_path).identity, find("slow.toml", tmp_path).identity]
     (site / "steady.py").write_text((site / "steady.py").read_text() + "\n# changed\n")
@@ -69,7 +70,7 @@ def test_installed__version_parameters_and_code_tell_it_apart(site: Path, tmp_pa
     assert all(identities.count(each) == 1 for each in identities)
 
 
-def test_installed__a_name_that_is_none_is_answered_with_the_nearest(site: Path, tmp_path: Path) -> None:
+def test_installed__an_unknown_name_gets_the_nearest_as_remedy(site: Path, tmp_path: Path) -> None:
     for written, remedy in (("staedy", "'steady'"), ("lerned", f"'{LEARNED}'")):
         with pytest.raises(UsageError) as caught:
             find(written, tmp_path)
@@ -78,28 +79,28 @@ def test_installed__a_name_that_is_none_is_answered_with_the_nearest(site: Path,
 
 def test_installed__two_packages_of_one_name_are_refused(site: Path, tmp_path: Path) -> None:
     install(site, "other-driver")
-    with pytest.raises(UsageError, match="several packages offer a driver 'steady': other-driver, steady-driver"):
+    with pytest.raises(UsageError, match="several packages provide a driver 'steady': other-driver, steady-driver"):
         find("steady", tmp_path)
 
 
 @pytest.mark.parametrize(
-    ("point", "said"),
+    ("point", "message"),
     [
         ("steady:Stedy", "can't be made: AttributeError"),
         ("stedy:Steady", "can't be made: ModuleNotFoundError"),
         ("steady:LAYOUT", "can't be made: TypeError"),
-        ("builtins:id", "made a int without takes_over, reset, decide"),
+        ("builtins:id", "returned a int without takes_over, reset, decide"),
     ],
 )
-def test_installed__what_makes_no_driver_is_named(
-    point: str, said: str, tmp_path: Path, car: Car, monkeypatch: pytest.MonkeyPatch
+def test_installed__an_entry_point_that_returns_no_driver_is_an_error(
+    point: str, message: str, tmp_path: Path, car: Car, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     install(tmp_path / "site", points=f"mine = {point}")
     monkeypatch.syspath_prepend(tmp_path / "site")
     monkeypatch.delitem(sys.modules, "steady", raising=False)
     with pytest.raises(UsageError) as caught:
         find("mine", tmp_path).try_out(car, sampled=False)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_installed__the_command_checks_it_and_a_campaign_takes_it(tmp_path: Path) -> None:
@@ -116,4 +117,4 @@ def test_installed__the_command_checks_it_and_a_campaign_takes_it(tmp_path: Path
     )
     checked = harness("check", campaign, env=environment)
     assert checked.returncode == 0, checked.stdout + checked.stderr
-    assert "There is nothing to train or to tune in it: rounds 0 and 1." in checked.stdout
+    assert wording.NOTHING_TO_TUNE in checked.stdout

@@ -1,4 +1,4 @@
-"""An ego that a campaign is given: found, refused without leave, told apart, and played in rounds 0 and 1."""
+"""External drivers as the ego: found, refused without permission, identified, and played in rounds 0 and 1."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from harness.campaign.plan.stages import TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.config.driver import KINDS
 from harness.config.toml_reading import tomllib
+from harness.drivers.external import ALLOW_CODE
 from harness.drivers.policy_file import write_policy
 from harness.errors import UsageError
 from harness.game.observation import LAYOUT
@@ -45,35 +46,35 @@ def ego(driver: object) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "message"),
     [
         ('kind = "proces"', "mine.toml: kind: there is no kind of driver 'proces' (did you mean 'process'?)"),
         ("", "mine.toml: kind: is missing"),
         ('kind = "process"', "mine.toml: command: is missing"),
         ('kind = "process"\ncomand = ["perl"]\ncommand = ["perl"]', "comand: unknown key (did you mean 'command'?)"),
-        ('kind = "process"\ncommand = ["no-such-program"]', "command: there is no program 'no-such-program' on PATH"),
-        ('kind = "process"\ncommand = ["./drive"]', "command: there is no program './drive' here that can be run"),
+        ('kind = "process"\ncommand = ["no-such-program"]', "there is no executable program 'no-such-program' on PATH"),
+        ('kind = "process"\ncommand = ["./drive"]', "command: there is no executable program './drive' in "),
         ('kind = "process"\ncommand = ["perl"]\nfiles = ["mine.tml"]', "(did you mean 'mine.toml'?)"),
         ('kind = "process"\ncommand = ["perl"]\ndeadline_s = 0', "deadline_s: 0 is not possible"),
         ('kind = "fmu"\nfile = "twin.fmu"', "file: 'twin.fmu': there is no such file"),
         ('kind = "fmu"\nfile = "mine.toml"\n[inputs]\nv = "speed_mp"', "did you mean 'speed_mps'?"),
         ('kind = "fmu"\nfile = "mine.toml"\n[outputs]\nsteering = "a"', "did you mean 'steering_rad'?"),
         ('kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "DQN"', "algorithm: 'DQN' is not possible"),
-        ('kind = "python"\nentry_point = "nobody"', "entry_point: no installed package offers a driver 'nobody'"),
+        ('kind = "python"\nentry_point = "nobody"', "entry_point: no installed package provides a driver 'nobody'"),
     ],
 )  # fmt: skip
-def test_find__what_is_wrong_with_a_document_is_named(text: str, said: str, tmp_path: Path) -> None:
-    assert said in refusal(document(tmp_path, text), tmp_path)
+def test_find__a_wrong_document_is_an_error_with_its_key(text: str, message: str, tmp_path: Path) -> None:
+    assert message in refusal(document(tmp_path, text), tmp_path)
 
 
 @pytest.mark.parametrize("name", ["twin.fmu", "model.zip"])
-def test_find__a_bare_file_is_answered_with_the_document_to_write(name: str, tmp_path: Path) -> None:
+def test_find__a_file_without_a_document_gets_the_document_as_remedy(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(b"PK")
     kind = {"twin.fmu": "fmu", "model.zip": "stable_baselines3"}[name]
     assert f'kind = "{kind}", file = "{name}"' in refusal(name, tmp_path)
 
 
-def test_find__a_path_that_leads_nowhere_is_answered_with_the_nearest(tmp_path: Path) -> None:
+def test_find__a_missing_path_gets_the_nearest_as_remedy(tmp_path: Path) -> None:
     document(tmp_path, "", "idm.toml")
     assert "'imd.toml': there is no such file or folder (did you mean 'idm.toml'?)" in refusal("imd.toml", tmp_path)
     assert "no folder" in refusal("nowhere/idm.toml", tmp_path)
@@ -87,17 +88,17 @@ def test_find__a_path_that_leads_nowhere_is_answered_with_the_nearest(tmp_path: 
         'kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "PPO"',
     ],
 )
-def test_find__code_that_comes_as_a_file_needs_leave_from_the_command_line(text: str, tmp_path: Path) -> None:
+def test_find__code_in_a_file_needs_permission_on_the_command_line(text: str, tmp_path: Path) -> None:
     name = document(tmp_path, text)
-    said = refusal(name, tmp_path, allow_code=False)
-    assert len(said.splitlines()) == 1
-    assert "a document can't give itself leave" in said
-    assert "--allow-code" in said
+    message = refusal(name, tmp_path, allow_code=False)
+    assert len(message.splitlines()) == 1
+    assert "a document can't give the permission" in message
+    assert ALLOW_CODE in message
     find(name, tmp_path, allow_code=True)
     assert "unknown key" in refusal(document(tmp_path, f"{text}\nallow_code = true"), tmp_path)
 
 
-def test_find__a_program_is_told_apart_by_all_it_rests_on(tmp_path: Path) -> None:
+def test_find__identity_of_a_program_has_all_its_files(tmp_path: Path) -> None:
     shutil.copytree(PERL, tmp_path / "perl")
     (tmp_path / "perl" / "map.csv").write_text("1\n")
     text = (PERL / "perl.toml").read_text()
@@ -114,7 +115,7 @@ def test_find__a_program_is_told_apart_by_all_it_rests_on(tmp_path: Path) -> Non
     assert all(identities.count(each) == 1 for each in identities)
 
 
-def test_find__a_link_of_a_virtual_environment_stays_one(tmp_path: Path) -> None:
+def test_find__a_link_is_not_resolved(tmp_path: Path) -> None:
     (tmp_path / "python").symlink_to(shutil.which("perl") or "")
     found = find(document(tmp_path, 'kind = "process"\ncommand = ["./python"]'), tmp_path)
     assert found.command == (str(tmp_path / "python"),)
@@ -123,26 +124,28 @@ def test_find__a_link_of_a_virtual_environment_stays_one(tmp_path: Path) -> None
 # --- the campaign's check ---
 
 
-def test_open_campaign__tries_the_driver_before_anything_runs(tmp_path: Path) -> None:
+def test_open_campaign__makes_a_test_decision_before_anything_runs(tmp_path: Path) -> None:
     text = 'kind = "process"\ncommand = ["perl", "-e", "die qq(no road today)"]'
-    (said,) = problems(write_campaign(tmp_path, ego=ego(document(tmp_path, text))))
-    assert "could not drive when it was tried" in said
-    assert "no road today" in said
+    (message,) = problems(write_campaign(tmp_path, ego=ego(document(tmp_path, text))))
+    assert "the test decision failed" in message
+    assert "no road today" in message
 
 
-def test_open_campaign__names_the_egos_problems_beside_all_others(tmp_path: Path) -> None:
+def test_open_campaign__reports_the_egos_problems_with_all_others(tmp_path: Path) -> None:
     driver = document(tmp_path, 'kind = "proces"')
-    said = problems(write_campaign(tmp_path, ego=ego(driver), personas=["nobody.toml"], assessment={"episodes": 1}))
-    assert len(said) == 3
+    found = problems(write_campaign(tmp_path, ego=ego(driver), personas=["nobody.toml"], assessment={"episodes": 1}))
+    assert len(found) == 3
 
 
-def test_open_campaign__an_unknown_vehicle_type_is_named(tmp_path: Path) -> None:
+def test_open_campaign__an_unknown_vehicle_type_is_an_error(tmp_path: Path) -> None:
     driver = document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_cra"')
-    (said,) = problems(write_campaign(tmp_path, ego=ego(driver)))
-    assert "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego to be of (did you mean 'ego_car'?)" in said
+    (message,) = problems(write_campaign(tmp_path, ego=ego(driver)))
+    assert (
+        "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego to be of (did you mean 'ego_car'?)" in message
+    )
 
 
-def test_open_campaign__its_files_are_in_the_manifests_hashes(tmp_path: Path) -> None:
+def test_open_campaign__hashes_the_files_of_the_driver(tmp_path: Path) -> None:
     opened = open_campaign(write_campaign(tmp_path, ego=ego(PERL / "perl.toml")), allow_code=True)
     assert opened.ego_driver is not None
     assert opened.hashes[os.path.relpath(PERL / "drive.pl", tmp_path)]
@@ -154,7 +157,7 @@ def keys(folder: Path, driver: object) -> dict[str, str]:
     return stage_keys(opened, stages)
 
 
-def test_keys__change_with_the_driver_and_only_with_it(tmp_path: Path) -> None:
+def test_keys__depend_on_the_driver(tmp_path: Path) -> None:
     shutil.copy(ADAS, tmp_path / "adas.toml")
     first, again = keys(tmp_path, "adas.toml"), keys(tmp_path, "adas.toml")
     assert first == again
@@ -162,7 +165,7 @@ def test_keys__change_with_the_driver_and_only_with_it(tmp_path: Path) -> None:
     assert not set(first.values()) & set(keys(tmp_path, "adas.toml").values())
 
 
-def test_keys__of_a_policy_are_what_they_were_before_there_were_other_drivers(tmp_path: Path) -> None:
+def test_keys__of_a_policy_are_the_hash_of_its_parameters(tmp_path: Path) -> None:
     import hashlib
 
     write_policy(some_policy(), tmp_path / "mine")
@@ -175,7 +178,7 @@ def test_keys__of_a_policy_are_what_they_were_before_there_were_other_drivers(tm
     [RSS, PERL / "perl.toml", "types.toml", "policy"],
     ids=["rules", "process", "sumo", "policy"],
 )
-def test_plan__an_ego_with_nothing_to_train_or_to_tune_gets_rounds_0_and_1(driver: object, tmp_path: Path) -> None:
+def test_plan__an_ego_without_tunable_parameters_gets_rounds_0_and_1(driver: object, tmp_path: Path) -> None:
     document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_car"', "types.toml")
     write_policy(some_policy(), tmp_path / "policy")
     opened = open_campaign(write_campaign(tmp_path, ego=ego(driver)), allow_code=True)
@@ -206,7 +209,7 @@ def played(folder: Path, driver: object, *options: object, **changes: Any) -> tu
 
 
 def check_rounds(run: Path, manifest: dict[str, Any], episodes: pd.DataFrame, in_words: str) -> None:
-    """The non-ego learned against the ego, everyone is assessed, and the report says who it was and what was not."""
+    """The non-ego was trained against the ego, all arms were assessed, and the report names the ego and the rounds."""
     assert {name: entry["status"] for name, entry in manifest["stages"].items()} == dict.fromkeys(
         manifest["stages"], "done"
     )
@@ -221,14 +224,14 @@ def check_rounds(run: Path, manifest: dict[str, Any], episodes: pd.DataFrame, in
 
 
 @pytest.mark.slow
-def test_campaign__of_rules(tmp_path: Path) -> None:
+def test_campaign__with_rules(tmp_path: Path) -> None:
     run, manifest, episodes = played(tmp_path, RSS)
     check_rounds(run, manifest, episodes, f"the rules rss ({RSS})")
     assert manifest["ego_driver"]["document"]["name"] == "rss"
 
 
 @pytest.mark.slow
-def test_campaign__of_a_program(tmp_path: Path) -> None:
+def test_campaign__with_a_program(tmp_path: Path) -> None:
     shutil.copytree(PERL, tmp_path / "perl")
     text = 'kind = "process"\ncommand = ["perl", "drive.pl"]\ndeadline_s = 60.0\n'
     (tmp_path / "perl" / "perl.toml").write_text(text)
@@ -241,7 +244,7 @@ def test_campaign__of_a_program(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_campaign__of_sumos_models(tmp_path: Path) -> None:
+def test_campaign__with_sumos_models(tmp_path: Path) -> None:
     shutil.copytree(MERGE, tmp_path / "merge")
     routes = tmp_path / "merge" / "merge.rou.xml"
     idm = '<vType id="idm" carFollowModel="IDM" length="4.2" maxSpeed="40" speedFactor="1" speedDev="0"/>'
@@ -254,11 +257,13 @@ def test_campaign__of_sumos_models(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_campaign__a_program_that_dies_costs_games_that_are_counted(tmp_path: Path) -> None:
-    """It dies of 12.5 m/s, in every game: the persona can't learn against it, and the training says why."""
-    dies = (PERL / "drive.pl").read_text().replace("my $steering", "die 'too fast' if $speed > 12.5; my $steering", 1)
+def test_campaign__games_in_which_a_program_crashes_are_errors(tmp_path: Path) -> None:
+    """The program crashes at 12.5 m/s in every game: training against it fails with the reason."""
+    crashing = (
+        (PERL / "drive.pl").read_text().replace("my $steering", "die 'too fast' if $speed > 12.5; my $steering", 1)
+    )
     shutil.copytree(PERL, tmp_path / "perl")
-    (tmp_path / "perl" / "drive.pl").write_text(dies)
+    (tmp_path / "perl" / "drive.pl").write_text(crashing)
     campaign = write_campaign(tmp_path, ego=ego("perl/perl.toml"), personas=[str(SPEEDY)], assessment={"episodes": 4})
     done = harness("campaign", campaign, "--out", tmp_path / "run", "--allow-code")
     assert done.returncode == 1, done.stdout + done.stderr
@@ -274,14 +279,14 @@ def test_campaign__a_program_that_dies_costs_games_that_are_counted(tmp_path: Pa
 # --- the page about egos ---
 
 
-def test_page__every_document_on_it_is_one() -> None:
+def test_page__has_a_valid_document_of_each_kind() -> None:
     page = (REPOSITORY / "docs" / "egos.md").read_text()
     blocks = [block for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "kind =" in block]
     kinds = {KINDS[table["kind"]].model_validate(table).kind for table in map(tomllib.loads, blocks)}  # type: ignore[attr-defined]
     assert kinds == set(KINDS) - {"rules"}
 
 
-def test_page__names_every_entry_that_a_driver_sees() -> None:
+def test_page__names_every_entry_of_the_observation() -> None:
     page = (REPOSITORY / "docs" / "egos.md").read_text()
     for name in LAYOUT:
         assert re.sub(r"@.*", "", re.sub(r"other\d", "other0", name)) in page, name

@@ -1,4 +1,4 @@
-"""An FMU drives: one that is built here, from C, for FMI 2.0 and 3.0. What it lacks is named before it runs."""
+"""FMUs as drivers, built from C for FMI 2.0 and 3.0; an FMU that does not fit is an error before it runs."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def document(**keys: Any) -> Fmu:
 
 
 def changed(folder: Path, *replacements: tuple[str, str]) -> Path:
-    """The example with another model description, and a binary that is none: nothing is run."""
+    """The example with another model description and an empty binary: nothing is run."""
     text = fmu_example().description(2)
     for old, new in replacements:
         assert old in text
@@ -54,23 +54,29 @@ def changed(folder: Path, *replacements: tuple[str, str]) -> Path:
     return folder / "changed.fmu"
 
 
-def problems(given: Fmu, file: Path) -> str:
+def problems(document: Fmu, file: Path) -> str:
     with pytest.raises(UsageError) as caught:
-        wiring(given, file)
+        wiring(document, file)
     return str(caught.value)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_fmu__reaches_its_goal_by_a_twin(fmi: int, twins: dict[int, Path], merge: OpenScene, car: Car) -> None:
+def test_fmu__drives_to_the_goal(fmi: int, twins: dict[int, Path], merge: OpenScene, car: Car) -> None:
     careful = read_document(CAREFUL, Persona)
-    arm = Arm("naive_alone", merge, (fmu_driver(document(), twins[fmi], car), None), (careful, careful), 1)
+    arm = Arm(
+        name="naive_alone",
+        scene=merge,
+        drivers=(fmu_driver(document(), twins[fmi], car), None),
+        personas=(careful, careful),
+        seed=1,
+    )
     games = [game.record for game in assess(arm, 3)]
     assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 3
 
 
-def expected(car: Car, seen: np.ndarray, before: np.ndarray, time_gap_s: float) -> tuple[np.ndarray, np.ndarray]:
-    """What twin.c works out, with its memory: the acceleration of the step before."""
-    at = {name: seen[:, k] for k, name in enumerate(LAYOUT)}
+def expected(values: np.ndarray, before: np.ndarray, time_gap_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """The outputs of twin.c; its state is the acceleration of the step before."""
+    at = {name: values[:, k] for k, name in enumerate(LAYOUT)}
     wanted = np.clip(-8.0 * at["speed_over_limit"], -3.0, 2.0)
     gap = at["other0_ahead_m"] - 4.6
     following = 0.3 * (gap - 2.0 - time_gap_s * at["speed_mps"]) + 0.9 * at["other0_ahead_mps"]
@@ -81,7 +87,9 @@ def expected(car: Car, seen: np.ndarray, before: np.ndarray, time_gap_s: float) 
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_fmu__sees_units_keeps_a_state_for_each_game_and_forgets_it(fmi: int, twins: dict[int, Path], car: Car) -> None:
+def test_fmu__has_si_units_and_a_state_per_game_which_reset_discards(
+    fmi: int, twins: dict[int, Path], car: Car
+) -> None:
     driver = fmu_driver(document(start={"time_gap_s": 1.8}), twins[fmi], car)
     random, before = np.random.default_rng(1), np.zeros(3)
     driver.reset(GAMES)
@@ -91,12 +99,12 @@ def test_fmu__sees_units_keeps_a_state_for_each_game_and_forgets_it(fmi: int, tw
             before[1] = 0.0
         view = random.uniform(-1.0, 1.0, (3, SIZE)).astype(np.float32)
         view[:, LAYOUT.index("other0_seen")] = [0.0, 1.0, 1.0]
-        before, steering = expected(car, car.seen(view), before, 1.8)
+        before, steering = expected(car.physical(view), before, 1.8)
         actions = driver.decide(GAMES, view, np.zeros((3, 2)))
-        np.testing.assert_allclose(actions, car.asked(before, steering, view), atol=1e-9)
+        np.testing.assert_allclose(actions, car.actions(before, steering, view), atol=1e-9)
 
 
-def test_fmu__is_wired_by_names_of_its_own(twins: dict[int, Path], tmp_path: Path, car: Car) -> None:
+def test_fmu__may_have_other_names_of_inputs_and_outputs(twins: dict[int, Path], tmp_path: Path, car: Car) -> None:
     names = ("path_left_m", "y_lane"), ("steering_rad", "delta")
     file = changed(tmp_path, *((f'name="{old}"', f'name="{new}"') for old, new in names))
     mine = document(inputs={"y_lane": "path_left_m"}, outputs={"steering_rad": "delta"})
@@ -105,31 +113,36 @@ def test_fmu__is_wired_by_names_of_its_own(twins: dict[int, Path], tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "keys", "said"),
+    ("old", "new", "keys", "message"),
     [
         ('name="steering_rad"', 'name="delta"', {}, "steering_rad: the FMU has no output of this name"),
         ('name="steering_rad"', 'name="steer_rad"', {}, "did you mean 'steer_rad'?"),
-        ('name="path_left_m"', 'name="y_lane"', {}, "y_lane: this input of the FMU is called like nothing"),
-        ('name="path_left_m"', 'name="path_lft_m"', {}, "as an entry did you mean 'path_left_m'?"),
+        ('name="path_left_m"', 'name="y_lane"', {}, "y_lane: this input of the FMU has no entry of the observation"),
+        ('name="path_left_m"', 'name="path_lft_m"', {}, "did you mean 'path_left_m'?"),
         ("", "", {"inputs": {"y": "path_left_m"}}, "y: the FMU has no input of this name"),
         ("", "", {"start": {"time_gap": 2.0}}, "time_gap: the FMU has no parameter or input of this name"),
         ("", "", {"start": {"speed_mps": 2.0}, "inputs": {"speed_mps": "goal_m"}}, "leave out one of them"),
         ('"continuous"><Real unit="rad"/>', '"discrete"><Integer/>', {}, "steering_rad: is of type Integer"),
-        ('m="1" s="-1"', 'm="1" s="-1" factor="0.2777"', {}, "speed_mps: is in m/s, and speed_mps is not"),
-        ('unit="m" start', 'unit="s" start', {}, "path_left_m: is in s, and path_left_m is not"),
+        (
+            'm="1" s="-1"',
+            'm="1" s="-1" factor="0.2777"',
+            {},
+            "speed_mps: its unit is m/s, which is not the unit of speed_mps",
+        ),
+        ('unit="m" start', 'unit="s" start', {}, "path_left_m: its unit is s, which is not the unit of path_left_m"),
         ('fmiVersion="2.0"', 'fmiVersion="1.9"', {}, "can't be read as an FMU"),
     ],
 )
-def test_fmu__what_is_missing_or_does_not_fit_is_named(
-    old: str, new: str, keys: dict[str, Any], said: str, tmp_path: Path
+def test_fmu__a_variable_that_is_missing_or_does_not_fit_is_an_error(
+    old: str, new: str, keys: dict[str, Any], message: str, tmp_path: Path
 ) -> None:
-    assert said in problems(document(**keys), changed(tmp_path, (old, new)))
+    assert message in problems(document(**keys), changed(tmp_path, (old, new)))
 
 
-def test_fmu__all_that_is_missing_is_named_at_once(tmp_path: Path) -> None:
+def test_fmu__all_missing_variables_are_reported_at_once(tmp_path: Path) -> None:
     file = changed(tmp_path, ('name="steering_rad"', 'name="delta"'), ('name="path_left_m"', 'name="y_lane"'))
-    said = problems(document(start={"gap": 1.0}), file)
-    assert [name for name in ("steering_rad:", "y_lane:", "gap:") if name in said] == [
+    found = problems(document(start={"gap": 1.0}), file)
+    assert [name for name in ("steering_rad:", "y_lane:", "gap:") if name in found] == [
         "steering_rad:",
         "y_lane:",
         "gap:",
@@ -149,22 +162,22 @@ def test_fmu__for_another_platform_is_refused(twins: dict[int, Path], tmp_path: 
     assert "has no binary for" in problems(document(), tmp_path / "win.fmu")
 
 
-def test_fmu__that_is_no_fmu_is_refused(tmp_path: Path) -> None:
+def test_fmu__a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     (tmp_path / "twin.fmu").write_bytes(b"PK\x03\x04")
     assert "can't be read as an FMU" in problems(document(), tmp_path / "twin.fmu")
 
 
 @pytest.mark.parametrize(
-    ("fault", "said"),
+    ("fault", "message"),
     [
-        ("abort();", "died of SIGABRT"),
-        ("*(volatile int *)0 = 1;", "died of SIGSEGV"),
+        ("abort();", "was killed by SIGABRT"),
+        ("*(volatile int *)0 = 1;", "was killed by SIGSEGV"),
         ("for (volatile int on = 1; on;) {}", "did not answer within 0.5 s"),
         ("twin->value[STEERING] = NAN;", "is not finite"),
     ],
 )
-def test_fmu__native_code_that_fails_costs_a_game_and_not_the_process(
-    fault: str, said: str, tmp_path: Path, car: Car
+def test_fmu__a_failure_of_native_code_is_an_error_and_the_next_game_is_played(
+    fault: str, message: str, tmp_path: Path, car: Car
 ) -> None:
     build = fmu_example()
     end = "v[STEERING] = 0.5 * v[TURNED] + 0.5 * atan2(v[LEFT], 4.0 + v[SPEED]);"
@@ -178,27 +191,27 @@ def test_fmu__native_code_that_fails_costs_a_game_and_not_the_process(
     driver.reset(GAMES[:1])
     driver.decide(GAMES[:1], view, np.zeros((1, 2)))
     view[0, LAYOUT.index("speed_mps")] = 0.5
-    with pytest.raises(DriverError, match=said):
+    with pytest.raises(DriverError, match=message):
         driver.decide(GAMES[:1], view, np.zeros((1, 2)))
     driver.reset(GAMES[:1])
     assert driver.decide(GAMES[:1], 0.0 * view, np.zeros((1, 2))).shape == (1, 2)
 
 
-def test_fmu__that_plays_one_game_at_a_time_says_so(tmp_path: Path, car: Car, twins: dict[int, Path]) -> None:
+def test_fmu__a_single_instance_fmu_plays_one_game_at_a_time(tmp_path: Path, car: Car, twins: dict[int, Path]) -> None:
     with zipfile.ZipFile(twins[2]) as whole, zipfile.ZipFile(tmp_path / "single.fmu", "w") as single:
         for name in whole.namelist():
             content = whole.read(name)
             once = b'<CoSimulation canBeInstantiatedOnlyOncePerProcess="true" '
             single.writestr(name, content.replace(b"<CoSimulation ", once) if name.endswith(".xml") else content)
     driver = fmu_driver(document(), tmp_path / "single.fmu", car)
-    for _ in range(2):  # one after the other is well
+    for _ in range(2):  # one after the other works
         driver.reset(GAMES[:1])
         driver.decide(GAMES[:1], np.zeros((1, SIZE), dtype=np.float32), np.zeros((1, 2)))
     with pytest.raises(DriverError, match=r"one game at a time only: give the campaign training\.games = 1"):
         driver.reset(GAMES)
 
 
-def test_fmu__an_error_status_is_named(tmp_path: Path, car: Car) -> None:
+def test_fmu__an_error_status_is_reported(tmp_path: Path, car: Car) -> None:
     build = fmu_example()
     source = build.SOURCE.read_text().replace("step(twin, step_s);\n    return fmi2OK;", "return fmi2Error;")
     driver = fmu_driver(document(), build.build(tmp_path / "failing.fmu", 2, source), car)

@@ -1,4 +1,4 @@
-"""A learned policy drives as the learner that made it would."""
+"""A learned policy drives as its PPO model would."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ from tests.support.policies import some_policy
 GAMES = np.arange(300)
 
 
-class Nothing(gymnasium.Env[Any, Any]):
-    """Only the spaces: a learner wants an environment to be made."""
+class Spaces(gymnasium.Env[Any, Any]):
+    """Only the spaces, which a learner needs."""
 
     observation_space, action_space = OBSERVATION_SPACE, ACTION_SPACE
 
 
 def learner(network: list[int], seed: int = 3) -> PPO:
     """A learner with large weights, so that its actions spread over the whole range and beyond."""
-    model = PPO("MlpPolicy", Nothing(), n_steps=8, batch_size=8, policy_kwargs={"net_arch": network}, device="cpu")
+    model = PPO("MlpPolicy", Spaces(), n_steps=8, batch_size=8, policy_kwargs={"net_arch": network}, device="cpu")
     generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
         for parameter in model.policy.parameters():
@@ -46,24 +46,24 @@ def observations(seed: int = 5) -> np.ndarray:
 def test_learned__drives_by_the_learners_most_likely_action(network: list[int]) -> None:
     model = learner(network)
     driver = LearnedDriver(policy_of(model, {}), sampled=False)
-    seen = observations()
-    expected, _ = model.predict(seen, deterministic=True)
-    actions = driver.decide(GAMES, seen, np.full((len(GAMES), 2), 9.0))
-    assert 0.05 < np.mean(np.abs(expected) < 1.0) < 0.95  # clipped ones and others
+    inputs = observations()
+    expected, _ = model.predict(inputs, deterministic=True)
+    actions = driver.decide(GAMES, inputs, np.full((len(GAMES), 2), 9.0))
+    assert 0.05 < np.mean(np.abs(expected) < 1.0) < 0.95  # some are clipped
     np.testing.assert_allclose(actions, expected, atol=1e-5)
 
 
-def test_learned__varies_by_the_noise_it_is_given_and_the_policys_own_deviation() -> None:
+def test_learned__samples_by_the_noise_and_the_policys_deviation() -> None:
     model = learner([16])
-    seen = observations()
+    inputs = observations()
     noise = np.random.default_rng(7).standard_normal((len(GAMES), 2))
     with torch.no_grad():
-        likeliest = model.policy.get_distribution(torch.from_numpy(seen)).mode().numpy()
+        mean = model.policy.get_distribution(torch.from_numpy(inputs)).mode().numpy()
         deviation = np.exp(model.policy.log_std.numpy())
     driver = LearnedDriver(policy_of(model, {}), sampled=True)
-    expected = np.clip(likeliest + deviation * noise, -1.0, 1.0)
-    np.testing.assert_allclose(driver.decide(GAMES, seen, noise), expected, atol=1e-5)
-    np.testing.assert_array_equal(driver.decide(GAMES, seen, noise), driver.decide(GAMES, seen, noise))
+    expected = np.clip(mean + deviation * noise, -1.0, 1.0)
+    np.testing.assert_allclose(driver.decide(GAMES, inputs, noise), expected, atol=1e-5)
+    np.testing.assert_array_equal(driver.decide(GAMES, inputs, noise), driver.decide(GAMES, inputs, noise))
 
 
 @pytest.mark.parametrize("sampled", [False, True])
@@ -75,15 +75,15 @@ def test_learned__stays_within_its_bounds(sampled: bool) -> None:
     assert actions.max() <= 1.0
 
 
-def test_learned__one_game_is_decided_as_it_would_be_among_many() -> None:
+def test_learned__decisions_are_independent_of_other_games() -> None:
     driver = LearnedDriver(some_policy(), sampled=True)
-    seen, noise = observations(), np.zeros((len(GAMES), 2))
-    together = driver.decide(GAMES, seen, noise)
-    alone = np.concatenate([driver.decide(GAMES[k : k + 1], seen[k : k + 1], noise[k : k + 1]) for k in GAMES])
+    inputs, noise = observations(), np.zeros((len(GAMES), 2))
+    together = driver.decide(GAMES, inputs, noise)
+    alone = np.concatenate([driver.decide(GAMES[k : k + 1], inputs[k : k + 1], noise[k : k + 1]) for k in GAMES])
     np.testing.assert_allclose(alone, together, atol=1e-5)
 
 
-def test_policy__goes_into_a_learner_and_comes_out_the_same() -> None:
+def test_policy__survives_a_round_trip_through_a_learner() -> None:
     policy = policy_of(learner([8, 6]), {})
     other = learner([8, 6], seed=4)
     put_policy(other, policy, deviation=0.5)
@@ -97,11 +97,11 @@ def test_policy__goes_into_a_learner_and_comes_out_the_same() -> None:
 @pytest.mark.parametrize("network", [[8], [8, 7], [9, 6]])
 def test_policy__that_does_not_fit_a_learner_is_refused(network: list[int]) -> None:
     policy: Policy = policy_of(learner([8, 6]), {})
-    with pytest.raises(ValueError, match="the actor to begin from"):
+    with pytest.raises(ValueError, match="the initial actor has"):
         put_policy(learner(network), policy, deviation=0.5)
 
 
-def test_drivers__are_drivers() -> None:
+def test_drivers__implement_the_protocol() -> None:
     assert isinstance(LearnedDriver(some_policy(), sampled=False), Driver)
     assert isinstance(SumoDriver(), Driver)
     assert not SumoDriver().takes_over

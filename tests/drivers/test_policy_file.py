@@ -1,4 +1,4 @@
-"""Policies on disk: exact, whole, and nothing but numbers."""
+"""Policies on disk: read back exactly, refused if damaged, and free of code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from harness.game.observation import SIZE
 from tests.support.policies import some_policy
 
 
-def test_policy__comes_back_exactly(tmp_path: Path) -> None:
+def test_policy__is_read_back_exactly(tmp_path: Path) -> None:
     policy = some_policy()
     write_policy(policy, tmp_path / "naive")
     again = read_policy(tmp_path / "naive")
@@ -99,22 +99,22 @@ DAMAGE: dict[str, tuple[str, Damage]] = {
 
 
 @pytest.mark.parametrize("name", DAMAGE)
-def test_read_policy__what_is_damaged_is_refused_by_name(name: str, tmp_path: Path) -> None:
+def test_read_policy__a_damaged_file_is_refused_by_name(name: str, tmp_path: Path) -> None:
     write_policy(some_policy(), tmp_path)
-    blamed, damage = DAMAGE[name]
+    damaged, damage = DAMAGE[name]
     damage(tmp_path / "policy.safetensors", tmp_path / "policy.json")
     with pytest.raises(UsageError) as error:
         read_policy(tmp_path)
     (problem,) = error.value.problems
-    assert problem.file == str(tmp_path / blamed)
+    assert problem.file == str(tmp_path / damaged)
     assert problem.message
     assert problem.remedy
 
 
-def test_read_policy__what_is_too_large_is_refused_unread(tmp_path: Path) -> None:
+def test_read_policy__a_file_that_is_too_large_is_refused_unread(tmp_path: Path) -> None:
     write_policy(some_policy(), tmp_path)
     with (tmp_path / "policy.safetensors").open("ab") as file:
-        file.truncate(10**12)  # a hole: it takes no room
+        file.truncate(10**12)  # sparse: it takes no space on disk
     with pytest.raises(UsageError, match="too large"):
         read_policy(tmp_path)
 

@@ -1,4 +1,4 @@
-"""A program drives by one JSON line each way; one that dies, is late or talks nonsense costs its game and no more."""
+"""Programs as drivers: a line of JSON per message and answer. A crash, a delay or an invalid answer costs one game."""
 
 from __future__ import annotations
 
@@ -47,25 +47,24 @@ def refusal(driver: ProcessDriver) -> str:
     return str(caught.value)
 
 
-def test_process__is_told_all_it_needs_and_asks_in_units(tmp_path: Path, car: Car) -> None:
-    tells = 'open("heard.jsonl", "a").write(line)'
-    mine = driver(tmp_path, car, tells)
+def test_process__receives_all_messages_and_decides_in_si_units(tmp_path: Path, car: Car) -> None:
+    mine = driver(tmp_path, car, 'open("received.jsonl", "a").write(line)')
     mine.reset(GAMES)
     actions = mine.decide(GAMES, SEEN, NOISE)
-    np.testing.assert_array_equal(actions, car.asked(np.array([1.0, 1.0]), np.array([0.01, 0.01]), SEEN))
+    np.testing.assert_array_equal(actions, car.actions(np.array([1.0, 1.0]), np.array([0.01, 0.01]), SEEN))
 
-    hello, begin, decide = map(json.loads, (tmp_path / "heard.jsonl").read_text().splitlines())
+    hello, reset, decide = map(json.loads, (tmp_path / "received.jsonl").read_text().splitlines())
     assert hello["layout"] == list(LAYOUT)
     assert hello["step_s"] == 0.1
     assert hello["limits"]["max_braking_mps2"] == 8.0
     assert hello["limits"]["length_m"] == 4.6
-    assert begin == {"type": "reset", "games": [3, 7]}
+    assert reset == {"type": "reset", "games": [3, 7]}
     assert decide["games"] == [3, 7]
-    np.testing.assert_array_equal(decide["observation"], car.seen(SEEN))
+    np.testing.assert_array_equal(decide["observation"], car.physical(SEEN))
     np.testing.assert_array_equal(decide["noise"], NOISE)
 
 
-def test_process__may_see_and_act_as_policies_do(tmp_path: Path, car: Car) -> None:
+def test_process__scaled_units_are_those_of_policies(tmp_path: Path, car: Car) -> None:
     change = 'if games and message["type"] == "decide": answer["actions"] = [row[:2] for row in message["observation"]]'
     mine = driver(tmp_path, car, change, units="scaled")
     mine.reset(GAMES)
@@ -73,11 +72,14 @@ def test_process__may_see_and_act_as_policies_do(tmp_path: Path, car: Car) -> No
 
 
 @pytest.mark.parametrize(
-    ("change", "said"),
+    ("change", "message"),
     [
-        ('if number == 2: sys.exit("out of petrol")', "ended with exit code 1 (asked: decide); it said: out of petrol"),
-        ("if number == 2: os.kill(os.getpid(), 11)", "died of SIGSEGV"),
-        ("if number == 0: sys.exit(0)", "ended with exit code 0 (asked: hello)"),
+        (
+            'if number == 2: sys.exit("out of petrol")',
+            "ended with exit code 1 (message: decide); on its standard error: out of petrol",
+        ),
+        ("if number == 2: os.kill(os.getpid(), 11)", "was killed by SIGSEGV"),
+        ("if number == 0: sys.exit(0)", "ended with exit code 0 (message: hello)"),
         ("if number == 2: sys.stdout.close(); os.close(1); time.sleep(60)", "closed its standard output"),
         ("if number == 2: print('{', flush=True); continue", "not JSON"),
         ("if number == 2: answer = [1]", "answered decide with [1], not with an object"),
@@ -88,26 +90,26 @@ def test_process__may_see_and_act_as_policies_do(tmp_path: Path, car: Car) -> No
         ("if number == 2: answer['actions'][1] = [float('nan'), 0]", "is not finite"),
         ("if number == 2: answer['actions'][1] = [10**400, 0]", "too large"),
         ("if number == 2: answer = {'error': 'no such lane'}", "reports an error: 'no such lane'"),
-        ("if number == 0: answer = {'protocol': 1}", "does not speak protocol 2"),
+        ("if number == 0: answer = {'protocol': 1}", "does not support protocol 2"),
         ("if number == 1: print('{}', flush=True)", "answered"),
         ("if number == 2: os.write(1, b'[' * 11_000_000)", "answers with more than 10,000,000 bytes"),
     ],
 )
-def test_process__what_is_no_answer_is_named(change: str, said: str, tmp_path: Path, car: Car) -> None:
-    assert said in refusal(driver(tmp_path, car, change))
+def test_process__an_invalid_answer_is_an_error(change: str, message: str, tmp_path: Path, car: Car) -> None:
+    assert message in refusal(driver(tmp_path, car, change))
 
 
 @pytest.mark.parametrize("change", ["time.sleep(600)", "os.write(1, b'{'); time.sleep(600)", "any(iter(int, 1))"])
-def test_process__a_late_answer_is_not_waited_for(change: str, tmp_path: Path, car: Car) -> None:
+def test_process__a_late_answer_is_an_error(change: str, tmp_path: Path, car: Car) -> None:
     mine = driver(tmp_path, car, f"if number == 2: {change}", deadline_s=0.3)
     mine.reset(GAMES)
     began = time.monotonic()
-    with pytest.raises(DriverError, match=r"did not answer within 0.3 s \(asked: decide\)"):
+    with pytest.raises(DriverError, match=r"did not answer within 0.3 s \(message: decide\)"):
         mine.decide(GAMES, SEEN, NOISE)
     assert time.monotonic() - began < 60.0  # it would sleep for 600
 
 
-def test_process__who_never_reads_is_late_however_much_there_is_to_say(tmp_path: Path, car: Car) -> None:
+def test_process__a_program_that_never_reads_misses_the_deadline(tmp_path: Path, car: Car) -> None:
     many = np.arange(500)
     mine = driver(tmp_path, car, "if number == 1: print('{}', flush=True); time.sleep(600)", deadline_s=0.3)
     mine.reset(many)
@@ -121,15 +123,15 @@ def test_process__many_games_fit_through_the_pipes(tmp_path: Path, car: Car) -> 
     assert mine.decide(many, np.zeros((1000, SIZE), dtype=np.float32), np.zeros((1000, 2))).shape == (1000, 2)
 
 
-def test_process__may_talk_on_its_standard_error_as_much_as_it_likes(tmp_path: Path, car: Car) -> None:
+def test_process__a_long_standard_error_does_not_block(tmp_path: Path, car: Car) -> None:
     mine = driver(tmp_path, car, "sys.stderr.write('blah ' * 100_000 + chr(10)); sys.stderr.flush()")
     for _ in range(3):
         mine.reset(GAMES)
         mine.decide(GAMES, SEEN, NOISE)
 
 
-def test_process__that_cannot_be_started_is_named(tmp_path: Path, car: Car) -> None:
-    mine = ProcessDriver(["./nowhere"], tmp_path, car, "si", 1.0, 5.0)
+def test_process__a_program_that_cannot_be_started_is_an_error(tmp_path: Path, car: Car) -> None:
+    mine = ProcessDriver(["./nowhere"], tmp_path, car, units="si", deadline_s=1.0, start_deadline_s=5.0)
     with pytest.raises(DriverError, match=r"\./nowhere ended with exit code 1.*FileNotFoundError"):
         mine.reset(GAMES)
 
@@ -142,9 +144,9 @@ def test_process__ends_with_its_driver(tmp_path: Path, car: Car) -> None:
     wait_for(lambda: not is_running(pid), "the end of the program")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="what kills it with its parent is Linux's")
-def test_process__ends_with_the_harness_however_that_ends(tmp_path: Path) -> None:
-    """Even a program that never looks whether its input has ended."""
+@pytest.mark.skipif(sys.platform != "linux", reason="PR_SET_PDEATHSIG exists on Linux only")
+def test_process__ends_when_the_harness_is_killed(tmp_path: Path) -> None:
+    """Also a program that never reads its input."""
     script = f"""
 import pathlib, numpy as np, sys, time
 sys.path.insert(0, {str(REPOSITORY)!r})
@@ -168,8 +170,8 @@ time.sleep(600)
     wait_for(lambda: not is_running(pid), "the end of the program")
 
 
-def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car: Car) -> None:
-    """The second game's program dies in its fourth decision; every other game is played, by a new one."""
+def test_process__a_crash_costs_one_game(tmp_path: Path, merge: OpenScene, car: Car) -> None:
+    """The program ends in the fourth decision of the second game; a new process plays the third and fourth game."""
     counts = (
         "path = os.path.join(os.getcwd(), 'games'); n = (len(open(path).read()) if os.path.exists(path) else 0);"
         "message['type'] == 'reset' and open(path, 'a').write('x');"
@@ -177,7 +179,7 @@ def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car:
         "n == 2 and message['type'] == 'decide' and steps == 4 and sys.exit('flat tyre')"
     )
     mine, careful = driver(tmp_path, car, counts), read_document(CAREFUL, Persona)
-    arm = Arm("naive_alone", merge, (mine, None), (careful, careful), 1)
+    arm = Arm(name="naive_alone", scene=merge, drivers=(mine, None), personas=(careful, careful), seed=1)
     games = [game.record for game in assess(arm, 4)]
     assert [game["ego_outcome"] == "error" for game in games] == [False, True, False, False]
     assert "DriverError" in games[1]["error"]
@@ -187,6 +189,11 @@ def test_process__who_died_costs_one_game(tmp_path: Path, merge: OpenScene, car:
 
 def test_process__the_example_in_perl_reaches_its_goal(merge: OpenScene, car: Car) -> None:
     folder, careful = REPOSITORY / "egos" / "examples" / "process", read_document(CAREFUL, Persona)
-    mine = ProcessDriver(["perl", "drive.pl"], folder, car, "si", 5.0, 20.0)
-    games = [game.record for game in assess(Arm("naive_alone", merge, (mine, None), (careful, careful), 1), 4)]
+    mine = ProcessDriver(["perl", "drive.pl"], folder, car, units="si", deadline_s=5.0, start_deadline_s=20.0)
+    games = [
+        game.record
+        for game in assess(
+            Arm(name="naive_alone", scene=merge, drivers=(mine, None), personas=(careful, careful), seed=1), 4
+        )
+    ]
     assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 4

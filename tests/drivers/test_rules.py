@@ -1,4 +1,4 @@
-"""A driver by rules: its documents, what it makes of what it sees, and whole games on the merge."""
+"""The rule-based driver: its documents, its perception and control, and whole games on the merge."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from harness.config.driver import read_driver
 from harness.config.persona import Persona
 from harness.config.rule_driver import REACTIONS, Cruise, LaneKeeping, Rules
 from harness.config.toml_reading import read_document
-from harness.drivers.adaptive_cruise import cruise_mps2, in_way, speed_aimed_at_mps, time_gap_law_mps2
+from harness.drivers.adaptive_cruise import cruise_mps2, in_path, target_speed_mps, time_gap_law_mps2
 from harness.drivers.car import Car, car_of
 from harness.drivers.external import find_driver
 from harness.drivers.lane_keeping import steering_rad
-from harness.drivers.perception import Encounters, OwnMotion, look
+from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.drivers.protocol import Driver
 from harness.drivers.rules import UNKNOWN_LIMIT_MPS, RulesDriver
 from harness.drivers.sumo import SumoDriver
@@ -52,7 +52,7 @@ def rules(**tables: dict[str, float]) -> Rules:
 
 
 def seeing(speed_mps: float = 13.89, over: float = 0.0, turned: float = 0.0, **other: float) -> np.ndarray:
-    """What one game's driver sees with one other, in metres and seconds, on a way that turns by `turned` everywhere."""
+    """The observation of one game with one other car, from physical units; `turned` is the heading of the path."""
     view = np.zeros((1, SIZE))
     values = {"speed_mps": speed_mps, "speed_over_limit": over, "path_left_m": other.pop("path_left_m", 0.0)}
     values |= {f"path_turned_rad@{d:g}m": 2.0 * turned for d in AHEAD_M}
@@ -77,24 +77,24 @@ def test_shipped_egos__are_documents_of_rules(repository: Path, name: str) -> No
     assert [each for each in REACTIONS if getattr(document, each)] == [name.replace("adas", "emergency_braking")]
 
 
-def test_rules__react_to_danger_in_one_way() -> None:
+def test_rules__have_at_most_one_reaction_to_danger() -> None:
     with pytest.raises(ValidationError, match="in one way"):
         rules(rss={}, fuzzy={})
 
 
-def test_rules__a_misspelt_parameter_is_named(tmp_path: Path) -> None:
+def test_rules__a_misspelt_parameter_is_an_error(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text('kind = "rules"\nname = "mine"\ndescription = "Mine alone."\n[cruise]\ntime_gab_s = 1.0\n')
     with pytest.raises(UsageError, match=r"cruise\.time_gab_s: unknown key \(did you mean 'time_gap_s'"):
         read_driver(file)
 
 
-def test_fuzzy__needs_something_between_comfortable_and_hardest() -> None:
+def test_fuzzy__hardest_braking_must_exceed_comfortable() -> None:
     with pytest.raises(ValidationError, match="hardest_mps2 must exceed"):
         rules(fuzzy={"comfortable_mps2": 6.0, "hardest_mps2": 6.0})
 
 
-def test_tunable__each_is_a_real_parameter_that_may_have_both_bounds() -> None:
+def test_tunable__each_is_a_parameter_and_accepts_both_bounds() -> None:
     document = rules(emergency_braking={})
     assert len(document.searched) >= 5
     for key, low, high in document.searched:
@@ -105,7 +105,7 @@ def test_tunable__each_is_a_real_parameter_that_may_have_both_bounds() -> None:
             assert getattr(getattr(document.tuned({key: value}), table), name) == value
 
 
-def test_tunable__nothing_of_a_table_that_is_not_there_or_of_a_reference_driver() -> None:
+def test_tunable__has_no_parameters_of_missing_tables_or_reference_drivers() -> None:
     assert {each.key.split(".")[0] for each in rules().searched} == {"cruise"}
     assert rules(fuzzy={}).searched == ()
     with pytest.raises(KeyError):
@@ -114,57 +114,57 @@ def test_tunable__nothing_of_a_table_that_is_not_there_or_of_a_reference_driver(
         rules().tuned({"cruise.time_gap_s": 0.1})
 
 
-def test_page__tells_what_is_usually_tuned(repository: Path) -> None:
+def test_page__lists_the_tunable_parameters(repository: Path) -> None:
     page = (repository / "docs" / "egos-by-rules.md").read_text(encoding="utf-8")
-    told = re.findall(r"^\| `([\w.]+\.\w+)` \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
-    assert [(key, float(low), float(high)) for key, low, high in told] == [*rules(emergency_braking={}).searched]
+    listed = re.findall(r"^\| `([\w.]+\.\w+)` \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
+    assert [(key, float(low), float(high)) for key, low, high in listed] == [*rules(emergency_braking={}).searched]
 
 
-def test_page__tells_every_parameter_with_its_default(repository: Path) -> None:
+def test_page__lists_every_parameter_with_its_default(repository: Path) -> None:
     page = (repository / "docs" / "egos-by-rules.md").read_text(encoding="utf-8")
     for name in ("cruise", "lane_keeping", *REACTIONS):
         table = page.split(f"### `[{name}]`")[1].split("###")[0]
-        told = dict(re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", table, re.MULTILINE))
-        assert {key: float(value) for key, value in told.items()} == getattr(rules(**{name: {}}), name).model_dump()
+        listed = dict(re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", table, re.MULTILINE))
+        assert {key: float(value) for key, value in listed.items()} == getattr(rules(**{name: {}}), name).model_dump()
 
 
 # --- what is seen --------------------------------------------------------------------------------------------------
 
 
-def test_look__other_ahead_in_ones_way(car: Car) -> None:
-    view, met = look(car, seeing(12.0, -0.2, ahead_m=20.0, left_m=0.5, ahead_mps=-4.0))
+def test_perceive__a_car_ahead_in_the_path(car: Car) -> None:
+    view, encounters = perceive(car, seeing(12.0, -0.2, ahead_m=20.0, left_m=0.5, ahead_mps=-4.0))
     assert (view.speed_mps[0], view.limit_mps[0]) == pytest.approx((12.0, 15.0))
-    first = {name: values[0, 0] for name, values in met._asdict().items()}
+    first = {name: values[0, 0] for name, values in encounters._asdict().items()}
     expected = {"gap_m": 15.4, "offset_m": 0.5, "clearance_m": -1.3, "speed_mps": 8.0, "approach_mps": 0.0}
     assert {name: first[name] for name in expected} == pytest.approx(expected)
-    assert met.seen.tolist() == [[True, False, False]]
+    assert encounters.seen.tolist() == [[True, False, False]]
 
 
-def test_look__who_comes_over_approaches_from_either_side(car: Car) -> None:
+def test_perceive__a_car_moving_over_approaches_from_either_side(car: Car) -> None:
     for side in (1.0, -1.0):
-        given = {"ahead_m": 5.0, "left_m": 3.2 * side, "left_mps": -side, "turned_sin": -side / 10.0}
-        _, met = look(car, seeing(10.0, **given))
-        assert met.approach_mps[0, 0] == pytest.approx(1.0)
+        other = {"ahead_m": 5.0, "left_m": 3.2 * side, "left_mps": -side, "turned_sin": -side / 10.0}
+        _, encounters = perceive(car, seeing(10.0, **other))
+        assert encounters.approach_mps[0, 0] == pytest.approx(1.0)
         # turned by asin(0.1), 4.6 m long and 1.8 m wide: 0.5 (0.46 + 1.791) to the side
-        assert met.clearance_m[0, 0] == pytest.approx(3.2 - 1.12550 - 0.9, abs=1e-4)
+        assert encounters.clearance_m[0, 0] == pytest.approx(3.2 - 1.12550 - 0.9, abs=1e-4)
 
 
-def test_look__the_way_turns_with_the_road(car: Car) -> None:
-    """The way leads 0.1 rad to the left: 20 m ahead it is 2 m to the left, and who drives there along it is on it."""
-    given = {"ahead_m": 20.0, "left_m": 20.0 * np.sin(0.1), "turned_sin": np.sin(0.1), "left_mps": 10.0 * np.sin(0.1)}
-    _, met = look(car, seeing(10.0, turned=0.1, ahead_mps=10.0 * np.cos(0.1) - 10.0, **given))
-    assert met.offset_m[0, 0] == pytest.approx(0.0, abs=1e-6)
-    assert met.approach_mps[0, 0] == pytest.approx(0.0, abs=1e-6)
-    assert met.speed_mps[0, 0] == pytest.approx(10.0)
+def test_perceive__the_path_turns_with_the_road(car: Car) -> None:
+    """The path is turned 0.1 rad to the left: 20 m ahead it is 2 m to the left, and a car there is on it."""
+    other = {"ahead_m": 20.0, "left_m": 20.0 * np.sin(0.1), "turned_sin": np.sin(0.1), "left_mps": 10.0 * np.sin(0.1)}
+    _, encounters = perceive(car, seeing(10.0, turned=0.1, ahead_mps=10.0 * np.cos(0.1) - 10.0, **other))
+    assert encounters.offset_m[0, 0] == pytest.approx(0.0, abs=1e-6)
+    assert encounters.approach_mps[0, 0] == pytest.approx(0.0, abs=1e-6)
+    assert encounters.speed_mps[0, 0] == pytest.approx(10.0)
 
 
-def test_look__who_closes_faster_than_the_view_tells_is_taken_to_stand(car: Car) -> None:
-    _, met = look(car, seeing(25.0, ahead_m=40.0, ahead_mps=-25.0))
-    assert met.speed_mps[0, 0] == 0.0
+def test_perceive__a_closing_speed_beyond_the_bound_means_standing(car: Car) -> None:
+    _, encounters = perceive(car, seeing(25.0, ahead_m=40.0, ahead_mps=-25.0))
+    assert encounters.speed_mps[0, 0] == 0.0
 
 
-def test_look__the_limit_is_not_seen_while_standing(car: Car) -> None:
-    view, _ = look(car, seeing(0.0, -1.0))
+def test_perceive__the_limit_is_not_seen_while_standing(car: Car) -> None:
+    view, _ = perceive(car, seeing(0.0, -1.0))
     assert np.isnan(view.limit_mps[0])
 
 
@@ -178,20 +178,20 @@ def test_time_gap_law__by_hand() -> None:
     assert time_gap_law_mps2(np.array(18.0), np.array(10.0), np.array(10.0), law) == pytest.approx(0.0)
 
 
-def test_speed_aimed_at__slows_for_a_curve_in_time() -> None:
+def test_target_speed__slows_for_a_curve_in_time() -> None:
     """0.1 rad between 20 and 30 m: 0.01 / m, entered at sqrt(2 / 0.01) = 14.1 m/s, and now sqrt(200 + 2 1.75 20)."""
     turned = np.where(AHEAD_M >= 30.0, 0.1, 0.0)[None]
-    found = speed_aimed_at_mps(np.array([30.0]), turned, Cruise())
+    found = target_speed_mps(np.array([30.0]), turned, Cruise())
     assert found[0] == pytest.approx(np.sqrt(270.0))
-    assert speed_aimed_at_mps(np.array([13.89]), turned, Cruise())[0] == 13.89
+    assert target_speed_mps(np.array([13.89]), turned, Cruise())[0] == 13.89
 
 
-def test_in_way__anticipates_who_will_be(car: Car) -> None:
-    """1.4 m beside and coming at 1 m/s: in the way within 1.5 s, not within 1 s."""
-    _, met = look(car, seeing(ahead_m=6.0, left_m=3.2, left_mps=-1.0))
-    assert in_way(met, 1.5)[0, 0]
-    assert not in_way(met, 1.0)[0, 0]
-    assert not in_way(look(car, seeing(ahead_m=-6.0, left_m=3.2, left_mps=-1.0))[1], 1.5)[0, 0], "behind"
+def test_in_path__anticipates_a_car_that_moves_over(car: Car) -> None:
+    """1.4 m beside and approaching at 1 m/s: in the path within 1.5 s, not within 1 s."""
+    _, encounters = perceive(car, seeing(ahead_m=6.0, left_m=3.2, left_mps=-1.0))
+    assert in_path(encounters, 1.5)[0, 0]
+    assert not in_path(encounters, 1.0)[0, 0]
+    assert not in_path(perceive(car, seeing(ahead_m=-6.0, left_m=3.2, left_mps=-1.0))[1], 1.5)[0, 0], "behind"
 
 
 @settings(deadline=None)
@@ -204,20 +204,36 @@ def test_cruise__more_gap_never_brakes_harder(one: float, two: float, own: float
 @settings(deadline=None)
 @given(st.floats(0.0, 100.0), st.floats(0.0, 30.0), st.floats(0.0, 30.0), st.floats(-3.5, 2.0))
 def test_cruise__is_comfortable(gap: float, own: float, other: float, before: float) -> None:
-    asked = _cruise(gap, own, other, before)
-    assert -3.5 <= asked <= 2.0
-    assert abs(asked - before) <= 0.5 + 1e-9
+    requested = _cruise(gap, own, other, before)
+    assert -3.5 <= requested <= 2.0
+    assert abs(requested - before) <= 0.5 + 1e-9
 
 
 def _cruise(gap_m: float, own_mps: float, other_mps: float, before_mps2: float | None = None) -> float:
-    """What the cruise control asks for behind somebody; without a before, as if jerk had no limit."""
+    """The request of the cruise control behind a car; without `before_mps2` the jerk has no limit."""
     nothing = np.zeros((1, 1))
     columns = (gap_m + 4.6, gap_m, 0.0, -1.8, other_mps, 0.0, 4.6)
-    met = Encounters(np.array([[True]]), *(nothing + column for column in columns))
+    encounters = Encounters(np.array([[True]]), *(nothing + column for column in columns))
     own = np.array([own_mps])
-    view = OwnMotion(own, np.array([13.89]), np.zeros(1), np.zeros(1), np.zeros(1), np.zeros((1, len(AHEAD_M))))
+    view = OwnMotion(
+        speed_mps=own,
+        limit_mps=np.array([13.89]),
+        acceleration_mps2=np.zeros(1),
+        steering_rad=np.zeros(1),
+        path_left_m=np.zeros(1),
+        path_turned_rad=np.zeros((1, len(AHEAD_M))),
+    )
     step_s = 1000.0 if before_mps2 is None else 0.1
-    return float(cruise_mps2(view, met, view.limit_mps, np.array([before_mps2 or 0.0]), Cruise(), step_s)[0])
+    return float(
+        cruise_mps2(
+            view,
+            encounters,
+            limit_mps=view.limit_mps,
+            before_mps2=np.array([before_mps2 or 0.0]),
+            law=Cruise(),
+            step_s=step_s,
+        )[0]
+    )
 
 
 # --- keeping the lane ----------------------------------------------------------------------------------------------
@@ -225,16 +241,23 @@ def _cruise(gap_m: float, own_mps: float, other_mps: float, before_mps2: float |
 
 def test_steering__by_hand() -> None:
     """1 m right of the path at 9 m/s: atan(0.3 / (9 + 1)) = 0.029991; turned away by 0.1 rad as well: 0.5 0.1 more,
-    and the front axle is 1.35 sin(0.1) farther off."""
+    and the front axle is 1.35 sin(0.1) farther from the path."""
     law = LaneKeeping(max_lateral_mps2=6.0, max_lateral_jerk_mps3=20.0)
     for turned, expected in ((0.0, 0.0299910), (0.1, 0.05 + np.arctan(0.03 * (1.0 + 1.35 * np.sin(0.1))))):
         along = np.full((1, len(AHEAD_M)), turned)
-        view = OwnMotion(np.array([9.0]), np.array([13.9]), np.zeros(1), np.array([expected]), np.ones(1), along)
-        assert steering_rad(view, law, 2.7, 0.1)[0] == pytest.approx(expected, abs=1e-6)
+        view = OwnMotion(
+            speed_mps=np.array([9.0]),
+            limit_mps=np.array([13.9]),
+            acceleration_mps2=np.zeros(1),
+            steering_rad=np.array([expected]),
+            path_left_m=np.ones(1),
+            path_turned_rad=along,
+        )
+        assert steering_rad(view, law=law, wheelbase_m=2.7, step_s=0.1)[0] == pytest.approx(expected, abs=1e-6)
 
 
 @pytest.mark.parametrize("speed_mps", [3.0, 8.0, 14.0, 25.0])
-def test_steering__brings_the_car_onto_its_path_and_keeps_it_there(car: Car, speed_mps: float) -> None:
+def test_steering__brings_the_car_onto_its_path_within_limits(car: Car, speed_mps: float) -> None:
     """From 1.5 m beside and 0.05 rad turned away, within UN R79's limits."""
     state, actuators, law = State.empty(1, 1), car.actuators, LaneKeeping()
     state.y_m[:], state.heading_rad[:], state.speed_mps[:], state.present[:] = 1.5, 0.05, speed_mps, True
@@ -242,14 +265,14 @@ def test_steering__brings_the_car_onto_its_path_and_keeps_it_there(car: Car, spe
     for _ in range(250):
         view = seeing(speed_mps, turned=-float(state.heading_rad[0, 0]), path_left_m=-float(state.y_m[0, 0]))
         view[0, LAYOUT.index("steering_rad")] = state.steering_rad[0, 0] / actuators.max_steering_rad[0]
-        seen, _ = look(car, view)
-        action = car.asked(np.zeros(1), steering_rad(seen, law, 2.7, car.step_s), view)
+        seen, _ = perceive(car, view)
+        action = car.actions(np.zeros(1), steering_rad(seen, law=law, wheelbase_m=2.7, step_s=car.step_s), view)
         acceleration, steering = requests(action[:, None], state.speed_mps, actuators)
         move(state, acceleration, steering, np.ones((1, 1), dtype=bool), actuators, car.step_s)
         offsets.append(float(state.y_m[0, 0]))
         lateral.append(float(lateral_acceleration_mps2(state, actuators)[0, 0]))
     assert max(abs(each) for each in offsets[-50:]) < 0.05
-    assert min(offsets) > -0.15, "it doesn't swing over to the other side"
+    assert min(offsets) > -0.15, "no overshoot to the other side"
     assert np.abs(lateral).max() <= 3.0
     assert np.abs(np.diff(lateral)).max() <= 5.0 * car.step_s + 0.01
 
@@ -258,16 +281,16 @@ def test_steering__brings_the_car_onto_its_path_and_keeps_it_there(car: Car, spe
 
 
 def decided(driver: RulesDriver, car: Car, *views: np.ndarray, game: int = 0) -> list[float]:
-    """Accelerations that it asks for, decision by decision, in one game."""
-    games, asked = np.array([game]), []
+    """Accelerations that it requests, decision by decision, in one game."""
+    games, requested = np.array([game]), []
     for view in views:
         pedals = float(driver.decide(games, view, np.zeros((1, 2)))[0, 0])
         limits = car.limits
-        asked.append(pedals * limits["max_acceleration_mps2" if pedals >= 0.0 else "max_braking_mps2"])
-    return asked
+        requested.append(pedals * limits["max_acceleration_mps2" if pedals >= 0.0 else "max_braking_mps2"])
+    return requested
 
 
-def begun(document: Rules, car: Car, games: int = 1) -> RulesDriver:
+def new_driver(document: Rules, car: Car, games: int = 1) -> RulesDriver:
     driver = RulesDriver(document, car)
     assert isinstance(driver, Driver)
     driver.reset(np.arange(games))
@@ -277,29 +300,29 @@ def begun(document: Rules, car: Car, games: int = 1) -> RulesDriver:
 def test_driver__brakes_for_a_standing_car_as_its_document_says(car: Car) -> None:
     """A standing car 10 m ahead at 10 m/s: time to collision 1 s."""
     views = [seeing(10.0, ahead_m=14.6, ahead_mps=-10.0)] * 16
-    asked = {
-        name: decided(begun(rules(**{name: {}} if name else {}), car), car, *views)
+    requested = {
+        name: decided(new_driver(rules(**{name: {}} if name else {}), car), car, *views)
         for name in ("", "emergency_braking", "careful_and_competent", "rss", "fuzzy")
     }
-    assert asked[""][-1] == pytest.approx(-3.5), "cruising knows no emergency"
-    assert asked["emergency_braking"][:4] == pytest.approx([-3.0, -6.0, -8.0, -8.0]), "all the car has"
-    assert asked["careful_and_competent"][:8] == pytest.approx([-0.4] * 8), "0.75 s of coasting"
-    assert asked["careful_and_competent"][-1] == pytest.approx(-8.0), "0.85 g is more than the car has"
-    assert asked["rss"][:8] == pytest.approx([0.0] * 8)
-    assert asked["rss"][-1] == pytest.approx(-0.774 * 9.81)
-    assert asked["fuzzy"][-1] == pytest.approx(-6.0)
+    assert requested[""][-1] == pytest.approx(-3.5), "cruise control has no emergency braking"
+    assert requested["emergency_braking"][:4] == pytest.approx([-3.0, -6.0, -8.0, -8.0]), "the limit of the car"
+    assert requested["careful_and_competent"][:8] == pytest.approx([-0.4] * 8), "0.75 s of coasting"
+    assert requested["careful_and_competent"][-1] == pytest.approx(-8.0), "0.85 g exceeds the limit of the car"
+    assert requested["rss"][:8] == pytest.approx([0.0] * 8)
+    assert requested["rss"][-1] == pytest.approx(-0.774 * 9.81)
+    assert requested["fuzzy"][-1] == pytest.approx(-6.0)
 
 
-def test_driver__what_was_done_before_goes_on_while_it_reacts(car: Car) -> None:
-    driver = begun(rules(careful_and_competent={}), car)
+def test_driver__continues_its_request_during_the_reaction_time(car: Car) -> None:
+    driver = new_driver(rules(careful_and_competent={}), car)
     slower = [seeing(10.0, ahead_m=14.6, ahead_mps=-4.0)] * 4
-    asked = decided(driver, car, *slower, *[seeing(10.0, ahead_m=14.6, ahead_mps=-9.9)] * 3)
-    assert asked[:4] == pytest.approx([-0.5, -1.0, -1.5, -2.0])
-    assert asked[4:] == pytest.approx([-2.0, -2.0, -2.0])
+    requested = decided(driver, car, *slower, *[seeing(10.0, ahead_m=14.6, ahead_mps=-9.9)] * 3)
+    assert requested[:4] == pytest.approx([-0.5, -1.0, -1.5, -2.0])
+    assert requested[4:] == pytest.approx([-2.0, -2.0, -2.0])
 
 
-def test_driver__remembers_each_game_by_itself(car: Car) -> None:
-    driver, danger = begun(rules(rss={}), car, games=3), seeing(10.0, ahead_m=14.6, ahead_mps=-10.0)
+def test_driver__keeps_a_state_per_game(car: Car) -> None:
+    driver, danger = new_driver(rules(rss={}), car, games=3), seeing(10.0, ahead_m=14.6, ahead_mps=-10.0)
     decided(driver, car, *[danger] * 15, game=2)
     assert decided(driver, car, danger, game=2)[0] < -7.0
     assert decided(driver, car, danger, game=0)[0] == 0.0
@@ -307,37 +330,39 @@ def test_driver__remembers_each_game_by_itself(car: Car) -> None:
     assert decided(driver, car, danger, game=2)[0] == 0.0
 
 
-def test_driver__decides_many_games_as_it_decides_one(car: Car) -> None:
+def test_driver__decisions_are_independent_of_other_games(car: Car) -> None:
     views = [seeing(10.0, ahead_m=gap, ahead_mps=-6.0, left_m=left) for gap in (6.0, 15.0, 40.0) for left in (0, 3.2)]
-    together = begun(rules(fuzzy={}), car, games=6).decide(np.arange(6), np.concatenate(views), np.zeros((6, 2)))
-    alone = [begun(rules(fuzzy={}), car).decide(np.zeros(1, dtype=int), view, np.zeros((1, 2)))[0] for view in views]
+    together = new_driver(rules(fuzzy={}), car, games=6).decide(np.arange(6), np.concatenate(views), np.zeros((6, 2)))
+    alone = [
+        new_driver(rules(fuzzy={}), car).decide(np.zeros(1, dtype=int), view, np.zeros((1, 2)))[0] for view in views
+    ]
     np.testing.assert_allclose(together, alone, atol=1e-12)
 
 
-def test_driver__from_standing_it_drives_until_it_has_seen_the_limit(car: Car) -> None:
-    driver = begun(rules(), car)
-    asked = decided(driver, car, *[seeing(0.0, -1.0)] * 30)
-    assert asked[-1] == pytest.approx(min(UNKNOWN_LIMIT_MPS / 2.0, 2.0))
+def test_driver__starts_from_standing_without_knowing_the_limit(car: Car) -> None:
+    driver = new_driver(rules(), car)
+    requested = decided(driver, car, *[seeing(0.0, -1.0)] * 30)
+    assert requested[-1] == pytest.approx(min(UNKNOWN_LIMIT_MPS / 2.0, 2.0))
 
 
 # --- whole games ---------------------------------------------------------------------------------------------------
 
 
-def play(repository: Path, scene: OpenScene, ego: str, other: Driver | None, games: int) -> list[dict[str, Any]]:
+def play(repository: Path, scene: OpenScene, *, ego: str, other: Driver | None, games: int) -> list[dict[str, Any]]:
     document = read_driver(repository / "egos" / f"{ego}.toml")
     assert isinstance(document, Rules)
     careful = read_document(repository / "personas" / "careful.toml", Persona)
     driver = RulesDriver(document, car_of(scene.world, EGO))
-    arm = Arm("arm", scene, (driver, other), (careful, careful), 1)
+    arm = Arm(name="arm", scene=scene, drivers=(driver, other), personas=(careful, careful), seed=1)
     return [game.record for game in assess(arm, games)]
 
 
 @pytest.mark.parametrize("other", [None, SumoDriver()], ids=["alone", "beside SUMO's driver"])
 @pytest.mark.parametrize("ego", EGOS)
-def test_games__every_ego_reaches_its_goal_calmly(
+def test_games__every_ego_reaches_its_goal_in_comfort(
     repository: Path, scene: OpenScene, ego: str, other: Driver | None
 ) -> None:
-    for record in play(repository, scene, ego, other, 10):
+    for record in play(repository, scene, ego=ego, other=other, games=10):
         assert (record["ego_outcome"], record["error"]) == ("goal", "")
         assert record["ego_max_lateral_acceleration_mps2"] < 0.1
         assert record["ego_max_deceleration_mps2"] < 1.0
@@ -355,17 +380,17 @@ BENT = "".join(
 
 
 def test_games__a_bend_is_driven_slower_and_in_the_lane(repository: Path, tmp_path: Path) -> None:
-    """Some 110 m of radius are 2.5 m/s^2 to the side at the limit of 16.67 m/s: the cruise control slows for it."""
+    """A radius of about 110 m means 2.5 m/s^2 of lateral acceleration at the limit of 16.67 m/s: the car slows down."""
     places: dict[str, object] = {"ego": ("ab bc", "ab_0"), "non_ego": ("ab bc", "ab_1"), "goal": "bc"}
     bent = build_scene(tmp_path / "bent", BENDS, BENT, places, goal_m=140.0, time_limit_s=40.0)
-    for record in play(repository, bent, "adas", None, 3):
+    for record in play(repository, bent, ego="adas", other=None, games=3):
         assert (record["ego_outcome"], record["error"]) == ("goal", "")
         assert 1.0 < record["ego_max_lateral_acceleration_mps2"] <= 3.1
         assert record["ego_max_deceleration_mps2"] <= 3.5
 
 
-def test_given__a_campaign_drives_its_ego_by_rules(repository: Path, car: Car) -> None:
-    given = find_driver("egos/adas.toml", repository / "campaign.toml", "ego.driver", allow_code=False)
-    assert isinstance(given.make(car, sampled=False), RulesDriver)
-    assert (given.kind, given.in_words) == ("rules", "the rules adas (egos/adas.toml)")
-    given.try_out(car, sampled=False)
+def test_find_driver__makes_a_rule_based_ego(repository: Path, car: Car) -> None:
+    external = find_driver("egos/adas.toml", repository / "campaign.toml", "ego.driver", allow_code=False)
+    assert isinstance(external.make(car, sampled=False), RulesDriver)
+    assert (external.kind, external.in_words) == ("rules", "the rules adas (egos/adas.toml)")
+    external.try_out(car, sampled=False)

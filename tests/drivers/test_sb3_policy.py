@@ -1,4 +1,4 @@
-"""Policies that Stable-Baselines3 saved drive as they would there; they are read only with the user's leave."""
+"""Policies saved by Stable-Baselines3 drive as they do there; they are read only with the user's permission."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from harness.game.observation import SIZE
 from harness.traffic.scene import OpenScene
 from tests.support.tiny import CAREFUL
 
-torch.set_num_threads(1)  # tiny networks: more only wait for one another
+torch.set_num_threads(1)  # tiny networks: more threads only wait for each other
 
 ALGORITHMS = ("PPO", "A2C", "SAC", "TD3")
 SHORT: dict[str, dict[str, Any]] = {
@@ -42,7 +42,7 @@ NOISE = np.random.default_rng(4).standard_normal((20, 2))
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """A model of each algorithm, trained for a moment on the harness's own environment, and saved."""
+    """A saved model of each algorithm, trained for 128 steps on the harness's environment."""
     folder = tmp_path_factory.mktemp("saved")
     assert harness.__version__  # importing the harness registers its environments
     game = gymnasium.make("harness/Ego-v0", other="sumo")
@@ -63,7 +63,7 @@ def document(algorithm: str, **keys: Any) -> StableBaselines3:
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
-def test_saved__drives_as_its_own_library_would(name: str, saved: dict[str, Path]) -> None:
+def test_saved__drives_as_stable_baselines3_does(name: str, saved: dict[str, Path]) -> None:
     model = getattr(stable_baselines3, name).load(saved[name], device="cpu")
     expected, _ = model.predict(SEEN, deterministic=True)
     driver = Sb3Driver(document(name), saved[name], sampled=False)
@@ -74,7 +74,7 @@ def test_saved__drives_as_its_own_library_would(name: str, saved: dict[str, Path
 
 
 @pytest.mark.parametrize("name", ["PPO", "A2C", "SAC"])
-def test_saved__varies_by_the_noise_it_is_given_and_its_own_deviation(name: str, saved: dict[str, Path]) -> None:
+def test_saved__samples_by_the_noise_and_its_own_deviation(name: str, saved: dict[str, Path]) -> None:
     policy = getattr(stable_baselines3, name).load(saved[name], device="cpu").policy
     driver = Sb3Driver(document(name), saved[name], sampled=True)
     with torch.no_grad():
@@ -86,14 +86,14 @@ def test_saved__varies_by_the_noise_it_is_given_and_its_own_deviation(name: str,
             mean = policy.get_distribution(seen).mode()
             expected = np.clip(mean.numpy() + policy.log_std.exp().numpy() * NOISE, -1.0, 1.0)
     np.testing.assert_allclose(driver.decide(GAMES, SEEN, NOISE), expected, atol=1e-5)
-    likeliest = driver.decide(GAMES, SEEN, 0.0 * NOISE)
+    mode = driver.decide(GAMES, SEEN, 0.0 * NOISE)
     np.testing.assert_allclose(
-        likeliest, Sb3Driver(document(name), saved[name], False).decide(GAMES, SEEN, NOISE), atol=1e-5
+        mode, Sb3Driver(document(name), saved[name], False).decide(GAMES, SEEN, NOISE), atol=1e-5
     )
 
 
-def test_saved__a_policy_that_does_not_vary_is_not_sampled(saved: dict[str, Path]) -> None:
-    with pytest.raises(UsageError, match="TD3's policies don't vary"):
+def test_saved__a_deterministic_policy_can_not_be_sampled(saved: dict[str, Path]) -> None:
+    with pytest.raises(UsageError, match="TD3's policies are deterministic"):
         Sb3Driver(document("TD3"), saved["TD3"], sampled=True)
 
 
@@ -101,12 +101,14 @@ def test_saved__a_policy_that_does_not_vary_is_not_sampled(saved: dict[str, Path
 def test_saved__plays_games(name: str, saved: dict[str, Path], merge: OpenScene) -> None:
     careful = read_document(CAREFUL, Persona)
     driver = Sb3Driver(document(name), saved[name], sampled=False)
-    (game,) = assess(Arm("naive_alone", merge, (driver, None), (careful, careful), 1), 1)
+    (game,) = assess(
+        Arm(name="naive_alone", scene=merge, drivers=(driver, None), personas=(careful, careful), seed=1), 1
+    )
     assert game.record["error"] == ""
 
 
 class Other(gymnasium.Env[Any, Any]):
-    """Somebody else's environment."""
+    """An environment with other spaces."""
 
     def __init__(self, seen: int, low: float, actions: int) -> None:
         self.observation_space = gymnasium.spaces.Box(low, 1.0, (seen,), np.float32)
@@ -114,7 +116,7 @@ class Other(gymnasium.Env[Any, Any]):
 
 
 @pytest.mark.parametrize(
-    ("spaces", "said"),
+    ("spaces", "message"),
     [
         (
             (12, -1.0, 2),
@@ -124,30 +126,30 @@ class Other(gymnasium.Env[Any, Any]):
         ((SIZE, -1.0, 1), "action_space: its action space is Box(-1.0, 1.0, (1,), float32), not Box(-1.0, 1.0, (2,)"),
     ],
 )
-def test_saved__what_was_trained_on_something_else_is_refused(
-    spaces: tuple[int, float, int], said: str, tmp_path: Path
+def test_saved__a_policy_with_other_spaces_is_refused(
+    spaces: tuple[int, float, int], message: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "PPO.zip"
     stable_baselines3.PPO("MlpPolicy", Other(*spaces), n_steps=8, batch_size=8, device="cpu").save(file)
     with pytest.raises(UsageError) as caught:
         Sb3Driver(document("PPO"), file, sampled=False)
-    assert said in str(caught.value)
+    assert message in str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "taken_for"), [("SAC", "PPO"), ("PPO", "TD3"), ("TD3", "SAC")])
-def test_saved__the_wrong_algorithm_is_named(name: str, taken_for: str, saved: dict[str, Path]) -> None:
-    with pytest.raises(UsageError, match=f"can't be read as a policy of {taken_for}.*is the algorithm right"):
-        Sb3Driver(document(taken_for), saved[name], sampled=False)
+@pytest.mark.parametrize(("name", "named"), [("SAC", "PPO"), ("PPO", "TD3"), ("TD3", "SAC")])
+def test_saved__a_wrong_algorithm_is_an_error(name: str, named: str, saved: dict[str, Path]) -> None:
+    with pytest.raises(UsageError, match=f"can't be read as a policy of {named}.*is the algorithm right"):
+        Sb3Driver(document(named), saved[name], sampled=False)
 
 
-def test_saved__what_is_no_zip_is_refused(tmp_path: Path) -> None:
+def test_saved__a_file_that_is_no_zip_is_refused(tmp_path: Path) -> None:
     (tmp_path / "PPO.zip").write_bytes(b"PK nothing")
     with pytest.raises(UsageError, match="can't be read as a policy of PPO"):
         Sb3Driver(document("PPO"), tmp_path / "PPO.zip", sampled=False)
 
 
 class Trap:
-    """What a malicious file would hold."""
+    """The content of a malicious file."""
 
     def __init__(self, touched: Path) -> None:
         self.touched = touched
@@ -156,7 +158,7 @@ class Trap:
         return Path.touch, (self.touched,)
 
 
-def test_saved__nothing_is_read_without_leave(tmp_path: Path) -> None:
+def test_saved__nothing_is_read_without_permission(tmp_path: Path) -> None:
 
     touched, file = tmp_path / "touched", tmp_path / "PPO.zip"
     payload = base64.b64encode(pickle.dumps(Trap(touched))).decode()
@@ -170,8 +172,8 @@ def test_saved__nothing_is_read_without_leave(tmp_path: Path) -> None:
     assert "--allow-code" in problem.remedy
     assert not touched.exists()
     allowed = find_driver("mine.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=True)
-    assert not touched.exists(), "finding it is not reading it"
+    assert not touched.exists(), "the file is found without being read"
     with pytest.raises(UsageError):
         Sb3Driver(document("PPO"), file, sampled=False)
-    assert touched.exists(), "and so the trap is one"
+    assert touched.exists(), "reading the file runs its code"
     assert allowed.files == {str(file): allowed.files[str(file)]}

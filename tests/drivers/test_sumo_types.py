@@ -1,4 +1,4 @@
-"""SUMO's own models as an ego: each car-following and lane-changing model, by a vehicle type of the route file."""
+"""SUMO's own models as the ego: each car-following and lane-changing model, by a vehicle type of the route file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LIMITS = 'length="4.4" width="1.8" accel="2.6" decel="4.5" maxSpeed="38" speedFa
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The merge, the ego in the lane that ends, with a vehicle type for each pair of models."""
+    """The merge with the ego in the lane that ends, and a vehicle type for each pair of models."""
     folder = tmp_path_factory.mktemp("models") / "merge"
     shutil.copytree(MERGE, folder)
     types = "".join(
@@ -44,13 +44,20 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def play(scene: OpenScene, non_ego: Driver | None, episodes: int) -> list[Game]:
     careful = read_document(CAREFUL, Persona)
-    return list(assess(Arm("naive_alone", scene, (SumoDriver(), non_ego), (careful, careful), 1), episodes))
+    return list(
+        assess(
+            Arm(name="naive_alone", scene=scene, drivers=(SumoDriver(), non_ego), personas=(careful, careful), seed=1),
+            episodes,
+        )
+    )
 
 
 def across_m(game: Game) -> float:
-    """How far the ego came across the road."""
+    """Lateral distance that the ego moved."""
     assert game.trace is not None
-    return float(np.ptp([y for y, who in zip(game.trace["y_m"], game.trace["player"], strict=True) if who == "ego"]))
+    return float(
+        np.ptp([y for y, player in zip(game.trace["y_m"], game.trace["player"], strict=True) if player == "ego"])
+    )
 
 
 @pytest.mark.parametrize("changing", CHANGING)
@@ -66,8 +73,8 @@ def test_sumo_types__each_model_leaves_the_lane_that_ends_and_reaches_the_goal(
         assert f"{following}_{changing}" in game.trace["vehicle_type"]
 
 
-def test_sumo_types__no_two_models_follow_alike(folder: Path) -> None:
-    """CACC is ACC but behind a car."""
+def test_sumo_types__car_following_models_differ(folder: Path) -> None:
+    """CACC differs from ACC only behind a car."""
     paths = {}
     for following in FOLLOWING:
         games = play(open_scene(folder, f"{following}_LC2013"), SumoDriver(), 4)
@@ -82,14 +89,14 @@ def test_sumo_types__the_ego_is_a_car_of_its_type(folder: Path) -> None:
     assert plain.world.length_m.tolist() == [4.6, 4.6]
 
 
-def test_sumo_types__sublanes_stand_a_player_that_drives_off_the_road(folder: Path) -> None:
+def test_sumo_types__sublanes_allow_a_player_that_leaves_the_road(folder: Path) -> None:
     wild = LearnedDriver(some_policy(), sampled=True)
     games = play(open_scene(folder, "EIDM_SL2015"), wild, 5)
     assert [game.record["error"] for game in games] == [""] * 5
     assert "rail" in [game.record["non_ego_outcome"] for game in games]
 
 
-def test_sumo_types__one_that_is_not_there_is_named(folder: Path) -> None:
+def test_sumo_types__an_unknown_type_is_an_error(folder: Path) -> None:
     with pytest.raises(UsageError) as caught:
         open_scene(folder, "IDM_LC2014")
     assert "has no vehicle type 'IDM_LC2014'" in str(caught.value)

@@ -1,4 +1,4 @@
-"""The stepping loop on real SUMO: what a step does to players and others, and what everyone sees of it."""
+"""The stepping loop on real SUMO: effects of a step on players and background traffic, and observations."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def payoff(repository: Any) -> Payoff:
 
 @pytest.fixture
 def opened(payoff: Payoff) -> Iterator[Open]:
-    """Opens arenas of two learners, or of the drivers given, and closes them."""
+    """Opens arenas of two learners, or of the given drivers, and closes them."""
     arenas = []
 
     def opened(scene: OpenScene, games: int = 1, *drivers: Any) -> Arena:
@@ -76,8 +76,8 @@ def opened(payoff: Payoff) -> Iterator[Open]:
     assert not libsumo.isLoaded()
 
 
-def begun(arena: Arena, start: InitialState, *others: Departure) -> Arena:
-    arena.reset({0: start}, {0: list(others)})
+def after_reset(arena: Arena, start: InitialState, *background: Departure) -> Arena:
+    arena.reset({0: start}, {0: list(background)})
     return arena
 
 
@@ -96,8 +96,8 @@ def bodies(step: Step) -> list[shapely.Geometry]:
     return [body(*map(float, pose)) for pose in poses]
 
 
-def played_out(arena: Arena, action: FloatArray = COAST, steps: int = 200) -> list[Step]:
-    """Steps until everybody's game has ended."""
+def play_to_the_end(arena: Arena, action: FloatArray = COAST, steps: int = 200) -> list[Step]:
+    """Steps until the game has ended for both players."""
     played = []
     while arena.state.running.any() and len(played) < steps:
         played.append(arena.step(action))
@@ -107,8 +107,8 @@ def played_out(arena: Arena, action: FloatArray = COAST, steps: int = 200) -> li
 # --- players, SUMO and tiles ------------------------------------------------------------------------------------------
 
 
-def test_step__sumo_has_the_players_where_the_arena_has_them(merge: OpenScene, opened: Open) -> None:
-    arena = begun(opened(merge), drawn(merge, 1))
+def test_step__players_have_the_same_pose_in_sumo_and_arena(merge: OpenScene, opened: Open) -> None:
+    arena = after_reset(opened(merge), drawn(merge, 1))
     generator = np.random.default_rng(0)
     for _ in range(40):
         arena.step(generator.normal(0.1, 0.1, (1, 2, 2)))
@@ -119,7 +119,7 @@ def test_step__sumo_has_the_players_where_the_arena_has_them(merge: OpenScene, o
             assert (x - 2.3 * np.cos(heading), y - 2.3 * np.sin(heading), heading) == pytest.approx(pose, abs=1e-3)
 
 
-def test_tiles__a_game_evolves_as_it_does_alone(merge: OpenScene, opened: Open) -> None:
+def test_tiles__games_are_independent(merge: OpenScene, opened: Open) -> None:
     actions = np.random.default_rng(0).normal(0.05, 0.1, (100, 2, 2))
     together = opened(merge, 4)
     together.reset({game: drawn(merge, "tile", game) for game in range(4)})
@@ -135,7 +135,7 @@ def test_tiles__a_game_evolves_as_it_does_alone(merge: OpenScene, opened: Open) 
             np.testing.assert_allclose(alone.observation[0], observations[game], atol=1e-6)
 
 
-def test_start__in_place_restarts_one_game_and_leaves_the_others_alone(merge: OpenScene, opened: Open) -> None:
+def test_reset__of_one_game_has_no_effect_on_the_others(merge: OpenScene, opened: Open) -> None:
     arena, start = opened(merge, 2), drawn(merge, "restart")
     arena.reset({0: start, 1: drawn(merge, "goes on")})
     first = arena.observation[0].copy()
@@ -150,44 +150,44 @@ def test_start__in_place_restarts_one_game_and_leaves_the_others_alone(merge: Op
         np.testing.assert_array_equal(arena.observation[0], expected)
 
 
-def test_step__quantities_stay_what_they_were(merge: OpenScene, opened: Open) -> None:
-    arena = begun(opened(merge), drawn(merge, 1))
+def test_step__quantities_of_earlier_steps_do_not_change(merge: OpenScene, opened: Open) -> None:
+    arena = after_reset(opened(merge), drawn(merge, 1))
     steps = [arena.step(COAST) for _ in range(5)]
     travelled = [float(step.quantities.state.x_m[0, 0]) for step in steps]
     assert np.diff(travelled) == pytest.approx([0.1 * drawn(merge, 1).speed_mps[0]] * 4)
     assert [int(step.quantities.state.step[0]) for step in steps] == [1, 2, 3, 4, 5]
 
 
-def test_step__the_first_one_is_paid_the_way_it_went(straight: OpenScene, opened: Open) -> None:
-    arena = begun(opened(straight), placed(straight, (40.2, RIGHT_Y, 0, 10), (60.2, LEFT_Y, 0, 7)))
+def test_step__the_first_step_has_an_advance(straight: OpenScene, opened: Open) -> None:
+    arena = after_reset(opened(straight), placed(straight, (40.2, RIGHT_Y, 0, 10), (60.2, LEFT_Y, 0, 7)))
     np.testing.assert_allclose(arena.step(COAST).quantities.advanced_m, [[1.0, 0.7]], atol=1e-9)
 
 
 # --- how games end ----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("others", [False, True])
-def test_goal__the_player_leaves_and_the_other_drives_on(others: bool, tmp_path: Any, opened: Open) -> None:
-    road = build_scene(tmp_path, others=FLOW.format("road") if others else "")
-    arena = begun(opened(road), placed(road, (240, RIGHT_Y, 0, 10), (200, LEFT_Y, 0, 10)))
+@pytest.mark.parametrize("background", [False, True])
+def test_goal__the_player_is_removed_and_the_other_continues(background: bool, tmp_path: Any, opened: Open) -> None:
+    road = build_scene(tmp_path, others=FLOW.format("road") if background else "")
+    arena = after_reset(opened(road), placed(road, (240, RIGHT_Y, 0, 10), (200, LEFT_Y, 0, 10)))
     for _ in range(10):
         step = arena.step(COAST)
     assert outcomes(arena) == ["goal", ""]
     assert step.quantities.state.present.all()
     assert arena.state.present[0].tolist() == [False, True]
     arena.step(COAST)
-    assert ("ego" in libsumo.vehicle.getIDList()) is not others  # where SUMO drives nobody, nobody meets it there
+    assert ("ego" in libsumo.vehicle.getIDList()) is not background  # removed only where SUMO drives vehicles
     assert not arena.observation[0, 0].any()
     assert arena.observation[0, 1, LAYOUT.index("other0_seen")] == 0.0
 
 
 def test_wreck__stays_as_an_obstacle_without_speed_or_payoff(straight: OpenScene, opened: Open) -> None:
-    arena = begun(opened(straight), placed(straight, (100, RIGHT_Y, 0, 10), (120, RIGHT_Y, 0.6, 10)))
+    arena = after_reset(opened(straight), placed(straight, (100, RIGHT_Y, 0, 10), (120, RIGHT_Y, 0.6, 10)))
     while not outcomes(arena)[1]:
         arena.step(COAST)
     assert outcomes(arena) == ["", "rail"]
     where = arena.state.x_m[0, 1], arena.state.y_m[0, 1]
-    steps = played_out(arena)
+    steps = play_to_the_end(arena)
     assert outcomes(arena) == ["collision", "rail"]
     assert (arena.state.x_m[0, 1], arena.state.y_m[0, 1]) == where
     assert arena.state.speed_mps[0].tolist() == [0.0, 0.0]
@@ -195,10 +195,10 @@ def test_wreck__stays_as_an_obstacle_without_speed_or_payoff(straight: OpenScene
     assert (arena.step(COAST).payoff == 0.0).all()
 
 
-def test_wreck__that_sumo_drove_stands_in_sumo_too(straight: OpenScene, opened: Open) -> None:
+def test_wreck__of_a_player_driven_by_sumo_stands_in_sumo_too(straight: OpenScene, opened: Open) -> None:
     start = placed(straight, (100, RIGHT_Y, 0, 12), (107, RIGHT_Y, 0, 3))
-    arena = begun(opened(straight, 1, None, SumoDriver()), start)
-    played_out(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
+    arena = after_reset(opened(straight, 1, None, SumoDriver()), start)
+    play_to_the_end(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
     assert outcomes(arena) == ["collision", "collision"]
     for _ in range(10):
         arena.step(COAST)
@@ -206,63 +206,61 @@ def test_wreck__that_sumo_drove_stands_in_sumo_too(straight: OpenScene, opened: 
 
 
 def test_timeout__ends_the_game_at_the_limit(straight: OpenScene, opened: Open) -> None:
-    arena = begun(opened(straight), placed(straight, (100, RIGHT_Y, 0, 0), (100, LEFT_Y, 0, 0)))
-    assert len(played_out(arena, steps=500)) == straight.world.steps == 200
+    arena = after_reset(opened(straight), placed(straight, (100, RIGHT_Y, 0, 0), (100, LEFT_Y, 0, 0)))
+    assert len(play_to_the_end(arena, steps=500)) == straight.world.steps == 200
     assert outcomes(arena) == ["timeout", "timeout"]
 
 
-def test_outcome__contact_counts_before_goal_and_time(straight: OpenScene, opened: Open) -> None:
-    arena = begun(opened(straight), placed(straight, (249.5, RIGHT_Y, 0, 10), (253, RIGHT_Y, 0, 0)))
+def test_outcome__contact_has_priority_over_goal_and_time(straight: OpenScene, opened: Open) -> None:
+    arena = after_reset(opened(straight), placed(straight, (249.5, RIGHT_Y, 0, 10), (253, RIGHT_Y, 0, 0)))
     arena.step(COAST)
     assert outcomes(arena) == ["collision", "collision"]
 
 
 @pytest.mark.parametrize("heading", [0.0, 0.3, -0.7, np.pi / 2, 2.5])
-def test_contact__of_turned_boxes_is_found_in_the_step_it_happens(
-    straight: OpenScene, opened: Open, heading: float
-) -> None:
-    arena = begun(opened(straight), placed(straight, (100, -3.2, 0, 15), (115, -3.0, heading, 0)))
-    *before, last = played_out(arena)
+def test_contact__of_turned_boxes_is_found_in_its_step(straight: OpenScene, opened: Open, heading: float) -> None:
+    arena = after_reset(opened(straight), placed(straight, (100, -3.2, 0, 15), (115, -3.0, heading, 0)))
+    *before, last = play_to_the_end(arena)
     assert outcomes(arena) == ["collision", "collision"]
     assert shapely.intersects(*bodies(last))
     assert not any(shapely.intersects(*bodies(step)) for step in before)
 
 
 @pytest.mark.parametrize("heading", [0.2, -0.2, 0.9, -1.4])
-def test_rail__is_touched_in_the_step_the_body_leaves_the_road(
+def test_rail__contact_is_in_the_step_in_which_the_body_leaves_the_road(
     straight: OpenScene, opened: Open, heading: float
 ) -> None:
-    arena = begun(opened(straight), placed(straight, (100, -3.2, heading, 10), None))
-    *before, last = played_out(arena)
+    arena = after_reset(opened(straight), placed(straight, (100, -3.2, heading, 10), None))
+    *before, last = play_to_the_end(arena)
     road = shapely.box(-50, -6.4, 350, 0)
     assert outcomes(arena) == ["rail", ""]
     assert not shapely.covers(road, bodies(last)[0])
     assert all(shapely.covers(road.buffer(0.02), bodies(step)[0]) for step in before)
 
 
-def test_contact__on_a_junction_is_seen(crossing: OpenScene, opened: Open) -> None:
-    arena = begun(opened(crossing), placed(crossing, (-20, -1.6, 0, 10), (1.6, -21, np.pi / 2, 10)))
-    *_, last = played_out(arena)
+def test_contact__on_a_junction_is_found(crossing: OpenScene, opened: Open) -> None:
+    arena = after_reset(opened(crossing), placed(crossing, (-20, -1.6, 0, 10), (1.6, -21, np.pi / 2, 10)))
+    *_, last = play_to_the_end(arena)
     assert outcomes(arena) == ["collision", "collision"]
     assert shapely.intersects(*bodies(last))
     assert (np.abs(last.quantities.state.x_m[0]) < 6).all()
 
 
-def test_junction__can_be_driven_over_without_touching_a_rail(crossing: OpenScene, opened: Open) -> None:
-    arena = begun(opened(crossing), placed(crossing, (-20, -1.6, 0, 10), None))
-    played_out(arena)
+def test_junction__has_no_rails_on_the_route(crossing: OpenScene, opened: Open) -> None:
+    arena = after_reset(opened(crossing), placed(crossing, (-20, -1.6, 0, 10), None))
+    play_to_the_end(arena)
     assert outcomes(arena)[0] == "goal"
 
 
-# --- those whom SUMO drives -------------------------------------------------------------------------------------------
+# --- players and background traffic driven by SUMO --------------------------------------------------------------------
 
 
-def test_sumo_driver__is_read_back_merges_and_reaches_the_goal(merge: OpenScene, opened: Open) -> None:
+def test_sumo_driver__merges_and_reaches_the_goal(merge: OpenScene, opened: Open) -> None:
     arena = opened(merge, 1, SumoDriver(), SumoDriver())
     for episode in range(3):
         arena.reload(episode)
-        begun(arena, drawn(merge, "sumo", episode))
-        steps = played_out(arena, steps=300)
+        after_reset(arena, drawn(merge, "sumo", episode))
+        steps = play_to_the_end(arena, steps=300)
         assert outcomes(arena) == ["goal", "goal"]
         xs = np.array([step.quantities.state.x_m[0, 1] for step in steps if step.drove[0, 1]])
         speeds = np.array([step.quantities.state.speed_mps[0, 1] for step in steps if step.drove[0, 1]])
@@ -271,14 +269,14 @@ def test_sumo_driver__is_read_back_merges_and_reaches_the_goal(merge: OpenScene,
         assert max(np.abs(step.quantities.state.acceleration_mps2).max() for step in steps) < 8.0
 
 
-def test_others__are_seen_where_sumo_has_them(straight: OpenScene, opened: Open) -> None:
-    arena = begun(
+def test_background__is_observed_at_its_position_in_sumo(straight: OpenScene, opened: Open) -> None:
+    arena = after_reset(
         opened(straight),
         placed(straight, (100, RIGHT_Y, 0, 10), None),
-        Departure("van", "van", ("road",), 0.0, "1", "123", "10"),
+        Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.0, lane="1", position="123", speed="10"),
     )
     seen = {name: arena.observation[0, 0, k] for k, name in enumerate(LAYOUT)}
-    assert seen["other0_seen"] == 0.0  # not in the traffic yet
+    assert seen["other0_seen"] == 0.0  # not departed yet
     arena.step(COAST)
     seen = {name: arena.observation[0, 0, k] for k, name in enumerate(LAYOUT)}
     x = libsumo.vehicle.getPosition("van")[0] - 3.0
@@ -287,25 +285,25 @@ def test_others__are_seen_where_sumo_has_them(straight: OpenScene, opened: Open)
     assert seen["other0_left_m"] * 8.0 == pytest.approx(3.2, abs=1e-4)
 
 
-def test_others__contact_with_one_is_a_collision(straight: OpenScene, opened: Open) -> None:
-    arena = begun(
+def test_background__contact_is_a_collision(straight: OpenScene, opened: Open) -> None:
+    arena = after_reset(
         opened(straight),
         placed(straight, (100, RIGHT_Y, 0, 12), None),
-        Departure("van", "van", ("road",), 0.0, "0", "120", "1"),
+        Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.0, lane="0", position="120", speed="1"),
     )
-    *before, last = played_out(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
+    *before, last = play_to_the_end(arena, np.array([[[1.0, 0.0], [0.0, 0.0]]]))
     assert outcomes(arena) == ["collision", ""]
     for step, touches in ((before[-1], False), (last, True)):
-        others = step.quantities.bodies
-        van = body(*(float(each[0, 2]) for each in (others.x_m, others.y_m, others.heading_rad)), 6.0, 2.0)
+        found = step.quantities.bodies
+        van = body(*(float(each[0, 2]) for each in (found.x_m, found.y_m, found.heading_rad)), length=6.0, width=2.0)
         assert shapely.intersects(bodies(step)[0], van) == touches
 
 
-def test_others__start_again_with_their_game(straight: OpenScene, opened: Open) -> None:
+def test_background__is_reset_with_its_game(straight: OpenScene, opened: Open) -> None:
     arena, start = opened(straight), placed(straight, (150, RIGHT_Y, 0, 0), None)
-    van = Departure("van", "van", ("road",), 0.3, "1", "50", "8")
+    van = Departure(name="van", vehicle_type="van", edges=("road",), depart_s=0.3, lane="1", position="50", speed="8")
     for _ in range(2):
-        begun(arena, start, van)
+        after_reset(arena, start, van)
         where = []
         for _ in range(12):
             arena.step(COAST)
@@ -315,36 +313,36 @@ def test_others__start_again_with_their_game(straight: OpenScene, opened: Open) 
         assert where[0] == pytest.approx(47.0)
 
 
-# --- spaces and sights ------------------------------------------------------------------------------------------------
+# --- observations ------------------------------------------------------------------------------------------------
 
 
-def test_drivers__see_exactly_what_learners_see(merge: OpenScene, opened: Open) -> None:
-    told: list[FloatArray] = []
+def test_drivers__have_the_observations_of_learners(merge: OpenScene, opened: Open) -> None:
+    received: list[FloatArray] = []
 
-    class Watching:
+    class Recording:
         takes_over = True
 
         def reset(self, games: IntArray) -> None:
-            told.clear()
+            received.clear()
 
         def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-            told.append(observation.copy())
+            received.append(observation.copy())
             return np.zeros((len(games), 2))
 
-    learner = begun(opened(merge), drawn(merge, 5))
+    learner = after_reset(opened(merge), drawn(merge, 5))
     seen = []
     for _ in range(30):
         seen.append(learner.observation[0, 1].copy())
         learner.step(COAST)
     learner.close()
-    driven = begun(opened(merge, 1, None, Watching()), drawn(merge, 5))
+    driven = after_reset(opened(merge, 1, None, Recording()), drawn(merge, 5))
     for _ in range(30):
         driven.step(COAST)
-    np.testing.assert_array_equal(np.concatenate(told), np.array(seen))
+    np.testing.assert_array_equal(np.concatenate(received), np.array(seen))
 
 
 @pytest.mark.parametrize("net", ["straight", "zipper"])
-def test_soak__random_driving_among_others_keeps_every_promise(tmp_path: Any, opened: Open, net: str) -> None:
+def test_soak__random_driving_in_traffic_keeps_all_invariants(tmp_path: Any, opened: Open, net: str) -> None:
     if net == "zipper":
         scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, FLOW.format("wide narrow"), goal_m=50.0)
     else:

@@ -1,4 +1,4 @@
-"""Games in store: the same as if each had been drawn when its time had come."""
+"""Automatic resets: a game drawn in advance is the same as one drawn at its reset."""
 
 from __future__ import annotations
 
@@ -22,36 +22,36 @@ TILES = 4
 FLOW = '<flow id="van" type="van" begin="0" end="20" probability="0.3"><route edges="road"/></flow>'
 
 
-class _Started:
-    """Stands for an arena: notes what was started."""
+class _RecordingArena:
+    """Stands in for an arena and records its resets."""
 
     games = TILES
 
     def __init__(self, scene: OpenScene) -> None:
         self.scene = scene
-        self.games_started: list[tuple[int, InitialState, list[Departure]]] = []
+        self.resets: list[tuple[int, InitialState, list[Departure]]] = []
 
     def reset(self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]]) -> None:
-        self.games_started += [(tile, start, departures[tile]) for tile, start in starts.items()]
+        self.resets += [(tile, start, departures[tile]) for tile, start in starts.items()]
 
 
-@pytest.fixture(scope="module", params=["", FLOW], ids=["alone", "among_others"])
+@pytest.fixture(scope="module", params=["", FLOW], ids=["alone", "with_traffic"])
 def scene(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     return build_scene(tmp_path_factory.mktemp("scenes") / "road", others=request.param)
 
 
 @given(order=st.lists(st.sets(st.integers(0, TILES - 1), min_size=1), max_size=12))
-def test_games__are_each_tiles_own_in_their_order_whoever_else_starts(scene: OpenScene, order: list[set[int]]) -> None:
+def test_games__of_a_tile_do_not_depend_on_other_tiles(scene: OpenScene, order: list[set[int]]) -> None:
     start_distribution = scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 0.5])
-    arena = _Started(scene)
+    arena = _RecordingArena(scene)
     games = AutoReset(arena, start_distribution, "a", 1)  # type: ignore[arg-type]
     for tiles in order:
         games.reset(tiles)
-    assert [tile for tile, *_ in arena.games_started] == [tile for tiles in order for tile in tiles]
-    had = [0] * TILES
-    for tile, start, departures in arena.games_started:
-        parts = ("a", 1, tile, had[tile])
-        had[tile] += 1
+    assert [tile for tile, *_ in arena.resets] == [tile for tiles in order for tile in tiles]
+    counts = [0] * TILES
+    for tile, start, departures in arena.resets:
+        parts = ("a", 1, tile, counts[tile])
+        counts[tile] += 1
         alone = draw_initial_state(start_distribution, *parts)
         assert start.parts == parts
         assert np.array_equal(start.position_m, alone.position_m)

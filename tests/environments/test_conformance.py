@@ -1,14 +1,21 @@
-"""`harness check-driver` finds what is wrong with a driver, and says it in words."""
+"""`harness check-driver`: each violation of the driver protocol is found and named."""
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from harness.config.campaign import LEARNED, SUMO
+from harness.drivers.sumo import SumoDriver
+from harness.environments import conformance
+from harness.environments.arena import Arena
 from harness.environments.conformance import check_conformance
 from harness.game.arrays import FloatArray, IntArray
+from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import LAYOUT
 from harness.traffic.scene import OpenScene
 from tests.support.repository import REPOSITORY
@@ -16,7 +23,7 @@ from tests.support.tiny import harness
 
 
 class Good:
-    """Holds its speed, with a memory kept as it has to be: it brakes softly from its tenth decision on."""
+    """Holds its speed, and brakes softly from its tenth decision on; its state is kept per game, as required."""
 
     takes_over = True
 
@@ -34,22 +41,22 @@ class Good:
         return actions
 
 
-class Flat(Good):
+class OneDimensional(Good):
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         return np.zeros(2)
 
 
-class Listing(Good):
+class ListReturning(Good):
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         return [[0.0, 0.0]]  # type: ignore[return-value]
 
 
-class Endless(Good):
+class NotFinite(Good):
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         return np.full((len(games), 2), np.nan)
 
 
-class Strong(Good):
+class OutOfBounds(Good):
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         return np.full((len(games), 2), 1.5)
 
@@ -67,15 +74,15 @@ class Raising(Good):
         return super().decide(games, observation, noise)
 
 
-class Forgetful(Good):
-    """Never forgets: its second game is driven on."""
+class Stale(Good):
+    """Ignores resets: its second game continues the state of the first."""
 
     def reset(self, games: IntArray) -> None:
         for game in games.tolist():
             self.steps.setdefault(game, 0)
 
 
-class Dicing(Good):
+class Random(Good):
     def __init__(self) -> None:
         super().__init__()
         self.chance = np.random.default_rng(1)
@@ -85,7 +92,7 @@ class Dicing(Good):
 
 
 class Sharing(Good):
-    """One memory for all its games."""
+    """One state for all games."""
 
     def reset(self, games: IntArray) -> None:
         self.steps = {-1: 0}
@@ -96,38 +103,38 @@ class Sharing(Good):
 
 
 class Averaging(Good):
-    """Acts on what all its games see."""
+    """Acts on the observations of all games."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         return np.repeat(0.01 * observation.mean(axis=0, keepdims=True)[:, :2], len(games), axis=0).astype(float)
 
 
-def test_check__a_good_driver_is_told_so(merge: OpenScene) -> None:
+def test_check__a_conforming_driver_passes(merge: OpenScene) -> None:
     found = check_conformance(Good(), merge, 2)
-    assert found.wrong == []
-    assert len(found.right) == 3
+    assert found.violations == []
+    assert len(found.passed) == 3
     assert len(found.outcomes) == 2
     assert min(found.seconds) >= 0.0
 
 
 @pytest.mark.parametrize(
-    ("driver", "said"),
+    ("driver", "message"),
     [
-        (Flat, "it decided an array [2], not [1, 2]"),
-        (Listing, "it decided list, not a NumPy array"),
-        (Endless, "not finite"),
-        (Strong, "pedals and wheel go from -1 to 1"),
-        (Writing, "it wrote into the observation"),
+        (OneDimensional, "it decided an array [2], not [1, 2]"),
+        (ListReturning, "it decided list, not a NumPy array"),
+        (NotFinite, "not finite"),
+        (OutOfBounds, "pedals and wheel are in -1 to 1"),
+        (Writing, "it modified the observation"),
         (Raising, "playing, game 0, decision 0: it raised KeyError: 'no such lane'"),
-        (Forgetful, "it is not deterministic: in decision 0 of game 0"),
-        (Dicing, "it is not deterministic"),
+        (Stale, "it is not deterministic: in decision 0 of game 0"),
+        (Random, "it is not deterministic"),
         (Sharing, "its games are not independent"),
         (Averaging, "its games are not independent"),
     ],
 )
-def test_check__what_is_wrong_is_said(driver: type[Good], said: str, merge: OpenScene) -> None:
-    (wrong,) = check_conformance(driver(), merge, 2).wrong
-    assert said in wrong
+def test_check__a_violation_is_named(driver: type[Good], message: str, merge: OpenScene) -> None:
+    (violation,) = check_conformance(driver(), merge, 2).violations
+    assert message in violation
 
 
 def write(folder: Path, change: str = "") -> Path:
@@ -146,7 +153,7 @@ for line in sys.stdin:
     return folder / "mine.toml"
 
 
-def test_command__says_what_is_right_and_what_is_wrong(tmp_path: Path) -> None:
+def test_command__reports_passed_checks_and_violations(tmp_path: Path) -> None:
     good = harness("check-driver", write(tmp_path), "--allow-code", "--games", 2)
     assert good.returncode == 0, good.stdout + good.stderr
     assert "the same games again: the same actions, bit for bit" in good.stdout
@@ -157,7 +164,7 @@ def test_command__says_what_is_right_and_what_is_wrong(tmp_path: Path) -> None:
     assert "it is not deterministic" in bad.stdout
 
 
-def test_command__runs_no_program_without_leave(tmp_path: Path) -> None:
+def test_command__runs_no_program_without_permission(tmp_path: Path) -> None:
     refused = harness("check-driver", write(tmp_path, 'open("ran", "w").close()'))
     assert refused.returncode == 2
     assert len(refused.stderr.splitlines()) == 1
@@ -165,6 +172,51 @@ def test_command__runs_no_program_without_leave(tmp_path: Path) -> None:
     assert not (tmp_path / "ran").exists()
 
 
-def test_command__checks_a_driver_by_rules() -> None:
+def test_command__checks_a_rule_based_driver() -> None:
     done = harness("check-driver", REPOSITORY / "egos" / "adas.toml", "--games", 2)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_check__sumos_driver_passes_without_decisions(merge: OpenScene) -> None:
+    found = check_conformance(SumoDriver(), merge, 2)
+    assert found.violations == []
+    assert [line for line in found.passed if "SUMO's own models move the ego" in line]
+    assert found.passed[-1] == "the same games again: the same motion, bit for bit"
+    assert len(found.outcomes) == 2
+    assert found.seconds == []
+
+
+def test_check__another_motion_of_sumos_driver_is_a_violation(
+    merge: OpenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seeds = iter(range(4))
+    reload = Arena.reload
+    monkeypatch.setattr(Arena, "reload", lambda arena, seed: reload(arena, next(seeds)))
+    monkeypatch.setattr(conformance, "draw_initial_state", different_states())
+    (violation,) = check_conformance(SumoDriver(), merge, 2).violations
+    assert "it is not deterministic: game 0" in violation
+
+
+def different_states() -> Callable[..., InitialState]:
+    """`draw_initial_state` with another state at each call."""
+    count = itertools.count()
+    return lambda distribution, *parts: draw_initial_state(distribution, *parts, next(count))
+
+
+@pytest.mark.parametrize("form", ["name", "document"])
+def test_command__checks_sumos_driver(form: str, tmp_path: Path) -> None:
+    (tmp_path / "car.toml").write_text('kind = "sumo"\nvehicle_type = "ego_car"\n')
+    driver = SUMO if form == "name" else tmp_path / "car.toml"
+    done = harness("check-driver", driver, "--games", 2)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"SUMO's own models of vehicle type ego_car ({driver}), on merge" in done.stdout
+    assert "the same games again: the same motion, bit for bit" in done.stdout
+    assert "games  goal, goal" in done.stdout
+
+
+def test_command__has_nothing_to_check_before_the_training() -> None:
+    refused = harness("check-driver", LEARNED)
+    assert refused.returncode == 2
+    assert len(refused.stderr.splitlines()) == 1
+    assert "'learned' is trained by a campaign: before the training there is no driver to check" in refused.stderr
+    assert "name the folder of a trained policy" in refused.stderr

@@ -1,4 +1,4 @@
-"""The faces of the arena: Gymnasium, PettingZoo and SB3, any number of them in one process."""
+"""The interfaces of the arena: Gymnasium, PettingZoo and SB3, any number of environments in one process."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Open = Callable[..., Any]
 
 @pytest.fixture(scope="module")
 def busy(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """A straight road with other traffic, whose time is up after 3 s."""
+    """A straight road with background traffic and a time limit of 3 s."""
     flow = '<flow id="f" type="van" begin="0" probability="0.5" departLane="random"><route edges="road"/></flow>'
     return build_scene(tmp_path_factory.mktemp("scenes") / "busy", others=flow, time_limit_s=3.0)
 
@@ -95,7 +95,7 @@ def run(program: str, *arguments: str, cwd: Path = REPOSITORY) -> str:
 
 @pytest.mark.parametrize("name", ["harness/Ego-v0", "harness/NonEgo-v0"])
 @pytest.mark.parametrize("other", [None, "sumo"])
-def test_gymnasium__its_checker_has_nothing_to_say(opened: Open, name: str, other: str | None) -> None:
+def test_gymnasium__passes_its_checker(opened: Open, name: str, other: str | None) -> None:
     environment = opened(gymnasium.make, name, other=other)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -113,18 +113,16 @@ def test_gymnasium__its_checker_has_nothing_to_say(opened: Open, name: str, othe
         "import importlib, gymnasium, harness; importlib.reload(harness); gymnasium.make('harness/Ego-v0')",
     ],
 )
-def test_gymnasium__knows_the_environments_by_name_in_whatever_order_things_are_imported(
-    program: str, tmp_path: Path
-) -> None:
+def test_gymnasium__knows_the_environments_in_any_order_of_imports(program: str, tmp_path: Path) -> None:
     run(program, "-W", "error", cwd=tmp_path)
 
 
-def test_import__of_the_package_alone_loads_nothing_heavy() -> None:
+def test_import__of_the_package_loads_no_large_library() -> None:
     loaded = run("import harness, sys; print(*sys.modules)").split()
     assert not {"numpy", "gymnasium", "libsumo", "torch", "pydantic"} & set(loaded)
 
 
-def test_import__everything_exported_is_there() -> None:
+def test_import__every_exported_name_exists() -> None:
     for name in harness.__all__:
         assert getattr(harness, name) is not None
     assert set(harness.__all__) <= set(dir(harness))
@@ -142,7 +140,7 @@ def test_docstring__names_every_entry_of_the_observation() -> None:
         assert f"| {first[word]}-" in text
 
 
-def test_seed__the_same_seed_gives_the_same_games_in_this_process_and_another(opened: Open, busy: OpenScene) -> None:
+def test_seed__gives_the_same_games_in_this_process_and_another(opened: Open, busy: OpenScene) -> None:
     environments = [opened(DrivingEnv, busy, other="sumo") for _ in range(2)]
     kinds = [type(each._game.arena.simulation) for each in environments]
     assert kinds == [LibsumoSimulation, SubprocessSimulation]
@@ -160,7 +158,7 @@ def test_seed__the_same_seed_gives_the_same_games_in_this_process_and_another(op
     assert any(step[0][LAYOUT.index("other1_seen")] for step in here[1])
 
 
-def test_step__pays_the_personas_payoff_and_says_what_it_is_made_of(opened: Open) -> None:
+def test_step__reward_is_the_personas_payoff_by_terms(opened: Open) -> None:
     environment = opened(DrivingEnv)
     _, info = environment.reset(seed=1)
     assert info["outcome"] == ""
@@ -177,7 +175,7 @@ def test_step__pays_the_personas_payoff_and_says_what_it_is_made_of(opened: Open
     assert info["time_s"] == pytest.approx(0.1 * len(steps))
 
 
-def test_step__contact_terminates_and_the_last_observation_is_of_that_moment(opened: Open) -> None:
+def test_step__contact_terminates_with_the_observation_of_that_moment(opened: Open) -> None:
     environment = opened(DrivingEnv)
     environment.reset(seed=1)
     observation, _, terminated, truncated, info = played(environment, SWERVE)[-1]
@@ -207,7 +205,7 @@ def test_step__needs_a_running_game_and_finite_actions(opened: Open) -> None:
 
 
 @pytest.mark.parametrize(("player", "learner"), [("ego", 0), ("non_ego", 1)])
-def test_player__is_the_one_that_is_learned(opened: Open, player: str, learner: int) -> None:
+def test_player__is_the_learner(opened: Open, player: str, learner: int) -> None:
     environment = opened(DrivingEnv, player=player)
     environment.reset(seed=1)
     arena = environment._game.arena
@@ -217,7 +215,7 @@ def test_player__is_the_one_that_is_learned(opened: Open, player: str, learner: 
     assert arena.state.x_m[0, learner] > before
 
 
-def test_other__a_policy_drives_with_its_personas_attention(opened: Open, policy: Path) -> None:
+def test_other__a_policy_has_its_personas_attention(opened: Open, policy: Path) -> None:
     environment = opened(DrivingEnv, other=policy, other_persona="personas/distracted.toml")
     lapsed, speeds = [], []
     for seed in range(5):
@@ -233,7 +231,7 @@ def test_other__a_policy_drives_with_its_personas_attention(opened: Open, policy
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "message"),
     [
         ({"player": "nonego"}, "did you mean 'non_ego'"),
         ({"scene": "networks/merg"}, "networks/merg"),
@@ -242,18 +240,20 @@ def test_other__a_policy_drives_with_its_personas_attention(opened: Open, policy
         ({"other": "sumo", "other_persona": "personas/careful.toml"}, "only a policy"),
     ],
 )
-def test_arguments__that_are_wrong_are_the_users_mistake(arguments: dict[str, Any], said: str) -> None:
-    with pytest.raises(UsageError, match=said):
+def test_arguments__wrong_ones_are_usage_errors(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
         DrivingEnv(**arguments)
     assert not libsumo.isLoaded()
 
 
-def test_paths__are_found_from_anywhere(opened: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_paths__are_found_from_any_working_directory(
+    opened: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     opened(DrivingEnv, scene="networks/merge").reset(seed=1)
 
 
-def test_garbage__an_environment_nobody_closed_gives_sumo_back_quietly() -> None:
+def test_garbage__an_environment_that_was_not_closed_closes_sumo() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         environment = DrivingEnv()
@@ -267,12 +267,12 @@ def test_garbage__an_environment_nobody_closed_gives_sumo_back_quietly() -> None
 
 
 @pytest.mark.filterwarnings("error")
-def test_pettingzoo__its_tests_have_nothing_to_say(opened: Open) -> None:
+def test_pettingzoo__passes_its_tests(opened: Open) -> None:
     parallel_api_test(opened(ParallelDrivingEnv), num_cycles=300)
     parallel_seed_test(lambda: opened(ParallelDrivingEnv), num_cycles=200)
 
 
-def test_parallel__who_has_ended_leaves_the_agents_and_the_other_goes_on(opened: Open) -> None:
+def test_parallel__an_agent_is_removed_at_its_end_and_the_other_continues(opened: Open) -> None:
     environment = opened(ParallelDrivingEnv, non_ego_persona="personas/speedy.toml")
     environment.reset(seed=2)
     actions = {"ego": STRAIGHT_ON, "non_ego": np.array([0.0, -1.0])}
@@ -288,7 +288,7 @@ def test_parallel__who_has_ended_leaves_the_agents_and_the_other_goes_on(opened:
     assert environment.step({}) == ({}, {}, {}, {}, {})
 
 
-def test_parallel__each_agent_is_paid_by_its_own_persona(opened: Open) -> None:
+def test_parallel__each_agent_has_the_payoff_of_its_persona(opened: Open) -> None:
     environment = opened(ParallelDrivingEnv, non_ego_persona="personas/speedy.toml")
     environment.reset(seed=2)
     _, rewards, _, _, infos = environment.step({"ego": STRAIGHT_ON, "non_ego": STRAIGHT_ON})
@@ -302,7 +302,7 @@ def test_parallel__each_agent_is_paid_by_its_own_persona(opened: Open) -> None:
 
 
 @pytest.mark.parametrize("kind", ["arena", "gymnasium"])
-def test_sb3__trains_beside_an_eval_callback_in_the_same_process(opened: Open, kind: str) -> None:
+def test_sb3__trains_with_an_eval_callback_in_the_same_process(opened: Open, kind: str) -> None:
     from stable_baselines3 import PPO
     from stable_baselines3.common.callbacks import EvalCallback
     from stable_baselines3.common.monitor import Monitor
@@ -317,9 +317,9 @@ def test_sb3__trains_beside_an_eval_callback_in_the_same_process(opened: Open, k
         )
     else:
         training = opened(DummyVecEnv, [lambda: Monitor(DrivingEnv())])
-    judging = opened(Monitor, DrivingEnv(other="sumo"))
-    assert isinstance(judging.unwrapped._game.arena.simulation, SubprocessSimulation)
-    callback = EvalCallback(judging, n_eval_episodes=2, eval_freq=256 // training.num_envs, verbose=0, warn=False)
+    evaluation = opened(Monitor, DrivingEnv(other="sumo"))
+    assert isinstance(evaluation.unwrapped._game.arena.simulation, SubprocessSimulation)
+    callback = EvalCallback(evaluation, n_eval_episodes=2, eval_freq=256 // training.num_envs, verbose=0, warn=False)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Training and eval env are not of the same type")
         model = PPO("MlpPolicy", training, n_steps=256 // training.num_envs, batch_size=128, n_epochs=1, device="cpu")

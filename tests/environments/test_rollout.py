@@ -1,4 +1,4 @@
-"""Assessment: the same games whoever plays them, and a game that can't be played costs only itself."""
+"""Assessment: the same games in every arm, and an error ends only its own game."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.support.policies import some_policy
 from tests.support.rollouts import Steady, arm, play, records, trace
 from tests.support.tiny import DISTRACTED
 
-CHANCE = LearnedDriver(some_policy(), sampled=True)
+RANDOM = LearnedDriver(some_policy(), sampled=True)
 POSE = ["x_m", "y_m", "heading_rad", "speed_mps"]
 
 
@@ -42,30 +42,30 @@ class Failing(Steady):
 
 
 def test_assess__twice_is_the_same(merge: OpenScene) -> None:
-    first, second = (play(arm(merge, CHANCE, SumoDriver())) for _ in range(2))
+    first, second = (play(arm(merge, RANDOM, SumoDriver())) for _ in range(2))
     assert records(first) == records(second)
     for one, other in zip(first, second, strict=True):
         pd.testing.assert_frame_equal(trace(one), trace(other), check_exact=True)
 
 
-def test_assess__a_game_does_not_depend_on_how_many_there_are(merge: OpenScene) -> None:
+def test_assess__a_game_does_not_depend_on_the_number_of_games(merge: OpenScene) -> None:
     many, one = play(arm(merge, Steady(), SumoDriver()), 3), play(arm(merge, Steady(), SumoDriver()), 1)
     assert records(many[:1]) == records(one)
 
 
-def test_assess__episodes_differ_and_so_do_seeds(merge: OpenScene) -> None:
+def test_assess__episodes_and_seeds_give_different_games(merge: OpenScene) -> None:
     games = [*play(arm(merge, Steady(), None)), *play(arm(merge, Steady(), None, seed=2))]
     starts = {tuple(trace(game).loc[0, POSE]) for game in games}
     assert len(starts) == 6
 
 
-def test_assess__an_episode_starts_alike_in_every_arm(merge: OpenScene) -> None:
+def test_assess__an_episode_has_the_same_start_in_every_arm(merge: OpenScene) -> None:
     arms = [
         arm(merge, Steady(), None),
-        arm(merge, CHANCE, SumoDriver()),
-        arm(merge, SumoDriver(), CHANCE),
-        arm(merge, None, CHANCE),
-        arm(merge, CHANCE, CHANCE, persona=DISTRACTED),
+        arm(merge, RANDOM, SumoDriver()),
+        arm(merge, SumoDriver(), RANDOM),
+        arm(merge, None, RANDOM),
+        arm(merge, RANDOM, RANDOM, persona=DISTRACTED),
     ]
     starts = []
     for each in arms:
@@ -77,29 +77,29 @@ def test_assess__an_episode_starts_alike_in_every_arm(merge: OpenScene) -> None:
                 for row in frame[frame["step"] == 0].itertuples()
             }
         )
-    everyone = starts[1]
-    assert set(everyone) == {(k, player) for k in range(3) for player in ("ego", "non_ego")}
+    both_players = starts[1]
+    assert set(both_players) == {(k, player) for k in range(3) for player in ("ego", "non_ego")}
     for each in starts:
-        assert each == {who: everyone[who] for who in each}
+        assert each == {player: both_players[player] for player in each}
 
 
-def test_assess__lapses_and_noise_belong_to_the_episode_not_to_the_arm(merge: OpenScene) -> None:
-    against = [play(arm(merge, ego, Steady(), persona=DISTRACTED), 6) for ego in (Steady(), None)]
+def test_assess__lapses_depend_on_the_episode_and_not_on_the_arm(merge: OpenScene) -> None:
+    arms = [play(arm(merge, ego, Steady(), persona=DISTRACTED), 6) for ego in (Steady(), None)]
     lapses = []
-    for games in against:
+    for games in arms:
         frames = [trace(game) for game in games]
-        of_person = [frame[frame["player"] == "non_ego"].set_index("step")["lapsed"] for frame in frames]
-        lapses.append(of_person)
+        of_non_ego = [frame[frame["player"] == "non_ego"].set_index("step")["lapsed"] for frame in frames]
+        lapses.append(of_non_ego)
     assert any(each.any() for each in lapses[0])
     for one, other in zip(*lapses, strict=True):
-        both = one.index.intersection(other.index)[:20]  # before anything could have happened
+        both = one.index.intersection(other.index)[:20]  # before the players can influence each other
         assert one[both].equals(other[both])
 
 
 # --- records ----------------------------------------------------------------------------------------------------------
 
 
-def test_record__cells_of_who_is_absent_are_empty(merge: OpenScene) -> None:
+def test_record__cells_of_an_absent_player_are_empty(merge: OpenScene) -> None:
     (game, *_) = play(arm(merge, SumoDriver(), None), 1)
     assert game.record["non_ego_outcome"] == ""
     assert all(game.record[name] is None for name in OF_NON_EGO)
@@ -113,7 +113,7 @@ def test_record__cells_of_who_is_absent_are_empty(merge: OpenScene) -> None:
 
 
 def test_record__the_ego_failed_unless_it_reached_the_goal(merge: OpenScene) -> None:
-    games = [*play(arm(merge, SumoDriver(), None), 2), *play(arm(merge, CHANCE, None), 2)]
+    games = [*play(arm(merge, SumoDriver(), None), 2), *play(arm(merge, RANDOM, None), 2)]
     outcomes = {game.record["ego_outcome"] for game in games}
     assert "goal" in outcomes
     assert outcomes & {"rail", "timeout"}
@@ -122,7 +122,7 @@ def test_record__the_ego_failed_unless_it_reached_the_goal(merge: OpenScene) -> 
         assert (game.record["ego_time_to_goal_s"] is not None) == (game.record["ego_outcome"] == "goal")
 
 
-def test_record__is_what_the_trace_says(merge: OpenScene) -> None:
+def test_record__agrees_with_the_trace(merge: OpenScene) -> None:
     for game in play(arm(merge, Steady(), SumoDriver()), 3):
         recorded, frame = game.record, trace(game)
         ego = frame[(frame["player"] == "ego") & (frame["step"] > 0)]
@@ -150,9 +150,9 @@ ERRORS = [RuntimeError("out of ideas"), KeyError("goal"), TypeError("no"), ZeroD
 
 
 @pytest.mark.parametrize("error", [*ERRORS, SimulationError("died")], ids=lambda error: type(error).__name__)
-def test_assess__a_driver_that_raises_costs_its_game_alone(error: Exception, merge: OpenScene) -> None:
+def test_assess__an_exception_of_a_driver_ends_only_its_game(error: Exception, merge: OpenScene) -> None:
     games = play(arm(merge, Failing(error), SumoDriver()), 4)
-    unharmed = play(arm(merge, Steady(), SumoDriver()), 4)
+    without_errors = play(arm(merge, Steady(), SumoDriver()), 4)
     assert [game.record["ego_outcome"] == "error" for game in games] == [False, True, False, True]
     for game in games[1::2]:
         assert game.record["error"] == f"{type(error).__name__}: {error}"
@@ -160,25 +160,25 @@ def test_assess__a_driver_that_raises_costs_its_game_alone(error: Exception, mer
         assert game.trace is None
         assert set(game.record) == {"episode", "ego_outcome", "non_ego_outcome", "error"}
     assert [game.record["episode"] for game in games] == [0, 1, 2, 3]
-    assert records(games[::2]) == records(unharmed[::2])
+    assert records(games[::2]) == records(without_errors[::2])
 
 
-def test_assess__an_interrupt_is_no_game(merge: OpenScene) -> None:
+def test_assess__an_interrupt_is_raised(merge: OpenScene) -> None:
     class Interrupted(Steady):
         def decide(self, *_: Any) -> FloatArray:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         play(arm(merge, Interrupted(), None))
-    assert len(play(arm(merge, Steady(), None), 1)) == 1  # and SUMO was given back
+    assert len(play(arm(merge, Steady(), None), 1)) == 1  # SUMO was closed
 
 
-def test_assess__actions_that_are_no_numbers_are_an_error(merge: OpenScene) -> None:
-    class Lost(Steady):
+def test_assess__actions_that_are_not_finite_are_an_error(merge: OpenScene) -> None:
+    class NotFinite(Steady):
         def decide(self, games: IntArray, *_: Any) -> FloatArray:
             return np.full((len(games), 2), np.nan)
 
-    (game,) = play(arm(merge, Lost(), None), 1)
+    (game,) = play(arm(merge, NotFinite(), None), 1)
     assert game.record["ego_outcome"] == "error"
     assert game.record["error"]
 
@@ -194,12 +194,12 @@ def test_trace__has_every_step_of_every_player(merge: OpenScene) -> None:
         assert np.array_equal(frame["time_s"], frame["step"] * merge.world.step_s)
         for player, rows in frame.groupby("player"):
             steps = rows["step"].tolist()
-            assert steps == list(range(len(steps)))  # from the start on, without a gap
+            assert steps == list(range(len(steps)))  # from the start, without a gap
             outcome = game.record[f"{player}_outcome"]
             reached = rows.index[rows["outcome"] != ""]
             assert set(rows.loc[reached, "outcome"]) == {outcome}
             if outcome == "goal":
-                assert len(reached) == 1  # it has left
+                assert len(reached) == 1  # then it is removed
                 assert rows["outcome"].iloc[-1] == "goal"
             else:
                 assert steps[-1] == frame["step"].max()
@@ -210,7 +210,7 @@ def test_trace__has_every_step_of_every_player(merge: OpenScene) -> None:
         assert frame.equals(frame.sort_values(["step", "player"], kind="stable"))
 
 
-def test_trace__types_are_those_of_the_route_file(merge: OpenScene) -> None:
+def test_trace__vehicle_types_are_those_of_the_route_file(merge: OpenScene) -> None:
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
     kinds = trace(game).groupby("player")["vehicle_type"].unique()
     assert {player: kind.tolist() for player, kind in kinds.items()} == {
@@ -219,8 +219,8 @@ def test_trace__types_are_those_of_the_route_file(merge: OpenScene) -> None:
     }
 
 
-def test_assess__sumo_has_no_wheel_and_what_needs_one_is_not_measured(merge: OpenScene) -> None:
+def test_assess__metrics_that_need_a_steering_angle_are_empty_for_sumo(merge: OpenScene) -> None:
     (game, *_) = play(arm(merge, SumoDriver(), SumoDriver()), 1)
     assert game.record["ego_max_lateral_acceleration_mps2"] is None
     assert game.trace is not None
-    assert set(game.trace["steering_rad"]) == {0.0}  # or its lane changes would be named swerves
+    assert set(game.trace["steering_rad"]) == {0.0}  # otherwise lane changes would be reported as swerves

@@ -1,7 +1,7 @@
-"""What a step costs, counted rather than timed: calls into SUMO, calls of Python functions, memory left behind.
+"""The cost of a step as counts: calls into SUMO, calls of Python functions, memory that is not released.
 
-The counts do not depend on the machine, so they are held to what was measured. When a step becomes cheaper on purpose,
-print the numbers again with `python -m tests.environments.test_step_cost` and lower the bounds. `make bench` has times.
+The counts do not depend on the machine, so the bounds are the measured counts. If a change makes a step cheaper, print
+the counts with `python -m tests.environments.test_step_cost` and lower the bounds. `make bench` measures times.
 """
 
 from __future__ import annotations
@@ -35,24 +35,24 @@ from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
 
-# Exact: what SUMO is asked, and no more.
+# Exact numbers of calls.
 PLACEMENTS_PER_GAME = 2  # moveToXY, with two players that the harness drives
-OF_ALL_GAMES = {"simulationStep": 1, "simulation.getArrivedIDList": 1}
-WHERE_OTHERS_ARE = {"simulation.getDepartedIDList": 1}
-READS_OF_OTHER = ("getPosition", "getAngle", "getSpeed")
+PER_STEP = {"simulationStep": 1, "simulation.getArrivedIDList": 1}
+PER_STEP_WITH_TRAFFIC = {"simulation.getDepartedIDList": 1}
+READS_PER_VEHICLE = ("getPosition", "getAngle", "getSpeed")
 
-# At most: what was measured, and a little more. `python -m tests.environments.test_step_cost` prints what it is now.
-LIBSUMO_CALLS_PER_RESTART = 0  # where SUMO drives nobody, players stay in the traffic from game to game
-LIBSUMO_CALLS_PER_RESTART_AMONG_OTHERS = 44  # of a game that is on: 8 for both players, out and in again, 6 an other
-FAR_READS_PER_OTHER = 0.2  # a step
+# Upper bounds: the measured counts plus a margin. `python -m tests.environments.test_step_cost` prints the counts.
+LIBSUMO_CALLS_PER_RESET = 0  # without background traffic, players stay in SUMO from game to game
+LIBSUMO_CALLS_PER_RESET_IN_TRAFFIC = 44  # of a running game: 8 to remove and add both players, 6 per vehicle
+READS_PER_FAR_VEHICLE = 0.2  # a step
 PYTHON_CALLS_PER_STEP = 112  # of all games together
-PYTHON_CALLS_PER_GAME = 0  # what each game adds: its placements are libsumo's own
-PYTHON_CALLS_PER_OTHER = 0.5
-PYTHON_CALLS_PER_RESTART = 90
-BLOCKS_LEFT_BEHIND = 350  # by 500 steps: one that were left by each step would be 500; some 50 to 200 come and go
+PYTHON_CALLS_PER_GAME = 0  # per game; placements are calls into the extension module
+PYTHON_CALLS_PER_VEHICLE = 0.5
+PYTHON_CALLS_PER_RESET = 90
+BLOCKS_NOT_RELEASED = 350  # after 500 steps: one block per step would be 500; 50 to 200 vary from run to run
 
 FEW, MANY = 4, 16  # games
-OTHERS = 6  # a game
+VEHICLES = 6  # of background traffic, per game
 STEPS = 20
 PERSONA = REPOSITORY / "personas" / "distracted.toml"
 VAN = (
@@ -64,14 +64,14 @@ NEAR_M, FAR_M = 60.0, 210.0  # along the road; the players start at 30 to 40
 
 @contextmanager
 def counted_sumo(counts: Counter[str]) -> Iterator[None]:
-    """Count the calls of every function of libsumo, by the name it has there: a part's functions are called in the
-    extension module as `vehicle_getSpeed`, by libsumo's own Python functions and by the harness."""
+    """Count the calls of every function of libsumo by its name. A function such as `vehicle.getSpeed` is
+    `vehicle_getSpeed` in the extension module; libsumo's Python functions and the harness call it there."""
     extension = libsumo.libsumo._libsumo
     with ExitStack() as patches:
         for name, function in list(vars(extension).items()):
-            part, _, called = name.partition("_")
-            if isinstance(function, BuiltinFunctionType) and isinstance(getattr(libsumo, part, None), type) and called:
-                known = "simulationStep" if name == "simulation_step" else f"{part}.{called}"
+            part, _, method = name.partition("_")
+            if isinstance(function, BuiltinFunctionType) and isinstance(getattr(libsumo, part, None), type) and method:
+                known = "simulationStep" if name == "simulation_step" else f"{part}.{method}"
                 patches.enter_context(patch.object(extension, name, counted(function, counts, known)))
         yield
 
@@ -85,7 +85,7 @@ def counted(function: Callable[..., Any], counts: Counter[str], name: str) -> Ca
 
 
 class Counting:
-    """An arena of coasting players, in which nobody gets anywhere before something was counted."""
+    """An arena of coasting players that do not reach their goals during the count."""
 
     def __init__(self, scene: OpenScene, games: int, sumo_drives: bool = False) -> None:
         persona = read_document(PERSONA, Persona)
@@ -93,10 +93,10 @@ class Counting:
         self.arena = Arena(scene, games, seats, seed=1)
         self._start_distribution: StartDistribution = scene.start_distribution(
             [HumanFactors()] * 2, [1.0, 1.0]
-        )  # always attentive: nobody drifts off the road
+        )  # without lapses of attention no player leaves the road
         self._coast = np.zeros((games, 2, 2))
 
-    def start(self, *games: int) -> None:
+    def reset(self, *games: int) -> None:
         departures = {game: self.arena.scene.departures(generator_of(1)) for game in games}
         self.arena.reset(
             {game: draw_initial_state(self._start_distribution, "cost", game) for game in games}, departures
@@ -107,7 +107,7 @@ class Counting:
             self.arena.step(self._coast)
 
     def libsumo_calls(self, work: Callable[[], None]) -> Counter[str]:
-        """Calls into libsumo while something is done."""
+        """Calls into libsumo during `work`."""
         calls: Counter[str] = Counter()
         with counted_sumo(calls):
             work()
@@ -116,10 +116,10 @@ class Counting:
 
 @contextmanager
 def counting(scene: OpenScene, games: int, sumo_drives: bool = False) -> Iterator[Counting]:
-    """An arena that has begun, with everything warm that is compiled or kept at first use."""
+    """An arena after a reset and three steps, so that compilation and caching at first use are not counted."""
     counted = Counting(scene, games, sumo_drives)
     try:
-        counted.start(*range(games))
+        counted.reset(*range(games))
         counted.steps(3)
         yield counted
     finally:
@@ -127,15 +127,15 @@ def counting(scene: OpenScene, games: int, sumo_drives: bool = False) -> Iterato
 
 
 def python_calls(work: Callable[[], None]) -> int:
-    """Calls of Python functions while something is done; comprehensions count where Python makes functions of them."""
+    """Calls of Python functions during `work`, including comprehensions where Python compiles them to functions."""
     calls = 0
 
-    def note(frame: FrameType, event: str, argument: object) -> None:
+    def count(frame: FrameType, event: str, argument: object) -> None:
         nonlocal calls
         calls += event == "call"
 
     before = sys.getprofile()
-    sys.setprofile(note)
+    sys.setprofile(count)
     try:
         work()
     finally:
@@ -143,8 +143,8 @@ def python_calls(work: Callable[[], None]) -> int:
     return calls
 
 
-def blocks_left(work: Callable[[], None]) -> int:
-    """Blocks of memory that Python holds after something was done and did not before."""
+def blocks_not_released(work: Callable[[], None]) -> int:
+    """Blocks of memory that Python holds after `work` and did not hold before."""
     gc.collect()
     before = sys.getallocatedblocks()
     work()
@@ -154,7 +154,7 @@ def blocks_left(work: Callable[[], None]) -> int:
 
 @dataclass(frozen=True)
 class Scenes:
-    """A straight road: with nobody else on it, with others beside the players, and with others far ahead."""
+    """A straight road: without background traffic, with traffic beside the players, and with traffic far ahead."""
 
     empty: OpenScene
     busy: OpenScene
@@ -163,40 +163,42 @@ class Scenes:
     @classmethod
     def built(cls, folder: Path) -> Scenes:
         empty = build_scene(folder / "empty")
-        return cls(empty, among(vans(NEAR_M), empty, folder / "busy"), among(vans(FAR_M), empty, folder / "far"))
+        return cls(
+            empty, with_traffic(vans(NEAR_M), empty, folder / "busy"), with_traffic(vans(FAR_M), empty, folder / "far")
+        )
 
 
-def among(others: str, empty: OpenScene, folder: Path) -> OpenScene:
-    """A scene with others on it, on the same net: its tiles are made once."""
+def with_traffic(vehicles: str, empty: OpenScene, folder: Path) -> OpenScene:
+    """A scene with background traffic on the same network, so that the tiles are made once."""
     shutil.copytree(empty.folder, folder)
     routes = folder / empty.document.routes
-    routes.write_text(routes.read_text().replace("</routes>", others + "</routes>"))
+    routes.write_text(routes.read_text().replace("</routes>", vehicles + "</routes>"))
     return open_scene(folder)
 
 
 def vans(first_m: float) -> str:
-    """Others on both lanes, one behind the other from there on."""
-    places = [(k, k % 2, first_m + 10.0 * k) for k in range(OTHERS)]
+    """Vehicles on both lanes, one behind the other, from `first_m` on."""
+    places = [(k, k % 2, first_m + 10.0 * k) for k in range(VEHICLES)]
     return "".join(VAN.format(k=k, lane=lane, position_m=position_m) for k, lane, position_m in places)
 
 
 def measured(scenes: Scenes) -> dict[str, float]:
-    """Each of the counts that have a bound."""
+    """The counts that have a bound."""
     found: dict[str, float] = {}
     with counting(scenes.empty, FEW) as few:
         of_few = python_calls(few.steps) / STEPS
     with counting(scenes.empty, MANY) as many:
         of_many = python_calls(many.steps) / STEPS
-        blocks_left(many.steps)  # what is kept at first use is nothing left behind
-        found["BLOCKS_LEFT_BEHIND"] = blocks_left(lambda: many.steps(500))
-        many.start(0)
-        found["PYTHON_CALLS_PER_RESTART"] = python_calls(lambda: many.start(0))
-        found["LIBSUMO_CALLS_PER_RESTART"] = many.libsumo_calls(lambda: many.start(0)).total()
+        blocks_not_released(many.steps)  # caches at first use are not counted
+        found["BLOCKS_NOT_RELEASED"] = blocks_not_released(lambda: many.steps(500))
+        many.reset(0)
+        found["PYTHON_CALLS_PER_RESET"] = python_calls(lambda: many.reset(0))
+        found["LIBSUMO_CALLS_PER_RESET"] = many.libsumo_calls(lambda: many.reset(0)).total()
     found["PYTHON_CALLS_PER_GAME"] = (of_many - of_few) / (MANY - FEW)
     found["PYTHON_CALLS_PER_STEP"] = of_few - FEW * found["PYTHON_CALLS_PER_GAME"]
     with counting(scenes.busy, MANY) as busy:
-        found["PYTHON_CALLS_PER_OTHER"] = (python_calls(busy.steps) / STEPS - of_many) / (MANY * OTHERS)
-        found["LIBSUMO_CALLS_PER_RESTART_AMONG_OTHERS"] = busy.libsumo_calls(lambda: busy.start(0)).total()
+        found["PYTHON_CALLS_PER_VEHICLE"] = (python_calls(busy.steps) / STEPS - of_many) / (MANY * VEHICLES)
+        found["LIBSUMO_CALLS_PER_RESET_IN_TRAFFIC"] = busy.libsumo_calls(lambda: busy.reset(0)).total()
     return found
 
 
@@ -212,40 +214,40 @@ def counts(scenes: Scenes) -> dict[str, float]:
     return found
 
 
-# --- what SUMO is asked -----------------------------------------------------------------------------------------------
+# --- calls into SUMO --------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("games", [1, FEW, MANY])
-def test_step__asks_sumo_for_placements_and_a_step_and_nothing_else(games: int, scenes: Scenes) -> None:
+def test_step__calls_sumo_for_placements_and_a_step_only(games: int, scenes: Scenes) -> None:
     with counting(scenes.empty, games) as counted:
         calls = counted.libsumo_calls(counted.steps)
-    expected = {name: number * STEPS for name, number in OF_ALL_GAMES.items()}
+    expected = {name: number * STEPS for name, number in PER_STEP.items()}
     assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * games * STEPS}
 
 
-def test_step__reads_each_other_beside_a_player_once(scenes: Scenes) -> None:
+def test_step__reads_each_vehicle_near_a_player_once(scenes: Scenes) -> None:
     with counting(scenes.busy, FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)
-    expected = {name: number * STEPS for name, number in (OF_ALL_GAMES | WHERE_OTHERS_ARE).items()}
-    expected |= {f"vehicle.{name}": OTHERS * FEW * STEPS for name in READS_OF_OTHER}
+    expected = {name: number * STEPS for name, number in (PER_STEP | PER_STEP_WITH_TRAFFIC).items()}
+    expected |= {f"vehicle.{name}": VEHICLES * FEW * STEPS for name in READS_PER_VEHICLE}
     assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * FEW * STEPS}
 
 
-def test_step__seldom_asks_for_others_far_away(scenes: Scenes) -> None:
+def test_step__seldom_reads_vehicles_far_away(scenes: Scenes) -> None:
     with counting(scenes.far, FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)
-    reads = sum(calls[f"vehicle.{name}"] for name in READS_OF_OTHER)
-    assert 0 < reads <= FAR_READS_PER_OTHER * OTHERS * FEW * STEPS
+    reads = sum(calls[f"vehicle.{name}"] for name in READS_PER_VEHICLE)
+    assert 0 < reads <= READS_PER_FAR_VEHICLE * VEHICLES * FEW * STEPS
 
 
-def test_step__a_player_left_to_sumo_is_read_and_not_placed(scenes: Scenes) -> None:
+def test_step__a_player_driven_by_sumo_is_read_and_not_placed(scenes: Scenes) -> None:
     with counting(scenes.empty, FEW, sumo_drives=True) as counted:
         calls = counted.libsumo_calls(counted.steps)
     assert calls["vehicle.moveToXY"] == FEW * STEPS
-    assert calls.total() == STEPS * (sum(OF_ALL_GAMES.values()) + FEW * (1 + len(READS_OF_OTHER)))
+    assert calls.total() == STEPS * (sum(PER_STEP.values()) + FEW * (1 + len(READS_PER_VEHICLE)))
 
 
-def test_step__a_game_that_has_ended_asks_no_more(scenes: Scenes) -> None:
+def test_step__a_finished_game_has_no_placements(scenes: Scenes) -> None:
     with counting(scenes.busy, FEW) as counted:
         counted.arena.state.outcome[0] = Outcome.GOAL
         for player in range(2):
@@ -254,21 +256,21 @@ def test_step__a_game_that_has_ended_asks_no_more(scenes: Scenes) -> None:
     assert calls["vehicle.moveToXY"] == PLACEMENTS_PER_GAME * (FEW - 1) * STEPS
 
 
-# --- what Python does -------------------------------------------------------------------------------------------------
+# --- calls of Python functions ----------------------------------------------------------------------------------------
 
 BOUNDS = {
-    "LIBSUMO_CALLS_PER_RESTART": LIBSUMO_CALLS_PER_RESTART,
-    "LIBSUMO_CALLS_PER_RESTART_AMONG_OTHERS": LIBSUMO_CALLS_PER_RESTART_AMONG_OTHERS,
+    "LIBSUMO_CALLS_PER_RESET": LIBSUMO_CALLS_PER_RESET,
+    "LIBSUMO_CALLS_PER_RESET_IN_TRAFFIC": LIBSUMO_CALLS_PER_RESET_IN_TRAFFIC,
     "PYTHON_CALLS_PER_STEP": PYTHON_CALLS_PER_STEP,
     "PYTHON_CALLS_PER_GAME": PYTHON_CALLS_PER_GAME,
-    "PYTHON_CALLS_PER_OTHER": PYTHON_CALLS_PER_OTHER,
-    "PYTHON_CALLS_PER_RESTART": PYTHON_CALLS_PER_RESTART,
-    "BLOCKS_LEFT_BEHIND": BLOCKS_LEFT_BEHIND,
+    "PYTHON_CALLS_PER_VEHICLE": PYTHON_CALLS_PER_VEHICLE,
+    "PYTHON_CALLS_PER_RESET": PYTHON_CALLS_PER_RESET,
+    "BLOCKS_NOT_RELEASED": BLOCKS_NOT_RELEASED,
 }
 
 
 @pytest.mark.parametrize("name", BOUNDS)
-def test_cost__is_no_more_than_it_was(name: str, counts: dict[str, float]) -> None:
+def test_cost__is_within_its_bound(name: str, counts: dict[str, float]) -> None:
     assert counts[name] <= BOUNDS[name]
 
 
@@ -276,12 +278,12 @@ def test_cost__every_count_has_a_bound(counts: dict[str, float]) -> None:
     assert counts.keys() == BOUNDS.keys()
 
 
-# --- the test's own eyes ----------------------------------------------------------------------------------------------
+# --- the counters -----------------------------------------------------------------------------------------------------
 
 
 def test_python_calls__are_counted() -> None:
     def nothing() -> None:
-        """Called, and that is all."""
+        """Do nothing."""
 
     def work() -> None:
         for _ in range(5):
@@ -290,9 +292,9 @@ def test_python_calls__are_counted() -> None:
     assert python_calls(work) == 6
 
 
-def test_blocks_left__what_is_kept_is_seen() -> None:
-    kept: list[list[int]] = []
-    assert 100 <= blocks_left(lambda: kept.extend([k] for k in range(100))) < 250
+def test_blocks_not_released__are_counted() -> None:
+    stored: list[list[int]] = []
+    assert 100 <= blocks_not_released(lambda: stored.extend([k] for k in range(100))) < 250
 
 
 if __name__ == "__main__":

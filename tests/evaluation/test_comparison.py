@@ -203,7 +203,7 @@ def test_compare__equal_differences_that_are_not_zero_have_no_t_and_are_never_si
     assert same(failure["mcnemar_p"], 2.0**-10)  # which does exist
 
 
-def test_compare__rounding_is_no_spread():
+def test_compare__rounding_errors_are_no_spread():
     speed = np.random.default_rng(1).uniform(10, 30, 50)
     arms = games("naive_alone", [0] * 50, speed), games("naive_vs_speedy", [0] * 50, speed - 0.1)
     assert np.ptp(speed - (speed - 0.1)) > 0
@@ -251,7 +251,7 @@ def test_compare__columns_and_dtypes_are_those_of_the_table_even_when_empty():
 
 
 @pytest.mark.parametrize("significance", [0, 1, -0.01, math.nan])
-def test_compare__refuses_a_significance_that_is_none(significance):
+def test_compare__refuses_a_wrong_significance(significance):
     with pytest.raises(ValueError, match="significance"):
         compare([RQ1], games("naive_alone", [0]), significance)
 
@@ -275,7 +275,7 @@ def test_compare__an_arm_against_itself_rejects_nothing(failed, speeds, signific
     assert (table["pairs"] + table["pairs_left_out"] == len(failed)).all()
 
 
-def test_compare__random_arms_without_a_difference_are_rejected_as_often_as_significance_says():
+def test_compare__rejects_random_arms_without_a_difference_at_the_rate_of_significance():
     random = np.random.default_rng(2024)
     campaigns, count = 600, 60
     arms, questions = [], []

@@ -1,4 +1,4 @@
-"""Manoeuvres in hand-drawn games: every rule where it just holds, and where it just doesn't."""
+"""Manoeuvres in made-up games: each rule just above and just below its threshold."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, buil
 
 STEP_S = 0.1
 LENGTH_M, WIDTH_M, WHEELBASE_M = 4.6, 1.8, 2.7
-ENDING_Y, THROUGH_Y = -4.8, -1.6  # lanes of the merge, whose right one ends at x 100
+ENDING_Y, THROUGH_Y = -4.8, -1.6  # lanes of the merge; the right one ends at x 100
 SIZES = {"car": (LENGTH_M, WIDTH_M), "van": (6.0, 2.0)}
 
 
 @pytest.fixture(scope="module")
 def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """Two lanes that go on for 300 m."""
+    """Two lanes of 300 m."""
     return build_scene(tmp_path_factory.mktemp("scenes") / "straight")
 
 
@@ -54,7 +54,7 @@ def car(
     outcome: str = "",
     kind: str = "car",
 ) -> pd.DataFrame:
-    """A car's rows: it begins at `x_m`, is at `y_m` in every step, its nose where it goes; the last has `outcome`."""
+    """A car's rows: start at `x_m`, `y_m` in every step, heading along its path; the last row has `outcome`."""
     time = np.arange(steps)
     speed = np.broadcast_to(np.asarray(speed_mps, dtype=float), steps)
     y = np.broadcast_to(np.asarray(y_m, dtype=float), steps)
@@ -80,7 +80,7 @@ def car(
 
 
 def across(begin_m: float, end_m: float, first: int, last: int, steps: int = 60) -> FloatArray:
-    """[T] y that goes over from one to the other, evenly between two steps."""
+    """[T] y that changes linearly from one value to the other between two steps."""
     return np.interp(np.arange(steps), [first, last], [begin_m, end_m])
 
 
@@ -101,8 +101,8 @@ def names(found: Sequence[Manoeuvre], player: str) -> list[str]:
 
 
 def cutting_in(gap_m: float, speed_mps: float = 12.0, **changes: Any) -> list[pd.DataFrame]:
-    """The non-ego goes over into the ego's lane so far ahead of it, bumper to bumper where it enters its way (step
-    24); the ego drives at 12 m/s."""
+    """The non-ego moves into the ego's lane with this gap, bumper to bumper, where it enters the ego's path (step 24);
+    the ego drives at 12 m/s."""
     ahead = gap_m + LENGTH_M - (speed_mps - 12.0) * 24 * STEP_S
     return [
         car("ego", 5.0),
@@ -110,12 +110,12 @@ def cutting_in(gap_m: float, speed_mps: float = 12.0, **changes: Any) -> list[pd
     ]
 
 
-def test_cut_in__says_when_how_near_and_how_soon(merge: OpenScene) -> None:
+def test_cut_in__has_its_time_gap_and_time_to_collision(merge: OpenScene) -> None:
     (found,) = only(named(merge, *cutting_in(10.0, 8.0)), "non_ego", "cut_in")
-    assert found.time_s == 2.4  # from then on their middles are less than 1.8 m apart across the road
+    assert found.time_s == 2.4  # from here on their centres are less than 1.8 m apart across the road
     assert found.gap_m == pytest.approx(10.0, abs=0.3)
     assert found.ttc_s == pytest.approx(10.0 / 4.0)
-    assert found.until_s == 3.2  # within half a metre of the ego's way
+    assert found.until_s == 3.2  # within half a metre of the ego's path
     assert found.text == f"cuts in {found.gap_m:.1f} m ahead, TTC {found.ttc_s:.1f} s"
 
 
@@ -134,22 +134,22 @@ def test_cut_in__only_within_the_stated_gap_or_time_to_collision(
     assert bool(only(named(merge, *cutting_in(gap_m, speed_mps)), "non_ego", "cut_in")) == cuts_in
 
 
-def test_cut_in__of_the_ego_too(merge: OpenScene) -> None:
+def test_cut_in__also_by_the_ego(merge: OpenScene) -> None:
     ego, non_ego = (each.assign(player=name) for each, name in zip(cutting_in(8.0), ("non_ego", "ego"), strict=True))
     found = named(merge, ego, non_ego)
     assert len(only(found, "ego", "cut_in")) == 1
     assert not only(found, "non_ego", "cut_in")
 
 
-def test_cut_in__not_by_who_is_ahead_while_the_other_comes_over(merge: OpenScene) -> None:
+def test_cut_in__not_by_a_leader_while_the_other_moves_over(merge: OpenScene) -> None:
     cars = [car("ego", 5.0, across(ENDING_Y, THROUGH_Y, 15, 35)), car("non_ego", 18.0)]
     found = named(merge, *cars)
     assert not only(found, "non_ego", "cut_in")
-    assert not only(found, "ego", "cut_in")  # it comes in behind
+    assert not only(found, "ego", "cut_in")  # it enters behind
 
 
 @pytest.mark.parametrize("ahead_m", [0.5, 30.0])
-def test_cut_in__not_by_who_is_there_from_the_start(ahead_m: float, merge: OpenScene) -> None:
+def test_cut_in__not_by_a_player_in_the_path_from_the_start(ahead_m: float, merge: OpenScene) -> None:
     assert not only(named(merge, car("ego", 5.0), car("non_ego", 5.0 + LENGTH_M + ahead_m)), "non_ego", "cut_in")
 
 
@@ -188,7 +188,7 @@ def test_hard_brake__a_normal_stop_has_no_name(straight: OpenScene) -> None:
     assert named(straight, car("ego", 20.0, RIGHT_Y, braking(3.0, 5, 60))) == []
 
 
-def test_hard_brake__a_short_pause_makes_no_second_one(straight: OpenScene) -> None:
+def test_hard_brake__a_short_pause_does_not_split_it(straight: OpenScene) -> None:
     speed = 14.0 - 0.5 * np.cumsum(np.isin(np.arange(60), [10, 11, 12, 16, 17, 18, 40, 41, 42]))
     found = only(named(straight, car("ego", 20.0, RIGHT_Y, speed)), "ego", "hard_brake")
     assert [(each.time_s, each.until_s) for each in found] == [(1.0, 1.8), (4.0, 4.2)]
@@ -198,7 +198,7 @@ def test_hard_brake__a_short_pause_makes_no_second_one(straight: OpenScene) -> N
 
 
 def swerving(lateral_mps2: float, turned_deg: float, steps: int = 60, side: float = 1.0) -> pd.DataFrame:
-    """Steers for half a second from step 20 on, after which it has turned so far."""
+    """Steers for half a second from step 20 on, and has then turned by this angle."""
     steering = np.arctan(WHEELBASE_M * lateral_mps2 / 12.0**2)
     wheel = np.where((np.arange(steps) >= 20) & (np.arange(steps) < 25), side * steering, 0.0)
     heading = side * np.radians(turned_deg) * np.clip((np.arange(steps) - 19) / 5, 0, 1)
@@ -220,14 +220,14 @@ def test_swerve__by_lateral_acceleration_and_heading(
         assert ("left" if side > 0 else "right") in found[0].text
 
 
-def test_swerve__straightening_up_is_none(straight: OpenScene) -> None:
-    """Turned to the right, it steers to the left until it follows the road."""
+def test_swerve__straightening_is_not_one(straight: OpenScene) -> None:
+    """The car points to the right and steers left until it follows the road."""
     heading = np.radians(-8.0) * (1.0 - np.clip((np.arange(60) - 19) / 5, 0, 1))
     wheel = np.where((np.arange(60) >= 20) & (np.arange(60) < 25), 0.08, 0.0)
     assert not only(named(straight, car("ego", 20.0, heading_rad=heading, steering_rad=wheel)), "ego", "swerve")
 
 
-def test_swerve__following_a_bend_is_none(tmp_path: Path) -> None:
+def test_swerve__following_a_bend_is_not_one(tmp_path: Path) -> None:
     """A quarter circle of radius 30 m at 10 m/s takes 3.3 m/s2."""
     angles = np.linspace(0.0, 0.5 * np.pi, 30)
     points = [(0.0, 0.0), *zip(150 + 30 * np.sin(angles), 30 - 30 * np.cos(angles), strict=True), (180.0, 180.0)]
@@ -245,7 +245,7 @@ def test_swerve__following_a_bend_is_none(tmp_path: Path) -> None:
     drawn = car("ego", 0.0, 0.0, 10.0, 150, heading_rad=routes.heading_rad[rows], steering_rad=steering)
     drawn = drawn.assign(x_m=routes.x_m[rows], y_m=routes.y_m[rows])
     assert not only(named(scene, drawn), "ego", "swerve")
-    turned = np.where(station > 100.0, np.radians(10.0), 0.0)  # the same wheel, where the road is straight
+    turned = np.where(station > 100.0, np.radians(10.0), 0.0)  # the same steering on a straight road
     astray = drawn.assign(heading_rad=drawn["heading_rad"] + turned, steering_rad=np.roll(steering, -45))
     assert only(named(scene, astray), "ego", "swerve")
 
@@ -270,7 +270,7 @@ def test_drift__over_into_the_next_lane_is_one_movement(straight: OpenScene) -> 
     assert "1.2 m to the left" in found.text
 
 
-def test_drift__what_a_driver_steers_is_none(straight: OpenScene) -> None:
+def test_drift__steered_movement_is_not_one(straight: OpenScene) -> None:
     wheel = 0.01 * np.sin(np.arange(60))
     y = across(RIGHT_Y, LEFT_Y, 10, 40)
     assert not only(named(straight, car("non_ego", 20.0, y, steering_rad=wheel)), "non_ego", "drift")
@@ -285,7 +285,7 @@ def test_drift__what_a_driver_steers_is_none(straight: OpenScene) -> None:
         (21, 0.6, 0.4, False),  # hardly moves
     ],
 )
-def test_drift__the_wheel_held_still_out_of_the_lane(
+def test_drift__a_still_wheel_out_of_the_lane(
     still_steps: int, begin_m: float, moved_m: float, drifts: bool, straight: OpenScene
 ) -> None:
     wheel = 0.01 * np.sin(np.arange(60))
@@ -296,8 +296,8 @@ def test_drift__the_wheel_held_still_out_of_the_lane(
     assert len(found) == drifts
 
 
-def test_drift__a_lane_change_of_sumos_is_none(straight: OpenScene) -> None:
-    """SUMO has no wheel: its drivers' is recorded as 0."""
+def test_drift__a_lane_change_by_sumo_is_not_one(straight: OpenScene) -> None:
+    """SUMO has no steering: its drivers' steering is recorded as 0."""
     assert named(straight, car("non_ego", 20.0, across(RIGHT_Y, LEFT_Y, 10, 40))) == []
 
 
@@ -305,7 +305,7 @@ def test_drift__a_lane_change_of_sumos_is_none(straight: OpenScene) -> None:
 
 
 def overtaking(behind_m: float, ahead_m: float, steps: int = 50) -> list[pd.DataFrame]:
-    """From so far behind the ego's middle to so far ahead of it, beside it."""
+    """From a distance behind the ego's centre to a distance ahead of it, in the lane beside it."""
     gains = (behind_m + ahead_m) / ((steps - 1) * STEP_S)
     ego = car("ego", 20.0, THROUGH_Y, 10.0, steps)
     return [ego, car("non_ego", 20.0 - behind_m, ENDING_Y, 10.0 + gains, steps)]
@@ -316,19 +316,19 @@ def overtaking(behind_m: float, ahead_m: float, steps: int = 50) -> list[pd.Data
     [
         (6.0, 6.0, True),
         (2.1, 4.7, True),
-        (1.9, 6.0, False),  # was beside it all along
-        (6.0, 4.5, False),  # not wholly past
+        (1.9, 6.0, False),  # was beside it from the start
+        (6.0, 4.5, False),  # not completely past
         (6.0, -0.5, False),
     ],
 )
-def test_overtake__from_behind_until_wholly_ahead(
+def test_overtake__from_behind_until_completely_ahead(
     behind_m: float, ahead_m: float, overtakes: bool, merge: OpenScene
 ) -> None:
     found = only(named(merge, *overtaking(behind_m, ahead_m)), "non_ego", "overtake")
     assert len(found) == overtakes
 
 
-def test_overtake__says_from_when_to_when(merge: OpenScene) -> None:
+def test_overtake__has_its_begin_and_end(merge: OpenScene) -> None:
     (found,) = only(named(merge, *overtaking(6.0, 6.0)), "non_ego", "overtake")
     assert found.time_s == pytest.approx((6.0 - LENGTH_M) / 12.0 * 4.9, abs=0.11)
     assert found.until_s == pytest.approx((6.0 + LENGTH_M) / 12.0 * 4.9, abs=0.11)
@@ -364,7 +364,7 @@ def test_tailgate__by_time_gap_duration_and_speed(
         assert found[0].text == f"follows as close as {time_gap_s:.1f} s" or time_gap_s == 0.95
 
 
-def test_tailgate__of_anyone(straight: OpenScene) -> None:
+def test_tailgate__behind_any_road_user(straight: OpenScene) -> None:
     cars = [car("flow.0", 31.0, RIGHT_Y, kind="van"), car("ego", 20.0, RIGHT_Y)]
     (found,) = only(named(straight, *cars), "ego", "tailgate")
     assert found.gap_m == pytest.approx(11.0 - 3.0 - 2.3, abs=0.3)
@@ -374,7 +374,7 @@ def test_tailgate__of_anyone(straight: OpenScene) -> None:
 
 
 def stopping(at_x_m: float, to_mps: float = 1.0, steps: int = 60) -> tuple[float, FloatArray]:
-    """Where to begin, and speeds from 12 m/s down by 3 m/s2 to `to_mps` at that place, and stay there."""
+    """The start, and speeds that fall from 12 m/s by 3 m/s2 to `to_mps` at this place, and stay constant."""
     speed = np.maximum(12.0 - 0.3 * np.arange(steps), to_mps)
     slow = int(np.flatnonzero(speed <= 2.2)[0])
     return at_x_m - speed[1 : slow + 1].sum() * STEP_S, np.where(np.arange(steps) <= slow + 3, speed, 0.0)
@@ -400,7 +400,7 @@ def test_forced_stop__behind_another(gap_m: float, forced: bool, straight: OpenS
         assert found[0].gap_m <= 9.1
 
 
-def test_forced_stop__not_on_an_open_road_nor_slowly_nor_for_who_never_drove(straight: OpenScene) -> None:
+def test_forced_stop__not_on_an_open_road_nor_slowly_nor_without_earlier_speed(straight: OpenScene) -> None:
     x, speed = stopping(100.0)
     assert named(straight, car("ego", x, RIGHT_Y, speed)) == []
     ahead = car("non_ego", 108.0, RIGHT_Y, 0.0)
@@ -419,13 +419,13 @@ def test_find__ends_with_the_egos_game(straight: OpenScene) -> None:
     assert named(straight, brakes, fails) == []
 
 
-def test_find__a_wreck_does_nothing(straight: OpenScene) -> None:
+def test_find__a_player_after_its_end_has_no_manoeuvres(straight: OpenScene) -> None:
     driving, wreck = car("non_ego", 20.0, RIGHT_Y, steps=30, outcome="rail"), car("non_ego", 60.0, RIGHT_Y, 0.0, 60)
     wreck = wreck.assign(acceleration_mps2=-9.0, outcome="rail").iloc[30:]
     assert named(straight, driving, wreck) == []
 
 
-def test_find__by_the_time_it_begins(merge: OpenScene) -> None:
+def test_find__in_order_of_begin(merge: OpenScene) -> None:
     cars = cutting_in(3.0)
     cars[0]["acceleration_mps2"] = np.where(np.arange(60) >= 30, -6.0, 0.0)
     found = named(merge, *cars)
@@ -433,7 +433,7 @@ def test_find__by_the_time_it_begins(merge: OpenScene) -> None:
     assert {"cut_in", "hard_brake"} <= {each.manoeuvre for each in found}
 
 
-def test_table__holds_the_manoeuvres_whole(merge: OpenScene) -> None:
+def test_table__keeps_every_value(merge: OpenScene) -> None:
     found = named(merge, *cutting_in(10.0, 8.0))
     rows = rows_of(found, arm="naive_vs_x", persona="x", seed=1, episode=7)
     table = typed(pd.DataFrame(rows, columns=list(MANOEUVRE_COLUMNS)))
@@ -445,7 +445,7 @@ def test_table__holds_the_manoeuvres_whole(merge: OpenScene) -> None:
 
 
 def done(player: str, name: str, time_s: float, until_s: float) -> Manoeuvre:
-    return Manoeuvre(player, name, time_s, until_s, np.nan, np.nan, "")
+    return Manoeuvre(player=player, manoeuvre=name, time_s=time_s, until_s=until_s, gap_m=np.nan, ttc_s=np.nan, text="")
 
 
 DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4.5)
@@ -459,22 +459,22 @@ DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4
         ([SWERVE], "- -> swerve -> rail"),
         ([DRIFT, SWERVE], "drift -> swerve -> rail"),
         ([SWERVE, DRIFT], "drift -> swerve -> rail"),
-        # startled by the ego's answer: that is not what it answered
+        # begins after the ego's response: it is not the cause
         ([DRIFT, SWERVE, done("non_ego", "hard_brake", 4.8, 5.2)], "drift -> swerve -> rail"),
-        # the ego had recovered, then came something new
+        # a new cause after the end of the response
         ([DRIFT, SWERVE, done("non_ego", "cut_in", 6.6, 7.0)], "cut in -> - -> rail"),
-        # what it still did when the cause came counts
+        # a response that had begun before the cause counts
         (
             [done("ego", "tailgate", 1.0, 8.0), done("non_ego", "hard_brake", 7.0, 8.0)],
             "hard brake -> tailgate -> rail",
         ),
         ([done("ego", "tailgate", 1.0, 3.0), done("non_ego", "cut_in", 7.0, 8.0)], "cut in -> - -> rail"),
         ([DRIFT, SWERVE, done("ego", "hard_brake", 5.0, 5.5)], "drift -> hard brake -> rail"),
-        # what was over long before is not answered
+        # an old manoeuvre is not a cause
         ([done("non_ego", "overtake", 0.0, 1.0), done("ego", "swerve", 6.5, 7.0)], "- -> swerve -> rail"),
     ],
 )
-def test_pair__what_the_non_ego_did_and_how_the_ego_answered(found: list[Manoeuvre], expected: str) -> None:
+def test_pair__cause_and_response(found: list[Manoeuvre], expected: str) -> None:
     assert f"{pair_of(found).words} -> rail" == expected
 
 
@@ -486,7 +486,7 @@ def test_pair__nothing_after_the_end() -> None:
 
 
 class Scripted:
-    """Turns the wheel as its script says, step by step, and keeps its speed."""
+    """Steers by a script, step by step, with constant speed."""
 
     takes_over = True
 
@@ -509,7 +509,7 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path,
         read_document(repository / "personas" / f"{name}.toml", Persona) for name in ("careful", "distracted")
     )
     drivers = (Scripted([0.0] * 30 + [0.9] * 10), Scripted([0.0]))
-    arm = Arm("naive_vs_distracted", merge, drivers, (careful, distracted), 1)
+    arm = Arm(name="naive_vs_distracted", scene=merge, drivers=drivers, personas=(careful, distracted), seed=1)
     stories = {}
     for game in assess(arm, 12):
         assert game.trace is not None

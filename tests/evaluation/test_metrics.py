@@ -1,4 +1,4 @@
-"""What is measured of a game, against numbers worked out by hand."""
+"""Metrics of a game, compared with values computed by hand."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_metrics__are_the_columns_of_the_episodes() -> None:
 
 
 @pytest.mark.parametrize("outcome", [Outcome.COLLISION, Outcome.RAIL, Outcome.TIMEOUT])
-def test_time_to_goal__who_never_got_there_is_unscored(outcome: Outcome) -> None:
+def test_time_to_goal__without_the_goal_is_unscored(outcome: Outcome) -> None:
     assert metrics.time_to_goal_s(drive(outcome=outcome)) is None
 
 
@@ -66,7 +66,7 @@ def test_min_ttc__contact_is_zero_and_that_is_a_value() -> None:
     assert metrics.min_ttc_s(drive(time_to_collision_s=[INF, 1.0, 0.4, 0.0])) == 0.0
 
 
-def test_max_deceleration__who_never_slowed_braked_by_zero() -> None:
+def test_max_deceleration__without_braking_is_zero() -> None:
     assert metrics.max_deceleration_mps2(drive(acceleration_mps2=[0.0, 1.0, 2.0, 0.5])) == 0.0
 
 

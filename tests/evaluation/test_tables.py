@@ -200,7 +200,7 @@ def test_write_csv__puts_columns_in_the_order_of_the_table(tmp_path):
         ({"ego_pay_off": 1.0}, r"nearest is episodes: missing \[\], unknown \['ego_pay_off'\]"),
     ],
 )
-def test_write_csv__refuses_what_the_table_can_not_hold_and_keeps_the_old_file(tmp_path, change, message):
+def test_write_csv__refuses_wrong_cells_and_keeps_the_old_file(tmp_path, change, message):
     path = tmp_path / "episodes.csv"
     write_csv(episodes_of(game()), path)
     before = path.read_bytes()
@@ -225,7 +225,7 @@ def test_write_csv__a_failure_to_write_leaves_the_old_file_and_no_other(tmp_path
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_write_csv__a_message_that_is_no_unicode_does_not_lose_the_table(tmp_path):
+def test_write_csv__accepts_a_message_that_is_not_unicode(tmp_path):
     path = tmp_path / "episodes.csv"
     write_csv(episodes_of(game(error="file \udcff")), path)
     assert read_csv(path)["error"].tolist() == ["file \\udcff"]
@@ -233,7 +233,7 @@ def test_write_csv__a_message_that_is_no_unicode_does_not_lose_the_table(tmp_pat
 
 @given(table=tables())
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-def test_read_csv__gives_back_what_was_written(tmp_path, table):
+def test_read_csv__returns_the_written_table(tmp_path, table):
     path = tmp_path / "table.csv"
     write_csv(table, path)
     again = read_csv(path)
@@ -261,13 +261,13 @@ def test_read_csv__agrees_with_pandas_reading_the_same_file(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "arm,persona\n", "half\n", ",".join(TABLES["training"]) + "\nnaive,,1,100\n"])
-def test_read_csv__what_is_no_table_is_the_users_mistake_and_names_the_file(tmp_path, text):
+def test_read_csv__another_file_is_a_usage_error_that_names_it(tmp_path, text):
     path = tmp_path / "training.csv"
     path.write_text(text)
     with pytest.raises(UsageError, match=r"training\.csv"):
         read_csv(path)
 
 
-def test_read_csv__a_missing_file_is_the_users_mistake_and_names_the_file(tmp_path):
+def test_read_csv__a_missing_file_is_a_usage_error_that_names_it(tmp_path):
     with pytest.raises(UsageError, match=r"episodes\.csv"):
         read_csv(tmp_path / "episodes.csv")

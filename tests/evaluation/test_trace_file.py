@@ -1,4 +1,4 @@
-"""Traces on disk: written game by game, there whole or not at all, read back as they were."""
+"""Trace files: written game by game, complete or absent, and read back unchanged."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def write(path: Path, *games: dict[str, list[Any]]) -> None:
             traces.add(each)
 
 
-def test_trace__comes_back_exactly(tmp_path: Path) -> None:
+def test_trace__is_read_back_unchanged(tmp_path: Path) -> None:
     file = tmp_path / "naive_alone-seed1.parquet"
     write(file, game(0), game(1, steps=5), game(2))
     trace = read_trace(file, 1)
@@ -65,7 +65,7 @@ def test_trace__equal_games_are_equal_bytes(tmp_path: Path) -> None:
     assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
 
 
-def test_trace_writer__an_arm_that_was_cut_short_leaves_what_was_there_before(tmp_path: Path) -> None:
+def test_trace_writer__an_interrupted_arm_keeps_the_old_file(tmp_path: Path) -> None:
     file = tmp_path / "t.parquet"
     write(file, game(0))
     before = file.read_bytes()

@@ -13,7 +13,7 @@ from tests.support.tiny import learned_run, sumo_run
 
 
 def drawn(**players):
-    """A trace of players that go straight along lane approach_1 or _0 of networks/merge: x (m) per step, speed, y."""
+    """A trace of players that drive straight on approach_1 or _0 of networks/merge: x (m) per step, speed, y."""
     rows = []
     for name, (places, speed_mps, y_m, outcomes) in players.items():
         for step, x_m in enumerate(places):
@@ -57,7 +57,9 @@ def test_series__are_what_the_records_were_made_of(run):
     episodes = read_csv(folder / "episodes.csv").set_index(["arm", "episode"])
     scene = open_scene(folder / "scene")
     traces = folder / "traces"
-    games = list(recorded_games(episodes.reset_index(), lambda arm, seed: traces / f"{arm}-seed{seed}.parquet", scene))
+    games = list(
+        recorded_games(episodes.reset_index(), {}, lambda arm, seed: traces / f"{arm}-seed{seed}.parquet", scene)
+    )
     assert len(games) == len(episodes)
     for game in games:
         row = episodes.loc[(game.arm, game.episode)]

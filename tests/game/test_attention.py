@@ -1,4 +1,4 @@
-"""Lapses of attention: drawn before the game, as long and as often as the persona says."""
+"""Lapses of attention: drawn before the game, with the durations and the frequency of the persona."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ def runs(lapsed: BoolArray) -> list[tuple[int, int]]:
     return [(int(first), int(end - first)) for first, end in edges.reshape(-1, 2)]
 
 
-def test_lapses__none_without_an_attention() -> None:
+def test_lapses__none_are_no_lapses() -> None:
     lapses = Lapses.none(250)
     assert lapses.lapsed.shape == (250,)
     assert not lapses.lapsed.any()
     assert not lapses.steering_rad.any()
 
 
-def test_lapses__are_as_long_as_the_range_allows() -> None:
+def test_lapses__last_within_their_range() -> None:
     lapses = draw_lapses(TEXTING, 100_000, 0.1, np.random.default_rng(1))
     lengths = np.array([length for first, length in runs(lapses.lapsed) if 0 < first < 100_000 - length])
     assert len(lengths) > 300
@@ -36,14 +36,14 @@ def test_lapses__are_as_long_as_the_range_allows() -> None:
     assert lengths.mean() == pytest.approx(50.0, abs=5 * 0.35)
 
 
-def test_lapses__come_as_often_as_the_mean_says() -> None:
+def test_lapses__occur_at_the_mean_rate() -> None:
     # an attentive stretch of 10 s on average and a lapse of 5 s: a third of the time, one lapse in 15 s
     lapses = draw_lapses(TEXTING, 200_000, 0.1, np.random.default_rng(2))
     assert lapses.lapsed.mean() == pytest.approx(1.0 / 3.0, abs=0.03)
     assert len(runs(lapses.lapsed)) == pytest.approx(20_000.0 / 15.0, rel=0.1)
 
 
-def test_lapses__the_first_may_come_at_any_time_of_a_game() -> None:
+def test_lapses__the_first_may_occur_at_any_time_of_a_game() -> None:
     first = []
     for seed in range(400):
         lapsed = draw_lapses(TEXTING, 250, 0.1, np.random.default_rng(seed)).lapsed
@@ -54,16 +54,16 @@ def test_lapses__the_first_may_come_at_any_time_of_a_game() -> None:
     assert np.mean(np.array(first) <= 10.0) == pytest.approx(0.755, abs=4 * 0.022)
 
 
-def test_lapses__each_drifts_one_way_throughout() -> None:
+def test_lapses__each_has_one_steering_angle() -> None:
     lapses = draw_lapses(TEXTING, 50_000, 0.1, np.random.default_rng(3))
-    drifts = []
+    angles = []
     for first, length in runs(lapses.lapsed):
         within = lapses.steering_rad[first : first + length]
         assert (within == within[0]).all()
-        drifts.append(within[0])
+        angles.append(within[0])
     assert not lapses.steering_rad[~lapses.lapsed].any()
-    assert np.std(drifts) == pytest.approx(0.01, rel=0.15)
-    assert np.mean(drifts) == pytest.approx(0.0, abs=0.003)
+    assert np.std(angles) == pytest.approx(0.01, rel=0.15)
+    assert np.mean(angles) == pytest.approx(0.0, abs=0.003)
 
 
 def test_lapses__are_equal_for_equal_seeds() -> None:
@@ -89,7 +89,7 @@ def test_lapses__of_a_longer_game_begin_like_those_of_a_shorter_one() -> None:
 def test_lapses__are_apart_and_within_the_range(
     mean: float, shortest: float, more: float, step: float, seed: int
 ) -> None:
-    attention = Attention(mean, (shortest, shortest + more), 0.0)
+    attention = Attention(mean_attentive_s=mean, lapse_s=(shortest, shortest + more))
     lapses = draw_lapses(attention, 400, step, np.random.default_rng(seed))
     for first, length in runs(lapses.lapsed):
         assert length <= max((shortest + more) / step + 0.5 + 1e-9, 1)
@@ -97,12 +97,13 @@ def test_lapses__are_apart_and_within_the_range(
             assert length >= max(shortest / step - 0.5 - 1e-9, 1)
 
 
-def test_overlooking__in_its_share_of_the_drives() -> None:
-    drawn = [unseen_behind_m(NoBlindSpotCheck(0.75, 1.0), luck) for luck in np.random.default_rng(1).random(2000)]
+def test_blind_spot_check__is_missing_in_its_share_of_the_games() -> None:
+    factor = NoBlindSpotCheck(share=0.75, ahead_m=1.0)
+    drawn = [unseen_behind_m(factor, draw) for draw in np.random.default_rng(1).random(2000)]
     assert set(drawn) == {1.0, -np.inf}
     # standard error sqrt(0.75 * 0.25 / 2000) = 0.0097
     assert np.mean(np.isfinite(drawn)) == pytest.approx(0.75, abs=4 * 0.0097)
 
 
-def test_overlooking__never_without_the_habit() -> None:
+def test_blind_spot_check__is_done_by_default() -> None:
     assert unseen_behind_m(NoBlindSpotCheck(), 0.0) == -np.inf

@@ -1,4 +1,4 @@
-"""How a player's car moves, against numbers worked out by hand and laws that hold for every input."""
+"""The motion of a player's car, compared with hand calculations and with laws that hold for every input."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ def test_drive__displacement_on_the_straight_is_the_new_speed_times_the_step(acc
     assert state.acceleration_mps2[0, 0] == pytest.approx(acceleration)
 
 
-@pytest.mark.parametrize(("asked", "got"), [(9.0, 3.0), (-20.0, -7.848)])
-def test_drive__pedals_are_bounded_by_engine_and_grip(asked: float, got: float) -> None:
-    # brakes could do 8 m/s2, the tyres only 0.8 * 9.81 = 7.848 m/s2
+@pytest.mark.parametrize(("requested", "actual"), [(9.0, 3.0), (-20.0, -7.848)])
+def test_drive__pedals_are_bounded_by_engine_and_grip(requested: float, actual: float) -> None:
+    # the brakes allow 8 m/s2, the tyres 0.8 * 9.81 = 7.848 m/s2
     state = state_of(10.0)
-    advance(state, asked, 0.0)
-    assert state.acceleration_mps2[0, 0] == pytest.approx(got)
+    advance(state, requested, 0.0)
+    assert state.acceleration_mps2[0, 0] == pytest.approx(actual)
 
 
-def test_drive__one_step_of_a_turn_is_as_worked_out_by_hand() -> None:
+def test_drive__one_step_of_a_turn_agrees_with_a_hand_calculation() -> None:
     # At 10 m/s with the wheels at 0.1 rad and coasting:
     #   tan 0.1 = 0.10033467       slip = atan(0.05016734) = 0.05012534, cos slip = 0.99874399
     #   curvature = 0.99874399 * 0.10033467 / 2.7 = 0.03711437 1/m  (lateral 3.711 m/s2, below the grip of 7.848)
@@ -96,7 +96,7 @@ def test_drive__brakes_to_a_stand_and_not_backwards() -> None:
     advance(state, -8.0, 0.0)
     assert state.speed_mps[0, 0] == 0.0
     assert state.x_m[0, 0] == 0.0
-    assert state.acceleration_mps2[0, 0] == pytest.approx(-3.0)  # 0.3 m/s in 0.1 s is all there was to lose
+    assert state.acceleration_mps2[0, 0] == pytest.approx(-3.0)  # 0.3 m/s in 0.1 s: the whole speed
 
 
 def test_drive__players_that_do_not_move_are_untouched() -> None:
@@ -128,19 +128,19 @@ CARS = st.builds(
     car=CARS,
     speed=st.floats(0.0, 40.0),
     steering=st.floats(-1.2, 1.2),
-    wishes=st.lists(st.tuples(st.floats(-20.0, 20.0), st.floats(-1.5, 1.5)), min_size=1, max_size=8),
+    request_list=st.lists(st.tuples(st.floats(-20.0, 20.0), st.floats(-1.5, 1.5)), min_size=1, max_size=8),
 )
-def test_drive__the_tyres_never_give_more_than_the_friction_circle(
-    car: Actuators, speed: float, steering: float, wishes: list[tuple[float, float]]
+def test_drive__the_tyre_force_stays_within_the_friction_circle(
+    car: Actuators, speed: float, steering: float, request_list: list[tuple[float, float]]
 ) -> None:
     lock = float(car.max_steering_rad[0])
     state = state_of(speed, steering_rad=float(np.clip(steering, -lock, lock)))
     grip = car.friction * GRAVITY_MPS2
-    for acceleration, wheel in wishes:
+    for acceleration, wheel in request_list:
         before = state.copy()
         advance(state, acceleration, wheel, car)
         turned = (state.heading_rad - before.heading_rad + np.pi) % (2.0 * np.pi) - np.pi
-        lateral = state.speed_mps * turned / STEP_S  # what the path itself asks of the tyres
+        lateral = state.speed_mps * turned / STEP_S  # lateral acceleration of the path
         along = (state.speed_mps - before.speed_mps) / STEP_S
         assert abs(lateral[0, 0]) <= grip + 1e-6
         assert np.hypot(lateral, along)[0, 0] <= grip + 1e-6
@@ -174,7 +174,7 @@ def test_drive__left_and_right_are_mirror_images(speed: float, wheel: float, ped
         (20.0, 0.052924),  # atan(2.7 * 7.848 / 400) = atan(0.052974)
     ],
 )
-def test_steering_range__is_the_lock_or_where_the_tyres_let_go(speed: float, steering: float) -> None:
+def test_steering_range__is_the_lock_or_the_grip_limit(speed: float, steering: float) -> None:
     assert steering_range_rad(np.array([[speed]]), actuators())[0, 0] == pytest.approx(steering, abs=1e-6)
 
 
@@ -183,14 +183,14 @@ def test_steering_range__is_the_lock_or_where_the_tyres_let_go(speed: float, ste
     [
         ((0.0, 0.0), 0.0, 0.0),
         ((1.0, 1.0), 3.0, 0.208807),
-        ((0.5, -0.5), 1.5, -0.045677),  # gentle about the centre: 0.5 * (0.25 + 0.75 * 0.5^2) = 0.21875 of 0.208807
+        ((0.5, -0.5), 1.5, -0.045677),  # progressive: 0.5 * (0.25 + 0.75 * 0.5^2) = 0.21875 of 0.208807
         ((-1.0, 0.0), -8.0, 0.0),
         ((-0.25, -1.0), -2.0, -0.208807),
-        ((7.0, -9.0), 3.0, -0.208807),  # beyond [-1, 1] is as far as it goes
+        ((7.0, -9.0), 3.0, -0.208807),  # clamped to [-1, 1]
     ],
 )
 def test_requests__scale_pedals_and_wheel(action: tuple[float, float], acceleration: float, steering: float) -> None:
     speed: FloatArray = np.array([[10.0]])
-    asked, wheel = requests(np.array([[action]]), speed, actuators())
-    assert asked[0, 0] == pytest.approx(acceleration)
+    requested, wheel = requests(np.array([[action]]), speed, actuators())
+    assert requested[0, 0] == pytest.approx(acceleration)
     assert wheel[0, 0] == pytest.approx(steering, abs=1e-6)

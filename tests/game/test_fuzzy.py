@@ -1,6 +1,8 @@
-"""Fuzzy terms, against zero-order Sugeno inference by hand."""
+"""Fuzzy functions, compared with zero-order Sugeno inference by hand."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,10 +12,10 @@ from hypothesis import strategies as st
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
 
 # speed over the limit as a share of it: legal up to 0, thrilling between 0.05 and 0.3, frightening beyond 0.5
-LEGAL = FuzzySet("legal", (0.0, 0.1), (1.0, 0.0), 0.0)
-THRILLING = FuzzySet("thrilling", (0.0, 0.1, 0.3, 0.5), (0.0, 1.0, 1.0, 0.0), 2.0)
-FRIGHTENING = FuzzySet("frightening", (0.3, 0.5), (0.0, 1.0), -4.0)
-EVERYTHING = FuzzySet("everything", (0.0,), (1.0,), 0.0)
+LEGAL = FuzzySet(name="legal", inputs=(0.0, 0.1), memberships=(1.0, 0.0), value=0.0)
+THRILLING = FuzzySet(name="thrilling", inputs=(0.0, 0.1, 0.3, 0.5), memberships=(0.0, 1.0, 1.0, 0.0), value=2.0)
+FRIGHTENING = FuzzySet(name="frightening", inputs=(0.3, 0.5), memberships=(0.0, 1.0), value=-4.0)
+EVERYTHING = FuzzySet(name="everything", inputs=(0.0,), memberships=(1.0,), value=0.0)
 SPEEDY = FuzzyFunction("speed_over_limit", (LEGAL, THRILLING, FRIGHTENING))
 
 
@@ -21,33 +23,39 @@ SPEEDY = FuzzyFunction("speed_over_limit", (LEGAL, THRILLING, FRIGHTENING))
     ("value", "membership"), [(-0.5, 0.0), (0.0, 0.0), (0.025, 0.25), (0.1, 1.0), (0.2, 1.0), (0.45, 0.25), (9.0, 0.0)]
 )
 def test_membership__is_linear_between_points_and_constant_outside(value: float, membership: float) -> None:
-    # beside a set of value 0 that everything belongs to wholly, the output is membership / (membership + 1)
-    beside = FuzzyFunction("q", (FuzzySet("hill", THRILLING.inputs, THRILLING.memberships, 1.0), EVERYTHING))
-    assert beside(np.array([value])) == pytest.approx([membership / (membership + 1.0)])
+    # with a second set of value 0 and membership 1 everywhere, the output is membership / (membership + 1)
+    function = FuzzyFunction("q", (replace(THRILLING, value=1.0), EVERYTHING))
+    assert function(np.array([value])) == pytest.approx([membership / (membership + 1.0)])
 
 
 @pytest.mark.parametrize(
-    ("value", "worth"),
+    ("value", "expected"),
     [
-        (-0.3, 0.0),  # wholly legal
+        (-0.3, 0.0),  # fully legal
         (0.025, 0.5),  # 0.75 legal, 0.25 thrilling: (0.75 * 0 + 0.25 * 2) / 1
-        (0.2, 2.0),  # wholly thrilling
+        (0.2, 2.0),  # fully thrilling
         (0.35, 0.5),  # 0.75 thrilling, 0.25 frightening: 0.75 * 2 - 0.25 * 4
-        (0.7, -4.0),  # wholly frightening
+        (0.7, -4.0),  # fully frightening
     ],
 )
-def test_function__is_the_average_of_the_sets_weighted_by_membership(value: float, worth: float) -> None:
-    assert SPEEDY(np.array([value])) == pytest.approx([worth])
+def test_function__is_the_average_of_the_sets_weighted_by_membership(value: float, expected: float) -> None:
+    assert SPEEDY(np.array([value])) == pytest.approx([expected])
 
 
 def test_function__memberships_need_not_sum_to_1() -> None:
     # 0.8 of the one set (value 1) and 0.8 of the other (value 3): (0.8 + 2.4) / 1.6 = 2, not 3.2
-    both = FuzzyFunction("q", (FuzzySet("a", (0.0,), (0.8,), 1.0), FuzzySet("b", (0.0,), (0.8,), 3.0)))
+    both = FuzzyFunction(
+        "q",
+        (
+            FuzzySet(name="a", inputs=(0.0,), memberships=(0.8,), value=1.0),
+            FuzzySet(name="b", inputs=(0.0,), memberships=(0.8,), value=3.0),
+        ),
+    )
     assert both(np.array([5.0])) == pytest.approx([2.0])
 
 
 def test_function__is_0_where_the_input_belongs_to_no_set() -> None:
-    hill = FuzzyFunction("q", (FuzzySet("hill", (1.0, 2.0, 3.0), (0.0, 1.0, 0.0), 5.0),))
+    hill = FuzzyFunction("q", (FuzzySet(name="hill", inputs=(1.0, 2.0, 3.0), memberships=(0.0, 1.0, 0.0), value=5.0),))
     assert hill(np.array([0.0, 0.5, 2.0, 3.0, 8.0])).tolist() == [0.0, 0.0, 5.0, 0.0, 0.0]
 
 

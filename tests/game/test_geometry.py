@@ -1,4 +1,4 @@
-"""Boxes and segments, against shapely as the oracle and against numbers worked out by hand."""
+"""Boxes and segments, compared with shapely and with hand calculations."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ BOXES = st.builds(
 
 
 def ring(each: Box) -> FloatArray:
-    """Its corners [4, 2], round from the front left."""
+    """The corners [4, 2] of a box, in order, from the front left."""
     along, across = 0.5 * each.length_m * np.array([1, 1, -1, -1]), 0.5 * each.width_m * np.array([1, -1, -1, 1])
     cos, sin = np.cos(each.heading_rad), np.sin(each.heading_rad)
     return np.stack((each.x_m + along * cos - across * sin, each.y_m + along * sin + across * cos), axis=-1)
@@ -52,7 +52,7 @@ def segment(x1: float, y1: float, x2: float, y2: float) -> FloatArray:
 
 
 def touch(a: Box, b: Box) -> bool:
-    """Contact, as the game has it: the distance is exactly 0."""
+    """Contact as defined in the game: the distance is exactly 0."""
     return box_distance(a, b) == 0.0
 
 
@@ -80,7 +80,7 @@ def test_box_segment__a_segment_inside_a_box_touches_it() -> None:
     assert box_segment_distance(box(0, 0), segment(-0.5, 0.1, 0.5, -0.1)) == 0.0
 
 
-def test_box_segment__a_segment_through_a_box_touches_it_though_both_ends_lie_far_off() -> None:
+def test_box_segment__a_segment_through_a_box_touches_it_with_both_ends_far_away() -> None:
     assert box_segment_distance(box(0, 0, 0.7), segment(-50, 1, 50, -1)) == 0.0
 
 
@@ -114,14 +114,14 @@ def test_nearest_segment__is_the_least_distance_of_the_rows(
     a: Box, ends: list[tuple[float, float, float, float]], limit: float
 ) -> None:
     segments = np.array([segment(*each) for each in ends])
-    rows = np.arange(0, len(ends), 2)[None, None]  # not all of them
+    rows = np.arange(0, len(ends), 2)[None, None]  # every second segment
     distances = [polygon(a).distance(shapely.LineString(segments[k])) for k in rows[0, 0]]
     found = distance_to_nearest_segment(players(a), segments, rows, limit)
     assert found[0, 0] == pytest.approx(min([*distances, limit]), abs=1e-6)
 
 
 def test_first_contact__is_the_soonest_of_those_marked() -> None:
-    # 20 m ahead at 5 m/s less: 4 s; 10 m behind at 5 m/s more: 2 s; one that touches is not looked at
+    # 20 m ahead at 5 m/s less: 4 s; 10 m behind at 5 m/s more: 2 s; the one that touches is not marked
     others = columns(box(24.6, 0), box(-14.6, 0), box(1, 0))
     speeds = np.array([[10.0]]), np.array([[5.0, 15.0, 10.0]])
     for among, seconds in (([True, True, False], 2.0), ([True, False, False], 4.0), ([False] * 3, np.inf)):
@@ -130,7 +130,7 @@ def test_first_contact__is_the_soonest_of_those_marked() -> None:
 
 
 @pytest.mark.parametrize(("gap", "touches"), [(-0.001, True), (0.001, False)])
-def test_boxes__a_millimetre_decides(gap: float, touches: bool) -> None:
+def test_boxes__contact_is_exact_to_a_millimetre(gap: float, touches: bool) -> None:
     assert touch(box(0, 0), box(4.6 + gap, 0)) == touches
     assert touch(box(0, 0), box(0, 1.8 + gap)) == touches
 
@@ -166,10 +166,10 @@ def test_time_to_contact__agrees_with_moving_the_box_in_small_steps(a: Box, b: B
     times = np.arange(0.0, 6.0, 0.02)
     moved = shapely.polygons(ring(b) + times[:, None, None] * np.array([vx, vy]))
     distance = shapely.distance(moved, polygon(a))
-    graze = 0.02 * np.hypot(vx, vy) + 1e-6  # what a step can pass over
+    graze = 0.02 * np.hypot(vx, vy) + 1e-6  # a contact shorter than this can fall between two steps
     touching = np.flatnonzero(distance <= 0.0)
     if len(touching):
         first = times[touching[0]]
         assert first - 0.02 - 1e-6 <= found <= first + 1e-6
     elif np.isfinite(found) and found < 5.9:
-        assert distance.min() <= graze  # a corner that is clipped between two steps
+        assert distance.min() <= graze  # a contact between two steps

@@ -1,4 +1,4 @@
-"""What bodies can't do, by hand: decisions that arrive late, others misjudged or unseen, a car not used in full."""
+"""Limits of the human body by hand: late decisions, estimation errors, limited sight, partial use of the car."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from harness.game.arrays import FloatArray
 from harness.game.attention import Attention, HumanFactors, Lapses, NoBlindSpotCheck, draw_lapses
 from harness.game.human_limits import (
     NO_LIMITS,
+    ActuatorShares,
     Limits,
     LookedButFailedToSee,
     PlayersLimits,
     Reaction,
     Sight,
-    Uses,
     draw_delay_steps,
-    draw_misjudged,
+    draw_estimation_errors,
     draw_noticed_m,
 )
 from harness.game.initial_state import InitialState, draw_initial_state
@@ -54,26 +54,26 @@ def arena(straight: OpenScene) -> Iterator[Arena]:
 
 
 def limited(start: InitialState, player: int, limits: Limits) -> InitialState:
-    """A start in which one player has limits."""
-    of = list(start.limits)
-    of[player] = limits
-    return replace(start, limits=tuple(of))
+    """The initial state with limits for one player."""
+    all_limits = list(start.limits)
+    all_limits[player] = limits
+    return replace(start, limits=tuple(all_limits))
 
 
 def played(arena: Arena, starts: dict[int, InitialState], actions: FloatArray) -> list[tuple[FloatArray, ...]]:
     """Accelerations, steering angles and observations of each step [G, P, ...]."""
     arena.reset(starts)
-    found = []
+    steps = []
     for action in actions:
         state = arena.step(action).quantities.state
-        found.append((state.acceleration_mps2.copy(), state.steering_rad.copy(), arena.observation.copy()))
-    return found
+        steps.append((state.acceleration_mps2.copy(), state.steering_rad.copy(), arena.observation.copy()))
+    return steps
 
 
 # --- reaction ---------------------------------------------------------------------------------------------------------
 
 
-def test_delay__decisions_arrive_so_many_steps_later_and_until_then_the_car_coasts() -> None:
+def test_delay__decisions_arrive_late_and_until_then_the_car_coasts() -> None:
     limits = PlayersLimits(games=2, players=2, steps=10)
     state = State.empty(2, 2)
     limits.reset(0, 0, Limits(delay_steps=2), state)
@@ -82,11 +82,11 @@ def test_delay__decisions_arrive_so_many_steps_later_and_until_then_the_car_coas
         arriving = limits.arriving(decided, np.array([step, step]))
         late = [0.0, 0.0, 0.1, 0.2, 0.3, 0.4][step]
         assert arriving[0, 0] == pytest.approx([late, late])
-        assert (arriving[0, 1] == decided[0, 1]).all()  # whose hands are not slow
+        assert (arriving[0, 1] == decided[0, 1]).all()  # the player without delay
         assert (arriving[1] == decided[1]).all()
 
 
-def test_delay__a_game_that_begins_anew_has_forgotten_what_was_decided_before() -> None:
+def test_delay__a_reset_discards_earlier_decisions() -> None:
     limits = PlayersLimits(games=1, players=1, steps=10)
     state = State.empty(1, 1)
     for _ in range(2):
@@ -96,7 +96,7 @@ def test_delay__a_game_that_begins_anew_has_forgotten_what_was_decided_before() 
             assert (arriving == (0.5 if step >= 3 else 0.0)).all()
 
 
-def test_delay__the_car_does_what_was_decided_before(arena: Arena, straight: OpenScene) -> None:
+def test_delay__the_car_follows_earlier_decisions(arena: Arena, straight: OpenScene) -> None:
     start = drawn(straight, 1)
     actions = np.random.default_rng(0).uniform(-0.3, 0.3, (12, 2, 2, 2))
     actions[:, 1] = actions[:, 0]  # the same decisions in both games
@@ -105,33 +105,38 @@ def test_delay__the_car_does_what_was_decided_before(arena: Arena, straight: Ope
     assert not seen[3][1][1, 0]
     for step in range(4, 12):
         pedals = actions[step - 4, 1, 0, 0]
-        most = (
+        largest = (
             straight.world.actuators.max_acceleration_mps2 if pedals > 0 else straight.world.actuators.max_braking_mps2
         )
-        assert seen[step][0][1, 0] == pytest.approx(pedals * most[0], rel=0.05)  # the friction circle takes a little
-    assert (seen[3][0][1, 1] == seen[3][0][0, 1]).all()  # the other is as quick as ever
+        assert seen[step][0][1, 0] == pytest.approx(pedals * largest[0], rel=0.05)  # less the friction circle
+    assert (seen[3][0][1, 1] == seen[3][0][0, 1]).all()  # the other player has no delay
 
 
-def test_delay__after_a_lapse_the_car_is_let_go_until_the_first_decision_arrives() -> None:
+def test_delay__after_a_lapse_the_controls_are_released_until_the_first_decision_arrives() -> None:
     lapsed = np.array([False, True, True, False, False, False, False, True, False, False])
     steering = np.where(lapsed, -0.01, 0.0)
     steering[7] = 0.02
-    held = Lapses(lapsed, steering).until_hands_obey(2)
-    assert held.lapsed.tolist() == [False, True, True, True, True, False, False, True, True, True]
-    assert held.steering_rad.tolist() == [0.0, -0.01, -0.01, -0.01, -0.01, 0.0, 0.0, 0.02, 0.02, 0.02]
+    delayed = Lapses(lapsed, steering).with_reaction_delay(2)
+    assert delayed.lapsed.tolist() == [False, True, True, True, True, False, False, True, True, True]
+    assert delayed.steering_rad.tolist() == [0.0, -0.01, -0.01, -0.01, -0.01, 0.0, 0.0, 0.02, 0.02, 0.02]
 
 
 @settings(max_examples=50, deadline=None)
 @given(seed=st.integers(0, 2**32), delay=st.integers(0, 30))
-def test_delay__makes_lapses_longer_and_none_of_them_earlier(seed: int, delay: int) -> None:
-    lapses = draw_lapses(Attention(3.0, (0.5, 2.0), 0.005, 0.001), 200, 0.1, np.random.default_rng(seed))
-    held = lapses.until_hands_obey(delay)
-    assert (held.lapsed >= lapses.lapsed).all()
-    assert (held.steering_rad[lapses.lapsed] == lapses.steering_rad[lapses.lapsed]).all()
-    begins = np.flatnonzero(np.diff(np.concatenate(([0], held.lapsed.astype(int)))) == 1)
+def test_delay__extends_lapses_and_starts_none_earlier(seed: int, delay: int) -> None:
+    lapses = draw_lapses(
+        Attention(mean_attentive_s=3.0, lapse_s=(0.5, 2.0), crown_rad=0.005, bumps_rad=0.001),
+        200,
+        0.1,
+        np.random.default_rng(seed),
+    )
+    delayed = lapses.with_reaction_delay(delay)
+    assert (delayed.lapsed >= lapses.lapsed).all()
+    assert (delayed.steering_rad[lapses.lapsed] == lapses.steering_rad[lapses.lapsed]).all()
+    begins = np.flatnonzero(np.diff(np.concatenate(([0], delayed.lapsed.astype(int)))) == 1)
     assert lapses.lapsed[begins].all()
     if delay == 0:
-        assert (held.lapsed == lapses.lapsed).all()
+        assert (delayed.lapsed == lapses.lapsed).all()
 
 
 def test_delay__is_drawn_from_its_range() -> None:
@@ -151,7 +156,7 @@ def seen(q: Quantities) -> dict[str, float]:
     return dict(zip(LAYOUT, observe(q)[0, 0].tolist(), strict=True))
 
 
-def test_range__who_is_farther_away_is_not_seen(moment: Moment, world: World) -> None:
+def test_range__a_vehicle_beyond_it_is_not_seen(moment: Moment, world: World) -> None:
     def sees(range_m: float) -> tuple[float, float]:
         entries = seen(moment(world, [car(50.0, sight_m=range_m), car(80.0)]))
         return entries["other0_seen"], entries["free_right_m@30m"]
@@ -159,10 +164,10 @@ def test_range__who_is_farther_away_is_not_seen(moment: Moment, world: World) ->
     assert sees(29.9)[0] == 0.0
     assert sees(30.1)[0] == 1.0
     assert sees(np.inf) == sees(30.1)
-    assert sees(29.9)[1] != sees(30.1)[1]  # nor does it take room
+    assert sees(29.9)[1] != sees(30.1)[1]  # and it does not reduce the free width
 
 
-def test_misjudged__distance_is_off_by_a_share_whichever_way_the_other_is(moment: Moment, world: World) -> None:
+def test_errors__of_distance_are_a_share_in_every_direction(moment: Moment, world: World) -> None:
     # 20 m ahead and 3.2 m to the right; a quarter farther is 25 m and 4 m
     entries = seen(moment(world, [car(50.0, distance_error=0.25), car(70.0, -4.8)]))
     assert entries["other0_ahead_m"] * 50.0 == pytest.approx(25.0)
@@ -172,9 +177,7 @@ def test_misjudged__distance_is_off_by_a_share_whichever_way_the_other_is(moment
     assert near["free_right_m@0m"] * 8.0 == pytest.approx(-1.5, abs=0.01)
 
 
-def test_misjudged__closing_speed_is_off_by_the_more_the_farther_away_the_other_is(
-    moment: Moment, world: World
-) -> None:
+def test_errors__of_closing_speed_grow_with_the_distance(moment: Moment, world: World) -> None:
     for ahead_m in (10.0, 40.0):
         players = [car(50.0, closing_error_per_s=0.05), car(50.0 + ahead_m, speed_mps=7.0)]
         entries = seen(moment(world, players))
@@ -182,90 +185,91 @@ def test_misjudged__closing_speed_is_off_by_the_more_the_farther_away_the_other_
         assert entries["other0_ahead_m"] * 50.0 == pytest.approx(ahead_m)
 
 
-def test_misjudged__one_that_errs_by_nothing_sees_exactly(moment: Moment, world: World) -> None:
+def test_errors__of_zero_are_exact_sight(moment: Moment, world: World) -> None:
     players = [car(50.3), car(61.7, -4.1, heading_rad=0.1)]
     plain = observe(moment(world, players, [car(80.1)]))
     exact = [{**each, "distance_error": 0.0, "closing_error_per_s": 0.0, "sight_m": np.inf} for each in players]
     assert observe(moment(world, exact, [car(80.1)])).tobytes() == plain.tobytes()
 
 
-def test_misjudged__errors_have_their_spread_and_change_slowly() -> None:
+def test_errors__have_their_deviation_and_correlation_time() -> None:
     sight = Sight(distance_error=0.2, closing_error_per_s=0.03, error_s=2.0)
-    found = np.array([draw_misjudged(sight, 200, 0.1, np.random.default_rng(seed)) for seed in range(400)])
-    logarithm, closing = np.log1p(found[..., 0]), found[..., 1]
-    for step in (0, 100, 199):  # stationary: as wide at the start as later; standard error 1 / sqrt(800)
+    errors = np.array([draw_estimation_errors(sight, 200, 0.1, np.random.default_rng(seed)) for seed in range(400)])
+    logarithm, closing = np.log1p(errors[..., 0]), errors[..., 1]
+    for step in (0, 100, 199):  # stationary; standard error 1 / sqrt(800)
         assert logarithm[:, step].std() == pytest.approx(0.2, rel=0.15)
         assert closing[:, step].std() == pytest.approx(0.03, rel=0.15)
-    for errors in (logarithm, closing):  # after 2 s the correlation is 1/e
-        assert np.corrcoef(errors[:, 50], errors[:, 70])[0, 1] == pytest.approx(np.exp(-1.0), abs=0.2)
-        assert np.corrcoef(errors[:, 50], errors[:, 51])[0, 1] > 0.9
+    for process in (logarithm, closing):  # after 2 s the correlation is 1/e
+        assert np.corrcoef(process[:, 50], process[:, 70])[0, 1] == pytest.approx(np.exp(-1.0), abs=0.2)
+        assert np.corrcoef(process[:, 50], process[:, 51])[0, 1] > 0.9
     assert abs(np.corrcoef(logarithm[:, 50], closing[:, 50])[0, 1]) < 0.2
 
 
-def test_misjudged__of_a_longer_game_begins_like_that_of_a_shorter_one() -> None:
+def test_errors__of_a_longer_game_start_like_those_of_a_shorter_one() -> None:
     sight = Sight(distance_error=0.2, closing_error_per_s=0.03)
-    short, long = (draw_misjudged(sight, steps, 0.1, np.random.default_rng(3)) for steps in (50, 120))
+    short, long = (draw_estimation_errors(sight, steps, 0.1, np.random.default_rng(3)) for steps in (50, 120))
     assert (short == long[:50]).all()
 
 
-def test_misjudged__an_arena_shows_each_step_its_own_error(arena: Arena, straight: OpenScene) -> None:
+def test_errors__an_arena_applies_the_error_of_each_step(arena: Arena, straight: OpenScene) -> None:
     start = drawn(straight, 1)
-    misjudged = np.zeros((straight.world.steps, 2))
-    misjudged[:, 0] = np.linspace(0.0, 0.5, len(misjudged))
+    errors = np.zeros((straight.world.steps, 2))
+    errors[:, 0] = np.linspace(0.0, 0.5, len(errors))
     coast = np.zeros((8, 2, 2, 2))
-    steps = played(arena, {0: start, 1: limited(start, 0, Limits(misjudged=misjudged))}, coast)
+    steps = played(arena, {0: start, 1: limited(start, 0, Limits(estimation_errors=errors))}, coast)
     ahead = LAYOUT.index("other0_ahead_m")
     for step, (_, _, observation) in enumerate(steps, 1):
         exact, seen = observation[:, 0, ahead]
-        assert seen == pytest.approx(exact * (1.0 + misjudged[step, 0]), rel=1e-5)
-        assert (observation[1, 1] == observation[0, 1]).all()  # the other sees as it did
+        assert seen == pytest.approx(exact * (1.0 + errors[step, 0]), rel=1e-5)
+        assert (observation[1, 1] == observation[0, 1]).all()  # the other player has no errors
 
 
-def test_missing__in_its_share_of_the_drives() -> None:
-    found = [draw_noticed_m(LookedButFailedToSee(0.25, 8.0), np.random.default_rng(seed)) for seed in range(2000)]
-    assert set(found) == {8.0, np.inf}
-    assert np.mean(np.isfinite(found)) == pytest.approx(0.25, abs=4 * 0.0097)
+def test_failure_to_see__occurs_in_its_share_of_the_games() -> None:
+    failure = LookedButFailedToSee(share=0.25, within_m=8.0)
+    drawn = [draw_noticed_m(failure, np.random.default_rng(seed)) for seed in range(2000)]
+    assert set(drawn) == {8.0, np.inf}
+    assert np.mean(np.isfinite(drawn)) == pytest.approx(0.25, abs=4 * 0.0097)
 
 
-def test_missing__is_a_habit_of_driving_and_the_rest_is_there_from_the_first_lesson() -> None:
+def test_open_eyes__remove_failures_to_see_and_keep_the_limits_of_the_body() -> None:
     person = HumanFactors(
-        no_blind_spot_check=NoBlindSpotCheck(0.5, 1.0),
-        looked_but_failed_to_see=LookedButFailedToSee(0.5, 5.0),
+        no_blind_spot_check=NoBlindSpotCheck(share=0.5, ahead_m=1.0),
+        looked_but_failed_to_see=LookedButFailedToSee(share=0.5, within_m=5.0),
         reaction=Reaction((0.2, 0.4)),
-        sight=Sight(60.0),
+        sight=Sight(range_m=60.0),
     )
-    assert person.with_open_eyes == HumanFactors(reaction=Reaction((0.2, 0.4)), sight=Sight(60.0))
+    assert person.with_open_eyes == HumanFactors(reaction=Reaction((0.2, 0.4)), sight=Sight(range_m=60.0))
 
 
-# --- what is used of the car ------------------------------------------------------------------------------------------
+# --- actuator shares --------------------------------------------------------------------------------------------------
 
 
-def test_uses__shares_of_throttle_brake_and_wheel() -> None:
+def test_actuator_shares__scale_throttle_brake_and_wheel() -> None:
     limits = PlayersLimits(games=1, players=3, steps=5)
     state = State.empty(1, 3)
     for player in range(2):
-        limits.reset(0, player, Limits(uses=(0.5, 0.25, 0.1)), state)
+        limits.reset(0, player, Limits(actuator_shares=(0.5, 0.25, 0.1)), state)
     acceleration, steering = limits.within(np.array([[2.0, -4.0, 2.0]]), np.array([[0.2, -0.2, 0.2]]))
     assert acceleration.tolist() == [[1.0, -1.0, 2.0]]
     assert steering[0] == pytest.approx([0.02, -0.02, 0.2])
 
 
-def test_uses__the_car_does_no_more(arena: Arena, straight: OpenScene) -> None:
+def test_actuator_shares__limit_the_car(arena: Arena, straight: OpenScene) -> None:
     start, actions = drawn(straight, 1), np.zeros((3, 2, 2, 2))
     actions[..., 0] = 1.0
-    (first, *_) = played(arena, {0: start, 1: limited(start, 1, Limits(uses=(0.4, 1.0, 1.0)))}, actions)
-    most = straight.world.actuators.max_acceleration_mps2
-    assert first[0][0] == pytest.approx(most)
-    assert first[0][1] == pytest.approx([most[0], 0.4 * most[1]])
+    (first, *_) = played(arena, {0: start, 1: limited(start, 1, Limits(actuator_shares=(0.4, 1.0, 1.0)))}, actions)
+    largest = straight.world.actuators.max_acceleration_mps2
+    assert first[0][0] == pytest.approx(largest)
+    assert first[0][1] == pytest.approx([largest[0], 0.4 * largest[1]])
 
 
-# --- nobody else's numbers --------------------------------------------------------------------------------------------
+# --- independent draws ------------------------------------------------------------------------------------------------
 
 BODY = HumanFactors(
-    looked_but_failed_to_see=LookedButFailedToSee(0.5, 8.0),
+    looked_but_failed_to_see=LookedButFailedToSee(share=0.5, within_m=8.0),
     reaction=Reaction((0.2, 0.9)),
-    sight=Sight(60.0, 0.1, 0.01, 5.0),
-    uses=Uses(0.8, 0.7, 0.6),
+    sight=Sight(range_m=60.0, distance_error=0.1, closing_error_per_s=0.01, error_s=5.0),
+    actuator_shares=ActuatorShares(throttle=0.8, braking=0.7, steering=0.6),
 )
 
 
@@ -277,10 +281,10 @@ def test_start__without_limits_has_none(straight: OpenScene) -> None:
     )
 
 
-def test_start__anothers_limits_move_nothing_that_is_drawn(straight: OpenScene) -> None:
-    texting = Attention(4.0, (1.0, 2.0), 0.005, 0.001)
+def test_start__limits_of_another_player_do_not_change_the_draws(straight: OpenScene) -> None:
+    texting = Attention(mean_attentive_s=4.0, lapse_s=(1.0, 2.0), crown_rad=0.005, bumps_rad=0.001)
     own = HumanFactors(
-        attention=texting, no_blind_spot_check=NoBlindSpotCheck(0.5, 1.0), sight=Sight(distance_error=0.1)
+        attention=texting, no_blind_spot_check=NoBlindSpotCheck(share=0.5, ahead_m=1.0), sight=Sight(distance_error=0.1)
     )
     for episode in range(5):
         plain, beside = (
@@ -291,12 +295,12 @@ def test_start__anothers_limits_move_nothing_that_is_drawn(straight: OpenScene) 
             assert (getattr(plain, name) == getattr(beside, name)).all()
         assert plain.seed == beside.seed
         assert (plain.lapses[0].lapsed == beside.lapses[0].lapsed).all()
-        assert (plain.limits[0].misjudged == beside.limits[0].misjudged).all()
+        assert (plain.limits[0].estimation_errors == beside.limits[0].estimation_errors).all()
         assert plain.limits[1] is NO_LIMITS
-        assert beside.limits[1].uses == (0.8, 0.7, 0.6)
+        assert beside.limits[1].actuator_shares == (0.8, 0.7, 0.6)
 
 
-def test_start__each_limit_is_drawn_apart_from_the_others(straight: OpenScene) -> None:
+def test_start__each_limit_is_drawn_independently(straight: OpenScene) -> None:
     def limits(human_factors: HumanFactors) -> Limits:
         return draw_initial_state(
             straight.start_distribution([[HumanFactors()], [human_factors]], [1.0, 1.0]), "episode", 3
@@ -308,23 +312,23 @@ def test_start__each_limit_is_drawn_apart_from_the_others(straight: OpenScene) -
         limits(HumanFactors(sight=BODY.sight)),
     )
     assert everything.delay_steps == late.delay_steps
-    assert late.misjudged is None
-    assert everything.misjudged is not None
-    assert (everything.misjudged == inexact.misjudged).all()
+    assert late.estimation_errors is None
+    assert everything.estimation_errors is not None
+    assert (everything.estimation_errors == inexact.estimation_errors).all()
     assert everything.sight_m in (8.0, 60.0)
 
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 2**32))
-def test_arena__limits_of_nothing_are_no_limits(arena: Arena, seed: int) -> None:
-    """A delay of 0 steps, errors of 0, all of the car: the game is bit for bit the one without."""
+def test_arena__limits_without_effect_equal_no_limits(arena: Arena, seed: int) -> None:
+    """With a delay of 0 steps, errors of 0 and full use of the car, the game is bit-identical to one without limits."""
     start = drawn(arena.scene, "law", seed)
     actions = np.random.default_rng(seed).uniform(-0.4, 0.4, (6, 2, 2, 2))
     actions[:, 1] = actions[:, 0]
-    nothing = Limits(0, np.inf, np.zeros((arena.world.steps, 2)), (1.0, 1.0, 1.0))
-    slow = limited(limited(start, 0, nothing), 1, nothing)
-    arena._limits.delays = arena._limits.spares = True  # as where somebody else has limits
-    for acceleration, steering, observation in played(arena, {0: start, 1: slow}, actions):
+    neutral = Limits(estimation_errors=np.zeros((arena.world.steps, 2)))
+    neutral_start = limited(limited(start, 0, neutral), 1, neutral)
+    arena._limits.delays = arena._limits.spares = True  # as if another player had limits
+    for acceleration, steering, observation in played(arena, {0: start, 1: neutral_start}, actions):
         assert (acceleration[0] == acceleration[1]).all()
         assert (steering[0] == steering[1]).all()
         assert (observation[0] == observation[1]).all()

@@ -1,4 +1,4 @@
-"""How a game starts: everything that is left to chance, and that chance hangs on names alone."""
+"""The initial state of a game: all its random draws, and their dependence on the named parts only."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from harness.game.initial_state import InitialState, StartDistribution, StartRan
 from harness.game.seeding import generator_of, seed_of
 from harness.traffic.scene import OpenScene
 
-TEXTING = Attention(2.0, (1.0, 2.0), 0.02)
+TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_rad=0.02))
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +34,7 @@ def test_start__is_within_the_ranges_of_the_scene(start_distribution: StartDistr
     for values, low, high in ((positions[:, 0], 30.0, 45.0), (beside, -8.0, 8.0), (speeds, 11.0, 14.0)):
         assert values.min() >= low
         assert values.max() <= high
-        assert values.max() - values.min() > 0.9 * (high - low)  # and the whole of the range is used
+        assert values.max() - values.min() > 0.9 * (high - low)  # the draws cover the range
 
 
 def test_start__is_on_the_lane_with_the_bumper_at_the_position(start_distribution: StartDistribution) -> None:
@@ -47,7 +47,7 @@ def test_start__is_on_the_lane_with_the_bumper_at_the_position(start_distributio
 def test_start__the_same_parts_give_the_same_start(start_distribution: StartDistribution) -> None:
     one, two = draw_initial_state(start_distribution, "a", 1), draw_initial_state(start_distribution, "a", 1)
     for field in fields(InitialState):
-        if field.name not in ("lapses", "variation"):
+        if field.name not in ("lapses", "lazy_noise"):
             assert np.array_equal(getattr(one, field.name), getattr(two, field.name))
     assert np.array_equal(one.noise, two.noise)
     assert one.seed == two.seed
@@ -61,10 +61,8 @@ def test_start__other_parts_give_another(start_distribution: StartDistribution, 
     assert (one.noise != other.noise).any()
 
 
-def test_start__pairs_whoever_drives_and_attends(start_distribution: StartDistribution) -> None:
-    texting = replace(
-        start_distribution, human_factors=([HumanFactors()], [HumanFactors(TEXTING)]), present_share=(1.0, 0.0)
-    )
+def test_start__is_paired_for_all_human_factors(start_distribution: StartDistribution) -> None:
+    texting = replace(start_distribution, human_factors=([HumanFactors()], [TEXTING]), present_share=(1.0, 0.0))
     one, two = draw_initial_state(start_distribution, "a", 1), draw_initial_state(texting, "a", 1)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "position_m", "noise", "seed"):
         assert np.array_equal(getattr(one, name), getattr(two, name))
@@ -73,18 +71,14 @@ def test_start__pairs_whoever_drives_and_attends(start_distribution: StartDistri
     assert two.present.tolist() == [True, False]
 
 
-def test_start__one_players_lapses_do_not_hang_on_the_others(start_distribution: StartDistribution) -> None:
-    both = draw_initial_state(
-        replace(start_distribution, human_factors=([HumanFactors(TEXTING)], [HumanFactors(TEXTING)])), "a", 1
-    )
-    alone = draw_initial_state(
-        replace(start_distribution, human_factors=([HumanFactors()], [HumanFactors(TEXTING)])), "a", 1
-    )
+def test_start__lapses_do_not_depend_on_the_other_players(start_distribution: StartDistribution) -> None:
+    both = draw_initial_state(replace(start_distribution, human_factors=([TEXTING], [TEXTING])), "a", 1)
+    alone = draw_initial_state(replace(start_distribution, human_factors=([HumanFactors()], [TEXTING])), "a", 1)
     assert (both.lapses[1].lapsed == alone.lapses[1].lapsed).all()
     assert (both.lapses[0].lapsed != both.lapses[1].lapsed).any()
 
 
-def test_start__a_share_of_games_is_alone(start_distribution: StartDistribution) -> None:
+def test_start__a_share_of_the_games_has_one_player(start_distribution: StartDistribution) -> None:
     drawn = starts(replace(start_distribution, present_share=(1.0, 0.25)), 800)
     present = np.array([each.present for each in drawn])
     assert present[:, 0].all()
@@ -99,7 +93,7 @@ def test_start__has_noise_and_lapses_for_every_step(start_distribution: StartDis
 
 
 def place(line: list[tuple[float, float]], scale: float = 1.0) -> StartRange:
-    return StartRange(np.array(line), (0.0, 1.0), False, (0.0, 1.0), scale)
+    return StartRange(line=np.array(line), position_m=(0.0, 1.0), beside_ego=False, speed_mps=(0.0, 1.0), scale=scale)
 
 
 @pytest.mark.parametrize(
@@ -117,8 +111,8 @@ def test_pose__along_a_lane_that_bends(position: float, x: float, y: float, head
     assert pose == pytest.approx((x, y, heading))
 
 
-def test_pose__follows_sumos_own_metres() -> None:
-    # SUMO counts 40 m for a lane that is drawn 20 m long: 30 m of it are drawn at 15 m
+def test_pose__uses_sumos_lane_length() -> None:
+    # the lane has a length of 40 m in SUMO and a shape of 20 m: 30 m along the lane are 15 m along its shape
     assert place([(0.0, 0.0), (20.0, 0.0)], scale=0.5).pose(30.0, 4.0) == pytest.approx((13.0, 0.0, 0.0))
 
 
@@ -128,27 +122,27 @@ PARTS = st.lists(PART, min_size=1, max_size=4).map(tuple)
 
 @settings(max_examples=100)
 @given(PARTS, PARTS)
-def test_seed__differs_whenever_the_parts_do(one: tuple[str | int, ...], two: tuple[str | int, ...]) -> None:
+def test_seed__differs_for_different_parts(one: tuple[str | int, ...], two: tuple[str | int, ...]) -> None:
     assert (seed_of(*one) == seed_of(*two)) == (one == two)
     assert 0 <= seed_of(*one) < 2**63
 
 
-def test_seed__knows_a_number_from_its_digits_and_where_parts_end() -> None:
+def test_seed__distinguishes_numbers_from_text_and_the_ends_of_parts() -> None:
     assert len({seed_of("a", 1), seed_of("a", "1"), seed_of("a1"), seed_of("a", "", "1"), seed_of(1, "a")}) == 5
 
 
 def test_seed__is_the_same_in_every_process_and_release() -> None:
     # printf 'str:assessment\x1fint:1\x1fstr:episode\x1fint:7' | sha256sum  begins with  a3c78411fec693c7;
-    # another number here means that no old result can be repeated
-    written = bytes.fromhex("a3c78411fec693c7")
-    assert seed_of("assessment", 1, "episode", 7) == int.from_bytes(written, "little") >> 1
+    # with any other number, earlier results could not be repeated
+    digest = bytes.fromhex("a3c78411fec693c7")
+    assert seed_of("assessment", 1, "episode", 7) == int.from_bytes(digest, "little") >> 1
 
 
-def test_seed__takes_a_number_from_numpy_for_the_number_it_is() -> None:
+def test_seed__treats_numpy_integers_as_integers() -> None:
     assert seed_of("episode", np.int64(7)) == seed_of("episode", 7)
 
 
-def test_generator__does_not_hang_on_what_was_drawn_before() -> None:
-    wanted = generator_of("a", 2).random()
+def test_generator__does_not_depend_on_earlier_draws() -> None:
+    expected = generator_of("a", 2).random()
     generator_of("a", 1).random(100)
-    assert generator_of("a", 2).random() == wanted
+    assert generator_of("a", 2).random() == expected

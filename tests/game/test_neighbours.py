@@ -1,4 +1,4 @@
-"""Who is near a player, when to look again at who is not, and everyone in the row of their game."""
+"""Vehicles near a player, the step in which to read the others again, and rows of vehicles by game."""
 
 from __future__ import annotations
 
@@ -7,73 +7,80 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.game.neighbours import NOTICED_M, by_game, who_is_near
+from harness.game.neighbours import NOTICED_M, near_players, rows_by_game
 
 STEP_S, FASTEST_MPS = 0.1, 40.0
 
 
 def look(
-    away_m: list[float], length_m: float = 4.0, speed_mps: float = 60.0, there: bool = True, everyone: bool = False
+    distances_m: list[float],
+    length_m: float = 4.0,
+    speed_mps: float = 60.0,
+    present: bool = True,
+    all_vehicles: bool = False,
 ) -> tuple[list[int], list[int]]:
-    """Who is near of vehicles so far east of the first player of the second game, in step 100; and when each is due."""
-    count = len(away_m)
-    fronts = np.column_stack((np.array(away_m), np.full(count, 500.0)))
+    """Indices of the near vehicles, and the steps in which all are due again.
+
+    The vehicles are east of the first player of the second game, and the current step is 100.
+    """
+    count = len(distances_m)
+    fronts = np.column_stack((np.array(distances_m), np.full(count, 500.0)))
     due_in = np.full((2, count), 100)
     table = (np.full((2, count), length_m), np.full((2, count), speed_mps), np.array([0.0, 500.0]))
-    players = (np.zeros((2, 2)), np.zeros((2, 2)), np.array([[True, True], [there, False]]))
-    near = who_is_near(
-        np.arange(count, 2 * count), fronts, due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, everyone
+    players = (np.zeros((2, 2)), np.zeros((2, 2)), np.array([[True, True], [present, False]]))
+    near = near_players(
+        np.arange(count, 2 * count), fronts, due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, all_vehicles
     )
-    assert (fronts[:, 1] == 0.0).all()  # as the game has it
-    assert (due_in[0] == 100).all()  # the other game's are left alone
+    assert (fronts[:, 1] == 0.0).all()  # without the offset of the tile
+    assert (due_in[0] == 100).all()  # the other game is unchanged
     return near.tolist(), due_in[1].tolist()
 
 
-def test_near__is_who_may_have_its_middle_within_the_distance() -> None:
+def test_near__vehicles_may_have_their_centre_within_the_distance() -> None:
     near, _ = look([0.0, NOTICED_M, NOTICED_M + 4.0, NOTICED_M + 4.1])
     assert near == [0, 1, 2]
 
 
-def test_near__is_looked_at_again_in_the_next_step_and_others_when_they_may_have_come_near() -> None:
-    # 60 + 40 m/s close 10 m a step: 35 m to spare are over in the fourth step, 3 steps are safe
+def test_near__vehicles_are_due_in_the_next_step_and_others_when_they_may_have_come_near() -> None:
+    # 60 + 40 m/s close 10 m a step: 35 m take more than 3 steps
     assert look([10.0, NOTICED_M + 4.0 + 35.0, NOTICED_M + 4.0 + 5.0])[1] == [101, 103, 101]
 
 
-def test_near__nobody_waits_longer_than_the_longest_wait() -> None:
+def test_near__no_vehicle_waits_longer_than_the_longest_wait() -> None:
     assert look([1e6])[1] == [150]
-    assert look([1e6, 3.0], there=False) == ([], [150, 150])  # nobody is there whom they could come near to
+    assert look([1e6, 3.0], present=False) == ([], [150, 150])  # there is no player to come near to
 
 
-def test_near__is_everyone_where_games_are_recorded() -> None:
-    near, due = look([0.0, 1e6], everyone=True)
+def test_near__all_vehicles_if_games_are_recorded() -> None:
+    near, due = look([0.0, 1e6], all_vehicles=True)
     assert near == [0, 1]
     assert due[0] == 101
 
 
-@given(away=st.lists(st.floats(0.0, 3000.0), min_size=1, max_size=20), speed=st.floats(1.0, 60.0))
-def test_near__nobody_is_missed_however_fast_both_close(away: list[float], speed: float) -> None:
-    """Who waits has not come within the distance one step before the look is due."""
-    near, due = look(away, speed_mps=speed)
-    for k, each in enumerate(away):
+@given(distances=st.lists(st.floats(0.0, 3000.0), min_size=1, max_size=20), speed=st.floats(1.0, 60.0))
+def test_near__no_vehicle_is_missed_at_any_closing_speed(distances: list[float], speed: float) -> None:
+    """A waiting vehicle is not within the distance one step before it is due."""
+    near, due = look(distances, speed_mps=speed)
+    for k, each in enumerate(distances):
         if k not in near:
             assert each - (due[k] - 101) * STEP_S * (speed + FASTEST_MPS) > NOTICED_M
 
 
 @given(counts=st.lists(st.integers(0, 5), min_size=1, max_size=6))
-def test_rows__have_everyone_of_a_game_from_the_first_place_on(counts: list[int]) -> None:
+def test_rows__have_all_vehicles_of_a_game_from_the_first_place_on(counts: list[int]) -> None:
     games = np.repeat(np.arange(len(counts)), counts)
     values = np.arange(float(2 * len(games))).reshape(2, -1) + 1.0
-    spread, present = by_game(games, len(counts), values)
+    rows, present = rows_by_game(games, len(counts), values)
     assert present.sum(1).tolist() == counts
     assert present.shape[1] == max(counts)
     for column in range(2):
-        assert spread[column][present].tolist() == values[column].tolist()
-        assert not spread[column][~present].any()
+        assert rows[column][present].tolist() == values[column].tolist()
+        assert not rows[column][~present].any()
         for game, count in enumerate(counts):
             assert present[game, :count].all()
 
 
 def test_rows__one_of_the_second_game_and_two_of_the_third() -> None:
-    spread, present = by_game(np.array([1, 2, 2]), 3, np.array([[7.0, 8.0, 9.0]]))
-    assert spread[0] == pytest.approx(np.array([[0, 0], [7, 0], [8, 9]]))
+    rows, present = rows_by_game(np.array([1, 2, 2]), 3, np.array([[7.0, 8.0, 9.0]]))
+    assert rows[0] == pytest.approx(np.array([[0, 0], [7, 0], [8, 9]]))
     assert present.tolist() == [[False, False], [True, False], [True, True]]

@@ -1,4 +1,4 @@
-"""What a driver sees: always in [-1, 1], the same wherever on earth, and never more than a windscreen shows."""
+"""Observations: always in [-1, 1], independent of place and heading, and only what a driver can see."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_observation__of_a_car_on_the_merge_road(moment: Moment, world: World) -
         "lane_end_m": 0.4,  # 40 of 100 m
         "goal_m": 115.0 / 200.0,
         "path_turned_rad@0m": 0.0,
-        "path_left_m": 0.4,  # the way lies 3.2 of 8 m to the left
+        "path_left_m": 0.4,  # the route is 3.2 of 8 m to the left
         "free_left_m@0m": 4.8 / 8.0,
         "free_right_m@0m": -1.6 / 8.0,
         "free_left_m@20m": (3.2 - 0.9) / 8.0,  # the other car is there
@@ -97,7 +97,7 @@ PLAYER = st.builds(
 
 @settings(max_examples=80, deadline=None)
 @given(players=st.lists(PLAYER, min_size=2, max_size=2), others=st.lists(CAR, max_size=5))
-def test_observation__is_finite_and_within_bounds_whatever_happens(
+def test_observation__is_finite_and_within_bounds_for_all_states(
     moment: Moment, merge: OpenScene, players: list[dict[str, Any]], others: list[dict[str, Any]]
 ) -> None:
     entries = observe(moment(merge.world, players, others))
@@ -110,7 +110,7 @@ def test_observation__is_finite_and_within_bounds_whatever_happens(
             assert not entries[0, p].any()
 
 
-def test_observation__of_a_player_that_is_not_there_is_zeros(moment: Moment, world: World) -> None:
+def test_observation__of_an_absent_player_is_zeros(moment: Moment, world: World) -> None:
     q = moment(world, [car(40.0), car(44.0, -4.8, present=False)])
     assert not observe(q)[0, 1].any()
     assert seen(q)["other0_seen"] == 0.0
@@ -132,7 +132,7 @@ def test_free_width__is_narrowed_by_a_car_alongside_on_its_side(
     assert beside[f"free_{side}_m@30m"] == alone[f"free_{side}_m@30m"]
 
 
-def test_others__come_nearest_first(moment: Moment, world: World) -> None:
+def test_others__are_sorted_by_distance(moment: Moment, world: World) -> None:
     others = [car(90.0), car(62.0), car(40.0), car(75.0)]
     entries = seen(moment(world, [car(50.0), car(56.0, -4.8)], others))
     ahead = [entries[f"other{k}_ahead_m"] * 50.0 for k in range(OTHERS)]
@@ -148,7 +148,7 @@ def test_others__beyond_100_m_are_not_seen(moment: Moment, world: World) -> None
 
 
 def road(world: World, heading: float, x0: float, y0: float, left: float, right: float, lanes: list[float]) -> World:
-    """A straight road 200 m long from anywhere to anywhere."""
+    """A straight road of 200 m with any start and heading."""
     at = np.arange(-MARGIN_M, 200.0 + MARGIN_M, SPACING_M)
     n = len(at)
 
@@ -159,9 +159,17 @@ def road(world: World, heading: float, x0: float, y0: float, left: float, right:
     middle = line(0.0)
     ends = np.where(np.array(lanes) == 0.0, np.inf, 150.0)
     table = Route(
-        middle[:, 0], middle[:, 1], np.full(n, heading), np.full(n, left), np.full(n, right), np.full(n, 14.0),
-        np.tile(lanes, (n, 1)), np.tile(ends, (n, 1)), 200.0, 180.0,
-    )  # fmt: skip
+        x_m=middle[:, 0],
+        y_m=middle[:, 1],
+        heading_rad=np.full(n, heading),
+        left_edge_m=np.full(n, left),
+        right_edge_m=np.full(n, right),
+        speed_limit_mps=np.full(n, 14.0),
+        lane_offset_m=np.tile(lanes, (n, 1)),
+        lane_end_m=np.tile(ends, (n, 1)),
+        length_m=200.0,
+        goal_m=180.0,
+    )
     rails = np.concatenate([np.stack((line(side)[:-1:20], line(side)[1::20]), axis=1) for side in (left, right)])
     return replace(world, road=Road(Rails.of(rails, 20.0), Routes.of([table, table])))
 
@@ -200,7 +208,7 @@ DRIVEN = st.builds(lambda body, wheel: {**body, "steering_rad": wheel}, ON_ROAD,
     x0=st.floats(-300.0, 300.0),
     y0=st.floats(-300.0, 300.0),
 )
-def test_observation__is_the_same_wherever_the_road_lies(
+def test_observation__does_not_depend_on_the_place_of_the_road(
     moment: Moment,
     merge: OpenScene,
     players: list[dict[str, Any]],
@@ -210,7 +218,7 @@ def test_observation__is_the_same_wherever_the_road_lies(
     y0: float,
 ) -> None:
     sides = sorted(each["y_m"] for each in [*players, *others])
-    assume(min(np.diff(sides)) > 0.01)  # who is exactly ahead is on neither side
+    assume(min(np.diff(sides)) > 0.01)  # a vehicle exactly ahead has no side
     here = road(merge.world, 0.0, 0.0, 0.0, 1.6, -4.8, [0.0, -3.2])
     there = road(merge.world, heading, x0, y0, 1.6, -4.8, [0.0, -3.2])
     one = observe(moment(here, players, others))
@@ -225,7 +233,7 @@ def test_observation__of_the_mirror_image_is_the_mirror_image(
     moment: Moment, merge: OpenScene, players: list[dict[str, Any]], others: list[dict[str, Any]]
 ) -> None:
     sides = sorted(each["y_m"] for each in [*players, *others])
-    assume(min(np.diff(sides)) > 0.01)  # who is exactly ahead is on neither side
+    assume(min(np.diff(sides)) > 0.01)  # a vehicle exactly ahead has no side
     one = observe(moment(road(merge.world, 0.0, 0.0, 0.0, 1.6, -4.8, [0.0, -3.2]), players, others))
     image = road(merge.world, 0.0, 0.0, 0.0, 4.8, -1.6, [0.0, 3.2])
     two = observe(moment(image, [mirrored(each) for each in players], [mirrored(each) for each in others]))
@@ -239,20 +247,20 @@ def test_observation__of_the_mirror_image_is_the_mirror_image(
 
 
 def close_but_for_ties(one: FloatArray, two: FloatArray) -> bool:
-    """Whether observations agree, leaving out the few entries that jump where a car just enters a stretch of road."""
+    """Whether observations agree, except for a few entries that jump when a car enters a bin of the road."""
     return bool((np.abs(one - two) > 1e-3).mean() <= 0.02)
 
 
-# --- no more than a driver could see ---------------------------------------------------------------------------------
+# --- only what a driver can see --------------------------------------------------------------------------------------
 
 
-def test_observation__does_not_show_the_others_hands_or_mind(moment: Moment, world: World) -> None:
+def test_observation__does_not_show_controls_or_lapses_of_others(moment: Moment, world: World) -> None:
     plain = moment(world, [car(50.0), car(56.0, -4.8)])
     busy = moment(world, [car(50.0), car(56.0, -4.8, steering_rad=0.3, acceleration_mps2=2.0, lapsed=True)])
     assert (observe(plain)[0, 0] == observe(busy)[0, 0]).all()
 
 
-def test_observation__shows_a_wreck_as_what_stands_there(moment: Moment, world: World) -> None:
+def test_observation__shows_a_wreck_as_a_stationary_vehicle(moment: Moment, world: World) -> None:
     wreck = moment(world, [car(50.0), car(70.0, speed_mps=0.0, outcome=Outcome.RAIL)])
     parked = moment(world, [car(50.0), car(10.0, -4.8)], [car(70.0, speed_mps=0.0)])
     assert seen(wreck)["other0_ahead_m"] == pytest.approx(0.4)
@@ -260,14 +268,16 @@ def test_observation__shows_a_wreck_as_what_stands_there(moment: Moment, world: 
     assert seen(parked)["other0_ahead_m"] == seen(wreck)["other0_ahead_m"]
 
 
-def test_observation__who_overlooks_sees_nobody_beside_or_behind(moment: Moment, world: World) -> None:
+def test_observation__without_a_blind_spot_check_vehicles_beside_and_behind_are_missing(
+    moment: Moment, world: World
+) -> None:
     players = [car(50.0, unseen_behind_m=1.0), car(50.9, -4.8)]
-    overlooked, looked = moment(world, players), moment(world, [car(50.0), car(50.9, -4.8)])
-    assert seen(overlooked)["other0_seen"] == 0.0
-    assert seen(overlooked)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
-    assert seen(looked)["other0_seen"] == 1.0
-    assert overlooked.touches_vehicle[0, 0] == looked.touches_vehicle[0, 0]  # what is not seen is there all the same
+    unchecked, checked = moment(world, players), moment(world, [car(50.0), car(50.9, -4.8)])
+    assert seen(unchecked)["other0_seen"] == 0.0
+    assert seen(unchecked)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
+    assert seen(checked)["other0_seen"] == 1.0
+    assert unchecked.touches_vehicle[0, 0] == checked.touches_vehicle[0, 0]  # contact does not depend on sight
 
 
-def test_observation__who_overlooks_sees_whoever_is_ahead(moment: Moment, world: World) -> None:
+def test_observation__without_a_blind_spot_check_vehicles_ahead_are_seen(moment: Moment, world: World) -> None:
     assert seen(moment(world, [car(50.0, unseen_behind_m=1.0), car(51.1, -4.8)]))["other0_seen"] == 1.0

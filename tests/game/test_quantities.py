@@ -1,6 +1,6 @@
-"""What can be said of the players at one moment, on the merge road and on a road that turns, by hand.
+"""The quantities of one moment by hand, on the merge road and on a road with a bend.
 
-On the merge road lane 1 (y = -1.6) goes on, lane 0 (y = -4.8) ends at 100 m; cars are 4.6 m by 1.8 m.
+On the merge road lane 1 (y = -1.6) continues and lane 0 (y = -4.8) ends at 100 m. Cars are 4.6 m by 1.8 m.
 """
 
 from __future__ import annotations
@@ -27,22 +27,22 @@ def world(merge: OpenScene) -> World:
 
 
 def turning(world: World, radius_m: float, turned_rad: float) -> World:
-    """The same cars on a road that goes 20 m east from the origin, then round a left bend, then straight on."""
+    """The same cars on a road of 20 m to the east from the origin, a left bend, and a straight."""
     at = np.arange(-MARGIN_M, 150.0 + MARGIN_M, SPACING_M)
     turned = np.clip((at - 20.0) / radius_m, 0.0, turned_rad)
     beyond = np.maximum(at - 20.0 - radius_m * turned_rad, 0.0)
     n = len(at)
     route = Route(
-        np.minimum(at, 20.0) + radius_m * np.sin(turned) + beyond * np.cos(turned_rad),
-        radius_m * (1.0 - np.cos(turned)) + beyond * np.sin(turned_rad),
-        turned,
-        np.full(n, 1.6),
-        np.full(n, -1.6),
-        np.full(n, 10.0),
-        np.zeros((n, 1)),
-        np.full((n, 1), np.inf),
-        150.0,
-        100.0,
+        x_m=np.minimum(at, 20.0) + radius_m * np.sin(turned) + beyond * np.cos(turned_rad),
+        y_m=radius_m * (1.0 - np.cos(turned)) + beyond * np.sin(turned_rad),
+        heading_rad=turned,
+        left_edge_m=np.full(n, 1.6),
+        right_edge_m=np.full(n, -1.6),
+        speed_limit_mps=np.full(n, 10.0),
+        lane_offset_m=np.zeros((n, 1)),
+        lane_end_m=np.full((n, 1), np.inf),
+        length_m=150.0,
+        goal_m=100.0,
     )
     rails = Rails.of(np.zeros((0, 2, 2)), 20.0)
     return replace(world, road=Road(rails, Routes.of([route, route])))
@@ -56,7 +56,7 @@ def bend(world: World) -> World:
 
 @pytest.fixture(scope="module")
 def hairpin(world: World) -> World:
-    """A hairpin of 4 m radius: the way back lies 8 m north of the way there."""
+    """A hairpin of 4 m radius: the road returns 8 m to the north."""
     return turning(world, 4.0, np.pi)
 
 
@@ -81,27 +81,27 @@ def test_leader_gap__is_to_the_nearest_of_several(moment: Moment, world: World) 
     assert q.leader_gap_m[0] == pytest.approx([15.4, 10.4])  # 20 - 4.6; and the ego leads the other at 15 - 4.6
 
 
-def test_leader_gap__a_car_in_the_next_lane_leads_nobody(moment: Moment, world: World) -> None:
+def test_leader_gap__a_car_in_the_next_lane_is_no_leader(moment: Moment, world: World) -> None:
     assert moment(world, [car(20.0), car(40.0, LANE_0_M)]).leader_gap_m[0].tolist() == [np.inf, np.inf]
 
 
-def test_leader_gap__a_car_half_way_in_the_lane_leads(moment: Moment, world: World) -> None:
+def test_leader_gap__a_car_partly_in_the_lane_is_a_leader(moment: Moment, world: World) -> None:
     # lateral distance 1.7 m, less than 0.9 + 0.9 m of half widths
     assert moment(world, [car(20.0), car(40.0, -3.3)]).leader_gap_m[0, 0] == pytest.approx(15.4)
     assert moment(world, [car(20.0), car(40.0, -3.5)]).leader_gap_m[0, 0] == np.inf
 
 
-def test_leader_gap__a_car_across_the_lane_takes_less_of_its_length(moment: Moment, world: World) -> None:
+def test_leader_gap__uses_the_extent_of_a_car_across_the_lane(moment: Moment, world: World) -> None:
     q = moment(world, [car(20.0), car(40.0, heading_rad=np.pi / 2)])
     assert q.leader_gap_m[0, 0] == pytest.approx(20.0 - 2.3 - 0.9)
 
 
-def test_leader_gap__beyond_sight_nobody_leads(moment: Moment, world: World) -> None:
+def test_leader_gap__a_car_beyond_sight_is_no_leader(moment: Moment, world: World) -> None:
     q = moment(world, [car(20.0), car(80.5)])
     assert q.leader_gap_m[0, 0] == np.inf
 
 
-def test_leader_gap__never_is_negative(moment: Moment, world: World) -> None:
+def test_leader_gap__is_never_negative(moment: Moment, world: World) -> None:
     assert moment(world, [car(20.0), car(22.0)]).leader_gap_m[0, 0] == 0.0
 
 
@@ -111,15 +111,15 @@ def test_leader_gap__follows_the_bend(moment: Moment, bend: World) -> None:
     assert q.leader_gap_m[0, 0] == pytest.approx(15.0 * np.pi / 2 + 5.0 - 4.6, abs=0.5)
 
 
-def test_leader_gap__a_car_ahead_leads_though_the_road_comes_back_beside_it(moment: Moment, hairpin: World) -> None:
-    # 50 m ahead of the player the road has come back to (10.57, 8): abreast of the leader at (10.6, 0)
+def test_leader_gap__a_car_ahead_is_the_leader_where_the_road_returns_beside_it(moment: Moment, hairpin: World) -> None:
+    # 50 m ahead of the player the road has returned to (10.57, 8), beside the leader at (10.6, 0)
     q = moment(hairpin, [car(-8.0, 0.0), car(10.6, 0.0)])
     assert q.leader_gap_m[0, 0] == pytest.approx(18.6 - 4.6, abs=0.01)
 
 
-def test_leader_gap__an_oncoming_car_beside_leads_nobody(moment: Moment, hairpin: World) -> None:
+def test_leader_gap__an_oncoming_car_beside_is_no_leader(moment: Moment, hairpin: World) -> None:
     q = moment(hairpin, [car(-8.0, 0.0), car(10.6, 8.0, heading_rad=np.pi)], [car(5.0, 4.0)])
-    assert q.leader_gap_m[0, 0] == pytest.approx(50.0 - 4.6, abs=0.1)  # only where the way back gets to it
+    assert q.leader_gap_m[0, 0] == pytest.approx(50.0 - 4.6, abs=0.1)  # 50 m ahead, where the road has returned
 
 
 def test_time_gap__is_the_gap_over_own_speed(moment: Moment, world: World) -> None:
@@ -137,7 +137,7 @@ def test_time_gap__of_a_car_that_stands_is_finite(moment: Moment, world: World) 
 
 def test_time_to_collision__behind_a_slower_car(moment: Moment, world: World) -> None:
     q = moment(world, [car(20.0, speed_mps=14.0), car(50.0, speed_mps=9.0)])
-    assert q.time_to_collision_s[0] == pytest.approx([25.4 / 5.0, 25.4 / 5.0])  # for both: it takes two
+    assert q.time_to_collision_s[0] == pytest.approx([25.4 / 5.0, 25.4 / 5.0])  # the same for both
 
 
 def test_time_to_collision__never_behind_a_faster_car_or_beside_one(moment: Moment, world: World) -> None:
@@ -160,7 +160,7 @@ def test_clearance__to_a_vehicle_beside(moment: Moment, world: World) -> None:
     assert q.clearance_m[0] == pytest.approx([0.7, 0.7], abs=0.02)
 
 
-def test_clearance__is_not_known_beyond_its_reach(moment: Moment, world: World) -> None:
+def test_clearance__is_limited_to_its_reach(moment: Moment, world: World) -> None:
     q = moment(world, [car(20.0), car(80.0)])
     assert q.vehicle_clearance_m[0].tolist() == [REACH_M, REACH_M]
 
@@ -180,33 +180,33 @@ def test_touches_vehicle__when_they_overlap(moment: Moment, world: World) -> Non
     assert q.time_to_collision_s[0].tolist() == [0.0, 0.0]
 
 
-# --- who is there ----------------------------------------------------------------------------------------------------
+# --- visibility ------------------------------------------------------------------------------------------------------
 
 
-def test_visible__nobody_sees_itself(moment: Moment, world: World) -> None:
+def test_visible__excludes_the_player_itself(moment: Moment, world: World) -> None:
     assert moment(world, [car(20.0), car(50.0)]).visible[0].tolist() == [[False, True], [True, False]]
 
 
-def test_visible__a_player_that_left_neither_sees_nor_is_seen(moment: Moment, world: World) -> None:
+def test_visible__excludes_a_player_that_left(moment: Moment, world: World) -> None:
     q = moment(world, [car(20.0), car(30.0, **GONE)], [car(60.0)])
     assert q.visible[0].tolist() == [[False, False, True], [False, False, False]]
     assert q.leader_gap_m[0].tolist() == pytest.approx([35.4, np.inf])
     assert q.vehicle_clearance_m[0, 0] == REACH_M
 
 
-def test_visible__a_wreck_stays_in_the_way(moment: Moment, world: World) -> None:
+def test_visible__includes_a_wreck(moment: Moment, world: World) -> None:
     q = moment(world, [car(20.0), car(50.0, **WRECKED)])
     assert q.visible[0, 0, 1]
     assert q.leader_gap_m[0, 0] == pytest.approx(25.4)
     assert q.time_to_collision_s[0, 0] == pytest.approx(2.54)
 
 
-def test_visible__another_road_user_that_is_not_there_yet_is_not(moment: Moment, world: World) -> None:
+def test_visible__excludes_a_background_vehicle_that_is_not_present(moment: Moment, world: World) -> None:
     q = moment(world, [car(20.0), car(30.0, LANE_0_M)], [car(40.0, present=False)])
     assert q.leader_gap_m[0, 0] == np.inf
 
 
-# --- the way ---------------------------------------------------------------------------------------------------------
+# --- route -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -221,7 +221,7 @@ def test_lane__offset_and_end_are_of_the_nearest(
     assert q.lane_end_m[0, 0] == pytest.approx(lane_end, abs=1e-6)
 
 
-def test_lane_end__once_passed_is_no_longer_ahead(moment: Moment, world: World) -> None:
+def test_lane_end__is_infinite_after_the_end(moment: Moment, world: World) -> None:
     assert moment(world, [car(120.0), car(10.0)]).lane_end_m[0, 0] == np.inf
 
 
@@ -236,11 +236,11 @@ def test_speed_over_limit__is_a_share_of_it(moment: Moment, world: World) -> Non
 
 def test_path__looks_along_the_bend(moment: Moment, bend: World) -> None:
     q = moment(bend, [car(0.0, 0.0), car(5.0, 0.0)])
-    # 0, 5, 10, 20 m ahead are straight on; 30 m ahead are 10 m into a bend of 15 m radius; 50 m are beyond it
+    # 0, 5, 10, 20 m ahead are straight; 30 m ahead is 10 m into a bend of 15 m radius; 50 m ahead is beyond it
     assert q.path.heading_rad[0, 0, 2:] == pytest.approx([0.0, 0.0, 0.0, 0.0, 10.0 / 15.0, np.pi / 2], abs=0.02)
 
 
-def test_games__do_not_see_each_other(moment: Moment, world: World) -> None:
+def test_games__are_independent(moment: Moment, world: World) -> None:
     one, two = moment(world, [car(20.0), car(30.0)]), moment(world, [car(70.0), car(90.0, LANE_0_M)])
     state, bodies = one.state.copy(), one.bodies
     for name, values in vars(state).items():
@@ -253,7 +253,7 @@ def test_games__do_not_see_each_other(moment: Moment, world: World) -> None:
         assert getattr(q, name) == pytest.approx(expected)
 
 
-def test_leader_gap__does_not_hang_on_where_the_routes_stations_lie(moment: Moment, world: World) -> None:
-    # bumper to bumper: 20 m between centres less a car of 4.6 m, wherever on the road (stations lie 0.5 m apart)
+def test_leader_gap__does_not_depend_on_the_route_stations(moment: Moment, world: World) -> None:
+    # bumper to bumper: 20 m between centres less a car of 4.6 m, everywhere on the road (stations are 0.5 m apart)
     for x in (50.0, 50.1, 50.25, 50.3, 50.49):
         assert moment(world, [car(x), car(x + 20.0)]).leader_gap_m[0, 0] == pytest.approx(15.4, abs=1e-9)

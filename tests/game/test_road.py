@@ -1,4 +1,4 @@
-"""Finding a player on its route and the rails around a point."""
+"""Location of players on their routes, and look-up of rails near a point."""
 
 from __future__ import annotations
 
@@ -14,9 +14,17 @@ from harness.game.road import MARGIN_M, SPACING_M, Rails, Route, Routes
 def route(x: FloatArray, y: FloatArray, heading: FloatArray, length: float, lanes: int = 1) -> Route:
     n = len(x)
     return Route(
-        x, y, heading, np.full(n, 3.0), np.full(n, -3.0), np.full(n, 13.0),
-        np.zeros((n, lanes)), np.full((n, lanes), np.inf), length, length - 5.0,
-    )  # fmt: skip
+        x_m=x,
+        y_m=y,
+        heading_rad=heading,
+        left_edge_m=np.full(n, 3.0),
+        right_edge_m=np.full(n, -3.0),
+        speed_limit_mps=np.full(n, 13.0),
+        lane_offset_m=np.zeros((n, lanes)),
+        lane_end_m=np.full((n, lanes), np.inf),
+        length_m=length,
+        goal_m=length - 5.0,
+    )
 
 
 def straight(heading: float, length: float = 80.0, lanes: int = 1, x0: float = 0.0, y0: float = 0.0) -> Route:
@@ -26,7 +34,7 @@ def straight(heading: float, length: float = 80.0, lanes: int = 1, x0: float = 0
 
 
 def arc(radius: float, length: float = 60.0) -> Route:
-    """From the origin, facing east, round a circle to the left (to the right: negative radius), straight beyond."""
+    """A circular arc from the origin, to the east and then left (negative radius: right), straight at both ends."""
     stations = np.arange(-MARGIN_M, length + MARGIN_M + SPACING_M, SPACING_M)
     within = np.clip(stations, 0.0, length)
     turned, beyond = within / radius, stations - within
@@ -56,7 +64,7 @@ def test_locate__on_a_straight_road(heading: float) -> None:
     assert offset[0] == pytest.approx(1.2, abs=1e-9)
 
 
-def test_locate__goes_on_before_the_start_and_beyond_the_end() -> None:
+def test_locate__works_before_the_start_and_beyond_the_end() -> None:
     station, offset = locate(Routes.of([straight(0.0), straight(0.0)]), [(-7.3, 0.4), (103.1, -2.0)], [-5.0, 100.0])
     assert station == pytest.approx([-7.3, 103.1])
     assert offset == pytest.approx([0.4, -2.0])
@@ -69,14 +77,14 @@ def test_locate__goes_on_before_the_start_and_beyond_the_end() -> None:
     inside=st.floats(-0.9, 0.6),
     moved=st.floats(-1.0, 3.0),
 )
-def test_locate__on_a_curve_is_right_to_the_centimetre(
+def test_locate__on_a_curve_is_exact_to_a_centimetre(
     radius: float, station: float, inside: float, moved: float
 ) -> None:
     offset = np.sign(radius) * min(abs(radius), 10.0) * inside  # up to 9 m to the outside, 6 m to the inside
     point = on_arc(radius, station, float(offset))
-    found, beside = locate(Routes.of([arc(radius)]), [point], [station - moved])
+    found, found_offset = locate(Routes.of([arc(radius)]), [point], [station - moved])
     assert found[0] == pytest.approx(station, abs=0.01)
-    assert beside[0] == pytest.approx(offset, abs=0.01)
+    assert found_offset[0] == pytest.approx(offset, abs=0.01)
 
 
 def test_locate__every_player_has_its_own_route() -> None:
@@ -86,7 +94,7 @@ def test_locate__every_player_has_its_own_route() -> None:
     assert offset == pytest.approx([1.0, -2.0, 0.5], abs=0.01)
     assert routes.goal_m.tolist() == [35.0, 55.0, 85.0]
     assert routes.lane_offset_m.shape[1] == 3
-    assert np.isnan(routes.lane_offset_m[routes.first_row[0], 1:]).all()  # the first has but one lane
+    assert np.isnan(routes.lane_offset_m[routes.first_row[0], 1:]).all()  # the first route has one lane
 
 
 def test_locate__follows_a_car_round_a_hairpin() -> None:
@@ -97,7 +105,7 @@ def test_locate__follows_a_car_round_a_hairpin() -> None:
         assert station == pytest.approx(true, abs=0.02)
 
 
-def test_find__a_player_of_which_nothing_is_known() -> None:
+def test_find__needs_no_previous_station() -> None:
     routes = Routes.of([straight(0.0), arc(20.0)])
     points = np.array([(33.3, 2.0), on_arc(20.0, 41.2, 1.0)])
     assert routes.find(*points.T[:, None])[0] == pytest.approx([33.3, 41.2], abs=SPACING_M / 2)
@@ -116,7 +124,7 @@ SEGMENTS = st.lists(st.tuples(POINT, POINT), min_size=1, max_size=12)
 
 @settings(max_examples=60, deadline=None)
 @given(segments=SEGMENTS, points=st.lists(POINT, min_size=1, max_size=8), reach=st.sampled_from([5.0, 20.0]))
-def test_rails__every_segment_within_reach_is_found(
+def test_rails__all_segments_within_reach_are_found(
     segments: list[tuple[tuple[float, float], tuple[float, float]]],
     points: list[tuple[float, float]],
     reach: float,
@@ -137,13 +145,13 @@ def distance(point: FloatArray, segment: FloatArray) -> float:
     return float(np.linalg.norm(point - start - share * span))
 
 
-def test_rails__there_may_be_none() -> None:
+def test_rails__may_be_empty() -> None:
     rails = Rails.of(np.zeros((0, 2, 2)), 20.0)
     near = rails.near(np.array([[0.0, 500.0]]), np.array([[0.0, -500.0]]))
-    assert (np.abs(rails.segments[near]) > 1e5).all()  # nothing but the far-away filler
+    assert (np.abs(rails.segments[near]) > 1e5).all()  # only the padding
 
 
-def test_rails__far_from_all_of_them_is_no_error() -> None:
+def test_rails__a_point_far_away_is_no_error() -> None:
     rails = Rails.of(np.array([[[0.0, 0.0], [10.0, 0.0]]]), 20.0)
     for place in (1e4, -1e4, np.inf, np.nan):
         assert rails.near(np.array([[place]]), np.array([[place]])).shape[:2] == (1, 1)

@@ -1,4 +1,4 @@
-"""Numbers that can't be right: each is injected where it would come from, and found in the step in which it appears."""
+"""Invalid numbers: each is injected at its source and reported in the step in which it occurs."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ from tests.support.scenes import build_scene, drawn
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign
 from tests.support.trainings import in_one_go, naive_ego
 
-STEP = 5  # in which something goes wrong
+STEP = 5  # the step with a fault
 
 
 class Misbehaving(Steady):
-    """Decides what it should not in the fifth step of every second game it begins."""
+    """Makes an invalid decision in the fifth step of every second game."""
 
     def __init__(self, decision: Callable[[FloatArray], Any]) -> None:
         self._decision, self._games, self._steps = decision, 0, 0
@@ -74,10 +74,10 @@ DECISIONS: dict[str, tuple[Callable[[FloatArray], Any], str]] = {
     "a game too many": (lambda steady: np.zeros((2, 2)), r"decided an array of shape \[2, 2\], not \[1, 2\]"),
     "an action too many": (lambda steady: np.zeros((1, 3)), r"decided an array of shape \[1, 3\], not \[1, 2\]"),
     "nothing": (lambda steady: None, r"decided an array of shape \[\]"),
-    "words": (lambda steady: [["full", "left"]], r"decided \[\['full', 'left'\]\], no numbers,"),
-    "ragged": (lambda steady: [[0.0, 0.0], [0.0]], r"decided \[\[0.0, 0.0\], \[0.0\]\], no numbers,"),
+    "words": (lambda steady: [["full", "left"]], r"decided \[\['full', 'left'\]\], which are not numbers,"),
+    "ragged": (lambda steady: [[0.0, 0.0], [0.0]], r"decided \[\[0.0, 0.0\], \[0.0\]\], which are not numbers,"),
 }
-each_decision = pytest.mark.parametrize(("decision", "said"), DECISIONS.values(), ids=DECISIONS)
+each_decision = pytest.mark.parametrize(("decision", "expected"), DECISIONS.values(), ids=DECISIONS)
 
 
 # --- drivers ----------------------------------------------------------------------------------------------------------
@@ -85,7 +85,7 @@ each_decision = pytest.mark.parametrize(("decision", "said"), DECISIONS.values()
 
 @each_decision
 def test_driver__that_misbehaves_is_an_error_row_with_driver_and_step(
-    decision: Callable[[FloatArray], Any], said: str, merge: OpenScene
+    decision: Callable[[FloatArray], Any], expected: str, merge: OpenScene
 ) -> None:
     games = play(arm(merge, SumoDriver(), Misbehaving(decision)), 4)
     unharmed = play(arm(merge, SumoDriver(), Steady()), 4)
@@ -93,7 +93,7 @@ def test_driver__that_misbehaves_is_an_error_row_with_driver_and_step(
     assert records(games[::2]) == records(unharmed[::2])
     for game in games[1::2]:
         assert game.record["ego_outcome"] == "error"
-        pattern = rf"ImpossibleNumber: the driver of non_ego, Misbehaving, {said}.* in step {STEP}\b"
+        pattern = rf"ImpossibleNumber: the driver of non_ego, Misbehaving, {expected}.* in step {STEP}\b"
         assert re.match(pattern, game.record["error"]), game.record["error"]
         assert game.trace is None
 
@@ -107,22 +107,22 @@ def test_opponent__that_misbehaves_ends_a_training_with_driver_and_step(
     decision, _ = DECISIONS[name]
 
     class AfterAWhile(Steady):
-        asked = count(1)
+        calls = count(1)
 
         def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> Any:
             steady = super().decide(games, observation, noise)
-            return decision(steady) if next(self.asked) == STEP else steady
+            return decision(steady) if next(self.calls) == STEP else steady
 
-    said = rf"the driver of non_ego, AfterAWhile, decided .* in step {STEP} of game \d, after \d+ steps"
-    with pytest.raises(FloatingPointError, match=said):
+    expected = rf"the driver of non_ego, AfterAWhile, decided .* in step {STEP} of game \d, after \d+ steps"
+    with pytest.raises(FloatingPointError, match=expected):
         in_one_go(replace(naive_ego(merge), opponent=AfterAWhile(), alone_share=0.0), tmp_path)
     assert not (tmp_path / "checkpoint.safetensors").exists()
 
 
-def test_driver__at_the_bounds_is_in_order(merge: OpenScene) -> None:
+def test_driver__may_decide_the_bounds(merge: OpenScene) -> None:
     class Flat(Steady):
         def decide(self, games: IntArray, *_: Any) -> Any:
-            return [[1, -1]] * len(games)  # whole numbers in lists are actions as well
+            return [[1, -1]] * len(games)  # lists of integers are valid actions
 
     (game,) = play(arm(merge, Flat(), None), 1)
     assert not game.record["error"]
@@ -131,29 +131,32 @@ def test_driver__at_the_bounds_is_in_order(merge: OpenScene) -> None:
 # --- payoffs ----------------------------------------------------------------------------------------------------------
 
 
-def broken(quantity: Any, value: float) -> property:
-    """A quantity that is wrong from the fifth step on."""
+def faulty(quantity: Any, value: float) -> property:
+    """A quantity with an invalid value from the fifth step on."""
     return property(lambda q: np.where(q.state.step[:, None] >= STEP, value, quantity.__get__(q, Quantities)))
 
 
 @pytest.mark.parametrize("value", [np.nan, -np.inf])
-def test_payoff__that_is_no_number_is_an_error_row_with_step(
+def test_payoff__that_is_not_finite_is_an_error_row_with_step(
     value: float, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(Quantities, "lane_offset_m", broken(Quantities.lane_offset_m, value))
+    monkeypatch.setattr(Quantities, "lane_offset_m", faulty(Quantities.lane_offset_m, value))
     assessed = arm(merge, Steady(), SumoDriver())
     assert "lane_offset" in {term.name for term in assessed.personas[EGO].payoff.terms}
     (game,) = play(assessed, 1)
     assert re.match(rf"ImpossibleNumber: the payoff of ego is (nan|inf) in step {STEP}$", game.record["error"])
 
 
-def test_payoff__a_fuzzy_term_does_not_make_a_number_of_what_is_none() -> None:
-    sets = (FuzzySet("near", (0.0, 1.0), (1.0, 0.0), -1.0), FuzzySet("far", (0.0, 1.0), (0.0, 1.0), 2.0))
+def test_payoff__a_fuzzy_term_keeps_nan() -> None:
+    sets = (
+        FuzzySet(name="near", inputs=(0.0, 1.0), memberships=(1.0, 0.0), value=-1.0),
+        FuzzySet(name="far", inputs=(0.0, 1.0), memberships=(0.0, 1.0), value=2.0),
+    )
     values = FuzzyFunction("clearance_m", sets)(np.array([np.nan, 0.5, np.inf, -np.inf]))
     assert np.array_equal(values, [np.nan, 0.5, 2.0, -1.0], equal_nan=True)
 
 
-def test_payoff__that_is_no_number_fails_a_training_stage_by_name(
+def test_payoff__that_is_not_finite_fails_a_training_stage_by_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     campaign = open_campaign(write_campaign(tmp_path))
@@ -162,9 +165,9 @@ def test_payoff__that_is_no_number_fails_a_training_stage_by_name(
     folder.keep_scene(MERGE, ("scene.toml", "merge.net.xml", "merge.rou.xml"))
     stages = plan(campaign.document, ["speedy"])
     keys = stage_keys(campaign, stages)
-    monkeypatch.setattr(Quantities, "lane_offset_m", broken(Quantities.lane_offset_m, np.nan))
-    said = rf"^naive-seed1: the payoff of ego is nan in step {STEP} of game 0, after \d+ steps$"
-    with pytest.raises(StageFailed, match=said):
+    monkeypatch.setattr(Quantities, "lane_offset_m", faulty(Quantities.lane_offset_m, np.nan))
+    expected = rf"^naive-seed1: the payoff of ego is nan in step {STEP} of game 0, after \d+ steps$"
+    with pytest.raises(StageFailed, match=expected):
         carry_out(stages[0], run_context_of(campaign, folder, keys), lambda done, total: None)
     assert folder.finished(stages[0].id, keys[stages[0].id]) is None
     assert not folder.policy(stages[0].id).exists()
@@ -173,31 +176,31 @@ def test_payoff__that_is_no_number_fails_a_training_stage_by_name(
 # --- motion -----------------------------------------------------------------------------------------------------------
 
 
-def carried_on_by_sumo(monkeypatch: pytest.MonkeyPatch, far_m: float) -> None:
-    """In the fifth step of every second game SUMO itself moves its non-ego so much farther along its lane."""
+def displace_in_sumo(monkeypatch: pytest.MonkeyPatch, far_m: float) -> None:
+    """In the fifth step of every second game SUMO moves its non-ego by an extra distance along its lane."""
     steps = {"now": 0, "games": 0}
-    begin, step = LibsumoSimulation.reset, LibsumoSimulation.step
+    reset, step = LibsumoSimulation.reset, LibsumoSimulation.step
 
-    def restarted(simulation: LibsumoSimulation, *arguments: Any) -> None:
+    def counted_reset(simulation: LibsumoSimulation, *arguments: Any) -> None:
         steps.update(now=0, games=steps["games"] + 1)
-        begin(simulation, *arguments)
+        reset(simulation, *arguments)
 
-    def stepped(simulation: LibsumoSimulation, *poses: FloatArray) -> Any:
+    def displaced_step(simulation: LibsumoSimulation, *poses: FloatArray) -> Any:
         steps["now"] += 1
         if steps["now"] == STEP and steps["games"] % 2 == 0:
             vehicle = libsumo.vehicle
             vehicle.moveTo("non_ego", vehicle.getLaneID("non_ego"), vehicle.getLanePosition("non_ego") + far_m)
         return step(simulation, *poses)
 
-    monkeypatch.setattr(LibsumoSimulation, "reset", restarted)
-    monkeypatch.setattr(LibsumoSimulation, "step", stepped)
+    monkeypatch.setattr(LibsumoSimulation, "reset", counted_reset)
+    monkeypatch.setattr(LibsumoSimulation, "step", displaced_step)
 
 
-def test_motion__a_player_that_sumo_carries_off_is_an_error_row_with_step_and_distance(
+def test_motion__a_player_that_sumo_displaces_is_an_error_row_with_step_and_distance(
     road: OpenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     unharmed = play(arm(road, Steady(), SumoDriver()), 4)
-    carried_on_by_sumo(monkeypatch, 50.0)
+    displace_in_sumo(monkeypatch, 50.0)
     games = play(arm(road, Steady(), SumoDriver()), 4)
     assert records(games[::2]) == records(unharmed[::2])
     for game in games[1::2]:
@@ -210,23 +213,23 @@ def test_motion__a_player_that_sumo_carries_off_is_an_error_row_with_step_and_di
         assert moved_m == pytest.approx(50.0 + 0.1 * speed_mps, abs=0.02)
 
 
-def test_motion__a_training_fails_where_sumo_carries_a_player_off(
+def test_motion__a_training_fails_if_sumo_displaces_a_player(
     road: OpenScene,
     merge: OpenScene,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    carried_on_by_sumo(monkeypatch, 50.0)
+    displace_in_sumo(monkeypatch, 50.0)
     alone = naive_ego(merge)
-    one = alone.settings.model_copy(update={"games": 1})  # of two: SB3 asks for more than one step at a time
+    one = alone.settings.model_copy(update={"games": 1})  # of two: SB3 needs more than one step per rollout
     spec = replace(alone, scene=road, opponent=SumoDriver(), alone_share=0.0, settings=one)
     with pytest.raises(FloatingPointError, match=rf"non_ego moved 5\d\.\d+ m in step {STEP}, .* after \d+ steps"):
         in_one_go(spec, tmp_path)
 
 
-@pytest.mark.parametrize(("farther_m", "wrong"), [(50.0, True), (0.01, True), (1e-4, False)])
-def test_motion__a_car_the_harness_moves_goes_as_far_as_its_speed_to_a_millimetre(
-    farther_m: float, wrong: bool, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("farther_m", "faulty"), [(50.0, True), (0.01, True), (1e-4, False)])
+def test_motion__a_car_that_the_harness_moves_follows_its_speed_to_a_millimetre(
+    farther_m: float, faulty: bool, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drive = harness.environments.arena.move
 
@@ -237,14 +240,14 @@ def test_motion__a_car_the_harness_moves_goes_as_far_as_its_speed_to_a_millimetr
 
     monkeypatch.setattr(harness.environments.arena, "move", drive_too_far)
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
-    if wrong:
+    if faulty:
         assert re.match(rf"ImpossibleNumber: ego moved [\d.]+ m in step {STEP}, ", game.record["error"])
     else:
         assert not game.record["error"]
 
 
 @pytest.mark.parametrize("name", ["x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"])
-def test_motion__that_is_no_number_is_named(name: str, merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_motion__that_is_not_finite_is_named(name: str, merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
     take_back = Arena._take_back
 
     def lose(arena: Arena, *arguments: Any) -> None:
@@ -254,10 +257,10 @@ def test_motion__that_is_no_number_is_named(name: str, merge: OpenScene, monkeyp
 
     monkeypatch.setattr(Arena, "_take_back", lose)
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
-    assert f"the motion of non_ego is no number in step {STEP}: " in game.record["error"]
+    assert f"the motion of non_ego is not finite in step {STEP}: " in game.record["error"]
 
 
-def test_motion__of_another_road_user_that_is_no_number_is_an_error_row(
+def test_motion__of_a_background_vehicle_that_is_not_finite_is_an_error_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     van = '<vehicle id="v" type="van" depart="0" departPos="60" departSpeed="9"><route edges="road"/></vehicle>'
@@ -273,11 +276,13 @@ def test_motion__of_another_road_user_that_is_no_number_is_an_error_row(
     assert not play(arm(scene, Steady(), SumoDriver()), 1)[0].record["error"]
     monkeypatch.setattr(LibsumoSimulation, "step", lose)
     (game,) = play(arm(scene, Steady(), SumoDriver()), 1)
-    assert game.record["error"].endswith(f"another road user is nowhere, or has no speed, in step {STEP}")
+    assert game.record["error"].endswith(
+        f"a background vehicle has no finite position, heading or speed in step {STEP}"
+    )
 
 
 @pytest.mark.parametrize("duration_s", [0.0, 0.1, 2.0])
-def test_motion__changing_lanes_is_no_jump_however_fast_sumo_does_it(duration_s: float, tmp_path: Path) -> None:
+def test_motion__a_lane_change_of_any_duration_is_valid(duration_s: float, tmp_path: Path) -> None:
     folder = Path(shutil.copytree(MERGE, tmp_path / "merge"))
     document = (folder / "scene.toml").read_text()
     assert "lane_change_duration_s = 2.0" in document
@@ -288,7 +293,7 @@ def test_motion__changing_lanes_is_no_jump_however_fast_sumo_does_it(duration_s:
     assert not any(game.record["error"] for game in games)
     frames = [frame[frame["player"] == "non_ego"] for frame in map(trace, games)]
     furthest = max(float(np.abs(np.diff(frame["y_m"])).max()) for frame in frames)
-    assert (furthest > 3.0) == (duration_s <= 0.1)  # a lane's width in a step, where that is all the time there is
+    assert (furthest > 3.0) == (duration_s <= 0.1)  # a lane's width in one step, for short durations
 
 
 # --- observations -----------------------------------------------------------------------------------------------------
@@ -300,12 +305,12 @@ def test_observation__out_of_its_bounds_is_an_error_row_with_entry_and_step(
 ) -> None:
     entry = LAYOUT.index("goal_m")
 
-    def see_wrongly(q: Quantities) -> FloatArray:
+    def faulty_observe(q: Quantities) -> FloatArray:
         view = observe(q)
         view[q.state.step == STEP, NON_EGO, entry] = value
         return view
 
-    monkeypatch.setattr(harness.environments.arena, "observe", see_wrongly)
+    monkeypatch.setattr(harness.environments.arena, "observe", faulty_observe)
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
     assert re.match(
         rf"ImpossibleNumber: non_ego sees goal_m as {np.float32(value)} in step {STEP}, not from -1 to 1$",
@@ -313,24 +318,24 @@ def test_observation__out_of_its_bounds_is_an_error_row_with_entry_and_step(
     )
 
 
-def test_observation__a_quantity_that_is_no_number_is_not_clipped_into_one(road: OpenScene) -> None:
+def test_observation__nan_is_not_clipped_into_a_number(road: OpenScene) -> None:
     scene = open_scene(road.folder)
     scene.world.road.routes.goal_m[EGO] = np.nan
     (game,) = play(arm(scene, Steady(), SumoDriver()), 1)
     assert game.record["error"] == "ImpossibleNumber: ego sees goal_m as nan in step 0, not from -1 to 1"
 
 
-def test_observation__of_a_start_is_looked_at_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_observation__of_a_reset_is_checked_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(harness.environments.arena, "observe", lambda q: observe(q) + np.float32(2.0))
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
     assert "in step 0, not from -1 to 1" in game.record["error"]
 
 
-def test_environment__a_gymnasium_learner_is_told_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_environment__a_gymnasium_learner_gets_the_error_too(merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
     environment = DrivingEnv(merge, persona=CAREFUL)
     try:
         environment.reset(seed=1)
-        monkeypatch.setattr(Quantities, "lane_offset_m", broken(Quantities.lane_offset_m, np.nan))
+        monkeypatch.setattr(Quantities, "lane_offset_m", faulty(Quantities.lane_offset_m, np.nan))
         for _ in range(STEP - 1):
             environment.step(np.zeros(2))
         with pytest.raises(ImpossibleNumber, match=f"payoff of ego is nan in step {STEP}$"):
@@ -344,14 +349,14 @@ def test_environment__a_gymnasium_learner_is_told_too(merge: OpenScene, monkeypa
 
 @pytest.fixture(scope="module")
 def road(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """The least there can be: one straight road, and the two players."""
+    """A minimal scene: one straight road and the two players."""
     return build_scene(tmp_path_factory.mktemp("road"))
 
 
 @pytest.fixture(scope="module", params=["road", "merge"])
 def everywhere(request: pytest.FixtureRequest) -> Quantities:
-    """Games in which both players are at each station of their routes, standing and at top speed, on the route's line,
-    beside the road and turned round; in the last game of each kind the other is not there."""
+    """Games with both players at each station of their routes: at rest and at top speed, on the route's line, beside
+    the road and turned round. In the last games the non-ego is not present."""
     scene: OpenScene = request.getfixturevalue(request.param)
     routes = scene.world.road.routes
     rows = np.arange(min(routes.last_row - routes.first_row) + 1)
@@ -377,7 +382,11 @@ def everywhere(request: pytest.FixtureRequest) -> Quantities:
 
 @pytest.mark.parametrize("name", TERMS)
 def test_term__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
-    payoff = Payoff(dict.fromkeys(GROUPS, 1.0), (Weighted(name, 1.0, 2.0 if TERMS[name].parameter else None),), {})
+    payoff = Payoff(
+        alpha=dict.fromkeys(GROUPS, 1.0),
+        terms=(Weighted(name=name, weight=1.0, parameter=2.0 if TERMS[name].parameter else None),),
+        fuzzy={},
+    )
     for player in (EGO, NON_EGO):
         (share,) = payoff.evaluate(everywhere, player).values()
         assert share.shape == everywhere.state.step.shape
@@ -386,9 +395,12 @@ def test_term__can_be_computed_at_every_place_of_every_route(name: str, everywhe
 
 @pytest.mark.parametrize("name", FUZZY_QUANTITIES)
 def test_fuzzy_term__can_be_computed_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
-    assert not np.isnan(getattr(everywhere, name)).any()  # nobody ahead is an infinite gap, which is worth what is far
-    sets = (FuzzySet("low", (0.0, 1.0), (1.0, 0.0), -1.0), FuzzySet("high", (0.0, 1.0), (0.0, 1.0), 2.0))
-    payoff = Payoff(dict.fromkeys(GROUPS, 1.0), (), {"fuzzy": (1.0, FuzzyFunction(name, sets))})
+    assert not np.isnan(getattr(everywhere, name)).any()  # without a leader the gap is infinite
+    sets = (
+        FuzzySet(name="low", inputs=(0.0, 1.0), memberships=(1.0, 0.0), value=-1.0),
+        FuzzySet(name="high", inputs=(0.0, 1.0), memberships=(0.0, 1.0), value=2.0),
+    )
+    payoff = Payoff(alpha=dict.fromkeys(GROUPS, 1.0), terms=(), fuzzy={"fuzzy": (1.0, FuzzyFunction(name, sets))})
     for player in (EGO, NON_EGO):
         assert np.isfinite(payoff.total(everywhere, player)).all()
 
@@ -421,7 +433,7 @@ def test_persona__every_document_of_the_repository_can_be_computed(everywhere: Q
 
 @pytest.mark.parametrize("limit", ["0.00", "-5", "nan", "inf"])
 def test_scene__without_a_speed_limit_on_a_players_route_is_refused(limit: str, tmp_path: Path) -> None:
-    """What is a share of the limit is the one thing that a scene can lack."""
+    """Shares of the speed limit are the only quantities that a scene can leave undefined."""
     folder = Path(shutil.copytree(MERGE, tmp_path / "merge"))
     net = folder / "merge.net.xml"
     text = re.sub(r'(<lane id="exit_[^>]*?) speed="[^"]*"', rf'\1 speed="{limit}"', net.read_text())
@@ -436,7 +448,7 @@ def test_scene__without_a_speed_limit_on_a_players_route_is_refused(limit: str, 
         assert problem.remedy
 
 
-# --- what it costs ----------------------------------------------------------------------------------------------------
+# --- cost -------------------------------------------------------------------------------------------------------------
 
 
 def test_checks__cost_less_than_a_hundredth_of_a_step_of_64_games(merge: OpenScene) -> None:
@@ -453,7 +465,7 @@ def test_checks__cost_less_than_a_hundredth_of_a_step_of_64_games(merge: OpenSce
 
         checks()
         best = {"checks": np.inf, "step": np.inf}
-        for _ in range(20):  # by turns, so that both find the machine in the same moods
+        for _ in range(20):  # in turns, so that load on the machine affects both
             best["checks"] = min(best["checks"], cpu_s(checks, 200))
             best["step"] = min(best["step"], cpu_s(lambda: arena.step(np.zeros((64, 2, 2))), 2))
         assert best["checks"] < 0.01 * best["step"]
@@ -462,7 +474,7 @@ def test_checks__cost_less_than_a_hundredth_of_a_step_of_64_games(merge: OpenSce
 
 
 def cpu_s(work: Callable[[], object], times: int) -> float:
-    began = time.process_time()
+    start = time.process_time()
     for _ in range(times):
         work()
-    return (time.process_time() - began) / times
+    return (time.process_time() - start) / times

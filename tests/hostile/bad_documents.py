@@ -40,8 +40,8 @@ def bombs(file: str) -> list[Bad]:
     return [
         Bad(f"{name}: a number of 5,000 digits", inserted(file, b"\nsize = " + b"9" * 5000 + b"\n", 0.0), (name,)),
         Bad(f"{name}: a key with 5,000 dots", inserted(file, b"a." * 5000 + b"a = 1\n", 0.0), (name,)),
-        Bad(f"{name}: a key with 400,000 dots", inserted(file, b"a." * 400_000 + b"a = 1\n", 0.0), (name, "without end")),
-        Bad(f"{name}: a key with 5,000 quoted dots", inserted(file, b"x = {" + b"'a' . " * 5000 + b"a = 1}\n", 0.0), (name, "without end")),
+        Bad(f"{name}: a key with 400,000 dots", inserted(file, b"a." * 400_000 + b"a = 1\n", 0.0), (name, "nested too deeply")),
+        Bad(f"{name}: a key with 5,000 quoted dots", inserted(file, b"x = {" + b"'a' . " * 5000 + b"a = 1}\n", 0.0), (name, "nested too deeply")),
         Bad(f"{name}: 20,000 unknown keys", inserted(file, b"\n".join(b"k%d = 1" % k for k in range(20_000)) + b"\n", 0.0), (name, "unknown key")),
         Bad(f"{name}: a key of 100,000 letters", inserted(file, b"k" * 100_000 + b" = 1\n", 0.0), (name, "unknown key")),
         Bad(f"{name}: a byte order mark", inserted(file, b"\xef\xbb\xbf", 0.0), (name, "byte order mark")),
@@ -143,15 +143,15 @@ PERSONAS = [
     *bombs(PERSONA),
     *no_numbers(PERSONA, "progress = 1.0", "operational.terms.progress"),
     *no_numbers(PERSONA, "mean_attentive_s = 5.0", "attention.mean_attentive_s"),
-    *no_numbers(PERSONA, "overlooks_share = 0.5", "perception.overlooks_share"),
+    *no_numbers(PERSONA, "no_blind_spot_check_share = 0.5", "perception.no_blind_spot_check_share"),
     *changed(
         PERSONA,
         *(
-            (f"a perception of {line}", "overlooks_share = 0.5", line, said)
+            (f"a perception of {line}", "no_blind_spot_check_share = 0.5", line, said)
             for line, said in {
-                "misses_share = 0.5": ("perception", "noticed_within_m"),
-                "noticed_within_m = 5.0": ("perception", "misses_share"),
-                "error_s = 5.0": ("perception", "distance_error"),
+                "looked_but_failed_to_see_share = 0.5": ("perception", "noticed_within_m"),
+                "noticed_within_m = 5.0": ("perception", "looked_but_failed_to_see_share"),
+                "error_correlation_time_s = 5.0": ("perception", "distance_error"),
                 "range_m = 0.0": ("perception.range_m",),
                 "rnge_m = 5.0": ("perception.rnge_m", "'range_m'"),
                 "distance_error = -0.1": ("perception.distance_error",),
@@ -161,8 +161,8 @@ PERSONAS = [
             (f"a body of {line}", "[perception]", f"{table}\n{line}\n[perception]", said)
             for table, line, said in (
                 ("[reaction]", "delay_s = [0.5, 0.2]", ("reaction.delay_s", "empty")),
-                ("[reaction]", "delay_s = [-0.5, 0.2]", ("reaction.delay_s", "0 to 5 s")),
-                ("[reaction]", "delay_s = [0.5, 6.0]", ("reaction.delay_s", "0 to 5 s")),
+                ("[reaction]", "delay_s = [-0.5, 0.2]", ("reaction.delay_s", "between 0 and 5 s")),
+                ("[reaction]", "delay_s = [0.5, 6.0]", ("reaction.delay_s", "between 0 and 5 s")),
                 ("[reaction]", "delay_s = [nan, nan]", ("reaction.delay_s",)),
                 ("[reaction]", "delay_s = 0.5", ("reaction.delay_s",)),
                 ("[reaction]", "", ("reaction.delay_s: is missing",)),
@@ -184,7 +184,7 @@ PERSONAS = [
         ("a negative weight", "progress = 1.0", "progress = -1.0", ("operational.terms.progress",)),
         ("a negative coefficient", "[human]\nweight = 1.0", "[human]\nweight = -1.0", ("human.weight",)),
         ("a quantity misspelt", "speed_over_limit", "sped_over_limit", ("human.fuzzy[0].quantity", "'speed_over_limit'")),
-        ("points that fall", "[[0.0, 0.0], [0.2, 1.0]]", "[[0.2, 0.0], [0.0, 1.0]]", ("points", "rise")),
+        ("points that fall", "[[0.0, 0.0], [0.2, 1.0]]", "[[0.2, 0.0], [0.0, 1.0]]", ("points", "increase")),
         ("a membership of two", "[0.2, 1.0]", "[0.2, 2.0]", ("points[1][1]",)),
         ("points as far as numbers go", "[0.2, 1.0]", "[1e308, 1.0]", ("points[1][0]",)),
         ("a point of one number", "[0.2, 1.0]", "[0.2]", ("points[1][1]: is missing",)),
@@ -260,11 +260,12 @@ SCENES = [
 # --- policies ---------------------------------------------------------------------------------------------------------
 
 
-def tensors(**changes: object) -> Spoil:
+def tensors(**changes: np.ndarray | None) -> Spoil:
     """A policy with parameters replaced, left out (None) or added; `__` in a name is a dot."""
 
     def spoil(project: Path) -> None:
-        given = {**some_policy().tensors, **{name.replace("__", "."): value for name, value in changes.items()}}
+        named = {name.replace("__", "."): value for name, value in changes.items()}
+        given = {**some_policy().tensors, **named}
         (project / TENSORS).write_bytes(save({name: value for name, value in given.items() if value is not None}))
 
     return spoil

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.cli import main as cli
+from harness.cli.main import main
 from harness.drivers.policy_file import write_policy
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
@@ -76,7 +76,7 @@ sets = [{ name = "fast", points = [[0.0, 0.0], [0.2, 1.0]], value = 1.0 }]
 mean_attentive_s = 5.0
 lapse_s = [1.0, 2.0]
 [perception]
-overlooks_share = 0.5
+no_blind_spot_check_share = 0.5
 """
 
 Spoil = Callable[[Path], object]
@@ -341,7 +341,7 @@ class Desk:
         self._capsys.readouterr()
         began, worked = time.monotonic(), sum(os.times()[:4])
         with pytest.raises(SystemExit) as stopped:
-            cli.main()
+            main()
         code = stopped.value.code
         took_s, cpu_s = time.monotonic() - began, sum(os.times()[:4]) - worked
         return Said(0 if code is None else int(code), *self._capsys.readouterr(), took_s, cpu_s)

@@ -13,10 +13,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from harness.reports.page import render_page
 from tests.hostile.inputs import CARD, CHECK, TENSORS, write_project, write_run
 from tests.support.chromium import launched, opener
-from tests.support.pages import campaign
+from tests.support.pages import campaign, rendered
 from tests.support.recorded import SCENE, manoeuvres, recorded
 from tests.support.sources import SOURCES, label, tree_of
 from tests.support.tiny import HARNESS, PATIENCE_S
@@ -193,7 +192,7 @@ def page_of(names: tuple[str, ...]) -> str:
     told.loc[told.index[0], ["manoeuvre", "text"]] = [names[0], names[1]]
     arguments["replays"] = [*arguments["replays"], names[3]]
     games = recorded(episodes)
-    return render_page(**{**arguments, "episodes": episodes}, games=games, scene=SCENE, manoeuvres=told)
+    return rendered(**{**arguments, "episodes": episodes}, games=games, scene=SCENE, manoeuvres=told)
 
 
 def test_report__what_data_says_makes_no_element_and_no_attribute() -> None:

@@ -1,4 +1,4 @@
-"""Replays on the real SUMO: what it plays is what was recorded, to the millimetre."""
+"""Replays in the real SUMO: it plays the recording, to the millimetre."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Films: what is in their pictures is where the trace has it, and what is missing to make one is said."""
+"""Films: players are at their places of the trace, and missing programs are reported."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def frames(file: Path) -> list[np.ndarray]:
 
 
 def place_m(mask: np.ndarray) -> np.ndarray:
-    """Where the middle of the marked pixels is from the middle of the picture: x, y."""
+    """The centre of the marked pixels relative to the centre of the picture: x, y."""
     rows, columns = np.nonzero(mask)
     x, y = 0.5 * (columns.min() + columns.max()), 0.5 * (rows.min() + rows.max())
     return np.array([x - 0.5 * SIZE_PX[0], 0.5 * SIZE_PX[1] - y]) / PX_PER_M
@@ -39,34 +39,34 @@ def place_m(mask: np.ndarray) -> np.ndarray:
 def test_film__shows_the_players_where_the_trace_has_them(merge_net: Path, tmp_path: Path) -> None:
     require_gui()
     trace = collision_game()
-    folder, told = write(trace, merge_net, tmp_path / "replay"), list[tuple[int, int]]()
+    folder, progress = write(trace, merge_net, tmp_path / "replay"), list[tuple[int, int]]()
     count = write_film(
         folder,
         trace,
         tmp_path / "film.gif",
         title="a game",
         step_length_s=STEP_S,
-        on_progress=lambda done, total: told.append((done, total)),
+        on_progress=lambda done, total: progress.append((done, total)),
     )
     steps = int(trace["step"].max()) + 1
     assert count == steps
-    assert told == [(k + 1, steps) for k in range(steps)]
+    assert progress == [(k + 1, steps) for k in range(steps)]
     assert [path.name for path in sorted(tmp_path.iterdir())] == ["film.gif", "replay"]
     pictures = frames(tmp_path / "film.gif")
-    assert len(pictures) == steps  # the clock in them makes each another
+    assert len(pictures) == steps  # the clock makes each picture different
     with Image.open(tmp_path / "film.gif") as film:
         assert film.size == SIZE_PX
-        assert film.info["duration"] == 100  # ms: at the speed of life
+        assert film.info["duration"] == 100  # ms: real time
 
     for step in (0, 10, 25, 32, steps - 1):
         there = trace[trace["step"] == step].set_index("player")[["x_m", "y_m"]]
         assert place_m(blue(pictures[step])) == pytest.approx([0.0, 0.0], abs=0.4)
         apart = (there.loc["non_ego"] - there.loc["ego"]).to_numpy()
-        if step != 32:  # there they touch, and one hides a part of the other
+        if step != 32:  # there they touch, and one covers a part of the other
             assert place_m(orange(pictures[step])) == pytest.approx(apart, abs=0.5)
 
 
-def test_film__goes_on_with_the_other_when_the_ego_has_left(merge_net: Path, tmp_path: Path) -> None:
+def test_film__follows_the_non_ego_after_the_ego_has_left(merge_net: Path, tmp_path: Path) -> None:
     require_gui()
     trace = game(
         drive("ego", straight(60.0, -1.6, 10.0, 8), outcome="goal"), drive("non_ego", straight(30.0, -1.6, 10.0, 12))
@@ -109,7 +109,7 @@ def test_problems__all_that_is_missing_with_its_remedy(tmp_path: Path, monkeypat
     monkeypatch.setattr("harness.replay.film.find_sumo_gui", lambda: None)
     monkeypatch.setattr("harness.replay.encoding.importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr("harness.replay.sumo_gui.sys.platform", "linux")
-    said = "\n".join(map(str, film_problems(tmp_path / "nowhere" / "film.mp4")))
+    text = "\n".join(map(str, film_problems(tmp_path / "nowhere" / "film.mp4")))
     for words in (
         "nowhere: is not a folder",
         "Xvfb: is not installed",
@@ -119,7 +119,7 @@ def test_problems__all_that_is_missing_with_its_remedy(tmp_path: Path, monkeypat
         "sumo-gui: is not installed",
         "pip install eclipse-sumo",
     ):
-        assert words in said
+        assert words in text
     assert "ffmpeg" not in "\n".join(map(str, film_problems(tmp_path / "film.gif")))
 
 
@@ -128,7 +128,7 @@ def test_problems__a_film_is_a_gif_or_an_mp4(tmp_path: Path) -> None:
     assert "neither .gif nor .mp4" in problem.message
 
 
-def test_film__without_a_screen_says_so_and_writes_nothing(
+def test_film__without_a_screen_reports_it_and_writes_nothing(
     merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder = write(clean_game(), merge_net, tmp_path / "replay")
@@ -139,7 +139,7 @@ def test_film__without_a_screen_says_so_and_writes_nothing(
     assert [path.name for path in tmp_path.iterdir()] == ["replay"]
 
 
-def test_film__a_sumo_gui_that_dies_says_what_it_said(
+def test_film__a_failed_sumo_gui_is_reported_with_its_message(
     merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     require_gui()
@@ -173,21 +173,21 @@ def test_mp4__ffmpeg_gets_every_picture(tmp_path: Path, monkeypatch: pytest.Monk
     assert arguments.strip().endswith(str(tmp_path / "film.mp4"))
 
 
-def test_mp4__what_ffmpeg_says_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mp4__shows_the_message_of_ffmpeg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     fake_ffmpeg(tmp_path, "echo 'no such codec' >&2; exit 1", monkeypatch)
     with pytest.raises(HarnessError, match="no such codec"):
         encode(iter(PICTURES * 50), tmp_path / "film.mp4", (64, 32), 0.1)
 
 
-def test_mp4__is_one(tmp_path: Path) -> None:
+def test_mp4__is_a_valid_film(tmp_path: Path) -> None:
     if find_ffmpeg() is None:
         pytest.skip("needs ffmpeg")
     encode(iter(PICTURES), tmp_path / "film.mp4", (64, 32), 0.1)
     assert (tmp_path / "film.mp4").read_bytes()[4:8] == b"ftyp"
 
 
-def test_gif__counts_time_though_nothing_moves(tmp_path: Path) -> None:
-    """Pillow makes equal pictures one, shown for longer."""
+def test_gif__has_the_full_duration_without_movement(tmp_path: Path) -> None:
+    """Pillow merges equal pictures into one with a longer duration."""
     still = pd.Series([PICTURES[0]] * 4).tolist()
     encode(iter(still), tmp_path / "film.gif", (64, 32), 0.1)
     with Image.open(tmp_path / "film.gif") as film:

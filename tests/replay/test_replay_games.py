@@ -1,4 +1,4 @@
-"""Games that the harness really played, replayed on the real SUMO: every frame is the trace."""
+"""Games played by the harness and replayed in the real SUMO: every frame is the trace."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TRAFFIC = """
 
 
 class Steady:
-    """Keeps pedals and wheel where they are."""
+    """Keeps pedals and wheel constant."""
 
     takes_over = True
 
@@ -36,7 +36,7 @@ class Steady:
         self._action = (pedals, wheel)
 
     def reset(self, games: IntArray) -> None:
-        """Nothing to forget."""
+        """It has no state."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         return np.tile(self._action, (len(games), 1))
@@ -55,7 +55,7 @@ def paper(repository: Path) -> OpenScene:
 
 @pytest.fixture(scope="module")
 def busy(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """Two lanes with vans that keep coming, and a car ahead."""
+    """Two lanes with a flow of vans, and a car ahead."""
     return build_scene(tmp_path_factory.mktemp("scenes") / "busy", others=TRAFFIC, cars=CARS, time_limit_s=12.0)
 
 
@@ -63,7 +63,7 @@ def played(
     scene: OpenScene, persona: Persona, drivers: tuple[Driver, Driver], outcome: str, episodes: int = 8
 ) -> pd.DataFrame:
     """The trace of the first game with such an outcome of the ego."""
-    for game in assess(Arm("arm", scene, drivers, (persona, persona), 1), episodes):
+    for game in assess(Arm(name="arm", scene=scene, drivers=drivers, personas=(persona, persona), seed=1), episodes):
         if game.record["ego_outcome"] == outcome:
             assert game.trace is not None
             return pd.DataFrame(dict(game.trace))

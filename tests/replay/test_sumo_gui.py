@@ -1,4 +1,4 @@
-"""A replay in SUMO-GUI under a virtual screen: what a person sees is where the trace has it."""
+"""A replay in SUMO-GUI on a virtual screen: the players are at their places of the trace."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
 
 
 def place(mask: np.ndarray, trace: pd.DataFrame, net: Path) -> tuple[float, float]:
-    """The middle of the marked pixels in net coordinates."""
+    """The centre of the marked pixels in net coordinates."""
     found = contacts(trace, types_of_vehicles(trace, net.with_name("merge.rou.xml")), RAILS)
     view = choose_view(trace, found)
     height, width = mask.shape
@@ -80,7 +80,7 @@ def test_gui__shows_both_cars_where_the_trace_has_them(
         assert abs(y_m - expected.loc[player, "y_m"]) < 1.0
 
 
-def test_gui__who_left_is_gone_and_who_is_there_at_the_end_stays(screen: str, merge_net: Path, tmp_path: Path) -> None:
+def test_gui__a_vehicle_that_left_is_gone_and_the_others_stay(screen: str, merge_net: Path, tmp_path: Path) -> None:
     trace = GAMES["clean"]()
     leaving, gone, last = photograph(write(trace, merge_net, tmp_path / "replay"), screen, [153, 154, 169])
     assert blue(leaving).any()
@@ -134,7 +134,7 @@ def test_gui__follows_the_ego_and_halts_at_the_contact(
     try:
         assert opened.wait(300.0)
         pictures = settled(screen)
-        assert watching.is_alive()  # at a halt, or the game would be over long since
+        assert watching.is_alive()  # at a halt; otherwise the game would be over
     finally:
         started[0].kill()  # as when its user closes it
     watching.join(300.0)
@@ -152,7 +152,7 @@ def test_gui__follows_the_ego_and_halts_at_the_contact(
 
 
 def settled(screen: str) -> np.ndarray:
-    """What is on the screen [height, width, 3] once nothing moves any more."""
+    """The picture of the screen [height, width, 3] once it does not change."""
     before, since = np.zeros(0), time.monotonic()
     deadline = since + 300.0
     while time.monotonic() < deadline:
@@ -166,7 +166,7 @@ def settled(screen: str) -> np.ndarray:
 
 
 def middle(mask: np.ndarray) -> np.ndarray:
-    """Row and column of the middle of the marked pixels that belong together: toolbars have blue ones too."""
+    """Row and column of the centre of the largest group of marked pixels: toolbars also have blue pixels."""
     rows = np.argwhere(mask)
     rows = rows[np.abs(rows - np.median(rows, axis=0)).max(1) < 60]
     return 0.5 * (rows.min(0) + rows.max(0))

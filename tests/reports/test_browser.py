@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from harness.reports.page import render_page
+from tests.support.pages import campaign, recordings, rendered, with_errors
 from tests.support.chromium import launched, opener
 from tests.support.pages import CONTRAST, campaign, recordings, with_errors
 
@@ -25,7 +25,7 @@ def report(tmp_path_factory):
 
 def write(folder, arguments):
     path = folder / "report.html"
-    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    path.write_text(rendered(**arguments, **recordings(arguments)), encoding="utf-8")
     return path
 
 
@@ -35,7 +35,7 @@ def opened(browser, report):
         yield open_page
 
 
-def test_report__opens_from_a_file_without_a_complaint_or_a_request(opened):
+def test_report__opens_from_a_file_without_an_error_or_a_request(opened):
     page = opened()
     assert page.title() == "merge: report"
     for details in page.locator("details").all():
@@ -72,7 +72,7 @@ def test_report__long_names_and_messages_do_not_widen_it(opened, tmp_path):
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_report__text_stands_out_from_its_ground_in_light_and_dark(opened, scheme):
+def test_report__text_has_enough_contrast_in_light_and_dark(opened, scheme):
     page = opened(color_scheme=scheme)
     for selector in ("h1", ".sentence", ".answer strong", ".count", ".banner", "figcaption", "td", "figure svg text"):
         ratio = page.locator(selector).first.evaluate(CONTRAST)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from harness.evaluation.tables import write_csv
-from harness.reports.page import render_page
+from tests.support.pages import campaign, recordings, rendered, with_errors
 from tests.support.chromium import launched, opener, until
 from tests.support.pages import campaign, recordings, with_errors
 
@@ -28,7 +28,7 @@ def arguments():
 @pytest.fixture(scope="module")
 def report(arguments, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    path.write_text(rendered(**arguments, **recordings(arguments)), encoding="utf-8")
     return path
 
 

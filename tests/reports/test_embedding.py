@@ -28,7 +28,7 @@ def read(embedded):
     return json.loads(embedded.document())
 
 
-def test_packing__gives_back_what_was_packed():
+def test_packing__can_be_unpacked():
     columns = [np.array([5.0, -3.0, 100_000.0]), np.zeros(0), np.array([-2_000_000.0, -1.0])]
     numbers = unpacked(pack(columns))
     assert np.cumsum(numbers[:3]).tolist() == columns[0].tolist()
@@ -44,7 +44,7 @@ def test_columns__are_the_trace_to_half_a_unit(games):
         measured = np.isfinite(values)
         assert np.abs(column[measured] * scale - values[measured]).max() <= 0.5 * scale + 1e-9
         assert (column[~measured] == NOTHING).all()
-    assert len(columns) == len(SCALES) * len(game.players) + 4 * len(game.others)
+    assert len(columns) == len(SCALES) * len(game.players) + 4 * len(game.background)
 
 
 def test_embedded__as_many_as_fit_and_the_first_ones(games):
@@ -73,7 +73,7 @@ def test_embedded__without_a_road_there_are_no_games(games):
     assert read(Embedded(None, games, {}, 10_000_000))["games"] == []
 
 
-def test_document__nothing_in_it_can_end_the_script(games):
+def test_document__cannot_end_the_script(games):
     hostile = "</script><!--<script>&\u2028"
     marks = {key(games[0].arm, games[0].seed, games[0].episode): [{"text": hostile}]}
     embedded = Embedded(SCENE, games[:1], marks, 10_000_000)

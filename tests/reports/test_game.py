@@ -1,10 +1,11 @@
-"""The report's section on the game: its numbers are the CSV files', its words say no more than was found."""
+"""The report's section on the game: its numbers are those of the CSV files, its sentences match the findings."""
 
 from __future__ import annotations
 
 import csv
 import math
 import re
+from dataclasses import replace
 
 import pandas as pd
 import pytest
@@ -13,10 +14,20 @@ from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps
 from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.game_theory.records import GameFindings, Response
 from harness.evaluation.tables import write_csv
-from harness.reports.game import CAPTIONS, game_section
-from harness.reports.game_wording import equilibrium_sentences, gap_verdicts
+from harness.reports.game import game_section
+from harness.reports.game_wording import (
+    CAPTIONS,
+    MEANINGS,
+    NEAR,
+    NO,
+    NO_GAME,
+    OPEN,
+    equilibrium_sentences,
+    gap_verdicts,
+)
 from harness.reports.heatmaps import views
-from harness.reports.page import render_page
+from tests.support.pages import CONTRAST
+from tests.support.pages import Page, campaign, rendered
 from tests.support.chromium import launched, opener
 from tests.support.game_tables import arm, findings, table
 from tests.support.pages import CONTRAST, Page, campaign
@@ -30,9 +41,9 @@ def found():
 
 
 def page_of(game, seeds=(1,)):
-    """A report that says little but of the game."""
+    """A report with little more than the section on the game."""
     arguments = campaign(personas=(), seeds=seeds)
-    return render_page(**arguments | {"training": arguments["training"][:0]}, game=game)
+    return rendered(**arguments | {"training": arguments["training"][:0]}, game=game)
 
 
 @pytest.fixture(scope="module")
@@ -124,7 +135,7 @@ def test_section__gaps_alone_or_a_crossplay_alone_are_a_section_too(found):
     empty = findings(games=4)
     empty = {name: getattr(empty, name)[:0] for name in CAPTIONS}
     gaps_alone = Page(page_of(GameFindings(**empty | {"gaps": found.gaps})))
-    assert "Everyone against everyone" not in gaps_alone.text
+    assert "Cross-play" not in gaps_alone.text
     assert "gaps" in gaps_alone.tables
     others = {name: getattr(found, name) for name in CAPTIONS if name != "gaps"}
     crossplay_alone = Page(page_of(GameFindings(**empty | others)))
@@ -138,7 +149,7 @@ EGO = Response(1, "ego", "speedy", 3, "pair", "best_ego", "retrained_speedy", "s
 NON_EGO = Response(1, "non_ego", "speedy", 3, "pair", "best_non_ego", "retrained_speedy", "speedy")
 
 
-def said(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, games=100):
+def verdict_texts(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, games=100):
     """The verdict on a pair of which the ego earns 10, the speedy driver 20; gains alternate a little around a mean."""
     wave = [0.01 * (-1) ** place for place in range(games)]
 
@@ -157,37 +168,37 @@ def said(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, games=100)
     return verdict.label, plain(verdict.sentence), plain(verdict.speed), verdict.tone
 
 
-def test_words__both_could_gain():
-    label, sentence, induced, tone = said(0.2, 6.2, failing=12)
+def test_words__both_sides_could_gain():
+    label, sentence, induced, tone = verdict_texts(0.2, 6.2, failing=12)
     assert label == "no"
-    assert sentence == "The ego could still gain 2 % of its payoff; the speedy driver 31 %: not an equilibrium."
+    assert sentence == f"The ego could still gain 2 % of its payoff; the speedy driver 31 %: {MEANINGS[NO]}."
     assert induced == (
-        "A speedy driver trained anew against this ego makes it fail in 12 of 100 games (12 %; 95 %: 7–19.8 %) "
+        "A speedy driver newly trained against this ego makes it fail in 12 of 100 games (12 %; 95 %: 7–19.8 %) "
         "instead of 3."
     )
     assert tone == "harm"
 
 
 def test_words__one_could_gain():
-    label, sentence, _, tone = said(-0.2, 6.2)
+    label, sentence, _, tone = verdict_texts(-0.2, 6.2)
     assert label == "no"
     assert sentence == (
-        "For the ego nothing better was found; the speedy driver could still gain 31 % of its payoff: "
-        "not an equilibrium."
+        f"For the ego nothing better was found; the speedy driver could still gain 31 % of its payoff: {MEANINGS[NO]}."
     )
     assert tone == "open"
 
 
-def test_words__nothing_better_is_no_equilibrium_but_as_near_as_was_looked():
-    label, sentence, induced, tone = said(-0.2, -0.4, failing=12)
+def test_words__nothing_better_found_is_not_refuted():
+    label, sentence, induced, tone = verdict_texts(-0.2, -0.4, failing=12)
     assert label == "not refuted"
     assert sentence == (
-        "For the ego nothing better was found; for the speedy driver nothing better was found: as near to an "
-        "equilibrium as this search can tell."
+        f"For the ego nothing better was found; for the speedy driver nothing better was found: {MEANINGS[NEAR]}."
     )
-    assert induced.endswith("instead of 3, though that driver earns no more by it.")
+    assert induced.endswith("instead of 3, but this driver does not earn more by it.")
     assert tone == "harm"  # the ego fails more, whatever for
-    assert said(0, -0.4)[1].startswith("The best response of the ego earns the same in every game; for the speedy")
+    assert verdict_texts(0, -0.4)[1].startswith(
+        "The best response of the ego earns the same in every game; for the speedy"
+    )
 
 
 def test_words__a_negative_gap_is_never_a_gain(found):
@@ -196,28 +207,28 @@ def test_words__a_negative_gap_is_never_a_gain(found):
     assert {gap.share for gap in negative} == {"none found"}
 
 
-def test_words__a_gain_that_cant_be_told_from_0_has_its_interval_beside_it():
+def test_words__a_gain_not_distinguishable_from_0_has_its_interval():
     row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
     row = row.assign(verdict=GapVerdict.NOT_DISTINGUISHABLE.value, payoff=-20.0, gap=6.0, gap_share=0.3)
     ((_, answer),) = gap_verdicts(row.assign(ci_low=-1.0, ci_high=13.0))
     assert answer.tone == "open"  # nothing is shown, neither way
     assert plain(answer.sentence).startswith(
-        "For the ego a gain of 30 % was measured, which can't be told from 0 (95 %: −5 to 65 %); for the speedy driver"
+        "For the ego a gain of 30 % was measured, which is not distinguishable from 0 (95 %: −5 to 65 %); "
+        "for the speedy driver"
     )
 
 
-def test_words__of_one_side_alone_nothing_is_decided():
-    label, sentence, induced, _ = said(-0.2, 0, responses=(EGO,))
+def test_words__with_one_side_only_nothing_is_decided():
+    label, sentence, induced, _ = verdict_texts(-0.2, 0, responses=(EGO,))
     assert label == "not decided"
     assert sentence == (
-        "For the ego nothing better was found; no best response of the speedy driver was trained: whether this is an "
-        "equilibrium is not decided."
+        f"For the ego nothing better was found; no best response of the speedy driver was trained: {MEANINGS[OPEN]}."
     )
     assert induced == ""
 
 
 @pytest.mark.parametrize("verdict", list(GapVerdict))
-def test_words__say_gain_without_reserve_only_where_it_can_be_told_from_0(verdict):
+def test_words__state_a_gain_only_where_it_is_distinguishable_from_0(verdict):
     row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
     row = row.assign(verdict=verdict.value, gap_share=0.1, gap=1.0, p_holm=0.2)
     ((_, answer),) = gap_verdicts(row)
@@ -231,18 +242,18 @@ def test_words__games_that_could_not_be_compared_are_counted_not_rated():
     ((_, verdict),) = gap_verdicts(gaps([EGO, NON_EGO], episodes, 0.01))
     assert verdict.label == "not decided"
     assert "1 of 2 pairs is left out: not played or not measured." in verdict.sentence
-    assert verdict.speed == "What a speedy driver trained anew makes of this ego was not measured."
+    assert verdict.speed == "The effect of a speedy driver newly trained against this ego was not measured."
     assert "%" not in verdict.sentence
 
 
-def test_words__several_seeds_are_counted_and_each_is_said(found):
+def test_words__several_seeds_are_counted_and_each_is_listed(found):
     (speedy, distracted) = (dict(gap_verdicts(found.gaps))[persona] for persona in PERSONAS)
     assert speedy.label == "no in 2 of 2 seeds"
     assert plain(speedy.speed).startswith(
-        "A speedy driver trained anew against this ego makes it fail in 26 % of games"
+        "A speedy driver newly trained against this ego makes it fail in 26 % of games"
     )
     assert distracted.label == "not refuted in 2 of 2 seeds"
-    assert distracted.sentence == "In 2 of 2 seeds no gain that can be told from 0 was found for either."
+    assert distracted.sentence == "In 2 of 2 seeds no gain that is distinguishable from 0 was found for either side."
     assert [answer.seed for answer in speedy.per_seed] == [1, 2]
 
 
@@ -252,10 +263,10 @@ def test_words__only_the_last_round_is_the_headline(found):
     assert verdicts["speedy"].label == "no in 2 of 2 seeds"
 
 
-def test_words__pairs_of_earlier_rounds_are_said_beneath(found):
+def test_words__pairs_of_earlier_rounds_are_listed(found):
     earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value, ego="naive")
     both = pd.concat([earlier, found.gaps], ignore_index=True)
-    section = game_section(GameFindings(both, found.crossplay, found.equilibria, found.generalisation))
+    section = game_section(replace(found, gaps=both))
     assert len(section.gaps) == 8
     assert [(persona, pair, answer.seed) for persona, pair, answer in section.others] == [
         ("speedy", "naive against speedy_round2", 1),
@@ -263,7 +274,7 @@ def test_words__pairs_of_earlier_rounds_are_said_beneath(found):
         ("distracted", "naive against distracted", 1),
         ("distracted", "naive against distracted", 2),
     ]
-    text = Page(page_of(GameFindings(both, found.crossplay, found.equilibria, found.generalisation), (1, 2))).text
+    text = Page(page_of(replace(found, gaps=both), (1, 2))).text
     assert "naive against distracted, seed 2: For the ego nothing better was found" in text
 
 
@@ -286,12 +297,12 @@ def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
         "speedy_round2: the ego fails in 15 % of games and earns 0.00."
     )
     assert plain(safest) == (
-        "Whoever comes, the safest choice of egos is 33.3 % naive + 66.7 % retrained: it fails in 13.3 % of games at "
-        "worst (against speedy, speedy_round2). The safest single ego is retrained, with 20 % at worst."
+        "The safest choice of egos is 33.3 % naive + 66.7 % retrained: in the worst case it fails in 13.3 % of games "
+        "(against speedy, speedy_round2). The safest single ego is retrained, with 20 % in the worst case."
     )
 
 
-def test_words__a_game_with_holes_says_who_is_left_out_and_gives_no_number():
+def test_words__an_incomplete_game_names_the_strategies_left_out():
     cells = pd.DataFrame(
         {
             "seed": 1,
@@ -305,7 +316,7 @@ def test_words__a_game_with_holes_says_who_is_left_out_and_gives_no_number():
     )
     for _, _, sentences in equilibrium_sentences(equilibria(cells)):
         assert sentences == [
-            "No ego was measured against all of these: there is no game to solve.",
+            NO_GAME,
             "Left out, because not played against all: naive, retrained, speedy, speedy_round2.",
         ]
 
@@ -407,7 +418,7 @@ def test_browser__hostile_names_are_inert(opened, found, tmp_path):
     response = Response(1, "ego", hostile, 1, "pair", "best_ego", hostile, hostile)
     episodes = table(arm("pair", ego_failed=[0, 0]), arm("best_ego", ego_failed=[0, 0], ego_payoff=[11, 12]))
     crossplay = found.crossplay.assign(ego=hostile)[:1]
-    game = GameFindings(gaps([response], episodes, 0.01), crossplay, found.equilibria, found.generalisation)
+    game = replace(found, gaps=gaps([response], episodes, 0.01), crossplay=crossplay)
     (tmp_path / "hostile.html").write_text(page_of(game), encoding="utf-8")
     page = opened(tmp_path / "hostile.html")
     page.wait_for_timeout(100)

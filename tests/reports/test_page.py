@@ -7,14 +7,29 @@ import re
 import pandas as pd
 import pytest
 
-from harness.evaluation.comparison import Verdict
+from harness.evaluation.comparison import Verdict, compare
+from harness.evaluation.research_questions import Question
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import TABLES, typed, write_csv
 from harness.replay.selection import choose_games, replay_name, worst_first
 from harness.reports import page as page_module
-from harness.reports.page import duration, render_page
-from harness.reports.wording import effect, number, p_number, p_text, percent, verdicts
-from tests.support.pages import Page, blank_figures, campaign, recomputed, recordings, with_errors
+from harness.reports.numbers import duration, number, p_number, p_text, percent
+from harness.reports.page import render_page
+from harness.reports.page_wording import FAILS_ALONE, QUICK, as_many_failures
+from harness.reports.run_tables import RunTables
+from harness.reports.wording import (
+    BEFORE_HOLM_ONLY,
+    NO_DIFFERENCE,
+    NO_ROUND_2,
+    NO_T_STATISTIC,
+    arms_not_played,
+    effect,
+    left_out,
+    too_few,
+    verdicts,
+)
+from tests.support.recorded import SCENE, manoeuvres, recorded
+from tests.support.pages import Page, blank_figures, rendered, campaign, recomputed, recordings, with_errors
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +39,7 @@ def small():
 
 @pytest.fixture(scope="module")
 def html(small):
-    return render_page(**small)
+    return rendered(**small)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +57,7 @@ def test_page__the_numbers_are_those_of_the_csv_file(name, small, page, tmp_path
         assert page.cells(name) == list(csv.reader(file))
 
 
-def test_page__every_number_that_is_read_is_the_exact_one_rounded(page):
+def test_page__every_shown_number_is_the_exact_one_rounded(page):
     checked = 0
     for name in ("summary", "episodes", "training"):
         headings = [cell["exact"] for cell in page.tables[name][0]]
@@ -66,7 +81,7 @@ def test_page__each_table_links_its_file(page):
 def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatch):
     monkeypatch.setattr(page_module, "MOST_ROWS", 10)
     with blank_figures():
-        page = Page(render_page(**small))
+        page = Page(rendered(**small))
     assert "episodes" not in page.tables
     assert f"{len(small['episodes'])} games are too many for a page" in page.text
 
@@ -75,13 +90,13 @@ def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatc
 
 
 def text_of(arguments):
-    """The page's text, sooner: without the learning curves."""
+    """The page's text without the learning curves, which take long."""
     return Page(without_curves(arguments)).text
 
 
 def without_curves(arguments):
     with blank_figures():
-        return render_page(**arguments | {"training": arguments["training"][:0]})
+        return rendered(**arguments | {"training": arguments["training"][:0]})
 
 
 def verdict_texts(arguments):
@@ -101,7 +116,7 @@ def test_words__significant_is_a_yes_with_counts_and_p_values():
     assert rq1[1].endswith("also after Holm's correction).")
     assert rq2[0] == "RQ2: yes"
     assert rq2[1].startswith(
-        "Retraining brings the ego's failures against the speedy driver down to 2 of 60 games from 18 of 60 (p"
+        "Retraining reduces the ego's failures against the speedy driver from 18 of 60 games to 2 of 60 (p"
     )
 
 
@@ -121,7 +136,7 @@ def test_words__significant_before_holm_only_is_not_a_yes():
     arguments["comparisons"].loc[failure, "verdict"] = Verdict.BEFORE_HOLM_ONLY.value
     rq1, _ = verdict_texts(arguments)
     assert rq1[0] == "RQ1: only before Holm's correction"
-    assert "significantly more often by itself, but not after Holm's correction (p = 0.0" in rq1[1]
+    assert f"significantly more often {BEFORE_HOLM_ONLY} (p = 0.0" in rq1[1]
     assert "p = 0.025 after Holm's correction" in rq1[1]
 
 
@@ -129,14 +144,14 @@ def test_words__no_difference():
     rq1, rq2 = verdict_texts(campaign(personas=["speedy"], failing={"naive": 0, "retrained": 0}))
     for label, sentence in (rq1, rq2):
         assert label.endswith("no difference")
-        assert "In each of the 60 pairs both games ended alike, so there is nothing to test." in sentence
+        assert NO_DIFFERENCE.format(pairs=60) in sentence
 
 
 def test_words__all_differences_equal_names_mcnemars_p_and_never_says_significant():
     rq1, _ = verdict_texts(campaign(personas=["speedy"], failing={"naive": 1}))
     assert rq1[0] == "RQ1: no t statistic"
-    assert "All 60 pairs differ alike, so the t-test does not exist" in rq1[1]
-    assert "McNemar's exact test, which does, gives p < 0.0001. That is below the campaign's significance" in rq1[1]
+    assert NO_T_STATISTIC.format(pairs=60) in rq1[1]
+    assert "McNemar's exact test gives p < 0.0001. This is below the campaign's significance" in rq1[1]
     assert "significantly" not in rq1[1]
 
 
@@ -145,27 +160,27 @@ def test_words__not_enough_pairs():
     lost = (arguments["episodes"]["arm"] == "naive_vs_speedy") & (arguments["episodes"]["episode"] > 0)
     rq1, _ = verdict_texts(with_errors(arguments, lost))
     assert rq1[0] == "RQ1: not answered"
-    assert "but only one pair of games could be compared: too few for a test." in rq1[1]
-    assert "59 of 60 pairs are left out: not played or not measured." in rq1[1]
+    assert too_few(1) in rq1[1]
+    assert left_out({"pairs": 1, "pairs_left_out": 59}) in rq1[1]
 
 
 def test_words__an_arm_that_was_not_played_is_named():
     arguments = campaign(personas=["speedy"])
     rq1, rq2 = verdict_texts(with_errors(arguments, arguments["episodes"]["arm"] == "retrained_vs_speedy"))
     assert rq1[0] == "RQ1: yes"
-    assert rq2 == ("RQ2: not answered", "The arm retrained_vs_speedy was not played.")
+    assert rq2 == ("RQ2: not answered", arms_not_played(["retrained_vs_speedy"]))
 
 
-def test_words__a_stage_that_is_not_done_leaves_its_question_open_not_unasked():
+def test_words__a_stage_that_is_not_done_leaves_its_question_not_answered():
     arguments = without_arm(campaign(personas=["speedy"]), "retrained_vs_speedy", seeds=[1])
-    assert verdict_texts(arguments)[1] == ("RQ2: not answered", "The arm retrained_vs_speedy was not played.")
+    assert verdict_texts(arguments)[1] == ("RQ2: not answered", arms_not_played(["retrained_vs_speedy"]))
     arguments = without_arm(campaign(personas=["speedy"], seeds=(1, 2)), "retrained_vs_speedy", seeds=[2])
     assert verdict_texts(arguments)[1][0] == "RQ2: yes in 1 of 2 seeds"
-    assert "Seed 2: not answered. The arm retrained_vs_speedy was not played." in text_of(arguments)
+    assert f"Seed 2: not answered. {arms_not_played(['retrained_vs_speedy'])}" in text_of(arguments)
 
 
 def without_arm(arguments, arm, seeds):
-    """The campaign of which an arm has failed, as the run folder has it: neither games nor comparisons."""
+    """The campaign with a failed arm: it has neither games nor comparisons."""
     rows, compared = arguments["episodes"], arguments["comparisons"]
     lost = (compared["question"] == "RQ2") & compared["seed"].isin(seeds)
     arguments["episodes"] = rows[~((rows["arm"] == arm) & rows["seed"].isin(seeds))]
@@ -180,7 +195,7 @@ def test_words__without_retraining_round_2_was_not_played():
     arguments = campaign(personas=["speedy"], retrained=False)
     rq1, rq2 = verdict_texts(arguments)
     assert rq1[0] == "RQ1: yes"
-    assert rq2[1] == "Round 2 was not played: there is nothing to train or to tune in this ego."
+    assert rq2[1] == NO_ROUND_2
     assert "retrained vs" not in without_curves(arguments)
 
 
@@ -199,15 +214,15 @@ def test_words__several_seeds_are_counted_and_shown_each():
     assert "Seed 2: no difference." in text
 
 
-def test_words__an_ordinary_driver_that_does_as_much_harm_is_pointed_out(page):
-    assert "an ordinary driver does it too" not in page.text
-    worse = text_of(campaign(personas=["speedy"], failing={"sumo": 0.4}))
-    assert "That is no less often than against speedy: an ordinary driver does it too." in worse
+def test_words__as_many_failures_against_an_ordinary_driver_are_stated(page):
+    sentence = as_many_failures("speedy", seeds=[1], several=False)
+    assert sentence not in page.text
+    assert sentence in text_of(campaign(personas=["speedy"], failing={"sumo": 0.4}))
 
 
-def test_words__an_ego_that_fails_alone_is_pointed_out(page):
+def test_words__failures_alone_are_stated(page):
     assert "Caution" not in page.text
-    assert "The naive ego fails alone as well" in text_of(campaign(personas=["speedy"], failing={"alone": 0.1}))
+    assert FAILS_ALONE in text_of(campaign(personas=["speedy"], failing={"alone": 0.1}))
 
 
 @pytest.mark.parametrize("question", ["RQ1", "RQ2"])
@@ -217,7 +232,7 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
     row |= {"p_value": 0.004, "p_holm": 0.02, "mcnemar_p": 0.004}
     rows = [row | {"metric": metric} for metric in ("failure", "mean_speed")]
     arms = {(arm["arm"], arm["seed"]): arm for arm in small["summary"].to_dict("records")}
-    answer = verdicts(question, "speedy", [1], rows, arms, 0.01)
+    answer = verdicts(question, "speedy", seeds=[1], rows=rows, arms=arms, significance=0.01)
     yes = verdict is Verdict.SIGNIFICANT
     assert (answer.label == "yes") == yes
     assert (answer.tone != "open") == yes
@@ -227,29 +242,30 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
         if verdict in (Verdict.NO_DIFFERENCE, Verdict.ALL_EQUAL, Verdict.NOT_ENOUGH_PAIRS):
             assert "significantly" not in text
         if verdict is Verdict.BEFORE_HOLM_ONLY:
-            assert "by itself, but not after Holm's correction" in text
+            assert BEFORE_HOLM_ONLY in text
         if verdict is Verdict.NOT_SIGNIFICANT:
             assert "not significantly" in text
 
 
-def test_words__one_seed_of_several_is_harm_enough_but_not_mended():
+def test_words__one_seed_of_several_is_enough_for_harm_but_not_for_mended():
     arguments = campaign(personas=["speedy"], seeds=(1, 2))
     arms = {(arm["arm"], arm["seed"]): arm for arm in arguments["summary"].to_dict("records")}
     for question, tone in (("RQ1", "harm"), ("RQ2", "open")):
         rows = [row for row in arguments["comparisons"].to_dict("records") if row["question"] == question]
         rows = [row | {"verdict": Verdict.NOT_SIGNIFICANT.value} if row["seed"] == 2 else row for row in rows]
-        assert verdicts(question, "speedy", [1, 2], rows, arms, 0.01).label == "yes in 1 of 2 seeds"
-        assert verdicts(question, "speedy", [1, 2], rows, arms, 0.01).tone == tone
+        answer = verdicts(question, "speedy", seeds=[1, 2], rows=rows, arms=arms, significance=0.01)
+        assert answer.label == "yes in 1 of 2 seeds"
+        assert answer.tone == tone
 
 
-def test_p_values__are_never_rounded_to_nothing_or_certainty():
+def test_p_values__are_never_rounded_to_0_or_1():
     assert [p_number(p) for p in (0.00031, 0.0123, 0.5, 1.0)] == ["0.0003", "0.0123", "0.5", "1"]
     assert p_text(1e-30) == "p\N{NO-BREAK SPACE}<\N{NO-BREAK SPACE}0.0001"
     assert p_number(0.99999) == ">\N{NO-BREAK SPACE}0.999"
     assert (p_number(math.nan), p_text(math.nan)) == ("–", "no p-value")
 
 
-def test_numbers__read_as_a_person_writes_them():
+def test_numbers__have_a_typographic_form():
     assert (number(-1.5, 1), number(-0.001, 2), number(math.nan, 1)) == ("\N{MINUS SIGN}1.5", "0.00", "–")
     assert [percent(share) for share in (0.25, 0.0362, 1)] == [
         f"{text}\N{NO-BREAK SPACE}%" for text in ("25", "3.6", "100")
@@ -280,9 +296,8 @@ def test_effect__names_the_direction_it_has(question, metric, mean, words):
 
 
 def test_banner__a_quick_run_says_so(page):
-    warning = "Quick run: fewer training steps than table 1; not for conclusions."
-    assert warning in text_of(campaign(personas=["speedy"], quick=True))
-    assert warning not in page.text
+    assert QUICK in text_of(campaign(personas=["speedy"], quick=True))
+    assert QUICK not in page.text
 
 
 def test_banner__stages_that_are_not_done_are_named_with_their_message(page):
@@ -330,7 +345,7 @@ def test_replays__those_that_the_page_can_play_are_links(small):
     assert 'href="#game=' not in without_curves(small)
 
 
-def test_replays__none_is_said_plainly(small):
+def test_replays__without_any_the_page_states_it(small):
     assert "No game was recorded for replay." in text_of(small | {"replays": []})
 
 
@@ -348,7 +363,7 @@ def test_page__names_from_documents_stay_text():
     arguments["manifest"]["name"] = hostile
     arguments["manifest"]["versions"] |= {hostile: hostile}
     with_errors(arguments, arguments["episodes"]["episode"] == 0)
-    html = render_page(**arguments, **recordings(arguments))
+    html = rendered(**arguments, **recordings(arguments))
     page = Page(html)
     assert hostile in page.text
     assert {tag for tag, _ in page.tags}.isdisjoint({"img", "iframe", "object", "link", "base"})
@@ -395,9 +410,7 @@ def test_page__every_table_has_a_caption_and_scoped_headings(html, page):
 
 
 def test_page__an_empty_run_is_a_page_too():
-    tables = ("episodes", "summary", "comparisons", "training", "manoeuvres")
-    empty = {name: typed(pd.DataFrame(columns=list(TABLES[name]))) for name in tables}
-    page = Page(render_page({"name": "merge", "stages": {}}, **empty, replays=[]))
+    page = Page(rendered(manifest={"name": "merge", "stages": {}}))
     assert "No persona has been assessed yet." in page.text
 
 
@@ -405,15 +418,15 @@ def test_page__draws_without_touching_matplotlibs_global_state(small):
     import matplotlib
 
     before = dict(matplotlib.rcParams)
-    render_page(**small)
+    rendered(**small)
     assert dict(matplotlib.rcParams) == before
 
 
-def test_page__takes_nothing_from_the_users_matplotlib_settings(small, html):
+def test_page__ignores_the_users_matplotlib_settings(small, html):
     import matplotlib
 
     with matplotlib.rc_context({"font.size": 30, "text.usetex": True, "axes.facecolor": "red"}):
-        assert render_page(**small) == html
+        assert rendered(**small) == html
 
 
 # --- manoeuvres ---
@@ -436,7 +449,7 @@ def test_manoeuvres__each_pair_opens_its_games_shortly_before_the_manoeuvre(smal
     assert '<a href="#game=naive_vs_speedy,1,6&amp;t=2.5">naive_vs_speedy, game 6</a>: collision (gap 3.1 m' in html
 
 
-def test_manoeuvres__a_failure_without_any_is_counted_last(small):
+def test_manoeuvres__failures_without_a_manoeuvre_are_last(small):
     found = recordings(small)["manoeuvres"]
     page = Page(without_curves(small | recordings(small) | {"manoeuvres": found[found["episode"] > 2]}))
     last = [cell["text"] for cell in page.tables["pairs"][-1]]
@@ -444,6 +457,6 @@ def test_manoeuvres__a_failure_without_any_is_counted_last(small):
     assert int(last[2]) > 0
 
 
-def test_manoeuvres__without_a_table_nothing_is_said_of_them(page):
+def test_manoeuvres__without_a_table_there_is_no_section(page):
     assert "pairs" not in page.tables
     assert "Manoeuvres" not in page.text

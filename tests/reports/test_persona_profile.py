@@ -1,4 +1,4 @@
-"""A persona's portrait says what its document means, reckoned by the code that the game plays by."""
+"""A persona's profile states the meaning of its document, computed by the code of the game."""
 
 from __future__ import annotations
 
@@ -20,7 +20,18 @@ from harness.reports.persona.drives import DRIFT_SPEED_MPS, drift_m, free_share,
 from harness.reports.persona.page import render_profile, write_profile
 from harness.reports.persona.plotting import area, axis, curve, stretches, ticks
 from harness.reports.persona.profile import (
+    AFTER_A_LAPSE,
+    ALWAYS_CHECKS,
+    ATTENDS,
+    COLLISION_IS_FREE,
+    DECIDES,
+    MOST_LIKELY,
+    NO_LAPSES,
+    SAMPLED,
     SHOWN,
+    STRAIGHT_WHEEL,
+    UNIMPAIRED_IN_TRAINING,
+    WANTS,
     PersonaProfile,
     attends,
     body,
@@ -39,12 +50,12 @@ from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY, harness
 TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), crown_rad=0.005, bumps_rad=0.001)
 
 
-def portrait(file: Path) -> PersonaProfile:
+def profile_of(file: Path) -> PersonaProfile:
     return persona_profile(read_document(file, Persona))
 
 
-def made(**changes: Any) -> PersonaProfile:
-    """The portrait of somebody made up."""
+def invented(**changes: Any) -> PersonaProfile:
+    """The profile of an invented persona."""
     document = {
         "name": "anna",
         "description": "<script>alert('anna')</script> [red]drives[/red]",
@@ -56,26 +67,26 @@ def made(**changes: Any) -> PersonaProfile:
 
 
 def drawn(of: PersonaProfile, width: int, encoding: str = "utf-8") -> str:
-    """What the terminal shows, without colour, as where it is not a terminal."""
+    """The output of the terminal without colour, as in a file."""
     file = io.TextIOWrapper(io.BytesIO(), encoding=encoding, newline="")
     show(of, Console(file=file, width=width, color_system=None, legacy_windows=False))
     file.flush()
     return file.buffer.getvalue().decode(encoding)  # type: ignore[attr-defined]
 
 
-# --- what it is worth ---
+# --- payoffs ---
 
 
-def test_portrait__shows_every_key_of_a_persona() -> None:
+def test_profile__shows_every_key_of_a_persona() -> None:
     assert set(SHOWN) == set(Persona.model_fields)
 
 
-def test_portrait__has_a_moment_for_every_term() -> None:
+def test_profile__has_a_moment_for_every_term() -> None:
     assert {*EXAMPLES, *LIMITED} == set(TERMS)
     terms = {group: {} for group in GROUPS}
     for name, term in TERMS.items():
         terms[term.group][name] = {"weight": 2.0, term.parameter: 1.0} if term.parameter else 2.0
-    found = made(**{group: {"weight": 0.5, "terms": each} for group, each in terms.items()})
+    found = invented(**{group: {"weight": 0.5, "terms": each} for group, each in terms.items()})
     worth = {each.name: (each.worth, each.moment) for each in found.terms}
     assert worth == {  # alpha 0.5, weight 2: the term's own value
         "collision": (-1.0, "once"),
@@ -96,46 +107,48 @@ def test_portrait__has_a_moment_for_every_term() -> None:
     }
 
 
-def test_function__is_drawn_as_the_game_reckons_it() -> None:
-    (speeding,) = portrait(SPEEDY).functions
+def test_function__is_that_of_the_game() -> None:
+    (speeding,) = profile_of(SPEEDY).functions
     # by hand: half-way between `within` (0) and `over` (1.5), and half-way between `over` and `reckless` (-2)
     assert np.interp([0.075, 0.2, 0.325, 0.45], speeding.inputs, speeding.worth) == pytest.approx(
         [0.75, 1.5, -0.25, -2]
     )
     assert function_in_words(speeding) == (
-        "Worth most from 0.15 to 0.25: +1.5 per second. Worth least from 0.4 on: −2 per second."
+        "Greatest payoff from 0.15 to 0.25: +1.5 per second. Least payoff from 0.4 on: −2 per second."
     )
     assert [(name, value) for name, value, _ in speeding.sets] == [("within", 0.0), ("over", 1.5), ("reckless", -2.0)]
 
 
-def test_function__of_a_distance_is_not_drawn_below_zero_and_a_level_one_is_said_to_be() -> None:
+def test_function__of_a_distance_starts_at_zero_and_a_constant_one_is_stated() -> None:
     sets = [{"name": "all", "points": [[3.0, 1.0]], "value": 2.0}]
-    (level,) = made(human={"weight": 0.5, "fuzzy": [{"name": "calm", "quantity": "goal_m", "sets": sets}]}).functions
-    assert function_in_words(level) == "Worth +1 per second everywhere."
+    (level,) = invented(
+        human={"weight": 0.5, "fuzzy": [{"name": "calm", "quantity": "goal_m", "sets": sets}]}
+    ).functions
+    assert function_in_words(level) == "+1 per second everywhere."
     sets = [{"name": "near", "points": [[0.0, 1.0], [5.0, 0.0]], "value": -2.0}]
-    (near,) = made(human={"fuzzy": [{"name": "near", "quantity": "clearance_m", "sets": sets}]}).functions
+    (near,) = invented(human={"fuzzy": [{"name": "near", "quantity": "clearance_m", "sets": sets}]}).functions
     assert near.inputs[0] == 0.0
 
 
-def test_wants__weighs_a_collision_against_progress() -> None:
-    assert list(wants(portrait(SPEEDY))) == ["A collision costs as much as 125 m of progress are worth."]
-    assert list(wants(made())) == ["A collision costs nothing of itself."]
-    of = made(human={"weight": 0.0, "terms": {"time_pressure": 1.0}}, safety={"terms": {"collision": 5.0}})
+def test_wants__compares_a_collision_with_progress() -> None:
+    assert list(wants(profile_of(SPEEDY))) == ["A collision costs as much as 125 m of progress earn."]
+    assert list(wants(invented())) == [COLLISION_IS_FREE]
+    of = invented(human={"weight": 0.0, "terms": {"time_pressure": 1.0}}, safety={"terms": {"collision": 5.0}})
     assert list(wants(of)) == [
-        "A collision costs as much as 2.5 times the goal is worth.",
-        "The human terms count nothing: their alpha is 0.",
+        "A collision costs 2.5 times the payoff of the goal.",
+        "The human terms have no effect: their alpha is 0.",
     ]
 
 
-# --- how it attends ---
+# --- human factors ---
 
 
-def test_lapses__shares_and_rates_are_those_of_drawn_ones() -> None:
+def test_lapses__shares_and_rates_are_those_of_drawn_lapses() -> None:
     # by hand: 5 s of every 9 s, a lapse in 9 s
     assert lapsed_share(TEXTING) == pytest.approx(5.0 / 9.0)
     assert lapses_per_minute(TEXTING) == pytest.approx(60.0 / 9.0)
     lapses = [draw_lapses(TEXTING, 100, 0.1, np.random.default_rng(seed)).lapsed for seed in range(2000)]
-    # a glance of a step parts lapses that follow one another at once, so a little less is drawn
+    # a step of attention separates consecutive lapses, so the drawn share is slightly smaller
     assert np.mean(lapses) == pytest.approx(lapsed_share(TEXTING), abs=0.03)
     free = np.mean([not each.any() for each in lapses])  # standard error sqrt(0.036 * 0.964 / 2000) = 0.0042
     assert free == pytest.approx(free_share(TEXTING, 10.0), abs=4 * 0.0042)
@@ -151,33 +164,35 @@ def test_drift__is_that_of_the_games_car() -> None:
 
 
 def test_attends__in_words() -> None:
-    said = " ".join(attends(portrait(DISTRACTED)))
-    assert "Eyes off the road 56 % of the time" in said
-    assert "lapses of 4 to 6 s, between them 4 s of attention on average; 6.7 lapses a minute" in said
-    assert "Of drives of 60 s, under 1 % are without a lapse" in said
-    assert "after 5 s, 5.1 m to the right (standard deviation 0.93 m)" in said
-    assert list(attends(portrait(CAREFUL))) == ["Attention never lapses."]
-    straight = made(attention={"mean_attentive_s": 55.0, "lapse_s": [5.0, 5.0]})
-    said = " ".join(attends(straight))
-    assert "Eyes off the road 8 % of the time, in the long run: lapses of 5 s, between them 55 s" in said
-    assert "The wheel then stands straight." in said
+    text = " ".join(attends(profile_of(DISTRACTED)))
+    assert "Eyes off the road 56 % of the time" in text
+    assert "lapses of 4 to 6 s, with 4 s of attention between them on average; 6.7 lapses per minute" in text
+    assert "Of drives of 60 s, under 1 % have no lapse" in text
+    assert "after 5 s, 5.1 m to the right (standard deviation 0.93 m)" in text
+    assert list(attends(profile_of(CAREFUL))) == [NO_LAPSES]
+    straight = invented(attention={"mean_attentive_s": 55.0, "lapse_s": [5.0, 5.0]})
+    text = " ".join(attends(straight))
+    assert "Eyes off the road 8 % of the time, in the long run: lapses of 5 s, with 55 s" in text
+    assert STRAIGHT_WHEEL in text
 
 
 def test_sees__in_words() -> None:
-    of = portrait(SPEEDY)
-    count = sum(each.overlooks for each in of.drives)
-    assert next(sees(of)).startswith("In 85 % of the drives, others whose centre is not at least 4 m ahead of its own")
-    assert f"in {count} of the 8 drawn here" in next(sees(of))
-    behind = made(perception={"overlooks_share": 1.0, "overlooked_up_to_m": -5.0})
-    assert "others whose centre is more than 5 m behind its own are not seen: in 8 of the 8" in next(sees(behind))
-    assert list(sees(portrait(CAREFUL))) == ["Nobody is overlooked."]
+    of = profile_of(SPEEDY)
+    count = sum(each.no_blind_spot_check for each in of.drives)
+    sentence = next(sees(of))
+    assert sentence.startswith(f"No blind-spot check in 85 % of the drives ({count} of the 8 sample drives)")
+    assert "its centre is not at least 4 m ahead of the person's own" in sentence
+    behind = invented(perception={"no_blind_spot_check_share": 1.0, "unseen_behind_m": -5.0})
+    assert "8 of the 8 sample drives" in next(sees(behind))
+    assert "its centre is more than 5 m behind the person's own" in next(sees(behind))
+    assert list(sees(profile_of(CAREFUL))) == [ALWAYS_CHECKS]
 
 
 def test_body__in_words() -> None:
-    assert list(body(portrait(CAREFUL))) == []
-    of = made(
+    assert list(body(profile_of(CAREFUL))) == []
+    of = invented(
         perception={
-            "misses_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
+            "looked_but_failed_to_see_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
             "distance_error": 0.1, "closing_error_per_s": 0.02,
         },
         reaction={"delay_s": [0.2, 0.6]},
@@ -185,25 +200,25 @@ def test_body__in_words() -> None:
         attention={"mean_attentive_s": 5.0, "lapse_s": [1.0, 2.0]},
     )  # fmt: skip
     assert list(body(of)) == [
-        "In 30 % of the drives it looks and fails to see: others are noticed within 8 m only.",
-        "Others more than 60 m away are never seen.",
-        "Two thirds of the time, 10 m to another are taken for 9.05 to 11.1 m.",  # 10 exp(-0.1) to 10 exp(0.1)
-        "At 20 m, closing speeds are off by 0.4 m/s (standard deviation).",
-        "What is misjudged stays so for 20 s or so.",
-        "Decisions count 0.2 to 0.6 s later: at 50 km/h after up to 8.3 m.",
-        "After a lapse the car is let go for as long again.",
-        "Of what the car can do it uses 50 % of its acceleration, 80 % of its steering.",
-        "While the person itself is trained, nobody is overlooked or missed; all else is as in driving.",
+        "In 30 % of the drives the person looks but fails to see: a vehicle is noticed within 8 m only.",
+        "Vehicles more than 60 m away are never seen.",
+        "Two thirds of the time, a distance of 10 m is perceived as 9.05 to 11.1 m.",  # 10 exp(-0.1) to 10 exp(0.1)
+        "At 20 m, the error of closing speeds is 0.4 m/s (standard deviation).",
+        "An error of perception lasts for about 20 s.",
+        "A decision takes effect 0.2 to 0.6 s later: at 50 km/h after up to 8.3 m.",
+        AFTER_A_LAPSE,
+        "The person uses 50 % of the acceleration, 80 % of the steering of the car.",
+        UNIMPAIRED_IN_TRAINING,
     ]
 
 
 def test_decides__in_words() -> None:
-    assert decides(portrait(SPEEDY)).startswith("Varies")
-    assert decides(portrait(CAREFUL)).startswith("Always takes")
+    assert decides(profile_of(SPEEDY)) == SAMPLED
+    assert decides(profile_of(CAREFUL)) == MOST_LIKELY
 
 
-def test_drives__are_the_same_each_time_and_have_lapses_of_the_documents_length() -> None:
-    first, second = portrait(DISTRACTED).drives, portrait(DISTRACTED).drives
+def test_drives__are_reproducible_and_have_lapses_of_the_documents_length() -> None:
+    first, second = profile_of(DISTRACTED).drives, profile_of(DISTRACTED).drives
     assert first == second
     whole = [end - begin for each in first for begin, end in each.lapses if begin > 0.0 and end < 60.0 - 1e-9]
     assert len(whole) > 20
@@ -214,7 +229,7 @@ def test_drives__are_the_same_each_time_and_have_lapses_of_the_documents_length(
 # --- in characters ---
 
 
-def test_curve__rises_from_foot_to_top_without_a_gap() -> None:
+def test_curve__rises_from_bottom_to_top_without_a_gap() -> None:
     x = np.array([0.0, 1.0])
     plain = curve(x, x, 4, 4, 0.0, 1.0, plain=True)
     assert plain == ["   *", "  * ", " *  ", "*   "]
@@ -235,11 +250,11 @@ def test_area_stretches_and_axis() -> None:
 
 @pytest.mark.parametrize("width", [40, 80, 120])
 @pytest.mark.parametrize("file", [SPEEDY, DISTRACTED], ids=["speedy", "distracted"])
-def test_terminal__fits_and_says_it_all(file: Path, width: int) -> None:
-    text = drawn(portrait(file), width)
+def test_terminal__fits_the_width_and_has_every_part(file: Path, width: int) -> None:
+    text = drawn(profile_of(file), width)
     assert "\x1b" not in text
     assert max(map(len, text.splitlines())) <= width
-    for words in ("collision", "What this person wants", "How this person attends", "How this person decides"):
+    for words in ("collision", WANTS, ATTENDS, DECIDES):
         assert words in text
     if file == DISTRACTED:
         assert text.count("█·") > 8
@@ -250,16 +265,16 @@ def test_terminal__fits_and_says_it_all(file: Path, width: int) -> None:
         assert "speed_over_limit" in text
 
 
-def test_terminal__of_ascii_alone_is_readable() -> None:
-    text = drawn(portrait(SPEEDY), 80, "ascii")
+def test_terminal__is_legible_in_ascii() -> None:
+    text = drawn(profile_of(SPEEDY), 80, "ascii")
     assert "alpha x weight" in text
     assert "-5 once" in text
     assert "***" in text
     assert "?" not in text
 
 
-def test_terminal__takes_what_a_document_says_as_it_is() -> None:
-    text = drawn(made(), 120)
+def test_terminal__prints_the_text_of_a_document_unchanged() -> None:
+    text = drawn(invented(), 120)
     assert "<script>alert('anna')</script> [red]drives[/red]" in text
     assert "one of <b>two</b> people [nobody, [nowhere]]" in text
 
@@ -267,31 +282,31 @@ def test_terminal__takes_what_a_document_says_as_it_is() -> None:
 # --- as a page ---
 
 
-def test_page__escapes_what_a_document_says() -> None:
-    page = render_profile(made())
+def test_page__escapes_the_text_of_a_document() -> None:
+    page = render_profile(invented())
     assert "<script" not in page
     assert "&lt;script&gt;alert(&#39;anna&#39;)&lt;/script&gt;" in page
     assert "one of &lt;b&gt;two&lt;/b&gt; people" in page
 
 
-def test_page__of_equal_portraits_is_equal() -> None:
-    assert render_profile(portrait(SPEEDY)) == render_profile(portrait(SPEEDY))
+def test_page__of_equal_profiles_is_equal() -> None:
+    assert render_profile(profile_of(SPEEDY)) == render_profile(profile_of(SPEEDY))
 
 
 def test_page__is_not_written_over_a_document(tmp_path: Path) -> None:
     file = tmp_path / "anna.toml"
     file.write_text("mine")
-    with pytest.raises(UsageError, match=r"has to end with \.html"):
-        write_profile(made(), file)
+    with pytest.raises(UsageError, match=r"must end with \.html"):
+        write_profile(invented(), file)
     assert file.read_text() == "mine"
     with pytest.raises(UsageError, match="there is no folder"):
-        write_profile(made(), tmp_path / "no" / "anna.html")
+        write_profile(invented(), tmp_path / "no" / "anna.html")
 
 
-def test_page__opens_in_dark_and_light_asks_for_nothing_and_never_scrolls_sideways(tmp_path: Path) -> None:
-    file = tmp_path / "portrait.html"
+def test_page__opens_in_dark_and_light_loads_nothing_and_does_not_scroll_sideways(tmp_path: Path) -> None:
+    file = tmp_path / "profile.html"
     fuzzy = read_document(SPEEDY, Persona).model_dump(exclude_none=True)["human"]
-    write_profile(made(human=fuzzy, attention={"mean_attentive_s": 5.0, "lapse_s": [4.0, 6.0]}), file)
+    write_profile(invented(human=fuzzy, attention={"mean_attentive_s": 5.0, "lapse_s": [4.0, 6.0]}), file)
     with launched() as browser, opener(browser, file) as open_page:
         for scheme in ("light", "dark"):
             page = open_page(color_scheme=scheme)
@@ -302,10 +317,10 @@ def test_page__opens_in_dark_and_light_asks_for_nothing_and_never_scrolls_sidewa
         assert page.evaluate("document.documentElement.scrollWidth") == 320
 
 
-def test_show__a_mistake_in_the_file_is_named(tmp_path: Path) -> None:
+def test_show__names_a_mistake_in_the_file(tmp_path: Path) -> None:
     file = tmp_path / "anna.toml"
     file.write_text(CAREFUL.read_text(encoding="utf-8").replace("progress", "progres"), encoding="utf-8")
-    said = harness("persona", "show", file)
-    assert said.returncode == 2
-    assert "operational.terms.progres" in said.stderr
-    assert "'progress'" in said.stderr
+    result = harness("persona", "show", file)
+    assert result.returncode == 2
+    assert "operational.terms.progres" in result.stderr
+    assert "'progress'" in result.stderr

@@ -1,4 +1,4 @@
-"""The player of the report in a real browser: it plays, steps, scrubs, keeps two games in step, and opens its links."""
+"""The player of the report in a real browser: it plays, steps, seeks, synchronises two games, and opens its links."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import re
 
 import pytest
 
-from harness.reports.page import GAMES_BYTES, PAGE_BYTES, render_page
+from harness.reports.page import GAMES_BYTES, PAGE_BYTES
 from harness.reports.player_data import key
+from tests.support.pages import campaign, recordings, rendered
 from tests.support.chromium import launched, opener, until
-from tests.support.pages import campaign, recordings
 from tests.support.recorded import STEP_S, recorded
 
-GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and what retraining made of it
+GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and the same episode after retraining
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def games(arguments):
 @pytest.fixture(scope="module")
 def report(arguments, tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(render_page(**arguments, **recordings(arguments)), encoding="utf-8")
+    path.write_text(rendered(**arguments, **recordings(arguments)), encoding="utf-8")
     return path
 
 
@@ -72,7 +72,7 @@ def scrub(page, time_s):
 # --- the clock ---
 
 
-def test_player__plays_and_pauses_without_a_complaint_or_a_request(opened):
+def test_player__plays_and_pauses_without_an_error_or_a_request(opened):
     page = opened()
     page.get_by_role("button", name="Play", exact=True).last.click()
     until(page, "() => Number(document.querySelector('.player').dataset.time) > 2.3")
@@ -83,7 +83,7 @@ def test_player__plays_and_pauses_without_a_complaint_or_a_request(opened):
     assert page.seen == []
 
 
-def test_player__stops_at_the_end_and_begins_anew(opened, games):
+def test_player__stops_at_the_end_and_restarts(opened, games):
     page = opened(f"#game={GAME}&t={games[GAME].steps * STEP_S - 0.2}")
     press(page, "Space")
     until(page, "() => document.querySelector('[data-do=play]').textContent === 'Play'")
@@ -127,7 +127,7 @@ def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(opened, ga
         assert time_of(page) == pytest.approx(expected, abs=1e-6), pressed
 
 
-def test_player__every_key_it_knows_is_explained(opened):
+def test_player__explains_every_key(opened):
     page = opened()
     page.locator(".keys summary").click()
     explained = page.locator(".keys").inner_text().lower()
@@ -135,7 +135,7 @@ def test_player__every_key_it_knows_is_explained(opened):
         assert name in explained
 
 
-def test_player__scrubbing_shows_the_values_of_that_moment(opened, games):
+def test_player__the_slider_shows_the_values_of_its_time(opened, games):
     page = opened()
     ego = games[GAME].players[0]
     for step in (5, 33, 61):
@@ -143,7 +143,7 @@ def test_player__scrubbing_shows_the_values_of_that_moment(opened, games):
         assert page.locator(".values .of-ego").inner_text().startswith(f"ego {ego.speed_mps[step]:.1f} m/s")
 
 
-def test_player__dragging_over_the_curves_is_scrubbing(opened, games):
+def test_player__dragging_over_the_curves_moves_through_time(opened, games):
     page = opened()
     page.locator(".curves").scroll_into_view_if_needed()
     box = page.locator(".curves").bounding_box()
@@ -210,10 +210,10 @@ def test_road__between_two_steps_a_car_is_between_its_places(opened, games):
     assert pixel(page, 0, ahead, ego.y_m[20]) != colour(page, "--asphalt")
 
 
-def test_road__others_are_drawn_too(opened, games):
+def test_road__background_traffic_is_drawn(opened, games):
     page = opened("#game=naive_vs_speedy,1,6&t=4")
     press(page, "f")
-    other = games[GAME].others[0]
+    other = games[GAME].background[0]
     assert pixel(page, 0, other.x_m[40] - 0.4, other.y_m[40]) == colour(page, "--other")
 
 
@@ -236,7 +236,7 @@ def test_road__follows_the_players_or_shows_the_whole_road_and_zooms(opened):
 # --- two games ---
 
 
-def test_side_by_side__stays_in_step(opened, games):
+def test_side_by_side__games_have_the_same_time(opened, games):
     page = opened()
     press(page, "b")
     page.wait_for_selector(".screens.two")
@@ -254,13 +254,13 @@ def test_side_by_side__stays_in_step(opened, games):
     press(page, "Space", "Period", "Comma")
     step = round(time_of(page) / STEP_S)
     for screen, name in enumerate((GAME, OTHER)):
-        said = page.locator(".values").nth(screen).locator(".of-ego").inner_text()
-        assert said.startswith(f"ego {games[name].players[0].speed_mps[step]:.1f} m/s")
+        text = page.locator(".values").nth(screen).locator(".of-ego").inner_text()
+        assert text.startswith(f"ego {games[name].players[0].speed_mps[step]:.1f} m/s")
     press(page, "b")
     page.wait_for_selector(".screens:not(.two)")
 
 
-def test_side_by_side__the_one_that_ended_waits_for_the_other(opened, games):
+def test_side_by_side__an_ended_game_shows_its_last_step(opened, games):
     assert games[GAME].steps < games[OTHER].steps
     page = opened(f"#game={GAME}&t=2&with={OTHER}")
     press(page, "End")
@@ -278,7 +278,7 @@ def test_link__reopens_the_games_at_the_moment(opened):
     page.wait_for_selector(".screens.two")
     scrub(page, 3.2)
     page.locator("[data-do=link]").click()
-    until(page, "() => document.querySelector('[data-is=said]').textContent.includes('link to this moment')")
+    until(page, "() => document.querySelector('[data-is=status]').textContent.includes('link to this moment')")
     fragment = page.evaluate("location.hash")
     assert fragment == f"#game={GAME}&t=3.2&with={OTHER}"
     again = opened(fragment)
@@ -290,9 +290,9 @@ def test_link__reopens_the_games_at_the_moment(opened):
     assert -5 < box["y"] < 200
 
 
-def test_link__of_a_game_that_is_not_there_says_so(opened):
+def test_link__to_a_missing_game_shows_a_message(opened):
     page = opened("#game=naive_vs_nobody,1,3&t=2")
-    until(page, "() => document.querySelector('[data-is=said]').textContent.includes('not in this page')")
+    until(page, "() => document.querySelector('[data-is=status]').textContent.includes('does not contain that game')")
     assert page.locator(".screen").count() == 1
     assert page.seen == []
 
@@ -314,7 +314,7 @@ def test_link__the_rows_of_the_tables_open_their_games(opened):
     assert time_of(page) == pytest.approx(float(wanted[2]))
 
 
-def test_marks__a_manoeuvre_goes_to_its_moment(opened):
+def test_marks__a_manoeuvre_seeks_to_its_time(opened):
     page = opened()
     page.get_by_role("button", name="4.0 s speedy: cut-in").click()
     assert time_of(page) == pytest.approx(4.0)
@@ -333,7 +333,7 @@ def test_clip__plays_by_itself_and_opens_in_the_player(opened):
     until(page, "() => Number(document.querySelector('.player').dataset.time) > 0.2")
 
 
-def test_clip__stands_still_for_who_asked_for_less_motion(opened):
+def test_clip__does_not_move_with_reduced_motion(opened):
     page = opened("", reduced_motion="reduce")
     page.wait_for_selector(".clip[data-time]")
     before = page.locator(".clip").first.get_attribute("data-time")
@@ -360,7 +360,7 @@ def test_player__hostile_names_are_inert(browser, tmp_path):
     found = recordings(arguments)
     found["manoeuvres"]["text"] = hostile
     path = tmp_path / "report.html"
-    path.write_text(render_page(**arguments, **found), encoding="utf-8")
+    path.write_text(rendered(**arguments, **found), encoding="utf-8")
     with opener(browser, path) as open_page:
         page = open_page()
         page.wait_for_selector(".player[data-ready]")
@@ -375,9 +375,9 @@ def test_player__hostile_names_are_inert(browser, tmp_path):
 
 def test_page__of_a_default_campaign_is_small_and_soon_interactive(browser, tmp_path):
     arguments = campaign(games=100)
-    html = render_page(**arguments, **recordings(arguments, others=6))
+    html = rendered(**arguments, **recordings(arguments, background=6))
     assert len(html.encode()) <= PAGE_BYTES
-    assert "more games are too many" not in html
+    assert "more games do not fit" not in html
     path = tmp_path / "report.html"
     path.write_text(html, encoding="utf-8")
     with opener(browser, path) as open_page:
@@ -387,11 +387,11 @@ def test_page__of_a_default_campaign_is_small_and_soon_interactive(browser, tmp_
         assert page.locator("[data-is=game] option").count() == len(arguments["episodes"])
 
 
-def test_page__what_is_too_much_is_left_to_the_run_folder(arguments, monkeypatch):
+def test_page__games_that_do_not_fit_stay_in_the_run_folder(arguments, monkeypatch):
     monkeypatch.setattr("harness.reports.page.GAMES_BYTES", 50_000)
     assert GAMES_BYTES > 50_000
-    html = render_page(**arguments, **recordings(arguments))
+    html = rendered(**arguments, **recordings(arguments))
     shown = len(re.findall(r'"packed"', html))
     assert 0 < shown < len(arguments["episodes"])
     assert f"{shown} recorded games" in html
-    assert f"{len(arguments['episodes']) - shown} more games are too many for a page" in html
+    assert f"{len(arguments['episodes']) - shown} more games do not fit into the page" in html

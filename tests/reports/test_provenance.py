@@ -1,4 +1,4 @@
-"""A run whose stages were made by different versions says so, and which."""
+"""The warning for a run with stages of different versions names the versions."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from harness.reports.page_wording import MIXED_VERSIONS
 from harness.reports.provenance import mixed_versions
 from tests.support.tiny import harness, sumo_run
 
@@ -19,24 +20,24 @@ def stages(**made_by: Any) -> dict[str, dict[str, Any]]:
     return {name: {"status": "done", "versions": versions} for name, versions in made_by.items()}
 
 
-def test_mixed_versions__of_one_there_is_nothing_to_say() -> None:
+def test_mixed_versions__of_one_version_there_is_no_warning() -> None:
     assert mixed_versions({}) == []
     assert mixed_versions(stages(a=[NEW], b=[NEW])) == []
 
 
-def test_mixed_versions__names_what_differs_and_nothing_else() -> None:
+def test_mixed_versions__names_only_the_differences() -> None:
     assert mixed_versions(stages(a=[NEW], b=[OLD], c=[NEW])) == [
-        "This run mixes versions: its numbers are not promised to be those of one version.",
+        MIXED_VERSIONS,
         "  by numpy 2.2.6: a, c",
         "  by numpy 2.1.0: b",
     ]
 
 
-def test_mixed_versions__within_a_training_that_went_on() -> None:
+def test_mixed_versions__within_a_resumed_training() -> None:
     assert mixed_versions(stages(a=[OLD, NEW]))[1:] == ["  by numpy 2.1.0, then 2.2.6: a"]
 
 
-def test_mixed_versions__a_program_that_one_did_not_have() -> None:
+def test_mixed_versions__a_program_missing_in_one_stage() -> None:
     assert mixed_versions(stages(a=[NEW], b=[{"python": "3.11.7"}]))[1:] == [
         "  by numpy 2.2.6: a",
         "  by numpy of no known version: b",
@@ -54,7 +55,7 @@ def test_mixed_versions__stages_that_are_not_done_or_of_no_known_versions_do_not
 
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["report", "campaign"])
-def test_run__that_mixes_versions_says_so_on_the_terminal_and_on_the_page(command: str, tmp_path: Path) -> None:
+def test_run__that_mixes_versions_warns_on_the_terminal_and_on_the_page(command: str, tmp_path: Path) -> None:
     run = shutil.copytree(sumo_run(), tmp_path / "run")
     for file, keys in ((run / "manifest.json", ("stages", "speedy-seed1")), (done_of(run), ("info",))):
         document = json.loads(file.read_text())

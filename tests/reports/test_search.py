@@ -1,4 +1,4 @@
-"""What the page says of searches: naive against reconfigured, the best over the trials, and the parameters found."""
+"""Searches on the page: naive against reconfigured, the best over the trials, and the found parameters."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed
-from harness.reports.page import render_page
+from harness.reports.page_wording import changed_ego_alone, rounds
 from harness.reports.provenance import mixed_versions
 from harness.reports.search import searches
-from tests.support.pages import campaign
+from harness.reports.treatment import RECONFIGURED
+from harness.reports.wording import QUESTIONS
+from tests.support.pages import campaign, rendered
 
 PAYOFFS = (2.0, 1.5, math.nan, 4.25, 4.25)
 
@@ -46,7 +48,7 @@ def _or_least(payoff: float) -> float:
 
 
 def reconfigured(**options: Any) -> dict[str, Any]:
-    """The arguments of render_page for a campaign whose ego was reconfigured, not retrained."""
+    """The fields of RunTables for a campaign with an ego that was reconfigured, not retrained."""
     given = campaign(personas=["speedy"], **options)
     given["manifest"] = json.loads(json.dumps(given["manifest"]).replace("retrained", "reconfigured"))
     given["manifest"]["stages"]["reconfigured_speedy-seed1"] |= {"kind": "reconfiguration"}
@@ -63,14 +65,11 @@ def words_of(page: str) -> str:
 
 
 def test_page__shows_naive_against_reconfigured_as_it_does_naive_against_retrained() -> None:
-    page = words_of(render_page(**reconfigured()))
-    assert "RQ2: yes Does reconfiguration mend it?" in page
-    assert (
-        "Reconfiguration brings the ego's failures against the speedy driver down to 2 of 60 games from 18 of 60"
-        in page
-    )
+    page = words_of(rendered(**reconfigured()))
+    assert f"RQ2: yes {QUESTIONS['RQ2'].format(doing=RECONFIGURED.doing)}" in page
+    assert "Reconfiguration reduces the ego's failures against the speedy driver from 18 of 60 games to 2 of 60" in page
     assert "reconfigured ego, against speedy" in page
-    assert "The reconfigured ego alone: is what worked unbroken?" in page
+    assert changed_ego_alone("reconfigured") in page
     assert "played by the naive and by the reconfigured ego" in page
     assert "drives faster after reconfiguration" in page
     assert "the ego tuned against speedy, against the same speedy" in page
@@ -78,20 +77,20 @@ def test_page__shows_naive_against_reconfigured_as_it_does_naive_against_retrain
 
 
 def test_page__of_several_seeds_counts_them() -> None:
-    page = words_of(render_page(**reconfigured(seeds=(1, 2))))
+    page = words_of(rendered(**reconfigured(seeds=(1, 2))))
     assert "In 2 of 2 training seeds reconfiguration makes the ego fail significantly less often" in page
 
 
 def test_page__says_what_was_found_and_escapes_names() -> None:
-    page = render_page(**reconfigured())
+    page = rendered(**reconfigured())
     assert '<tr><th scope="row">gap_s</th><td>1.5</td><td>2.25</td><td>\N{MINUS SIGN}1</td><td>3</td></tr>' in page
     assert "<b>odd</b>" not in page
     assert "&lt;b&gt;odd&lt;/b&gt;" in page
-    assert "0, 1 and 2: this ego is not trained, but its parameters are tuned" in words_of(page)
+    assert rounds([{"kind": "reconfiguration"}]) in words_of(page)
 
 
-def test_page__of_a_campaign_without_a_search_says_nothing_of_any() -> None:
-    page = words_of(render_page(**campaign(personas=["speedy"])))
+def test_page__without_a_search_has_no_such_section() -> None:
+    page = words_of(rendered(**campaign(personas=["speedy"])))
     assert "econfiguration" not in page
     assert "trial" not in page
 
@@ -99,7 +98,7 @@ def test_page__of_a_campaign_without_a_search_says_nothing_of_any() -> None:
 def test_searches__in_words() -> None:
     (found,) = searches(trials())
     assert found.summary == (
-        "5 trials; best in trial 3: mean payoff 4.25, failures in 12.5 %. "
+        "5 trials; the best is trial 3: mean payoff 4.25, failures in 12.5 %. "
         "As given: mean payoff 2.00, failures in 12.5 %. 1 could not be played: ValueError: no"
     )
     assert found.document == "policies/reconfigured_speedy-seed1/driver.toml"
@@ -110,11 +109,11 @@ def test_searches__in_words() -> None:
 def test_searches__each_seed_has_its_own() -> None:
     both = pd.concat([trials(1), trials(2, (1.0, 2.0))])
     assert [each.stage for each in searches(both)] == ["reconfigured_speedy, seed 1", "reconfigured_speedy, seed 2"]
-    assert "2 trials; best in trial 1" in str(searches(both)[1].figure)
+    assert "2 trials; the best is trial 1" in str(searches(both)[1].figure)
     assert searches(trials()[:0]) == []
 
 
-def test_mixed_versions__what_only_searches_are_made_by_is_compared_among_searches() -> None:
+def test_mixed_versions__programs_of_searches_are_compared_among_searches() -> None:
     def stage(kind: str, **versions: str) -> dict[str, Any]:
         return {"status": "done", "kind": kind, "versions": [versions]}
 

@@ -1,6 +1,6 @@
-"""A real browser for tests of the report: Debian's Chromium, driven by Playwright.
+"""A real browser for tests of the report: Debian's Chromium, controlled by Playwright.
 
-What is missing makes these tests skip, and fail where HARNESS_REQUIRE_BROWSER=1.
+Without Playwright or Chromium these tests are skipped; with HARNESS_REQUIRE_BROWSER=1 they fail.
 """
 
 from __future__ import annotations
@@ -8,7 +8,10 @@ from __future__ import annotations
 import os
 import shutil
 import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NoReturn
 
 import pytest
 
@@ -24,14 +27,14 @@ ARGUMENTS = [
 ]
 
 
-def missing(what):
+def missing(what: str) -> NoReturn:
     if os.environ.get("HARNESS_REQUIRE_BROWSER") == "1":
-        pytest.fail(f"{what}, and HARNESS_REQUIRE_BROWSER=1 asks for it")
+        pytest.fail(f"{what}, and HARNESS_REQUIRE_BROWSER=1 requires it")
     pytest.skip(what)
 
 
 @contextmanager
-def launched():
+def launched() -> Iterator[Any]:
     """The browser."""
     try:
         from playwright.sync_api import sync_playwright
@@ -47,11 +50,13 @@ def launched():
 
 
 @contextmanager
-def opener(browser, report):
-    """Opens a report in a window of its own; what the browser complained of or asked for is in `seen`."""
-    contexts = []
+def opener(browser: Any, report: Path) -> Iterator[Callable[..., Any]]:
+    """Open a report in a new window; its list `seen` gets every message, error and request of the page."""
+    contexts: list[Any] = []
 
-    def open_page(path=report, width=1280, height=900, fragment="", **settings):
+    def open_page(
+        path: Path = report, width: int = 1280, height: int = 900, fragment: str = "", **settings: Any
+    ) -> Any:
         context = browser.new_context(viewport={"width": width, "height": height}, **settings)
         contexts.append(context)
         page = context.new_page()
@@ -76,10 +81,10 @@ def opener(browser, report):
         context.close()
 
 
-def until(page, expression, argument=None, seconds=300.0):
-    """Wait until a function of JavaScript is true; Playwright's own way of waiting breaks the page's policy."""
+def until(page: Any, expression: str, argument: Any = None, seconds: float = 300.0) -> None:
+    """Wait until a JavaScript function is true; Playwright's own waiting violates the page's content policy."""
     end = time.monotonic() + seconds
     while not page.evaluate(expression, argument):
         if time.monotonic() > end:
-            pytest.fail(f"waited {seconds:g} s in vain for: {expression}")
+            pytest.fail(f"not true within {seconds:g} s: {expression}")
         page.wait_for_timeout(20)

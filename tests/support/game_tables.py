@@ -1,8 +1,10 @@
-"""Made-up games of a campaign that goes on: arms of egos against non-egos, and best responses to pairs of them."""
+"""Made-up games of a campaign with cross-play: arms of egos against non-egos, and best responses to their pairs."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import pandas as pd
@@ -12,7 +14,16 @@ from harness.evaluation.game_theory.records import Pairing, Response
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 
 
-def arm(name, seed=1, ego_failed=(), ego_payoff=None, non_ego_payoff=None, persona="", speed=13.0, first_episode=0):
+def arm(
+    name: str,
+    seed: int = 1,
+    ego_failed: Sequence[int | None] = (),
+    ego_payoff: Sequence[float] | None = None,
+    non_ego_payoff: Sequence[float] | None = None,
+    persona: str = "",
+    speed: float = 13.0,
+    first_episode: int = 0,
+) -> pd.DataFrame:
     """Games of one arm, an episode each; None in `ego_failed` is a game that errored."""
     count = len(ego_failed)
     ego = [10.0] * count if ego_payoff is None else ego_payoff
@@ -37,8 +48,8 @@ def arm(name, seed=1, ego_failed=(), ego_payoff=None, non_ego_payoff=None, perso
     return pd.DataFrame(rows, columns=list(EPISODE_COLUMNS))
 
 
-def table(*arms):
-    """Arms under one another, as episodes.csv holds them."""
+def table(*arms: pd.DataFrame) -> pd.DataFrame:
+    """Arms one below the other, as in episodes.csv."""
     return typed(pd.concat(arms, ignore_index=True))
 
 
@@ -61,24 +72,27 @@ FAILING = {
     ("robust", "sumo"): 0.02,
 }
 """Share of games the ego fails."""
-MET = {
+TRAINED_AGAINST = {
     "retrained_speedy": ("speedy",),
     "retrained_distracted": ("distracted",),
     "robust": ("speedy", "distracted"),
 }
-GAINS = {
+Gains = Mapping[tuple[Literal["ego", "non_ego"], str], float]
+GAINS: Gains = {
     ("ego", "speedy"): 0.1,
     ("non_ego", "speedy"): 6.0,
     ("ego", "distracted"): -0.3,
     ("non_ego", "distracted"): 0.1,
 }
-"""What the best response earns more, by role and persona."""
+"""The gain of the best response, by role and persona."""
 
 
-def a_campaign(seeds=(1,), games=50, gains=None):
-    """Episodes, pairings and responses of a whole made-up campaign: every cell of FAILING, a best response of both
+def a_campaign(
+    seeds: Sequence[int] = (1,), games: int = 50, gains: Gains | None = None
+) -> tuple[pd.DataFrame, list[Pairing], list[Response]]:
+    """Episodes, pairings and responses of a made-up campaign: every cell of FAILING, and best responses of both
     sides of each persona's last pair."""
-    gains, random = GAINS | (gains or {}), np.random.default_rng(5)
+    gains, random = {**GAINS, **(gains or {})}, np.random.default_rng(5)
     arms, pairings, responses = [], [], []
     for seed in seeds:
         for (ego, non_ego), rate in FAILING.items():
@@ -102,13 +116,18 @@ def a_campaign(seeds=(1,), games=50, gains=None):
     return table(*arms), pairings, responses
 
 
-def _noisy(name, seed, failed, persona, random):
+def _noisy(name: str, seed: int, failed: Sequence[int], persona: str, random: np.random.Generator) -> pd.DataFrame:
     ego = [float(random.normal(8, 1) - 12 * each) for each in failed]
     non_ego = [float(random.normal(15, 2) + 3 * each) if persona else math.nan for each in failed]
     return arm(name, seed, failed, ego, non_ego, persona, speed=float(random.normal(13, 0.5)))
 
 
-def findings(seeds=(1,), games=50, gains=None, significance=0.01):
-    """What is found in such a campaign."""
+def findings(
+    seeds: Sequence[int] = (1,),
+    games: int = 50,
+    gains: Gains | None = None,
+    significance: float = 0.01,
+) -> Any:
+    """The findings of such a campaign."""
     episodes, pairings, responses = a_campaign(seeds, games, gains)
-    return find(pairings, responses, MET, episodes, significance)
+    return find(pairings, responses, TRAINED_AGAINST, episodes, significance)

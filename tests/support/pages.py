@@ -1,4 +1,4 @@
-"""Reports of made-up campaigns: what render_page takes, and what a page holds."""
+"""Reports of made-up campaigns: their tables, the rendered page, and what it holds."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from html.parser import HTMLParser
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -14,10 +14,25 @@ import pytest
 from matplotlib.figure import Figure
 
 from harness.evaluation.comparison import compare
-from harness.evaluation.research_questions import Question
+from harness.evaluation.research_questions import Question, ResearchQuestion
+from harness.evaluation.strategies import (
+    NAIVE_ALONE,
+    NAIVE_VS_SUMO,
+    Arm,
+    NaiveEgo,
+    PersonaNonEgo,
+    RetrainedEgo,
+    Strategy,
+    against_persona,
+    persona_alone,
+    strategy_name,
+)
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import TABLES, typed
 from harness.replay.selection import choose_games, replay_name
+from harness.reports.page import render_page
+from harness.reports.player_data import RecordedGame, SceneDrawing
+from harness.reports.run_tables import RunTables
 from tests.support.recorded import SCENE, manoeuvres, recorded
 
 GAMES = 60
@@ -27,16 +42,16 @@ FAILING = {"alone": 0.0, "sumo": 0.03, "naive": 0.3, "retrained": 0.03}
 def campaign(
     personas: Sequence[str] = ("speedy", "distracted"),
     seeds: Sequence[int] = (1,),
-    failing: Mapping[str, float] | None = None,
+    failing: dict[str, float] | None = None,
     games: int = GAMES,
     quick: bool = False,
     retrained: bool = True,
 ) -> dict[str, Any]:
-    """The arguments of render_page for a made-up campaign, its tables computed as those of a real one.
+    """The fields of RunTables for a made-up campaign, its tables computed as those of a real one.
 
     `failing` overrides FAILING: the share of games the ego fails, by kind of arm.
     """
-    rates = {**FAILING, **(failing or {})}
+    rates = FAILING | (failing or {})
     arms: list[tuple[str, str, str | None]] = [("naive_alone", "", "alone"), ("naive_vs_sumo", "", "sumo")]
     stages = ["naive"]
     for persona in personas:
@@ -50,14 +65,19 @@ def campaign(
             stages.append(f"retrained_{persona}")
     random = np.random.default_rng(7)
     rows = [
-        _game(arm, persona, seed, episode, rates.get(kind) if kind else None, random)
+        _game(arm, persona, seed, episode, rates.get(kind or ""), random)
         for arm, persona, kind in arms
         for seed in seeds
         for episode in range(games)
     ]
     episodes = typed(pd.DataFrame(rows, columns=list(TABLES["episodes"])))
-    asked: tuple[Literal["RQ1", "RQ2"], ...] = ("RQ1", "RQ2") if retrained else ("RQ1",)
-    questions = [_question(question, persona, seed) for persona in personas for seed in seeds for question in asked]
+    questions = [
+        Question(question, persona, seed, before, after)
+        for persona in personas
+        for seed in seeds
+        for question, before, after in _asked(persona)
+        if question == "RQ1" or retrained
+    ]
     training = pd.DataFrame([row for stage in stages for seed in seeds for row in _windows(stage, seed, random)])
     manifest = {
         "format": 1,
@@ -81,6 +101,8 @@ def campaign(
     ]
     return {
         "manifest": manifest,
+        "arms": {arm.name: arm for persona in personas for arm in _arms(persona)},
+        "strategies": {strategy_name(each): each for persona in personas for each in _strategies(persona)},
         "episodes": episodes,
         "summary": summarise(episodes),
         "comparisons": compare(questions, episodes, 0.01),
@@ -89,15 +111,27 @@ def campaign(
     }
 
 
-def _question(question: Literal["RQ1", "RQ2"], persona: str, seed: int) -> Question:
-    baseline = "naive_alone" if question == "RQ1" else f"naive_vs_{persona}"
-    return Question(question, persona, seed, baseline, f"{'naive' if question == 'RQ1' else 'retrained'}_vs_{persona}")
+def _arms(persona: str) -> list[Arm]:
+    naive, retrained = NaiveEgo(), RetrainedEgo(against=persona)
+    pairs = [against_persona(ego, persona) for ego in (naive, retrained)]
+    return [NAIVE_ALONE, NAIVE_VS_SUMO, persona_alone(persona), *pairs, Arm(ego=retrained)]
+
+
+def _strategies(persona: str) -> list[Strategy]:
+    return [NaiveEgo(), PersonaNonEgo(persona=persona), RetrainedEgo(against=persona)]
+
+
+def _asked(persona: str) -> list[tuple[ResearchQuestion, str, str]]:
+    return [
+        ("RQ1", "naive_alone", f"naive_vs_{persona}"),
+        ("RQ2", f"naive_vs_{persona}", f"retrained_vs_{persona}"),
+    ]
 
 
 def _game(
     arm: str, persona: str, seed: int, episode: int, failing: float | None, random: np.random.Generator
-) -> dict[str, object]:
-    row: dict[str, object] = {
+) -> dict[str, Any]:
+    row: dict[str, Any] = {
         "arm": arm,
         "persona": persona,
         "seed": seed,
@@ -125,7 +159,7 @@ def _game(
     return row
 
 
-def _windows(stage: str, seed: int, random: np.random.Generator) -> Iterator[dict[str, object]]:
+def _windows(stage: str, seed: int, random: np.random.Generator) -> Iterator[dict[str, Any]]:
     persona = stage.removeprefix("retrained_") if stage != "naive" else ""
     for window in range(1, 10):
         yield {
@@ -142,23 +176,28 @@ def _windows(stage: str, seed: int, random: np.random.Generator) -> Iterator[dic
 
 @contextmanager
 def blank_figures() -> Iterator[None]:
-    """Figures are laid out, but drawn blank: to draw them takes most of a page's time, and its text needs none."""
+    """Lay figures out but draw them blank: drawing takes most of a page's time, and tests of its text don't need it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", lambda figure, file, **_: file.write('<svg viewBox="0 0 1 1"></svg>'))
         yield
 
 
-def recordings(arguments: Mapping[str, Any], others: int = 2) -> dict[str, Any]:
-    """What render_page takes beside a campaign, of games drawn to fit it."""
-    games = recorded(arguments["episodes"], others)
+def rendered(games: Sequence[RecordedGame] = (), scene: SceneDrawing | None = None, **tables: Any) -> str:
+    """The report of these tables, as `campaign` makes them."""
+    return render_page(RunTables(**tables), games, scene)
+
+
+def recordings(arguments: Mapping[str, Any], background: int = 2) -> dict[str, Any]:
+    """What `rendered` takes beside a campaign: recorded games that fit it, and their manoeuvres."""
+    games = recorded(arguments["episodes"], background)
     return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
 
 
-def _done(seed: int) -> dict[str, object]:
+def _done(seed: int) -> dict[str, Any]:
     return {"kind": "assessment", "seed": seed, "status": "done", "seconds": 12.34, "message": ""}
 
 
-def _training_stage(seed: int) -> dict[str, object]:
+def _training_stage(seed: int) -> dict[str, Any]:
     trained = {"steps": 1_179_648, "budget_steps": 3_000_000, "stopped": "converged", "rule": "the curve is flat"}
     return {"kind": "training", "seed": seed, "status": "done", "seconds": 3725.0, "message": ""} | trained
 
@@ -170,7 +209,7 @@ class Page(HTMLParser):
         super().__init__()
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.pieces: list[str] = []
-        self.tables: dict[str, list[list[dict[str, Any]]]] = {}
+        self.tables: dict[str | None, list[list[dict[str, Any]]]] = {}
         self._table: list[list[dict[str, Any]]] = []
         self._cell: dict[str, Any] | None = None
         self._silent = 0
@@ -182,7 +221,7 @@ class Page(HTMLParser):
         self.tags.append((tag, attributes))
         self._silent += tag in ("style", "script")
         if tag == "table":
-            self._table = self.tables.setdefault(attributes.get("id") or f"table {len(self.tables)}", [])
+            self._table = self.tables.setdefault(attributes.get("id", f"table {len(self.tables)}"), [])
         elif tag == "tr":
             self._table.append([])
         elif tag in ("td", "th"):
@@ -200,12 +239,12 @@ class Page(HTMLParser):
         if self._cell is not None:
             self._cell["text"] += data
 
-    def cells(self, name: str) -> list[list[str]]:
+    def cells(self, name: str) -> list[list[str | None]]:
         """A table of the page as the CSV file should have it, its header first."""
         return [[cell["text"] if cell["exact"] is None else cell["exact"] for cell in row] for row in self.tables[name]]
 
 
-def with_errors(arguments: dict[str, Any], games: pd.Series) -> dict[str, Any]:
+def with_errors(arguments: dict[str, Any], games: Any) -> dict[str, Any]:
     """The campaign with `games`, a mask over its episodes, that could not be played."""
     frame = arguments["episodes"]
     frame.loc[games, "ego_outcome"] = "error"
@@ -236,7 +275,13 @@ def recomputed(arguments: dict[str, Any]) -> dict[str, Any]:
     """The campaign with tables that fit its changed episodes."""
     old = arguments["comparisons"]
     questions = [
-        _question(row["question"], row["persona"], row["seed"])
+        Question(
+            row["question"],
+            row["persona"],
+            row["seed"],
+            "naive_alone" if row["question"] == "RQ1" else f"naive_vs_{row['persona']}",
+            f"{'naive' if row['question'] == 'RQ1' else 'retrained'}_vs_{row['persona']}",
+        )
         for row in old[old["metric"] == "failure"].to_dict("records")
     ]
     arguments["summary"] = summarise(arguments["episodes"])

@@ -28,7 +28,8 @@ def driver(
 ) -> ProcessDriver:
     """A driver by a Python program that answers well, but for the change."""
     (folder / "program.py").write_text(OBEDIENT.format(change=change))
-    return ProcessDriver([sys.executable, "program.py"], folder, car, units, deadline_s, 20.0, **options)
+    command = [sys.executable, "program.py"]
+    return ProcessDriver(command, folder, car, units=units, deadline_s=deadline_s, start_deadline_s=20.0, **options)
 
 
 def is_running(pid: int) -> bool:

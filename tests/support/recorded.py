@@ -1,10 +1,14 @@
-"""Recorded games drawn by hand, for tests of the page: on the road of networks/merge, without SUMO."""
+"""Made-up recorded games for tests of the page: on the road of networks/merge, without SUMO."""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games, worst_first
 from harness.reports.player_data import PlayerTrack, RecordedGame, SceneDrawing, Touch, Track
 
@@ -18,18 +22,18 @@ SCENE = SceneDrawing(
 )
 
 
-def recorded(episodes, others=2):
-    """A game for each row of `episodes` that was played, the ones to watch first on top."""
+def recorded(episodes: pd.DataFrame, background: int = 2) -> Iterator[RecordedGame]:
+    """A game for each played row of `episodes`, those to watch first at the front."""
     played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
     chosen = worst_first(choose_games(played))
     rest = worst_first(played.drop(chosen.index))
     for rows in (chosen, rest):
         for row in rows.itertuples():
-            yield recorded_game(row, others)
+            yield recorded_game(row, background)
 
 
-def recorded_game(row, others=2):
-    """One game that ends as its row says."""
+def recorded_game(row: Any, background: int = 2) -> RecordedGame:
+    """One game with the outcome of its row and so many background vehicles."""
     outcome = row.ego_outcome or row.non_ego_outcome
     random = np.random.default_rng([row.seed, row.episode])
     ends = STEPS - 18 + int(random.integers(10)) if outcome in ("collision", "rail") else STEPS
@@ -46,15 +50,44 @@ def recorded_game(row, others=2):
     touches = []
     if outcome in ("collision", "rail"):
         place = (players[0].x_m[-1], players[0].y_m[-1] - 0.9 if outcome == "collision" else 0.0)
-        touches.append(Touch(float(time[-1]), *map(float, place), f"{outcome} at {time[-1]:.1f} s"))
+        x_m, y_m = map(float, place)
+        touches.append(Touch(time_s=float(time[-1]), x_m=x_m, y_m=y_m, label=f"{outcome} at {time[-1]:.1f} s"))
     along = [
-        Track(f"car {n}", 5.0, 1.8, 0, 80 + 30 * n + 9.0 * time, np.full(len(time), -1.6), 0 * time, 0 * time + 9.0)
-        for n in range(others)
+        Track(
+            name=f"car {n}",
+            length_m=5.0,
+            width_m=1.8,
+            first_step=0,
+            x_m=80 + 30 * n + 9.0 * time,
+            y_m=np.full(len(time), -1.6),
+            heading_rad=0 * time,
+            speed_mps=0 * time + 9.0,
+        )
+        for n in range(background)
     ]
-    return RecordedGame(row.arm, row.persona, row.seed, row.episode, STEP_S, ends, outcome, players, along, touches)
+    return RecordedGame(
+        arm=row.arm,
+        persona=row.persona,
+        seed=row.seed,
+        episode=row.episode,
+        step_s=STEP_S,
+        steps=ends,
+        outcome=outcome,
+        players=players,
+        background=along,
+        touches=touches,
+    )
 
 
-def _player(name, time, x_m, y_m, speed_mps, random, outcome):
+def _player(
+    name: str,
+    time: FloatArray,
+    x_m: float,
+    y_m: float,
+    speed_mps: float,
+    random: np.random.Generator,
+    outcome: str,
+) -> PlayerTrack:
     ego = name == "ego"
     wave = random.uniform(0.6, 1.4)
     acceleration = (-0.6 if ego else 0.5) * np.sin(wave * time) + random.normal(0, 0.08, len(time))
@@ -62,22 +95,34 @@ def _player(name, time, x_m, y_m, speed_mps, random, outcome):
         acceleration = np.where(time > time[-1] - 1.2, -4.0, acceleration)
     speed = np.maximum(speed_mps + np.cumsum(acceleration) * STEP_S, 0.0)
     x = x_m + np.concatenate(([0.0], np.cumsum(speed)[:-1] * STEP_S))
-    y = np.full(len(time), y_m)
+    y: FloatArray = np.full(len(time), y_m)
     if not ego:
         y = y_m + 3.2 * np.clip((x - 85) / 40, 0, 1) ** 2
     elif outcome == "rail":
         y = y_m + 0.75 * np.clip((time - time[-1] + 2.0) / 2.0, 0, 1) ** 2
     heading = np.arctan2(np.gradient(y), np.gradient(x))
     gap = np.where(np.abs(time - 3.5) < 2.5, 18 - 2.2 * time, np.inf)
-    soonest = np.where(time > 2.5, np.maximum(time[-1] - time, 0.0) * 1.3, np.inf)
+    time_to_collision = np.where(time > 2.5, np.maximum(time[-1] - time, 0.0) * 1.3, np.inf)
     return PlayerTrack(
-        name, 4.6, 1.8, 0, x, y, heading, speed, acceleration, np.gradient(heading) * 2.0,
-        (time > 2.0) & (time < 3.4) & (not ego), gap, soonest, outcome if outcome != "timeout" else "timeout",
-        len(time) - 1,
-    )  # fmt: skip
+        name=name,
+        length_m=4.6,
+        width_m=1.8,
+        first_step=0,
+        x_m=x,
+        y_m=y,
+        heading_rad=heading,
+        speed_mps=speed,
+        acceleration_mps2=acceleration,
+        steering_rad=np.gradient(heading) * 2.0,
+        lapsed=(time > 2.0) & (time < 3.4) & (not ego),
+        leader_gap_m=gap,
+        time_to_collision_s=time_to_collision,
+        outcome=outcome,
+        ended_step=len(time) - 1,
+    )
 
 
-def manoeuvres(episodes):
+def manoeuvres(episodes: pd.DataFrame) -> pd.DataFrame:
     """A frame of manoeuvres as `harness.evaluation.manoeuvres` writes it: two in each game against a persona."""
     names = (("cut_in", "swerve"), ("drift", "hard_brake"), ("tailgate", "overtake"))
     rows = []

@@ -1,11 +1,11 @@
-"""Small scenes that tests build on the spot, and starts at given poses in them."""
+"""Small scenes that tests build, and initial states with given poses in them."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -48,13 +48,13 @@ def build_scene(
     folder: Path,
     nodes: str = STRAIGHT_NODES,
     edges: str = STRAIGHT_EDGES,
-    places: dict[str, object] = STRAIGHT,
+    places: Mapping[str, Sequence[str]] = STRAIGHT,
     others: str = "",
     cars: str = CARS,
     goal_m: float = 250.0,
     time_limit_s: float = 20.0,
 ) -> OpenScene:
-    """Write a scene's folder, its net built by netconvert, and open it."""
+    """Write a scene's folder with a net built by netconvert, and open it."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "n.nod.xml").write_text(f"<nodes>{nodes}</nodes>")
     (folder / "n.edg.xml").write_text(f"<edges>{edges}</edges>")
@@ -84,20 +84,20 @@ non_ego = {{ vehicle = "non_ego", lane = "{non_ego[1]}", position_m = [30.0, 40.
 
 
 def drawn(scene: OpenScene, *parts: str | int, present: Sequence[float] = (1.0, 1.0)) -> InitialState:
-    """A start drawn from named parts."""
+    """An initial state drawn from named parts."""
     return draw_initial_state(scene.start_distribution([HumanFactors(), HumanFactors()], present), *parts)
 
 
 def placed(scene: OpenScene, *poses: tuple[float, float, float, float] | None) -> InitialState:
-    """A start with the players' centres at x_m, y_m, heading_rad, speed_mps; None: the player takes no part."""
+    """An initial state with the players' centres at x_m, y_m, heading_rad, speed_mps; None: the player is absent."""
     start = drawn(scene, "placed")
-    given = np.array([pose or (40.0, LEFT_Y, 0.0, 0.0) for pose in poses])
+    values = np.array([pose or (40.0, LEFT_Y, 0.0, 0.0) for pose in poses])
     return replace(
         start,
-        x_m=given[:, 0],
-        y_m=given[:, 1],
-        heading_rad=given[:, 2],
-        speed_mps=given[:, 3],
-        position_m=given[:, 0] + 0.5 * scene.world.length_m,
+        x_m=values[:, 0],
+        y_m=values[:, 1],
+        heading_rad=values[:, 2],
+        speed_mps=values[:, 3],
+        position_m=values[:, 0] + 0.5 * scene.world.length_m,
         present=np.array([pose is not None for pose in poses]),
     )

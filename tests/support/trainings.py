@@ -31,4 +31,4 @@ def naive_ego(scene: OpenScene) -> TrainingSpec:
 
 def in_one_go(spec: TrainingSpec, folder: Path, **options: Any) -> Trained:
     """Train from the start to the end, with a checkpoint in `folder`."""
-    return train(spec, folder / "checkpoint.safetensors", "key", {}, **options)
+    return train(spec, checkpoint=folder / "checkpoint.safetensors", key="key", card={}, **options)

@@ -1,4 +1,4 @@
-"""The simulation of this process, against SUMO itself."""
+"""The simulation of this process, compared with SUMO's own state."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from tests.support.repository import REPOSITORY
 from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed
 
 HARNESS, SUMO = True, False
-OTHERS = '<vehicle id="other" type="van" depart="0"><route edges="road"/></vehicle>'
+BACKGROUND = '<vehicle id="other" type="van" depart="0"><route edges="road"/></vehicle>'
 Open = Callable[..., LibsumoSimulation]
 
 
@@ -36,8 +36,8 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
 
 @pytest.fixture(scope="module")
 def busy(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
-    """That road, with others on it: tests say which."""
-    return build_scene(tmp_path_factory.mktemp("scenes") / "busy", others=OTHERS)
+    """The same road with background traffic, which the tests define."""
+    return build_scene(tmp_path_factory.mktemp("scenes") / "busy", others=BACKGROUND)
 
 
 @pytest.fixture
@@ -58,7 +58,15 @@ def opened(scene: OpenScene) -> Iterator[Open]:
 
 
 def other(name: str, depart_s: float = 0.0, lane: str = "0", position: str = "100", speed: str = "5") -> Departure:
-    return Departure(name, "van", ("road",), depart_s, lane, position, speed)
+    return Departure(
+        name=name,
+        vehicle_type="van",
+        edges=("road",),
+        depart_s=depart_s,
+        lane=lane,
+        position=position,
+        speed=speed,
+    )
 
 
 def step(simulation: LibsumoSimulation, start: InitialState) -> Reading:
@@ -75,7 +83,7 @@ def centre_in_sumo(name: str) -> tuple[float, float, float]:
 # --- players ----------------------------------------------------------------------------------------------------------
 
 
-def test_step__poses_given_are_the_poses_sumo_has(scene: OpenScene, opened: Open) -> None:
+def test_step__sumo_has_the_poses_of_the_players(scene: OpenScene, opened: Open) -> None:
     simulation = opened()
     simulation.reset(0, placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), [])
     generator = np.random.default_rng(0)
@@ -87,7 +95,7 @@ def test_step__poses_given_are_the_poses_sumo_has(scene: OpenScene, opened: Open
             assert centre_in_sumo(name) == pytest.approx((x[0, k], y[0, k], heading[0, k]), abs=1e-3)
 
 
-def test_step__tiles_lie_beside_one_another_and_know_nothing_of_it(busy: OpenScene, opened: Open) -> None:
+def test_step__tiles_are_side_by_side_and_independent(busy: OpenScene, opened: Open) -> None:
     simulation = opened(games=3, on=busy)
     for game in range(3):
         simulation.reset(game, placed(busy, (40, RIGHT_Y, 0, 10), None), [other("van")])
@@ -99,7 +107,7 @@ def test_step__tiles_lie_beside_one_another_and_know_nothing_of_it(busy: OpenSce
     np.testing.assert_allclose(reading.y_m, RIGHT_Y, atol=1e-6)
 
 
-def test_step__a_player_stays_in_the_traffic_wherever_it_is_placed(scene: OpenScene, opened: Open) -> None:
+def test_step__a_player_stays_in_the_traffic_at_every_place(scene: OpenScene, opened: Open) -> None:
     simulation = opened()
     simulation.reset(0, placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), [])
     for x in (60.0, 297.0, 299.9, 310.0, 2000.0, 5.0, -400.0, 40.0):  # the road ends at 300
@@ -109,17 +117,17 @@ def test_step__a_player_stays_in_the_traffic_wherever_it_is_placed(scene: OpenSc
                 assert centre_in_sumo(name)[0] == pytest.approx(x + 6.0 * k, abs=1e-3)
 
 
-def test_step__sumo_shows_the_others_the_speed_a_player_has_even_above_the_limit(busy: OpenScene, opened: Open) -> None:
+def test_step__sumo_has_the_speed_of_a_player_above_the_limit(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     simulation.reset(0, placed(busy, (40, RIGHT_Y, 0, 12), None), [])
-    shown = []
+    speeds = []
     for k in range(1, 4):
         simulation.step(np.array([[40 + 2.5 * k, 0]]), np.array([[RIGHT_Y, 0]]), np.zeros((1, 2)))
-        shown.append(libsumo.vehicle.getSpeed("ego"))
-    assert shown == pytest.approx([12, 25, 25])  # first the speed it starts with
+        speeds.append(libsumo.vehicle.getSpeed("ego"))
+    assert speeds == pytest.approx([12, 25, 25])  # the first step has the start speed
 
 
-def test_restart__players_left_to_sumo_start_at_their_pose_and_speed_and_drive_on(
+def test_reset__players_that_sumo_drives_start_at_their_pose_and_speed_and_drive_on(
     scene: OpenScene, opened: Open
 ) -> None:
     simulation = opened((HARNESS, SUMO))
@@ -133,16 +141,14 @@ def test_restart__players_left_to_sumo_start_at_their_pose_and_speed_and_drive_o
         assert abs(after[1, 3] - before[1, 3]) <= 0.3
 
 
-def test_restart__a_player_left_to_sumo_starts_though_sumo_would_not_let_it_in(scene: OpenScene, opened: Open) -> None:
+def test_reset__a_player_that_sumo_drives_starts_where_sumo_would_not_insert_it(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (45.2, RIGHT_Y, 0, 0), (40, RIGHT_Y, 0, 13))
     simulation.reset(0, start, [])
     assert step(simulation, start).players[0, 1, 3] == pytest.approx(13)
 
 
-def test_restart__a_start_above_what_sumo_lets_its_vehicles_drive_is_slowed_to_that(
-    tmp_path: Path, opened: Open
-) -> None:
+def test_reset__a_start_speed_above_the_limit_of_sumo_is_reduced_to_it(tmp_path: Path, opened: Open) -> None:
     slow = '<vType id="ego_car"/><vType id="person_car" speedFactor="0.9" speedDev="0"/>'
     scene = build_scene(tmp_path / "slow", cars=slow)
     simulation = opened((HARNESS, SUMO), on=scene)
@@ -151,7 +157,7 @@ def test_restart__a_start_above_what_sumo_lets_its_vehicles_drive_is_slowed_to_t
     assert step(simulation, start).players[0, 1, 3] == pytest.approx(0.9 * 13.89)
 
 
-def test_restart__in_place_leaves_nothing_of_the_game_before(scene: OpenScene, opened: Open) -> None:
+def test_reset__removes_all_vehicles_of_the_previous_game(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     both, alone = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), placed(scene, (90, LEFT_Y, 0, 10), None)
     for start, expected in ((both, {"ego", "non_ego", "van"}), (alone, {"ego"}), (both, {"ego", "non_ego"})):
@@ -161,7 +167,7 @@ def test_restart__in_place_leaves_nothing_of_the_game_before(scene: OpenScene, o
         assert set(libsumo.vehicle.getIDList()) == expected
 
 
-def test_restart__where_sumo_drives_nobody_players_stay_in_the_traffic_and_begin_where_they_should(
+def test_reset__if_sumo_drives_no_vehicle_players_stay_in_the_traffic_and_start_at_their_poses(
     scene: OpenScene, opened: Open
 ) -> None:
     simulation, generator = opened(games=2), np.random.default_rng(0)
@@ -186,7 +192,7 @@ def test_restart__where_sumo_drives_nobody_players_stay_in_the_traffic_and_begin
     assert set(libsumo.vehicle.getIDList()) == {"g0_ego", "g0_non_ego", "g1_ego", "g1_non_ego"}
 
 
-def test_restart__where_sumo_drives_nobody_who_takes_no_part_is_gone(scene: OpenScene, opened: Open) -> None:
+def test_reset__if_sumo_drives_no_vehicle_absent_players_are_removed(scene: OpenScene, opened: Open) -> None:
     simulation = opened()
     both, alone = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10)), placed(scene, (90, LEFT_Y, 0, 10), None)
     for start, expected in ((both, {"ego", "non_ego"}), (alone, {"ego"}), (both, {"ego", "non_ego"})):
@@ -196,7 +202,7 @@ def test_restart__where_sumo_drives_nobody_who_takes_no_part_is_gone(scene: Open
         assert set(libsumo.vehicle.getIDList()) == expected
 
 
-def test_remove__the_player_is_gone_and_the_other_goes_on(scene: OpenScene, opened: Open) -> None:
+def test_remove__the_player_is_removed_and_the_other_drives_on(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10))
     simulation.reset(0, start, [])
@@ -206,7 +212,7 @@ def test_remove__the_player_is_gone_and_the_other_goes_on(scene: OpenScene, open
     assert libsumo.vehicle.getIDList() == ("non_ego",)
 
 
-def test_halt__a_player_that_sumo_drove_stands_where_it_is_told(scene: OpenScene, opened: Open) -> None:
+def test_halt__a_player_that_sumo_drove_stands_at_the_given_pose(scene: OpenScene, opened: Open) -> None:
     simulation = opened((HARNESS, SUMO))
     start = placed(scene, (40, RIGHT_Y, 0, 10), (40, LEFT_Y, 0, 10))
     simulation.reset(0, start, [])
@@ -220,10 +226,10 @@ def test_halt__a_player_that_sumo_drove_stands_where_it_is_told(scene: OpenScene
     assert step(simulation, start).players[0, 1, 0] == pytest.approx(41.0)
 
 
-# --- others -----------------------------------------------------------------------------------------------------------
+# --- background traffic------------------------------------------------------------------------------------------------
 
 
-def test_others__depart_when_they_are_due_and_are_seen_once_they_are_in(busy: OpenScene, opened: Open) -> None:
+def test_background__departs_at_its_time_and_is_read_from_then_on(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (40, LEFT_Y, 0, 0), None)
     simulation.reset(0, start, [other("early"), other("late", 0.3, "0", "50")])
@@ -235,27 +241,27 @@ def test_others__depart_when_they_are_due_and_are_seen_once_they_are_in(busy: Op
     assert list(present) == [[True]] * 3 + [[True, True]] * 2
 
 
-def test_others__are_read_by_their_centre_with_their_size_and_type(busy: OpenScene, opened: Open) -> None:
+def test_background__is_read_with_centre_size_and_type(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (40, LEFT_Y, 0, 0), None)
     simulation.reset(0, start, [other("van")])
     reading = step(simulation, start)
-    seen = [float(getattr(reading, name)[0, 0]) for name in ("x_m", "y_m", "heading_rad", "speed_mps")]
-    assert seen == pytest.approx([97, RIGHT_Y, 0, 5])
+    pose = [float(getattr(reading, name)[0, 0]) for name in ("x_m", "y_m", "heading_rad", "speed_mps")]
+    assert pose == pytest.approx([97, RIGHT_Y, 0, 5])
     assert (reading.length_m[0, 0], reading.width_m[0, 0], reading.types.tolist()) == (6.0, 2.0, [["van"]])
 
 
-def test_others__wait_while_a_player_stands_in_their_way(busy: OpenScene, opened: Open) -> None:
+def test_background__waits_while_a_player_blocks_the_insertion(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (4, RIGHT_Y, 0, 0), None)
     simulation.reset(0, start, [other("waiting", 0.2, "0", "base", "10")])
     readings = [step(simulation, start) for _ in range(10)]
     assert not any(reading.present.any() for reading in readings)
-    away = replace(start, x_m=start.x_m + 60)
-    assert [step(simulation, away).present.any() for _ in range(3)][-1]
+    moved = replace(start, x_m=start.x_m + 60)
+    assert [step(simulation, moved).present.any() for _ in range(3)][-1]
 
 
-def test_others__waiting_to_get_in_are_cleared_by_a_restart(busy: OpenScene, opened: Open) -> None:
+def test_background__waiting_vehicles_are_removed_by_a_reset(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (4, RIGHT_Y, 0, 0), None)
     for _ in range(2):
@@ -268,20 +274,20 @@ def test_others__waiting_to_get_in_are_cleared_by_a_restart(busy: OpenScene, ope
     assert libsumo.vehicle.getIDList() == ("ego",)
 
 
-def test_others__leave_the_reading_when_they_arrive(busy: OpenScene, opened: Open) -> None:
+def test_background__is_not_read_after_its_arrival(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
     start = placed(busy, (40, LEFT_Y, 0, 0), None)
     simulation.reset(0, start, [other("gone", 0.0, "0", "298", "10"), other("stays")])
     assert [step(simulation, start).names[0].tolist() for _ in range(5)][-1] == ["stays"]
 
 
-def test_others__that_sumo_refuses_are_an_error_with_its_message(busy: OpenScene, opened: Open) -> None:
+def test_background__a_refused_vehicle_is_an_error_with_the_message_of_sumo(busy: OpenScene, opened: Open) -> None:
     simulation = opened(on=busy)
-    with pytest.raises(SimulationError, match=r"start game 0.*departLane.*wrong"):
-        simulation.reset(0, placed(busy, (40, LEFT_Y, 0, 0), None), [other("wrong", lane="7")])
+    with pytest.raises(SimulationError, match=r"reset game 0.*departLane.*refused"):
+        simulation.reset(0, placed(busy, (40, LEFT_Y, 0, 0), None), [other("refused", lane="7")])
 
 
-def test_reload__the_same_seed_brings_the_same_traffic(tmp_path: Path, opened: Open) -> None:
+def test_reload__the_same_seed_gives_the_same_traffic(tmp_path: Path, opened: Open) -> None:
     scene = build_scene(tmp_path, others='<flow id="f" type="van" begin="0" period="2"><route edges="road"/></flow>')
     simulation, start = opened(on=scene), placed(build_scene(tmp_path), (150, LEFT_Y, 0, 0), None)
 
@@ -296,7 +302,7 @@ def test_reload__the_same_seed_brings_the_same_traffic(tmp_path: Path, opened: O
 # --- one libsumo per process ------------------------------------------------------------------------------------------
 
 
-def test_local__has_room_for_one(scene: OpenScene, opened: Open) -> None:
+def test_local__there_can_be_one(scene: OpenScene, opened: Open) -> None:
     first = opened()
     with pytest.raises(SimulationError, match="already"):
         opened()
@@ -304,7 +310,7 @@ def test_local__has_room_for_one(scene: OpenScene, opened: Open) -> None:
     opened()
 
 
-def test_close__twice_is_once_and_takes_nothing_from_the_next(scene: OpenScene, opened: Open) -> None:
+def test_close__twice_has_no_effect_on_the_next_simulation(scene: OpenScene, opened: Open) -> None:
     first = opened()
     first.close()
     second = opened()
@@ -312,15 +318,15 @@ def test_close__twice_is_once_and_takes_nothing_from_the_next(scene: OpenScene, 
     start = placed(scene, (40, LEFT_Y, 0, 0), None)
     second.reset(0, start, [])
     step(second, start)
-    for verb in (lambda: first.reload(1), lambda: first.reset(0, start, []), lambda: step(first, start)):
+    for call in (lambda: first.reload(1), lambda: first.reset(0, start, []), lambda: step(first, start)):
         with pytest.raises(SimulationError, match="closed"):
-            verb()
+            call()
 
 
-def test_garbage__gives_libsumo_back(scene: OpenScene) -> None:
-    gone = weakref.ref(LibsumoSimulation(scene, 1, (True, True), 1))
+def test_garbage__releases_libsumo(scene: OpenScene) -> None:
+    simulation = weakref.ref(LibsumoSimulation(scene, 1, (True, True), 1))
     gc.collect()
-    assert gone() is None
+    assert simulation() is None
     assert not LibsumoSimulation.in_use()
 
 
@@ -338,12 +344,12 @@ from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import open_scene
 simulation = LibsumoSimulation(open_scene(pathlib.Path({str(scene.folder)!r})), 1, (True, True), 1)
 """
-    done = subprocess.run(
+    run = subprocess.run(
         [sys.executable, "-X", "dev", "-c", program],
         cwd=REPOSITORY,
         env={"TMPDIR": str(tmp_path), "PATH": ""},
         capture_output=True,
         text=True,
     )
-    assert (done.returncode, done.stderr) == (0, "")
+    assert (run.returncode, run.stderr) == (0, "")
     assert list(tmp_path.iterdir()) == []

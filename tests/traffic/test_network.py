@@ -1,7 +1,7 @@
-"""The road read from a SUMO net: the merge scene against its picture, and nets of every kind built here.
+"""Roads of SUMO nets: the merge scene compared with its geometry, and nets of many kinds built here.
 
-What holds on any net: the drivable area has no holes at its seams, a car driven along a route's line touches no rail,
-rails stand on both sides of it, and where the scene ends the road is open.
+Properties of every net: the drivable area has no holes at its seams, a car on a route's line touches no rail, there are
+rails on both sides of the line, and the road is open at the ends of the scene.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ ROUNDABOUT = (
         for k in range(4)
     ),
 )
-# The way in has one lane, that leads to the right lane of the middle edge; the way to the left goes on from the left.
+# The entry has one lane, which leads to the right lane of the middle edge; the left exit starts from its left lane.
 CHANGE = (
     '<node id="a" x="0" y="-80"/><node id="b" x="80" y="0"/><node id="c" x="180" y="0"/>'
     '<node id="d" x="180" y="80"/><node id="e" x="180" y="-80"/>',
@@ -89,7 +89,7 @@ GENERATED = {
 
 @dataclass
 class Read:
-    """A net as the harness reads it, with a few ways through it."""
+    """A net as the harness reads it, with some routes through it."""
 
     net: Net
 
@@ -107,11 +107,14 @@ class Read:
 
     @cached_property
     def tables(self) -> list[Route]:
-        return [route_table(self.net, self.area, way, way[-1], 1.0) for way in ways_through(self.net, 8)]
+        return [
+            route_table(self.net, self.area, edges, goal=edges[-1], goal_position_m=1.0)
+            for edges in routes_through(self.net, 8)
+        ]
 
     def table(self, *names: str, goal_position_m: float = 1.0) -> Route:
         edges = [self.net.getEdge(name) for name in names]
-        return route_table(self.net, self.area, edges, edges[-1], goal_position_m)
+        return route_table(self.net, self.area, edges, goal=edges[-1], goal_position_m=goal_position_m)
 
 
 @pytest.fixture(scope="module")
@@ -124,8 +127,8 @@ def nets(build_net: Build, generate_net: Build) -> dict[str, Read]:
 EVERY_NET = pytest.mark.parametrize("name", [*NETS, *GENERATED])
 
 
-def ways_through(net: Net, most: int) -> list[list[Edge]]:
-    """Ways of up to three edges that a car can take without turning round."""
+def routes_through(net: Net, most: int) -> list[list[Edge]]:
+    """Routes of up to three edges for cars, without turnarounds."""
     found: list[list[Edge]] = []
     for edge in net.getEdges(withInternal=False):
         ways = [[edge]]
@@ -148,7 +151,7 @@ def stations(route: Route) -> FloatArray:
 
 
 def clearance(rails: Rails, route: Route, offset_m: float = 0.0) -> FloatArray:
-    """Distance to the rails of a car all along the route, beside its line."""
+    """Distance to the rails of a car at all stations of the route, at a lateral offset."""
     along = stations(route)
     inside = (along >= 2.5) & (along <= route.length_m - 2.5)
     heading = route.heading_rad[inside]
@@ -161,11 +164,11 @@ def clearance(rails: Rails, route: Route, offset_m: float = 0.0) -> FloatArray:
 # --- the merge scene -------------------------------------------------------------------------------------------------
 
 
-def test_merge__rails_are_where_the_picture_shows_them(merge: OpenScene) -> None:
+def test_merge__rails_are_in_their_places(merge: OpenScene) -> None:
     lines = sorted(merge.rail_lines, key=lambda line: line[:, 1].mean())
     assert len(lines) == 2
     low, high = (shapely.LineString(line) for line in lines)
-    # the right rail: straight, the taper from (100, -6.4) to (130, -3.2), straight; open ends leave out 0.3 m
+    # the right rail: straight, the taper from (100, -6.4) to (130, -3.2), straight; the openings take 0.3 m
     assert low.hausdorff_distance(shapely.LineString([(0.3, -6.4), (100, -6.4), (130, -3.2), (219.7, -3.2)])) < 0.02
     assert high.hausdorff_distance(shapely.LineString([(0.3, 0), (219.7, 0)])) < 0.02
 
@@ -183,7 +186,7 @@ def test_merge__edges_by_station(merge: OpenScene, station: float, left: float, 
         assert routes.right_edge_m[row] == pytest.approx(right, abs=0.02)
 
 
-def test_merge__lane_0_ends_at_100_m_and_lane_1_goes_on(merge: OpenScene) -> None:
+def test_merge__lane_0_ends_at_100_m_and_lane_1_continues(merge: OpenScene) -> None:
     routes = merge.world.road.routes
     row = routes.first_row[0] + round((50.0 + MARGIN_M) / SPACING_M)
     assert routes.lane_offset_m[row].tolist() == pytest.approx([-3.2, 0.0])
@@ -196,17 +199,17 @@ def test_merge__goal_and_limit(merge: OpenScene) -> None:
     assert (routes.speed_limit_mps == 13.89).all()
 
 
-# --- the scene that is shipped ---------------------------------------------------------------------------------------
+# --- the shipped scene -----------------------------------------------------------------------------------------------
 
 
-def test_shipped_merge__has_a_shoulder_that_counts_as_road_and_a_taper_on_the_left(repository: Path) -> None:
+def test_shipped_merge__has_a_drivable_shoulder_and_a_taper_on_the_left(repository: Path) -> None:
     scene = open_scene(repository / "networks" / "merge")
     low, high = (shapely.LineString(line) for line in sorted(scene.rail_lines, key=lambda line: line[:, 1].mean()))
     assert low.hausdorff_distance(shapely.LineString([(0.3, -6.2), (219.7, -6.2)])) < 0.02
     assert high.hausdorff_distance(shapely.LineString([(0.3, 3.2), (100, 3.2), (130, 0), (219.7, 0)])) < 0.02
     routes = scene.world.road.routes
     row = routes.first_row[0] + round((50.0 + MARGIN_M) / SPACING_M)
-    assert routes.lane_offset_m[row].tolist() == pytest.approx([0.0, 3.2])  # the shoulder is no lane to drive in
+    assert routes.lane_offset_m[row].tolist() == pytest.approx([0.0, 3.2])  # the shoulder is not a lane of the route
     assert routes.lane_end_m[row].tolist() == [np.inf, 100.0]
 
 
@@ -218,7 +221,7 @@ def test_area__has_no_holes_at_seams(nets: dict[str, Read], name: str) -> None:
     area = nets[name].area
     assert area.is_valid
     for part in getattr(area, "geoms", [area]):
-        for ring in part.interiors:  # a hole is a block between streets, not a crack
+        for ring in part.interiors:  # a hole is a block between streets, not a gap at a seam
             assert not shapely.Polygon(ring).buffer(-1.0).is_empty
 
 
@@ -249,12 +252,12 @@ def test_route__its_line_has_no_jumps(nets: dict[str, Read], name: str) -> None:
 
 
 @EVERY_NET
-def test_route__rails_stand_on_both_sides(nets: dict[str, Read], name: str) -> None:
+def test_route__has_rails_on_both_sides(nets: dict[str, Read], name: str) -> None:
     read = nets[name]
     for table in read.tables:
         assert (table.left_edge_m > 0.9).all()
         assert (table.right_edge_m < -0.9).all()
-        row = stations(table).searchsorted(15.0)  # on the first edge, off the junctions
+        row = stations(table).searchsorted(15.0)  # on the first edge, outside junctions
         for offset in (table.left_edge_m[row], table.right_edge_m[row]):
             x = np.array([table.x_m[row] - offset * np.sin(table.heading_rad[row])])
             y = np.array([table.y_m[row] + offset * np.cos(table.heading_rad[row])])
@@ -270,12 +273,12 @@ def test_fringe__is_open(nets: dict[str, Read], name: str) -> None:
     for edge in outer:
         table = read.table(edge)
         last = np.flatnonzero(stations(table) <= table.length_m)[-1]
-        for row in range(last - 6, last + 12):  # from within the road until it has left
+        for row in range(last - 6, last + 12):  # from the road to beyond its end
             place = (np.array([[each]]) for each in (table.x_m[row], table.y_m[row], table.heading_rad[row]))
             assert read.rails.distance_m(Box(*place, np.array([4.6]), np.array([1.8])), 10.0) > 0.0
 
 
-def test_fringe__the_other_end_of_a_ring_is_not_one(build_net: Build) -> None:
+def test_fringe__a_ring_has_none(build_net: Build) -> None:
     square = [(0, 0), (60, 0), (60, 60), (0, 60)]
     nodes = "".join(f'<node id="{k}" x="{x}" y="{y}"/>' for k, (x, y) in enumerate(square))
     edges = "".join(f'<edge id="e{k}" from="{k}" to="{(k + 1) % 4}"/>' for k in range(4))
@@ -285,7 +288,7 @@ def test_fringe__the_other_end_of_a_ring_is_not_one(build_net: Build) -> None:
         assert line[0] == pytest.approx(line[-1])
 
 
-def test_two_way__the_turnaround_beyond_the_end_is_no_road(nets: dict[str, Read]) -> None:
+def test_two_way__the_turnaround_beyond_the_end_is_not_drivable(nets: dict[str, Read]) -> None:
     west, _, east, _ = nets["two-way street"].area.bounds
     assert (west, east) == pytest.approx((0.0, 150.0), abs=0.02)
 
@@ -294,21 +297,21 @@ def test_crossing__left_and_right_edges_reach_into_the_arms(nets: dict[str, Read
     table = nets["crossing"].table("sc", "cn")
     middle = np.abs(table.y_m - nets["crossing"].net.getNode("c").getCoord()[1]).argmin()
     approach = stations(table).searchsorted(30.0)
-    assert table.left_edge_m[middle] > 10.0  # across the middle one sees down the side streets
+    assert table.left_edge_m[middle] > 10.0  # in the middle the area extends into the side streets
     assert table.right_edge_m[middle] < -10.0
     assert table.left_edge_m[approach] - table.right_edge_m[approach] == pytest.approx(4 * 3.2, abs=0.05)
 
 
-def test_change_of_lanes__the_line_moves_over_on_the_edge(nets: dict[str, Read]) -> None:
+def test_change_of_lanes__the_line_changes_lanes_on_the_edge(nets: dict[str, Read]) -> None:
     table = nets["change of lanes"].table("in", "middle", "left")
     middle = nets["change of lanes"].net.getEdge("middle")
-    entry, leave = (network.lane_line(middle.getLane(k)) for k in (0, 2))
+    entry, exit_ = (network.lane_line(middle.getLane(k)) for k in (0, 2))
     line = shapely.LineString(np.stack((table.x_m, table.y_m), axis=1))
     assert line.distance(shapely.Point(entry[0])) < 0.3
-    assert line.distance(shapely.Point(leave[-1])) < 0.3
+    assert line.distance(shapely.Point(exit_[-1])) < 0.3
 
 
-def test_change_of_lanes__lanes_that_do_not_lead_on_end_at_their_edge(nets: dict[str, Read]) -> None:
+def test_change_of_lanes__lanes_that_leave_the_route_end_at_their_edge(nets: dict[str, Read]) -> None:
     table = nets["change of lanes"].table("in", "middle", "left")
     row = np.flatnonzero(np.isfinite(table.lane_offset_m).sum(1) == 3)[20]
     first, second, third = table.lane_end_m[row]
@@ -332,15 +335,15 @@ def test_junction__lanes_stay_side_by_side_inside(build_net: Build) -> None:
 
 
 @pytest.mark.parametrize("name", ["crossing", "crossing without lanes inside"])
-def test_goal__lies_on_its_edge_as_far_along_as_asked(nets: dict[str, Read], name: str) -> None:
+def test_goal__is_at_its_position_on_its_edge(nets: dict[str, Read], name: str) -> None:
     table = nets[name].table("wc", "cn", goal_position_m=25.0)
     row = stations(table).searchsorted(table.goal_m)
-    lane = nets[name].net.getLane("cn_0")  # SUMO's metres along a lane may not be those of its line
+    lane = nets[name].net.getLane("cn_0")  # SUMO's lane length may differ from its shape
     goal = shapely.LineString(network.lane_line(lane)).interpolate(25.0 / lane.getLength(), normalized=True)
     assert goal.distance(shapely.Point(table.x_m[row], table.y_m[row])) < 0.6
 
 
-def test_route__sidewalks_are_not_lanes_of_it(nets: dict[str, Read]) -> None:
+def test_route__has_no_sidewalks(nets: dict[str, Read]) -> None:
     read = nets["crossing with sidewalks"]
     assert len(read.net.getEdge("nc").getLanes()) == 2  # a lane and a sidewalk
     table = read.table("nc", "cs")
@@ -348,18 +351,19 @@ def test_route__sidewalks_are_not_lanes_of_it(nets: dict[str, Read]) -> None:
     assert np.isfinite(table.lane_offset_m[row]).sum() == 1
 
 
-def test_route__that_does_not_connect_is_refused(nets: dict[str, Read]) -> None:
+def test_route__a_gap_is_refused(nets: dict[str, Read]) -> None:
     with pytest.raises(ValueError, match="no connection from edge 'cn' to 'wc'"):
         nets["crossing"].table("cn", "wc")
 
 
-def test_route__that_misses_the_goal_is_refused(nets: dict[str, Read]) -> None:
+def test_route__a_missing_goal_is_refused(nets: dict[str, Read]) -> None:
     net = nets["crossing"].net
+    edges = [net.getEdge("wc"), net.getEdge("cn")]
     with pytest.raises(ValueError, match="does not pass the goal's edge 'ce'"):
-        route_table(net, nets["crossing"].area, [net.getEdge("wc"), net.getEdge("cn")], net.getEdge("ce"), 1.0)
+        route_table(net, nets["crossing"].area, edges, goal=net.getEdge("ce"), goal_position_m=1.0)
 
 
-def test_find__names_the_nearest_edge_and_lane(nets: dict[str, Read]) -> None:
+def test_find__names_the_most_similar_edge_and_lane(nets: dict[str, Read]) -> None:
     net, path = nets["change of lanes"].net, Path("a.net.xml")
     assert network.find_edge(net, path, "key", "middle").getID() == "middle"
     assert network.find_lane(net, path, "key", "middle_2").getID() == "middle_2"

@@ -1,4 +1,4 @@
-"""What a route file says, and what is said about one that can't be understood."""
+"""Reading of route files, and the errors of invalid ones."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ Write = Callable[[str], Path]
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    def to_file(inside: str) -> Path:
+    def to_file(content: str) -> Path:
         path = tmp_path / "a.rou.xml"
-        path.write_text(f"<routes>{inside}</routes>", encoding="utf-8")
+        path.write_text(f"<routes>{content}</routes>", encoding="utf-8")
         return path
 
     return to_file
@@ -31,12 +31,12 @@ def flow(attributes: str) -> str:
     return f'{TYPE_AND_ROUTE}<flow id="f" type="car" route="through" {attributes}/>'
 
 
-def everyone(routes: RouteFile, until_s: float = 10.0, seed: int = 0) -> list[Departure]:
+def departures(routes: RouteFile, until_s: float = 10.0, seed: int = 0) -> list[Departure]:
     return routes.departures(set(), until_s, np.random.default_rng(seed))
 
 
 def times(routes: RouteFile, until_s: float = 10.0, seed: int = 0) -> list[float]:
-    return [each.depart_s for each in everyone(routes, until_s, seed)]
+    return [each.depart_s for each in departures(routes, until_s, seed)]
 
 
 def problem(path: Path) -> str:
@@ -53,23 +53,40 @@ def test_vehicle__is_read_with_its_type_and_route(write: Write) -> None:
         '<vehicle id="v" type="car" route="through" depart="2.5" departLane="1" departPos="20" departSpeed="max"/>'
     )
     routes = read_route_file(write(TYPE_AND_ROUTE + vehicle))
-    assert routes.types["car"] == VehicleType("car", 4.2, 1.7, 33.0)
-    assert routes.vehicles["v"] == Departure("v", "car", ("one", "two", "three"), 2.5, "1", "20", "max")
+    assert routes.types["car"] == VehicleType(name="car", length_m=4.2, width_m=1.7, max_speed_mps=33.0)
+    assert routes.vehicles["v"] == Departure(
+        name="v",
+        vehicle_type="car",
+        edges=("one", "two", "three"),
+        depart_s=2.5,
+        lane="1",
+        position="20",
+        speed="max",
+    )
 
 
-def test_vehicle__takes_sumos_defaults_where_nothing_is_said(write: Write) -> None:
+def test_vehicle__has_the_defaults_of_sumo(write: Write) -> None:
     routes = read_route_file(write('<vehicle id="v"><route edges="one"/></vehicle>'))
     vehicle = routes.vehicles["v"]
-    assert vehicle == Departure("v", "DEFAULT_VEHTYPE", ("one",), 0.0, "first", "base", "0")
-    assert routes.types[vehicle.vehicle_type] == VehicleType("DEFAULT_VEHTYPE", 5.0, 1.8, 55.55)
+    assert vehicle == Departure(
+        name="v",
+        vehicle_type="DEFAULT_VEHTYPE",
+        edges=("one",),
+        depart_s=0.0,
+        lane="first",
+        position="base",
+        speed="0",
+    )
+    default = routes.types[vehicle.vehicle_type]
+    assert default == VehicleType(name="DEFAULT_VEHTYPE", length_m=5.0, width_m=1.8, max_speed_mps=55.55)
 
 
-def test_vehicle__may_come_before_its_route(write: Write) -> None:
+def test_vehicle__may_precede_its_route(write: Write) -> None:
     routes = read_route_file(write('<vehicle id="v" route="r"/><route id="r" edges="one"/>'))
     assert routes.vehicles["v"].edges == ("one",)
 
 
-def test_types__are_handed_to_sumo_without_the_vehicles(write: Write) -> None:
+def test_types__are_written_without_the_vehicles(write: Write) -> None:
     mix = '<vTypeDistribution id="mix"><vType id="van" width="2.1"/></vTypeDistribution>'
     routes = read_route_file(write(TYPE_AND_ROUTE + mix + '<flow id="f" type="mix" route="through" period="5"/>'))
     assert "vTypeDistribution" in routes.types_xml
@@ -84,7 +101,7 @@ def test_types__are_handed_to_sumo_without_the_vehicles(write: Write) -> None:
     [
         ('period="3"', [0.0, 3.0, 6.0, 9.0]),
         ('begin="1" end="8" period="3"', [1.0, 4.0, 7.0]),
-        ('begin="1" end="7" period="3"', [1.0, 4.0]),  # nobody departs at the end itself
+        ('begin="1" end="7" period="3"', [1.0, 4.0]),  # without the end itself
         ('vehsPerHour="1800"', [0.0, 2.0, 4.0, 6.0, 8.0]),  # 3600 / 1800 = 2 s
         ('end="10" number="4"', [0.0, 2.5, 5.0, 7.5]),
         ('period="1" number="2"', [0.0, 1.0]),
@@ -93,16 +110,16 @@ def test_types__are_handed_to_sumo_without_the_vehicles(write: Write) -> None:
         ('begin="20" period="1"', []),
     ],
 )
-def test_flow__departs_when_it_says(write: Write, attributes: str, expected: list[float]) -> None:
+def test_flow__departs_at_its_times(write: Write, attributes: str, expected: list[float]) -> None:
     assert times(read_route_file(write(flow(attributes)))) == pytest.approx(expected)
 
 
-def test_flow__its_vehicles_are_numbered_like_sumos(write: Write) -> None:
+def test_flow__its_vehicles_are_numbered_as_in_sumo(write: Write) -> None:
     routes = read_route_file(write(flow('period="4" departSpeed="10"')))
-    assert [(each.name, each.speed) for each in everyone(routes)] == [("f.0", "10"), ("f.1", "10"), ("f.2", "10")]
+    assert [(each.name, each.speed) for each in departures(routes)] == [("f.0", "10"), ("f.1", "10"), ("f.2", "10")]
 
 
-def test_flow__chance_comes_from_the_generator(write: Write) -> None:
+def test_flow__random_departures_come_from_the_generator(write: Write) -> None:
     routes = read_route_file(write(flow('probability="0.3"')))
     assert times(routes, 300.0, seed=1) == times(routes, 300.0, seed=1)
     assert times(routes, 300.0, seed=1) != times(routes, 300.0, seed=2)
@@ -110,15 +127,15 @@ def test_flow__chance_comes_from_the_generator(write: Write) -> None:
     assert abs(len(times(routes, 2000.0)) - 600) < 5 * 20.5
 
 
-def test_departures__in_order_of_time_without_the_players(write: Write) -> None:
+def test_departures__are_sorted_by_time_without_the_players(write: Write) -> None:
     more = '<vehicle id="late" route="through" depart="4"/><vehicle id="ego" route="through"/>'
     routes = read_route_file(write(flow('begin="1" period="5"') + more))
-    found = routes.departures({"ego"}, 10.0, np.random.default_rng(0))
-    assert [each.name for each in found] == ["f.0", "late", "f.1"]
+    background = routes.departures({"ego"}, 10.0, np.random.default_rng(0))
+    assert [each.name for each in background] == ["f.0", "late", "f.1"]
 
 
 @pytest.mark.parametrize(
-    ("inside", "said"),
+    ("content", "expected"),
     [
         ('<vehicle id="v" type="cat" route="through"/>', "vehicle v: unknown vehicle type 'cat' (did you mean 'car'?)"),
         ('<vehicle id="v" route="trough"/>', "vehicle v: unknown route 'trough' (did you mean 'through'?)"),
@@ -126,12 +143,12 @@ def test_departures__in_order_of_time_without_the_players(write: Write) -> None:
         ('<vehicle id="v"/>', "vehicle: has no 'route' (give every vehicle its route)"),
         ('<vehicle id="v"><route edges=" "/></vehicle>', "vehicle v: its route has no edges"),
         ('<vehicle id="v" route="through" depart="soon"/>', "vehicle v.depart: 'soon' is not a number"),
-        ('<vehicle id="v" route="through" depart="-1"/>', "vehicle v.depart: '-1' is not a number that makes sense"),
+        ('<vehicle id="v" route="through" depart="-1"/>', "vehicle v.depart: '-1' is not a number that is possible"),
         ('<vehicle id="v" route="through" depart="nan"/>', "vehicle v.depart: 'nan' is not a number"),
         ('<vehicle id="v" route="through" depart="inf"/>', "vehicle v.depart: 'inf' is not a number"),
-        ('<vType id="t" length="0"/>', "vType t.length: '0' is not a number that makes sense"),
-        ('<vType id="t" maxSpeed="0"/>', "vType t.maxSpeed: '0' is not a number that makes sense"),
-        ('<flow id="f" route="through" period="0"/>', "flow f.period: '0' is not a number that makes sense"),
+        ('<vType id="t" length="0"/>', "vType t.length: '0' is not a number that is possible"),
+        ('<vType id="t" maxSpeed="0"/>', "vType t.maxSpeed: '0' is not a number that is possible"),
+        ('<flow id="f" route="through" period="0"/>', "flow f.period: '0' is not a number that is possible"),
         ('<flow id="f" route="through" probability="2"/>', "flow f.probability: '2' is not a number"),
         ('<flow id="f" route="through"/>', "flow f: has no rate (give one of period, vehsPerHour, probability)"),
         ('<flow id="f" route="through" number="3"/>', "flow f: has no rate"),
@@ -140,16 +157,16 @@ def test_departures__in_order_of_time_without_the_players(write: Write) -> None:
         ('<trip id="t" from="a" to="b"/>', "trip: is not understood here (valid: flow, route, vType"),
     ],
 )
-def test_mistake__is_named_with_its_place_and_remedy(write: Write, inside: str, said: str) -> None:
-    assert problem(write(TYPE_AND_ROUTE + inside)).startswith(said)
+def test_mistake__is_named_with_its_place_and_remedy(write: Write, content: str, expected: str) -> None:
+    assert problem(write(TYPE_AND_ROUTE + content)).startswith(expected)
 
 
-def test_file__that_is_missing(write: Write) -> None:
+def test_file__a_missing_one_is_an_error(write: Write) -> None:
     path = write("")
     assert "there is no such file (did you mean 'a.rou.xml'?)" in problem(path.with_name("b.rou.xml"))
 
 
-def test_file__that_is_not_xml(tmp_path: Path) -> None:
+def test_file__other_content_than_xml_is_an_error(tmp_path: Path) -> None:
     path = tmp_path / "a.rou.xml"
     path.write_text("<routes><vehicle", encoding="utf-8")
     assert problem(path).startswith("is not readable XML")
@@ -157,14 +174,14 @@ def test_file__that_is_not_xml(tmp_path: Path) -> None:
     assert problem(path).startswith("is not readable XML")
 
 
-def test_file__with_an_entity_bomb_is_refused(tmp_path: Path) -> None:
+def test_file__an_entity_bomb_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.rou.xml"
     laughs = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 10))
     path.write_text(f'<!DOCTYPE r [<!ENTITY l0 "ha">{laughs}]><routes>&l9;</routes>', encoding="utf-8")
     assert problem(path).startswith("carries XML entities")
 
 
-def test_file__with_an_external_entity_is_refused(tmp_path: Path) -> None:
+def test_file__an_external_entity_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.rou.xml"
     path.write_text('<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><routes>&x;</routes>', encoding="utf-8")
     assert problem(path).startswith("carries XML entities")

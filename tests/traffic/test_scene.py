@@ -1,4 +1,4 @@
-"""Opening a scene: each way in which its files may not fit together is named with file, key and remedy."""
+"""Opening a scene: each inconsistency of its files is reported with file, key and remedy."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from harness.traffic.scene import OpenScene, open_scene
 
 @pytest.fixture
 def folder(repository: Path, tmp_path: Path) -> Path:
-    """A copy of tests/data/merge to break, its document without comments."""
+    """A copy of tests/data/merge to modify, with a document without comments."""
     copy = Path(shutil.copytree(repository / "tests" / "data" / "merge", tmp_path / "merge"))
     document = (copy / "scene.toml").read_text(encoding="utf-8")
     (copy / "scene.toml").write_text(re.sub(r" *#.*", "", document), encoding="utf-8")
@@ -25,7 +25,7 @@ def folder(repository: Path, tmp_path: Path) -> Path:
 def change(folder: Path, name: str, old: str, new: str) -> None:
     path = folder / name
     text = path.read_text(encoding="utf-8")
-    assert old in text, "the scene is no longer what this test breaks"
+    assert old in text, "the scene does not have the text that this test replaces"
     path.write_text(text.replace(old, new), encoding="utf-8")
 
 
@@ -39,12 +39,12 @@ def problems(folder: Path) -> list[Problem]:
 
 
 def only(folder: Path) -> tuple[str, str, str]:
-    """File, key, and what is said of the one problem."""
+    """File, key, and message with remedy of the only problem."""
     (problem,) = problems(folder)
     return Path(problem.file).name, problem.key, f"{problem.message} ({problem.remedy})"
 
 
-# --- in order --------------------------------------------------------------------------------------------------------
+# --- valid --------------------------------------------------------------------------------------------------------
 
 
 def test_merge__opens(merge: OpenScene) -> None:
@@ -56,17 +56,17 @@ def test_merge__opens(merge: OpenScene) -> None:
     assert world.actuators.friction == 0.8
     assert merge.edges == (("approach", "exit"), ("approach", "exit"))
     assert merge.vehicle(1).vehicle_type == "person_car"
-    assert merge.departures(np.random.default_rng(0)) == []  # there are the players and nobody else
+    assert merge.departures(np.random.default_rng(0)) == []  # there is no background traffic
 
 
-def test_scene__others_depart_and_the_players_do_not(folder: Path) -> None:
+def test_scene__departures_are_those_of_the_background_traffic(folder: Path) -> None:
     flow = '<flow id="more" type="person_car" route="through" begin="1" period="10" departLane="1"/>'
     change(folder, "merge.rou.xml", "</routes>", f"{flow}</routes>")
-    found = open_scene(folder).departures(np.random.default_rng(0))
-    assert [(each.name, each.depart_s) for each in found] == [("more.0", 1.0), ("more.1", 11.0), ("more.2", 21.0)]
+    departures = open_scene(folder).departures(np.random.default_rng(0))
+    assert [(each.name, each.depart_s) for each in departures] == [("more.0", 1.0), ("more.1", 11.0), ("more.2", 21.0)]
 
 
-def test_scene__actuators_and_sizes_are_each_players_own(folder: Path) -> None:
+def test_scene__each_player_has_its_own_actuators_and_size(folder: Path) -> None:
     change(folder, "merge.rou.xml", 'id="person_car" length="4.60"', 'id="person_car" length="9.10"')
     change(folder, "scene.toml", "[non_ego]", "[ego.actuators]\nmax_braking_mps2 = 5.5\n[non_ego]")
     world = open_scene(folder).world
@@ -74,8 +74,8 @@ def test_scene__actuators_and_sizes_are_each_players_own(folder: Path) -> None:
     assert world.actuators.max_braking_mps2.tolist() == [5.5, 8.0]
 
 
-def test_scene__starts_follow_sumos_metres_where_a_lane_is_drawn_shorter(folder: Path) -> None:
-    # approach is drawn 100 m long; say that it counts 200 m, and a bumper at 40 m is drawn at 20 m
+def test_scene__starts_use_the_lane_length_of_sumo(folder: Path) -> None:
+    # the shape of approach is 100 m long; with a lane length of 200 m, a bumper at 40 m is at 20 m of the shape
     change(folder, "merge.net.xml", 'length="100.00"', 'length="200.00"')
     x, y, _ = open_scene(folder).places[0].pose(40.0, 4.6)
     assert (x, y) == pytest.approx((20.0 - 2.3, -1.6))
@@ -84,54 +84,54 @@ def test_scene__starts_follow_sumos_metres_where_a_lane_is_drawn_shorter(folder:
 # --- files -----------------------------------------------------------------------------------------------------------
 
 
-def test_scene_file__that_is_missing(tmp_path: Path) -> None:
+def test_scene_file__a_missing_one_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "scene.tml").write_text("", encoding="utf-8")
     assert only(tmp_path) == ("scene.toml", "", "there is no such file (did you mean 'scene.tml'?)")
 
 
-def test_folder__that_is_missing(tmp_path: Path) -> None:
+def test_folder__a_missing_one_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="there is no folder"):
         open_scene(tmp_path / "nowhere")
 
 
-def test_net__that_is_missing_names_the_nearest(folder: Path) -> None:
+def test_net__a_missing_one_is_an_error_with_the_most_similar_name(folder: Path) -> None:
     change(folder, "scene.toml", 'net = "merge.net.xml"', 'net = "merg.net.xml"')
     assert only(folder) == ("merg.net.xml", "", "there is no such file (did you mean 'merge.net.xml'?)")
 
 
-def test_net__that_is_not_xml(folder: Path) -> None:
+def test_net__other_content_than_xml_is_an_error(folder: Path) -> None:
     (folder / "merge.net.xml").write_text("a road, honestly", encoding="utf-8")
-    name, _, said = only(folder)
+    name, _, message = only(folder)
     assert name == "merge.net.xml"
-    assert said.startswith("is not readable XML")
+    assert message.startswith("is not readable XML")
 
 
-def test_net__that_is_another_kind_of_xml(folder: Path) -> None:
+def test_net__another_kind_of_xml_is_an_error(folder: Path) -> None:
     shutil.copy(folder / "merge.rou.xml", folder / "merge.net.xml")
-    said = "is not a SUMO net: its root is not net (build it with netconvert or netedit)"
-    assert only(folder) == ("merge.net.xml", "routes", said)
+    message = "is not a SUMO net: its root is not net (build it with netconvert or netedit)"
+    assert only(folder) == ("merge.net.xml", "routes", message)
 
 
-def test_net__that_breaks_off_in_the_middle_of_a_lane(folder: Path) -> None:
+def test_net__an_invalid_shape_is_an_error(folder: Path) -> None:
     change(folder, "merge.net.xml", 'shape="0.00,-4.80 100.00,-4.80"', 'shape="0.00,-4.80 here"')
-    said = "'0.00,-4.80 here' is not a line of points x,y (build it with netconvert or netedit)"
-    assert only(folder) == ("merge.net.xml", "lane approach_0.shape", said)
+    message = "'0.00,-4.80 here' is not a line of points x,y (build it with netconvert or netedit)"
+    assert only(folder) == ("merge.net.xml", "lane approach_0.shape", message)
 
 
-def test_net__with_an_entity_bomb(folder: Path) -> None:
+def test_net__an_entity_bomb_is_refused(folder: Path) -> None:
     (folder / "merge.net.xml").write_text(
         '<!DOCTYPE n [<!ENTITY a "ha"><!ENTITY b "&a;&a;">]><net>&b;</net>', encoding="utf-8"
     )
     assert only(folder)[2].startswith("carries XML entities")
 
 
-def test_files__that_are_both_missing_are_both_named(folder: Path) -> None:
+def test_files__two_missing_ones_are_both_named(folder: Path) -> None:
     (folder / "merge.net.xml").unlink()
     (folder / "merge.rou.xml").unlink()
     assert [Path(each.file).name for each in problems(folder)] == ["merge.net.xml", "merge.rou.xml"]
 
 
-# --- names that don't fit --------------------------------------------------------------------------------------------
+# --- inconsistent names ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -195,16 +195,16 @@ def test_files__that_are_both_missing_are_both_named(folder: Path) -> None:
         ),
     ],
 )
-def test_scene__that_does_not_fit_the_net(
+def test_scene__an_inconsistency_with_the_net_is_named(
     folder: Path, file: str, old: str, new: str, expected: tuple[str, str, str]
 ) -> None:
     change(folder, file, old, new)
     assert only(folder) == expected
 
 
-def test_start__off_the_lane(folder: Path) -> None:
+def test_start__off_the_lane_is_an_error(folder: Path) -> None:
     change(folder, "scene.toml", "[30.0, 45.0]", "[30.0, 120.0]")
-    ego, non_ego = problems(folder)  # who starts beside the ego is off the lane with it
+    ego, non_ego = problems(folder)  # the non-ego starts beside the ego
     assert (ego.key, non_ego.key) == ("ego.position_m", "non_ego.beside_ego_m")
     assert ego.message == "reaches from 30 to 120 m, off lane 'approach_1' of 100 m"
     assert non_ego.message == "reaches from 22 to 128 m, off lane 'approach_0' of 100 m"
@@ -212,7 +212,7 @@ def test_start__off_the_lane(folder: Path) -> None:
 
 
 def own_route(folder: Path, edges: str) -> None:
-    """Give the ego another route than the non-ego."""
+    """Give the ego a route of its own."""
     change(
         folder,
         "merge.rou.xml",
@@ -221,18 +221,18 @@ def own_route(folder: Path, edges: str) -> None:
     )
 
 
-def test_route__through_an_edge_that_is_not_there(folder: Path) -> None:
+def test_route__an_unknown_edge_is_named(folder: Path) -> None:
     own_route(folder, "approach exitt")
     assert only(folder) == ("merge.rou.xml", "vehicle ego", "the net has no edge 'exitt' (did you mean 'exit'?)")
 
 
-def test_route__that_does_not_reach_the_goal(folder: Path) -> None:
+def test_route__must_reach_the_goal(folder: Path) -> None:
     own_route(folder, "approach")
-    expected = "its route does not pass the goal's edge 'exit' (mend the route's edges)"
+    expected = "its route does not pass the goal's edge 'exit' (correct the route's edges)"
     assert only(folder) == ("merge.rou.xml", "vehicle ego", expected)
 
 
-def test_route__that_is_not_connected(folder: Path) -> None:
+def test_route__must_be_connected(folder: Path) -> None:
     own_route(folder, "exit approach")
     change(folder, "scene.toml", 'edge = "exit"\nposition_m = 45.0', 'edge = "approach"\nposition_m = 90.0')
     change(
@@ -242,11 +242,11 @@ def test_route__that_is_not_connected(folder: Path) -> None:
         'lane = "exit_0"\nposition_m = [3.0, 4.0]',
     )
     change(folder, "scene.toml", "beside_ego_m = [-8.0, 8.0]", "position_m = [3.0, 4.0]")
-    expected = "its route has no connection from edge 'exit' to 'approach' (mend the route's edges)"
+    expected = "its route has no connection from edge 'exit' to 'approach' (correct the route's edges)"
     assert only(folder) == ("merge.rou.xml", "vehicle ego", expected)
 
 
-def test_route__that_does_not_pass_the_start(folder: Path) -> None:
+def test_route__must_pass_the_start(folder: Path) -> None:
     own_route(folder, "exit")
     expected = "'approach_1' is not on the route of vehicle 'ego' (choose a lane of one of its edges)"
     assert only(folder) == ("scene.toml", "ego.lane", expected)
@@ -265,7 +265,7 @@ def test_type__of_a_player_can_not_be_a_distribution(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "said"),
+    ("vehicle", "expected"),
     [
         (
             '<vehicle id="third"><route edges="approach exitt"/></vehicle>',
@@ -273,7 +273,7 @@ def test_type__of_a_player_can_not_be_a_distribution(folder: Path) -> None:
         ),
         (
             '<vehicle id="third"><route edges="exit approach"/></vehicle>',
-            "its route has no connection from edge 'exit' to 'approach' (mend the route's edges)",
+            "its route has no connection from edge 'exit' to 'approach' (correct the route's edges)",
         ),
         (
             '<flow id="third" period="5"><route edges="aproach"/></flow>',
@@ -281,20 +281,20 @@ def test_type__of_a_player_can_not_be_a_distribution(folder: Path) -> None:
         ),
     ],
 )
-def test_traffic__that_sumo_would_refuse_in_the_middle_of_a_game(folder: Path, vehicle: str, said: str) -> None:
+def test_background__a_vehicle_that_sumo_would_refuse_is_named(folder: Path, vehicle: str, expected: str) -> None:
     change(folder, "merge.rou.xml", "</routes>", f"{vehicle}</routes>")
-    assert only(folder) == ("merge.rou.xml", "vehicle third", said)
+    assert only(folder) == ("merge.rou.xml", "vehicle third", expected)
 
 
-def test_traffic__may_not_take_a_players_name(folder: Path) -> None:
+def test_background__may_not_have_the_name_of_a_player(folder: Path) -> None:
     change(folder, "merge.rou.xml", 'vehicle id="ego"', 'vehicle id="hero"')
     change(folder, "merge.rou.xml", "</routes>", '<vehicle id="ego" route="through" depart="3"/></routes>')
     change(folder, "scene.toml", 'vehicle = "ego"', 'vehicle = "hero"')
-    expected = "has a player's name without being it (call it something else)"
+    expected = "has the name of a player, but is not the player's vehicle (rename it)"
     assert only(folder) == ("merge.rou.xml", "vehicle ego", expected)
 
 
-def test_scene__everything_that_is_wrong_is_named_at_once(folder: Path) -> None:
+def test_scene__all_problems_are_named_at_once(folder: Path) -> None:
     change(folder, "scene.toml", 'edge = "exit"', 'edge = "exi"')
     change(folder, "scene.toml", 'lane = "approach_0"', 'lane = "approach_7"')
     change(folder, "scene.toml", 'vehicle = "ego"', 'vehicle = "eggo"')
@@ -303,16 +303,16 @@ def test_scene__everything_that_is_wrong_is_named_at_once(folder: Path) -> None:
     assert keys == ["vehicle third", "ego.vehicle", "goal.edge", "non_ego.lane"]
 
 
-def test_document__that_is_wrong_is_named_before_the_net_is_read(folder: Path) -> None:
+def test_document__its_problems_are_named_before_the_net_is_read(folder: Path) -> None:
     change(folder, "scene.toml", "friction = 0.8", "friction = -1.0")
     change(folder, "scene.toml", 'net = "merge.net.xml"', 'net = "../merge.net.xml"')
     assert [each.key for each in problems(folder)] == ["friction", "net"]
 
 
-# --- all at once ------------------------------------------------------------------------------------------------------
+# --- several files ----------------------------------------------------------------------------------------------------
 
 
-def test_scene__a_mistake_in_its_document_hides_none_in_its_files(folder: Path) -> None:
+def test_scene__a_problem_of_the_document_hides_none_of_the_files(folder: Path) -> None:
     change(folder, "scene.toml", "friction =", "fricton =")
     change(folder, "merge.rou.xml", 'route="through" depart="0" departLane="0"', 'route="trough" depart="soon"')
     change(folder, "merge.net.xml", 'speed="13.89" length="90.00"', 'speed="-1" length="nan"')

@@ -1,4 +1,4 @@
-"""A second simulation in the same process: the same numbers from a child process, and no child left behind."""
+"""A second simulation of a process: a child process with the same numbers, which never outlives its parent."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def ends(process: int, within_s: float = 300.0) -> bool:
     return False
 
 
-def test_open__the_first_is_local_further_ones_are_not_and_after_it_the_next_is_local_again(scene: OpenScene) -> None:
+def test_open__one_simulation_at_a_time_is_local(scene: OpenScene) -> None:
     first = open_simulation(scene, 1, (True, True), 1)
     second = open_simulation(scene, 1, (True, True), 1)
     first.close()
@@ -79,31 +79,31 @@ def test_both__give_the_same_numbers(scene: OpenScene) -> None:
     actions = np.random.default_rng(0).normal(0.0, 0.1, (120, 2, 2, 2))
 
     def played(arena: Arena) -> bytes:
-        seen = []
+        results = []
         for seed in (1, 2):
             arena.reload(seed)
             starts = {game: drawn(scene, "both", game) for game in range(2)}
             arena.reset(starts, {game: scene.departures(np.random.default_rng(game)) for game in range(2)})
             for action in actions:
                 arena.step(action)
-                seen += [arena.observation.tobytes(), arena.state.x_m.tobytes(), arena.state.outcome.tobytes()]
+                results += [arena.observation.tobytes(), arena.state.x_m.tobytes(), arena.state.outcome.tobytes()]
                 assert arena.reading is not None
-                seen += [arena.reading.x_m.tobytes(), repr(arena.reading.names.tolist()).encode()]
-        return b"".join(seen)
+                results += [arena.reading.x_m.tobytes(), repr(arena.reading.names.tolist()).encode()]
+        return b"".join(results)
 
-    here, there = (played(arena) for arena in arenas)
+    local, remote = (played(arena) for arena in arenas)
     for arena in arenas:
         arena.close()
-    assert here == there
+    assert local == remote
 
 
-def test_refusal__in_the_child_is_an_error_here_and_the_child_goes_on(
-    scene: OpenScene, far: SubprocessSimulation
-) -> None:
+def test_refusal__in_the_child_is_an_error_and_the_child_continues(scene: OpenScene, far: SubprocessSimulation) -> None:
     start = placed(scene, (40, LEFT_Y, 0, 0), None)
-    wrong = Departure("wrong", "van", ("road",), 0.0, "7", "base", "0")
-    with pytest.raises(SimulationError, match=r"start game 0.*departLane.*wrong"):
-        far.reset(0, start, [wrong])
+    refused = Departure(
+        name="refused", vehicle_type="van", edges=("road",), depart_s=0.0, lane="7", position="base", speed="0"
+    )
+    with pytest.raises(SimulationError, match=r"reset game 0.*departLane.*refused"):
+        far.reset(0, start, [refused])
     far.reload(1)
     far.reset(0, start, [])
     assert far.step(start.x_m[None], start.y_m[None], start.heading_rad[None]).names.tolist() == [[]]
@@ -117,16 +117,14 @@ def test_refusal__to_load_leaves_no_child(scene: OpenScene, tmp_path: Path) -> N
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
-def test_death__of_the_child_is_an_error_that_names_the_signal(far: SubprocessSimulation) -> None:
+def test_crash__of_the_child_is_an_error_that_names_the_signal(far: SubprocessSimulation) -> None:
     os.kill(far._child.pid, signal.SIGSEGV)
     for _ in range(2):
         with pytest.raises(SimulationError, match="SIGSEGV"):
             far.reload(1)
 
 
-def test_interrupt__ends_the_child_rather_than_leave_an_answer_to_come(
-    far: SubprocessSimulation, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_interrupt__ends_the_child(far: SubprocessSimulation, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patched:
 
         def interrupted(stream: Any) -> Any:
@@ -139,7 +137,7 @@ def test_interrupt__ends_the_child_rather_than_leave_an_answer_to_come(
         far.reload(2)
 
 
-def test_close__ends_the_child_and_twice_is_once(far: SubprocessSimulation) -> None:
+def test_close__ends_the_child_and_may_be_repeated(far: SubprocessSimulation) -> None:
     far.close()
     assert far._child.poll() == 0
     far.close()
@@ -153,7 +151,7 @@ def test_garbage__ends_the_child(scene: OpenScene) -> None:
     assert child.poll() == 0
 
 
-def test_prints__of_sumo_do_not_reach_the_channel() -> None:
+def test_prints__of_sumo_do_not_enter_the_pipe() -> None:
     program = """
 from harness.traffic import libsumo_simulation
 from harness.traffic import subprocess_simulation
@@ -177,8 +175,8 @@ subprocess_simulation.serve()
     for message, answer in (((None,), None), (("reload", 5), 5)):
         subprocess_simulation._send(child.stdin, message)
         assert subprocess_simulation._receive(child.stdout) == (answer, None)
-    rest, said = child.communicate(timeout=300)
-    assert (rest, said.split()) == (b"", [b"SUMO", b"saysthis", b"and", b"thatbye"])
+    rest, errors = child.communicate(timeout=300)
+    assert (rest, errors.split()) == (b"", [b"SUMO", b"saysthis", b"and", b"thatbye"])
 
 
 SCRIPT = """
@@ -197,21 +195,19 @@ print(both[1]._child.pid, flush=True)
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 @pytest.mark.parametrize("end", ["", "raise RuntimeError", "os.kill(os.getpid(), signal.SIGKILL)", "os._exit(3)"])
-def test_parent__a_script_without_a_main_guard_leaves_no_orphan_however_it_ends(
-    scene: OpenScene, tmp_path: Path, end: str
-) -> None:
+def test_parent__a_script_without_a_main_guard_leaves_no_orphan(scene: OpenScene, tmp_path: Path, end: str) -> None:
     script = tmp_path / "script.py"
     script.write_text(SCRIPT.format(repository=str(REPOSITORY), end=end))
-    done = subprocess.run(
+    run = subprocess.run(
         [sys.executable, str(script)], cwd=scene.folder.parent, capture_output=True, text=True, timeout=300
     )
-    assert done.stdout.strip().isdigit(), done.stderr
-    assert ends(int(done.stdout))
-    assert done.returncode == 0 or end
+    assert run.stdout.strip().isdigit(), run.stderr
+    assert ends(int(run.stdout))
+    assert run.returncode == 0 or end
 
 
-def test_soak__players_off_the_road_around_a_zipper_junction_do_not_kill_sumo(tmp_path: Path) -> None:
-    """SUMO 1.28 dies of this (SIGSEGV in a thousand steps) if lane changes take time, and with its sublane model."""
+def test_soak__players_off_the_road_near_a_zipper_junction_do_not_crash_sumo(tmp_path: Path) -> None:
+    """SUMO 1.28 crashes (SIGSEGV within a thousand steps) if lane changes take time, and with its sublane model."""
     scene = build_scene(tmp_path, ZIPPER_NODES, ZIPPER_EDGES, ZIPPER, goal_m=100.0)
     simulation, generator = SubprocessSimulation(scene, 4, (True, True), 1), np.random.default_rng(0)
     try:

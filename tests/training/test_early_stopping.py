@@ -1,4 +1,4 @@
-"""When a learning curve has settled."""
+"""The rule for early convergence."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_has_converged__never_before_the_least_number_of_segments(segments: int)
     assert not has_converged([1.0] * segments)
 
 
-def test_has_converged__a_curve_that_rose_and_settled_has() -> None:
+def test_has_converged__a_curve_with_a_plateau_has() -> None:
     assert has_converged([-10.0, -6.0, -2.0, *[5.0] * (2 * LATEST)])
 
 
@@ -38,14 +38,14 @@ def test_has_converged__not_before_the_rise_is_out_of_both_windows() -> None:
 
 
 def test_has_converged__by_no_more_than_the_tolerance_of_the_span() -> None:
-    # span 100; the mean of the latest is above that of the ones before by just less, and just more, than 1 of it
+    # span 100: the mean of the latest segments is above that of the segments before by just less, and just more, than 1
     assert pytest.approx(0.01) == TOLERANCE
     before = [-100.0, *[0.0] * LATEST]
     assert has_converged([*before, *[0.99] * LATEST])
     assert not has_converged([*before, *[1.02] * LATEST])
 
 
-def test_has_converged__noise_on_a_plateau_is_no_rise_but_noise_on_a_slope_is() -> None:
+def test_has_converged__on_a_noisy_plateau_and_not_on_a_noisy_slope() -> None:
     noise = np.random.default_rng(1).normal(0.0, 0.3, 60)
     rise = np.concatenate((np.linspace(-20.0, 0.0, 20), np.zeros(40)))
     curve = (rise + noise).tolist()
@@ -60,6 +60,6 @@ def test_has_converged__segments_without_a_finished_game_do_not_count() -> None:
     assert not has_converged([*[-math.inf] * 3, *map(float, range(20))])
 
 
-def test_rule__says_what_is_done() -> None:
+def test_rule__names_windows_and_tolerance() -> None:
     assert f"latest {LATEST} segments" in RULE
     assert "1%" in RULE

@@ -1,4 +1,4 @@
-"""The search for a better ego: the same games for all, and the same search however often it is interrupted."""
+"""The parameter search: the same games for every trial, and the same trials after an interruption."""
 
 from __future__ import annotations
 
@@ -49,16 +49,23 @@ def personas() -> tuple[Persona, Persona]:
 
 
 def search_of(scene: OpenScene, folder: Path, text: str, **settings: Any) -> Search:
-    given = find(document(folder, text), folder)
+    external = find(document(folder, text), folder)
     few = {"trials": 5, "games": 6, "games_at_once": 6, **settings}
-    return Search(scene, given, personas(), opponent(), Reconfiguration(**few), ("reconfiguration", 1, "test"))
+    return Search(
+        scene=scene,
+        driver=external,
+        personas=personas(),
+        opponent=opponent(),
+        settings=Reconfiguration(**few),
+        parts=("reconfiguration", 1, "test"),
+    )
 
 
 # --- the games ---
 
 
-class Watched:
-    """Remembers what was seen first in each game."""
+class Recording:
+    """Drives by `adas.toml`, and records the first observation of each game."""
 
     takes_over = True
 
@@ -79,35 +86,37 @@ class Watched:
 
 
 def play(scene: OpenScene, driver: Driver, other: Driver | Mixture | None = None, **changes: Any) -> Any:
-    given = {"games": 7, "at_once": 3, "alone_share": 0.3, "parts": ("test", 1)} | changes
-    games = PairedRollouts(scene, personas(), other or opponent(), **given)
+    arguments = {"games": 7, "at_once": 3, "alone_share": 0.3, "parts": ("test", 1)} | changes
+    games = PairedRollouts(scene, personas=personas(), opponent=other or opponent(), **arguments)
     try:
         return games.play(driver), games.play(driver)
     finally:
         games.close()
 
 
-def test_games__are_so_many_as_asked_for_and_the_same_again(scene: OpenScene) -> None:
-    watched = Watched(scene)
-    once, again = play(scene, watched)
+def test_games__have_the_given_number_and_are_reproducible(scene: OpenScene) -> None:
+    recording = Recording(scene)
+    once, again = play(scene, recording)
     assert once.payoff.shape == once.failed.shape == (7,)
     np.testing.assert_array_equal(once.payoff, again.payoff)
     np.testing.assert_array_equal(once.failed, again.failed)
-    np.testing.assert_array_equal(watched.first[:9], watched.first[9:])  # three loads of three; two are over
-    assert len(np.unique(np.array(watched.first[:7]), axis=0)) == 7  # and each is another
+    np.testing.assert_array_equal(
+        recording.first[:9], recording.first[9:]
+    )  # three loads of three games; two are dropped
+    assert len(np.unique(np.array(recording.first[:7]), axis=0)) == 7  # all different
 
 
-def test_games__do_not_depend_on_how_many_are_played_at_once(scene: OpenScene) -> None:
-    alone, together = (play(scene, Watched(scene), at_once=at_once)[0] for at_once in (1, 7))
+def test_games__do_not_depend_on_the_number_at_once(scene: OpenScene) -> None:
+    alone, together = (play(scene, Recording(scene), at_once=at_once)[0] for at_once in (1, 7))
     np.testing.assert_allclose(alone.payoff, together.payoff, atol=1e-4)
     np.testing.assert_array_equal(alone.failed, together.failed)
 
 
-@pytest.mark.parametrize(("share", "met"), [(0.0, range(20, 21)), (1.0, range(1)), (0.5, range(4, 17))])
-def test_games__are_alone_in_their_share(share: float, met: range, scene: OpenScene) -> None:
+@pytest.mark.parametrize(("share", "opponents"), [(0.0, range(20, 21)), (1.0, range(1)), (0.5, range(4, 17))])
+def test_games__are_without_the_opponent_in_their_share(share: float, opponents: range, scene: OpenScene) -> None:
     other = _Counting()
-    play(scene, Watched(scene), other, games=20, at_once=20, alone_share=share)
-    assert len(other.games) in met
+    play(scene, Recording(scene), other, games=20, at_once=20, alone_share=share)
+    assert len(other.games) in opponents
 
 
 class _Counting:
@@ -117,28 +126,34 @@ class _Counting:
         self.games: set[int] = set()
 
     def reset(self, games: IntArray) -> None:
-        """Nothing to forget."""
+        """Do nothing."""
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         self.games |= {*games.tolist()}
         return np.zeros((len(games), 2))
 
 
-def test_games__may_be_against_several_who_take_turns(scene: OpenScene) -> None:
+def test_games__may_be_against_a_mixture(scene: OpenScene) -> None:
     _, speedy = personas()
     both = _Counting(), _Counting()
-    play(scene, Watched(scene), Mixture(tuple(Member(each, speedy) for each in both)), games=20, at_once=20)
+    play(
+        scene,
+        Recording(scene),
+        Mixture(tuple(Member(driver=each, persona=speedy) for each in both)),
+        games=20,
+        at_once=20,
+    )
     assert both[0].games
     assert both[1].games
     assert not both[0].games & both[1].games
 
 
-# --- what is proposed ---
+# --- proposals ---
 
 TUNABLE = (Tunable("a", 0.0, 1.0), Tunable("b", -10.0, -5.0))
 
 
-def test_propose__is_told_by_the_trials_so_far_and_nothing_else() -> None:
+def test_propose__depends_on_the_trials_before_and_the_seed_only() -> None:
     trials: list[Trial] = []
     for number in range(15):
         values = propose(TUNABLE, trials, "test", 1)
@@ -146,22 +161,26 @@ def test_propose__is_told_by_the_trials_so_far_and_nothing_else() -> None:
         assert values != propose(TUNABLE, trials, "test", 2)
         assert all(low <= values[key] <= high for key, low, high in TUNABLE)
         assert list(values) == ["a", "b"]
-        trials.append(Trial(values, None if number == 3 else -abs(values["a"] - 0.25), 0.0))
+        trials.append(
+            Trial(values=values, mean_payoff=None if number == 3 else -abs(values["a"] - 0.25), failure_rate=0.0)
+        )
     assert len({trial.values["a"] for trial in trials}) == 15
 
 
-def test_propose__goes_where_it_was_good() -> None:
+def test_propose__moves_towards_good_values() -> None:
     trials: list[Trial] = []
     for _ in range(40):
         values = propose(TUNABLE, trials, "test", 1)
-        trials.append(Trial(values, -abs(values["a"] - 0.25) - 0.1 * abs(values["b"] + 9.0), 0.0))
+        trials.append(
+            Trial(values=values, mean_payoff=-abs(values["a"] - 0.25) - 0.1 * abs(values["b"] + 9.0), failure_rate=0.0)
+        )
     first, last = (np.mean([each.mean_payoff for each in some]) for some in (trials[:10], trials[30:]))
     assert last > first
     assert abs(trials[best(trials)].values["a"] - 0.25) < 0.1
 
 
-def test_best__is_the_first_of_equals_and_never_one_that_was_not_played() -> None:
-    trials = [Trial({}, payoff, 0.0) for payoff in (1.0, None, 3.0, 3.0, 2.0)]
+def test_best__is_the_first_of_equals_and_has_a_payoff() -> None:
+    trials = [Trial(values={}, mean_payoff=payoff, failure_rate=0.0) for payoff in (1.0, None, 3.0, 3.0, 2.0)]
     assert best(trials) == 2
     assert best(trials[:2]) == 0
 
@@ -169,8 +188,8 @@ def test_best__is_the_first_of_equals_and_never_one_that_was_not_played() -> Non
 # --- the search ---
 
 
-def test_search__finds_the_speed_that_pays(scene: OpenScene, tmp_path: Path) -> None:
-    """Half the limit costs the careful ego payoff all the way, above the limit it is fined: the best is near it."""
+def test_search__finds_the_speed_with_the_best_payoff(scene: OpenScene, tmp_path: Path) -> None:
+    """The careful ego loses payoff at half the limit and above the limit: the best speed is near the limit."""
     search = search_of(scene, tmp_path, SLOW + SPEED, trials=16, games=8, games_at_once=8, alone_share=1.0)
     trials = run_search(search, tmp_path / "trials.json")
     assert dict(trials[0].values) == {"cruise.speed_share": 0.5}
@@ -184,74 +203,79 @@ def test_search__finds_the_speed_that_pays(scene: OpenScene, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("stops_at", [[1], [3, 3, 4]])
-def test_search__interrupted_is_the_same_search(stops_at: list[int], scene: OpenScene, tmp_path: Path) -> None:
+def test_search__an_interruption_does_not_change_the_trials(
+    stops_at: list[int], scene: OpenScene, tmp_path: Path
+) -> None:
     search = search_of(scene, tmp_path, SLOW + SPEED)
     whole = run_search(search, tmp_path / "whole.json")
     for stop in stops_at:
 
-        def begin(trial: int, stop: int = stop) -> None:
+        def interrupt(trial: int, stop: int = stop) -> None:
             if trial == stop:
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):
-            run_search(search, tmp_path / "kept.json", on_start=begin)
-        assert len(read_trials(tmp_path / "kept.json")) == stop
-    told: list[tuple[int, int]] = []
-    assert run_search(search, tmp_path / "kept.json", lambda *of: told.append(of)) == whole
-    assert told == [(done, 5) for done in range(stops_at[-1], 6)]
-    assert (tmp_path / "kept.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
+            run_search(search, tmp_path / "stored.json", on_start=interrupt)
+        assert len(read_trials(tmp_path / "stored.json")) == stop
+    reports: list[tuple[int, int]] = []
+    assert run_search(search, tmp_path / "stored.json", lambda *counts: reports.append(counts)) == whole
+    assert reports == [(done, 5) for done in range(stops_at[-1], 6)]
+    assert (tmp_path / "stored.json").read_bytes() == (tmp_path / "whole.json").read_bytes()
 
 
-def test_search__that_is_finished_plays_nothing(
+def test_search__a_finished_search_plays_no_games(
     scene: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     search = search_of(scene, tmp_path, SLOW + SPEED, trials=2)
-    whole = run_search(search, tmp_path / "kept.json")
+    whole = run_search(search, tmp_path / "stored.json")
     monkeypatch.setattr(harness.training.parameter_search, "PairedRollouts", None)
-    assert run_search(search, tmp_path / "kept.json") == whole
+    assert run_search(search, tmp_path / "stored.json") == whole
 
 
-def test_kept__is_read_back_bit_for_bit_or_not_at_all(tmp_path: Path) -> None:
-    trials = [Trial({"a": 0.1 + 0.2}, 1 / 3, 0.0), Trial({"a": 1e-300}, None, None, "ValueError: “no”")]
-    kept = tmp_path / "kept.json"
-    assert read_trials(kept) == []
-    write_trials(trials, kept)
-    assert read_trials(kept) == trials
-    whole = kept.read_bytes()
+def test_trials__are_read_back_exactly_or_not_at_all(tmp_path: Path) -> None:
+    trials = [
+        Trial(values={"a": 0.1 + 0.2}, mean_payoff=1 / 3, failure_rate=0.0),
+        Trial(values={"a": 1e-300}, mean_payoff=None, failure_rate=None, error="ValueError: “no”"),
+    ]
+    stored = tmp_path / "stored.json"
+    assert read_trials(stored) == []
+    write_trials(trials, stored)
+    assert read_trials(stored) == trials
+    whole = stored.read_bytes()
     for damaged in (whole[:-20], b"", b"[]", b"null", whole.replace(b"0.3333", b"0.4333"), b"\xff" + whole):
-        kept.write_bytes(damaged)
-        assert read_trials(kept) == []
+        stored.write_bytes(damaged)
+        assert read_trials(stored) == []
 
 
-class _Fails:
-    """An ego that can't be driven with some values."""
+class _Failing:
+    """An ego that can't be made with some values."""
 
     def __init__(self, search: Search, fails: Any) -> None:
-        self._given, self._fails = search.driver, fails
+        self._driver, self._fails = search.driver, fails
 
     @property
     def searched(self) -> Any:
-        return self._given.searched
+        return self._driver.searched
 
     @property
     def numbers(self) -> Any:
-        return self._given.numbers
+        return self._driver.numbers
 
     def tuned(self, values: Any) -> Any:
         if self._fails(values):
             raise ValueError("no such driver")
-        return self._given.tuned(values)
+        return self._driver.tuned(values)
 
     def make(self, *of: Any) -> Driver:
         if self._fails(self.numbers):
             raise ValueError("no such driver")
-        return self._given.make(*of)
+        return self._driver.make(*of)
 
 
-def test_search__a_driver_that_can_not_be_made_is_a_trial_without_a_payoff(scene: OpenScene, tmp_path: Path) -> None:
+def test_search__a_driver_that_can_not_be_made_is_a_trial_without_payoff(scene: OpenScene, tmp_path: Path) -> None:
     search = search_of(scene, tmp_path, SLOW + SPEED, trials=8)
-    fails: Any = _Fails(search, lambda values: values["cruise.speed_share"] > 0.8)
-    trials = run_search(replace(search, driver=fails), tmp_path / "kept.json")
+    fails: Any = _Failing(search, lambda values: values["cruise.speed_share"] > 0.8)
+    trials = run_search(replace(search, driver=fails), tmp_path / "stored.json")
     too_fast = [each for each in trials if each.values["cruise.speed_share"] > 0.8]
     assert 0 < len(too_fast) < 7
     assert {(each.mean_payoff, each.error) for each in too_fast} == {(None, "ValueError: no such driver")}
@@ -259,15 +283,15 @@ def test_search__a_driver_that_can_not_be_made_is_a_trial_without_a_payoff(scene
     assert trials[best(trials)] not in too_fast
 
 
-def test_search__fails_where_the_ego_can_not_drive_as_it_was_given(scene: OpenScene, tmp_path: Path) -> None:
+def test_search__fails_if_the_ego_can_not_play_with_its_own_parameters(scene: OpenScene, tmp_path: Path) -> None:
     search = search_of(scene, tmp_path, SLOW + SPEED)
-    fails: Any = _Fails(search, lambda values: True)
-    with pytest.raises(StageFailed, match="could not play as it was given: ValueError: no such driver"):
-        run_search(replace(search, driver=fails), tmp_path / "kept.json")
-    assert read_trials(tmp_path / "kept.json") == []
+    fails: Any = _Failing(search, lambda values: True)
+    with pytest.raises(StageFailed, match="could not play with its own parameters: ValueError: no such driver"):
+        run_search(replace(search, driver=fails), tmp_path / "stored.json")
+    assert read_trials(tmp_path / "stored.json") == []
 
 
-# --- of every kind ---
+# --- every kind of driver ---
 
 PROGRAM = """
 import json, sys
@@ -290,13 +314,13 @@ for line in sys.stdin:
 def check_speed_is_found(scene: OpenScene, folder: Path, text: str) -> None:
     text += "[parameters]\nspeed_mps = 5.0\n[tunable]\nspeed_mps = [3.0, 13.0]\n"
     search = search_of(scene, folder, text, trials=6, games=3, games_at_once=3, alone_share=1.0)
-    trials = run_search(search, folder / "kept.json")
+    trials = run_search(search, folder / "stored.json")
     assert [each.error for each in trials] == [""] * 6
     speeds = [each.values["speed_mps"] for each in trials]
     payoffs = [each.mean_payoff or 0.0 for each in trials]
     assert speeds[0] == 5.0
     assert len(set(payoffs)) == 6
-    assert np.corrcoef(speeds, payoffs)[0, 1] > 0.8  # what the search was told is what the driver drove by
+    assert np.corrcoef(speeds, payoffs)[0, 1] > 0.8  # the driver uses the proposed values
 
 
 def test_search__of_an_installed_package(scene: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -323,6 +347,6 @@ def test_search__of_a_digital_twin(scene: OpenScene, tmp_path: Path) -> None:
     fmu_example().build(tmp_path / "twin.fmu")
     text = 'kind = "fmu"\nfile = "twin.fmu"\n[start]\ntime_gap_s = 1.8\n[tunable]\ntime_gap_s = [0.8, 4.0]\n'
     search = search_of(scene, tmp_path, text, trials=3, games=4, games_at_once=4, alone_share=0.0)
-    trials = run_search(search, tmp_path / "kept.json")
+    trials = run_search(search, tmp_path / "stored.json")
     assert [each.error for each in trials] == [""] * 3
     assert len({each.mean_payoff for each in trials}) == 3

@@ -12,7 +12,7 @@ import fmpy
 
 SOURCE = Path(__file__).with_name("twin.c")
 TOKEN = "{6f2b1c1e-7d35-4b7c-9d0e-3a1b5c2d4e6f}"
-# In the order of the value references in twin.c: name, causality, unit, start value
+# Name, causality, unit and start value, in the order of the value references in twin.c
 VARIABLES = [
     ("speed_mps", "input", "m/s", 0.0),
     ("speed_over_limit", "input", "1", 0.0),
@@ -36,10 +36,12 @@ def description(fmi: int) -> str:
     variables = ""
     for reference, (name, causality, unit, start) in enumerate(VARIABLES):
         variability = "fixed" if causality == "parameter" else "continuous"
-        given = f'name="{name}" valueReference="{reference}" causality="{causality}" variability="{variability}"'
+        attributes = f'name="{name}" valueReference="{reference}" causality="{causality}" variability="{variability}"'
         real = f'unit="{unit}"' + (f' start="{start}"' if start is not None else "")
         variables += (
-            f"<ScalarVariable {given}><Real {real}/></ScalarVariable>" if fmi == 2 else f"<Float64 {given} {real}/>"
+            f"<ScalarVariable {attributes}><Real {real}/></ScalarVariable>"
+            if fmi == 2
+            else f"<Float64 {attributes} {real}/>"
         )
     outputs = [k for k, (_, causality, _, _) in enumerate(VARIABLES) if causality == "output"]
     if fmi == 2:
@@ -59,7 +61,7 @@ def description(fmi: int) -> str:
 
 
 def build(fmu: Path, fmi: int = 3, source: str = SOURCE.read_text(encoding="utf-8")) -> Path:
-    """Compile the source, and zip it with its description."""
+    """Compile the source, and write the FMU: a zip archive of the library and its description."""
     headers = Path(fmpy.__file__).with_name("c-code")
     with tempfile.TemporaryDirectory() as folder:
         library, c_file = Path(folder) / "twin.so", Path(folder) / "twin.c"

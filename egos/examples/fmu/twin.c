@@ -1,5 +1,5 @@
-/* A digital twin in little: lane keeping, distance keeping, and a drive train that follows with a lag.
- * One source for FMI 2.0 and 3.0 (-DFMI=2, -DFMI=3). build.py compiles it and writes the model description. */
+/* A small digital twin: lane keeping, distance keeping, and a drive train with a lag.
+ * The source is for FMI 2.0 and 3.0 (-DFMI=2, -DFMI=3). build.py compiles it and writes the model description. */
 #include <math.h>
 #include <stdlib.h>
 
@@ -53,7 +53,7 @@ static int copy_in(Twin *twin, const unsigned refs[], size_t count, const double
     return 0;
 }
 
-/* An FMU has every function of the standard. Those that this one has no use for answer with an error. */
+/* An FMU must have every function of the standard. Those that this one does not need return an error. */
 #define UNUSED(name) EXPORT int name(void) { return 3; }
 
 #if FMI == 2

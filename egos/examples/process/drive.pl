@@ -1,10 +1,10 @@
 #!/usr/bin/env perl
-# A driver in Perl, without any module: keeps to its lane and its distance. docs/egos.md has the protocol.
+# A driver in Perl without modules: it keeps its lane and its distance. The protocol is in docs/egos.md.
 use strict;
 use warnings;
-$| = 1;    # an answer that waits in a buffer is late
+$| = 1;    # flush every line
 
-my %entry;     # name of an entry of the observation => its place
+my %entry;     # name of an entry of the observation => its index
 my $length;    # of the car, in metres
 
 sub bounded { my ($low, $value, $high) = @_; return $value < $low ? $low : $value > $high ? $high : $value }
@@ -24,19 +24,19 @@ sub decide {
     return sprintf '[%.6f, %.6f]', bounded(-8, $acceleration, 3), $steering;
 }
 
-# The harness writes each message as one line of JSON, in the order that docs/egos.md gives.
+# Each message is one line of JSON with the keys in the order of docs/egos.md.
 while (my $line = <STDIN>) {
     if ($line =~ /"type": "hello"/) {
         my ($names) = $line =~ /"layout": \[(.*?)\]/;
-        my $place = 0;
-        %entry = map { $_ => $place++ } $names =~ /"(.*?)"/g;
+        my $index = 0;
+        %entry = map { $_ => $index++ } $names =~ /"(.*?)"/g;
         ($length) = $line =~ /"length_m": ([-+.\deE]+)/;
         print qq({"protocol": 2}\n);
     } elsif ($line =~ /"type": "reset"/) {
-        print "{}\n";    # nothing is remembered of a game
+        print "{}\n";    # this driver has no state
     } else {
-        my ($views) = $line =~ /"observation": \[(.*?)\]\]/;
-        my @actions = map { decide(/[-+.\deE]+/g) } split /\], \[/, $views;
+        my ($rows) = $line =~ /"observation": \[(.*?)\]\]/;
+        my @actions = map { decide(/[-+.\deE]+/g) } split /\], \[/, $rows;
         print '{"actions": [', join(', ', @actions), "]}\n";
     }
 }

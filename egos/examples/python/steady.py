@@ -1,4 +1,4 @@
-"""A driver as a Python package: steers along its lane and holds a speed."""
+"""A driver as a Python package: it follows its lane and holds a speed."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class Steady:
         self._car, self._speed_mps = car, speed_mps
 
     def reset(self, games: np.ndarray) -> None:
-        """Nothing to forget."""
+        """Do nothing: the driver has no state."""
 
     def decide(self, games: np.ndarray, observation: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        """Actions [N, 2] in games [N] from what is seen in them [N, SIZE]."""
-        seen = self._car.seen(observation)  # in metres, seconds and radians
-        speed = seen[:, SPEED]
-        steering_rad = 0.5 * seen[:, TURNED] + 0.5 * np.arctan2(seen[:, LEFT], 4.0 + speed)
+        """Actions [N, 2] in games [N], from their observations [N, SIZE]."""
+        values = self._car.physical(observation)  # in metres, seconds and radians
+        speed = values[:, SPEED]
+        steering_rad = 0.5 * values[:, TURNED] + 0.5 * np.arctan2(values[:, LEFT], 4.0 + speed)
         acceleration_mps2 = np.clip(self._speed_mps - speed, -3.0, 2.0)
-        return self._car.asked(acceleration_mps2, steering_rad, observation)
+        return self._car.actions(acceleration_mps2, steering_rad, observation)

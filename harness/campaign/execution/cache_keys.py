@@ -79,7 +79,7 @@ def _personas(campaign: OpenCampaign, stage: Stage) -> list[Any]:
     own = [stage.persona] if stage.persona in personas else []
     players = stage.drivers if isinstance(stage, AssessmentStage) else (stage.opponent,)
     names = ["", *own, *(persona_of(each) for driver in players for each in members_of(driver))]
-    return [personas[name].model_dump(mode="json") for name in dict.fromkeys(names)]
+    return [personas[name].identity() for name in dict.fromkeys(names)]
 
 
 def _stage(stage: Stage) -> dict[str, Any]:

@@ -29,7 +29,6 @@ from harness.config.campaign import Training
 from harness.drivers.mixture import Player
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
-from harness.evaluation.strategies import BestResponse
 from harness.evaluation.tables import TRAINING_COLUMNS, typed, write_csv
 from harness.files import make_folder, write_atomically
 from harness.game.state import EGO, NON_EGO, ROLES
@@ -114,14 +113,21 @@ def _train(stage: TrainingStage, run: StageRun) -> Made:
         initial=read_policy(run.players.policy_folder(stage.initial)) if stage.initial is not None else None,
         settings=settings,
         parts=("training", stage.seed, stage.name),
-        as_it_drives=isinstance(stage.strategy, BestResponse),
+        as_it_drives=stage.is_best_response,
     )
     card = _policy_card(stage, spec, settings)
     checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
     versions = _versions_since(checkpoint)
     try:
-        key, tensorboard = context.keys[stage.id], folder.tensorboard(stage.id)
-        trained = train(spec, checkpoint, key, card, tensorboard, run.on_progress, run.on_start)
+        trained = train(
+            spec,
+            checkpoint=checkpoint,
+            key=context.keys[stage.id],
+            card=card,
+            tensorboard=folder.tensorboard(stage.id),
+            on_progress=run.on_progress,
+            on_start=run.on_start,
+        )
     except (FloatingPointError, ValueError) as error:
         raise StageFailed(f"{stage.id}: {error}") from error
     make_folder(folder.policy(stage.id))

@@ -69,7 +69,7 @@ def run_stages(
                     _handle(worker, schedule, crashes, spawn, emit)
 
 
-def _dispatch(schedule: Schedule, workers: list[_Worker], crashes: Crashes, spawn: Spawn, emit: Emit) -> None:
+def _dispatch(schedule: Schedule[Stage], workers: list[_Worker], crashes: Crashes, spawn: Spawn, emit: Emit) -> None:
     """Give every idle worker a stage, as long as there are any."""
     for worker in workers:
         if worker.stage is not None or (stage := schedule.take()) is None:
@@ -84,7 +84,7 @@ def _dispatch(schedule: Schedule, workers: list[_Worker], crashes: Crashes, spaw
         emit(Event(kind="started", stage=stage.id))
 
 
-def _handle(worker: _Worker, schedule: Schedule, crashes: Crashes, spawn: Spawn, emit: Emit) -> None:
+def _handle(worker: _Worker, schedule: Schedule[Stage], crashes: Crashes, spawn: Spawn, emit: Emit) -> None:
     """Receive one event of a busy worker, and let schedule and crash counts follow."""
     event, stage = _receive(worker), worker.stage
     if event is None or stage is None:

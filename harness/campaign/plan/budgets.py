@@ -5,7 +5,6 @@ from __future__ import annotations
 from harness.campaign.plan.planned_drivers import members_of, persona_of
 from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign, Training
-from harness.evaluation.strategies import BestResponse
 
 
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
@@ -15,7 +14,7 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     by which its learning curve is judged, times their number.
     """
     settings = campaign.training
-    if isinstance(stage.strategy, BestResponse):
+    if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})
     personas = len({persona_of(each) for each in members_of(stage.opponent)})

@@ -14,7 +14,7 @@ from harness.campaign.plan.search_rounds import plan_searches
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_drivers import crossplay_drivers, driver_of, ego_learns
 from harness.config.campaign import Campaign
-from harness.evaluation.strategies import BestResponse, OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
+from harness.evaluation.strategies import OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
 
 
 def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Stage]:
@@ -26,7 +26,7 @@ def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> 
     stages = [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed, tunable)]
     if campaign.policies is None:
         return stages
-    return [each for each in stages if not isinstance(each, TrainingStage) or isinstance(each.strategy, BestResponse)]
+    return [each for each in stages if not isinstance(each, TrainingStage) or each.is_best_response]
 
 
 def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int, tunable: bool) -> list[Stage]:

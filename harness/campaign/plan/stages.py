@@ -15,7 +15,7 @@ from harness.campaign.plan.planned_drivers import (
     policies_before,
     stages_before,
 )
-from harness.evaluation.strategies import Arm, ReconfiguredEgo, Strategy, player_of, strategy_name
+from harness.evaluation.strategies import Arm, BestResponse, ReconfiguredEgo, Strategy, player_of, strategy_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,6 +95,11 @@ class TrainingStage(_Stage):
     def name(self) -> str:
         """The strategy's name."""
         return strategy_name(self.strategy)
+
+    @property
+    def is_best_response(self) -> bool:
+        """Whether it is one training of a player's best response."""
+        return isinstance(self.strategy, BestResponse)
 
     @property
     def learner(self) -> int:

@@ -1,7 +1,7 @@
-"""Model cards: a README.md beside each policy of a run that says who it is, how it came about and how it fares.
+"""Model cards: a README.md beside each policy of a run that describes the policy, its training and its results.
 
-Everything in a card is from the run's manifest, its summary and the policy's own JSON, without timings: the same
-campaign gives the same card.
+A card contains data of the run's manifest, its summary and the policy's JSON only, without timings: the same campaign
+gives the same card.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.game.payoff import GROUPS, TERMS
 from harness.game.state import NON_EGO, ROLES
-from harness.reports.wording import interval, number, percent
+from harness.reports.numbers import interval, number, percent
 
 CARD = "README.md"
 _PROGRAMS = ("python", "eclipse-sumo", "torch", "stable-baselines3", "numpy")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Term:
     """A row of the payoff's table."""
 
@@ -47,7 +47,7 @@ class _Term:
 
 
 def write_model_cards(folder: RunFolder, manifest: Mapping[str, Any], summary: pd.DataFrame) -> None:
-    """Write the card of every policy that a run trained. A run of before there were cards gets none."""
+    """Write the card of every policy that a run trained. A run of an older version without cards gets none."""
     if "persona_documents" not in manifest:
         return
     cards = {
@@ -60,7 +60,7 @@ def write_model_cards(folder: RunFolder, manifest: Mapping[str, Any], summary: p
 
 
 class _PolicyCard(Document):
-    """What a card tells of a policy's JSON."""
+    """The part of a policy's JSON that a card uses."""
 
     model_config = ConfigDict(extra="ignore")
     player: Literal["ego", "non_ego"]
@@ -71,13 +71,13 @@ class _PolicyCard(Document):
 
 
 def _policy_card(folder: Path) -> dict[str, Any]:
-    """The content of a policy's JSON. Raises UsageError where it is not what a training wrote."""
+    """The content of a policy's JSON. Raises UsageError where it does not have the form that a training writes."""
     card = read_card(folder)
     try:
         _PolicyCard.model_validate(card)
     except ValidationError as error:
-        key, said = ".".join(map(str, error.errors()[0]["loc"])), error.errors()[0]["msg"]
-        raise UsageError.of(policy_files(folder)[0], key, f"is damaged: {said}", "train the policy again") from None
+        key, message = ".".join(map(str, error.errors()[0]["loc"])), error.errors()[0]["msg"]
+        raise UsageError.of(policy_files(folder)[0], key, f"is damaged: {message}", "train the policy again") from None
     return card
 
 
@@ -86,7 +86,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
     entry = manifest["stages"][stage]
     is_ego = policy["player"] != ROLES[NON_EGO]
     document = manifest["ego_persona"] if is_ego else manifest["persona_documents"][entry["persona"]]
-    persona = Persona.model_validate(document, strict=False)
+    persona = Persona.from_record(document)
     versions = manifest["versions"]
     environment = Environment(
         loader=PackageLoader("harness", "campaign/results"),
@@ -120,16 +120,16 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
 
 
 def _one_line(text: str) -> str:
-    """A person's words as one line of plain text: no heading, no table and no element can be made of them."""
+    """A text of a document as one line of plain text, without Markdown headings, tables or HTML elements."""
     return " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
 
 
 def _intro(entry: Mapping[str, Any], is_ego: bool) -> str:
     if not is_ego:
-        return f"A non-ego: a person of kind `{entry['persona']}`, who drives for reasons of their own."
+        return f"A non-ego: a selfish driver with the persona `{entry['persona']}`."
     if entry["persona"]:
-        return f"The ego, retrained against the person `{entry['persona']}`."
-    return "The naive ego: it learned alone on the road."
+        return f"The ego, retrained against the persona `{entry['persona']}`."
+    return "The naive ego: it was trained alone on the road."
 
 
 def _facts(
@@ -140,46 +140,50 @@ def _facts(
     yield "player", policy["player"]
     yield "persona", f"`{persona.name}`"
     yield "scene", f"`{policy['scene']}`"
-    partner = {None: "nobody", "sumo": "SUMO's own driver", "given": _given(manifest, campaign)}
+    partner = {None: "no other player", "sumo": "SUMO's own driver", "given": _given(manifest, campaign)}
     yield "against", partner.get(against, f"`{against}`")
     if against is not None:
         how = campaign.retraining if entry["name"] != entry["persona"] else campaign.non_ego_training
-        yield "games without the other", percent(how.alone_share)
-    yield "began from", f"`{policy['began_from']}`" if policy["began_from"] else "nothing"
-    ended = {"converged": "stopped by convergence", "budget": "the whole budget"}.get(entry["stopped"], "")
-    yield "trained for", f"{entry['steps']:,} of at most {entry['budget_steps']:,} steps: {ended}"
+        yield "games without the other player", percent(how.alone_share)
+    yield "initial policy", f"`{policy['began_from']}`" if policy["began_from"] else "none"
+    reason = {"converged": "stopped by convergence", "budget": "the whole budget"}.get(entry["stopped"], "")
+    yield "trained for", f"{entry['steps']:,} of at most {entry['budget_steps']:,} steps: {reason}"
     if entry.get("rule"):
         yield "convergence", entry["rule"]
     yield "training seed", str(entry["seed"])
-    yield "decisions", "its most likely action" if persona.decisions == "mode" else "sampled from its distribution"
+    yield "decisions", "the most likely action" if persona.decisions == "mode" else "sampled from the distribution"
     if persona.attention is not None:
         lapse = "–".join(f"{each:g}" for each in persona.attention.lapse_s)
         yield "attention", f"lapses for {lapse} s after {persona.attention.mean_attentive_s:g} s on average"
         if policy["player"] == ROLES[NON_EGO]:
             yield "no lapses in", f"the first {percent(campaign.non_ego_training.attentive_share)} of the budget"
     if persona.perception is not None:
-        share, up_to_m = percent(persona.perception.overlooks_share), persona.perception.overlooked_up_to_m
-        if persona.perception.overlooks_share:
-            yield "overlooks", f"in {share} of drives, others whose centre is less than {up_to_m:g} m ahead of its own"
+        share, up_to_m = percent(persona.perception.no_blind_spot_check_share), persona.perception.unseen_behind_m
+        if persona.perception.no_blind_spot_check_share:
+            yield (
+                "no blind-spot check",
+                f"in {share} of drives: vehicles less than {up_to_m:g} m ahead (centres) are not seen",
+            )
         yield from _sight(persona.perception)
     if persona.reaction is not None:
-        yield "reaction", f"decisions count {'–'.join(f'{each:g}' for each in persona.reaction.delay_s)} s later"
+        yield "reaction", f"decisions take effect {'–'.join(f'{each:g}' for each in persona.reaction.delay_s)} s later"
     if persona.actuators is not None:
         uses = persona.actuators
         shares = (uses.throttle_share, uses.braking_share, uses.steering_share)
         throttle, braking, steering = map(percent, shares)
-        yield "uses of the car", f"{throttle} of its acceleration, {braking} of its braking, {steering} of its steering"
+        yield "use of the car", f"{throttle} of the acceleration, {braking} of the braking, {steering} of the steering"
 
 
 def _sight(perception: Perception) -> Iterator[tuple[str, str]]:
-    if perception.misses_share:
-        share, within_m = percent(perception.misses_share), perception.noticed_within_m
-        yield "misses", f"in {share} of drives, others that are more than {within_m:g} m away"
+    if perception.looked_but_failed_to_see_share:
+        share, within_m = percent(perception.looked_but_failed_to_see_share), perception.noticed_within_m
+        yield "looked but failed to see", f"in {share} of drives: vehicles more than {within_m:g} m away"
     if perception.range_m is not None:
-        yield "sees", f"others up to {perception.range_m:g} m away"
+        yield "range of sight", f"{perception.range_m:g} m"
     if perception.distance_error or perception.closing_error_per_s:
-        closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance a second"
-        yield "misjudges", f"distances by {percent(perception.distance_error)}, {closing}, for {perception.error_s:g} s"
+        distances = f"distances by {percent(perception.distance_error)}"
+        closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance per second"
+        yield "errors of perception", f"{distances}, {closing}, for {perception.error_correlation_time_s:g} s"
 
 
 def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
@@ -194,13 +198,20 @@ def _terms(persona: Persona) -> Iterator[_Term]:
             if isinstance(given, Parametrised):
                 weight = given.weight
                 limit = f", within {given.within_s:g} s" if given.within_m is None else f", within {given.within_m:g} m"
-            counts = "per second" if term.per_second else "as it happens"
-            yield _Term(group, name, f"{weight:g}", counts, term.meaning + limit)
+            counts = "per second" if term.per_second else "per event"
+            yield _Term(group=group, name=name, weight=f"{weight:g}", counts=counts, meaning=term.meaning + limit)
     for each in persona.human.fuzzy:
         sets = "; ".join(
-            f"{of.name} ({', '.join(f'{x:g}: {y:g}' for x, y in of.points)}) is worth {of.value:g}" for of in each.sets
+            f"{one.name} ({', '.join(f'{x:g}: {y:g}' for x, y in one.points)}) has the value {one.value:g}"
+            for one in each.sets
         )
-        yield _Term("human", each.name, f"{each.weight:g}", "per second", f"fuzzy, of `{each.quantity}`: {sets}")
+        yield _Term(
+            group="human",
+            name=each.name,
+            weight=f"{each.weight:g}",
+            counts="per second",
+            meaning=f"fuzzy, of `{each.quantity}`: {sets}",
+        )
 
 
 _HEADINGS = {
@@ -243,8 +254,8 @@ def _with(value: str, span: str) -> str:
 
 def _purpose(persona: Persona, is_ego: bool) -> str:
     if is_ego:
-        return "For campaigns of this harness: as the ego under study, or to be compared with another ego."
-    return f"For campaigns of this harness: to find out how an ego copes with a person who is `{persona.name}`."
+        return "For campaigns of this harness: as the ego under study, or for comparison with another ego."
+    return f"For campaigns of this harness: to test an ego against a driver with the persona `{persona.name}`."
 
 
 def _snippet(stage: str, entry: Mapping[str, Any], is_ego: bool) -> str:
@@ -253,7 +264,7 @@ def _snippet(stage: str, entry: Mapping[str, Any], is_ego: bool) -> str:
     lines = [
         f'personas = ["personas/{entry["persona"]}.toml"]',
         f"seeds = [{entry['seed']}]",
-        'policies = "policies"    # the path of the folder that holds this one',
+        'policies = "policies"    # the path of the parent of this folder',
         "",
         "[ego]",
         'driver = "sumo"          # or the folder of a policy: your own',

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import read_trace
 from harness.evaluation.trace_quantities import series_of
 from harness.game.state import ROLES
@@ -21,25 +22,25 @@ from harness.traffic import drawing
 from harness.traffic.network import read_net
 from harness.traffic.scene import OpenScene
 
-TAKE_TURNS = 20  # games of an arm and seed: where not all fit on a page, there are some of each, good ones too
+TAKE_TURNS = 20  # games of an arm and seed in turn, so that a page without room for all has some of each
 
 
 def recorded_games(
-    episodes: pd.DataFrame, traces: Callable[[str, int], Path], scene: OpenScene
+    episodes: pd.DataFrame, arms: Mapping[str, Arm], traces: Callable[[str, int], Path], scene: OpenScene
 ) -> Iterator[RecordedGame]:
-    """Every game that was played, the ones to watch first on top, each read when it is asked for.
+    """Every played game, those to watch first at the front. Each is read when the iterator reaches it.
 
-    Those that became replays come first, `TAKE_TURNS` of every arm and seed before more of any, worst first, each
-    followed by the game of the same episode that it is compared with; then the rest. `traces` is where the traces of an
-    arm and seed are.
+    Games with a replay come first, worst first, in turns of `TAKE_TURNS` per arm and seed. Each is followed by the game
+    of the same episode that it is compared with; then the rest. `arms` are the arms by name; `traces` gives the traces
+    file of an arm and seed.
     """
-    for game in watching_order(episodes).itertuples():
+    for game in watching_order(episodes, arms).itertuples():
         trace = read_trace(traces(game.arm, game.seed), game.episode)
         if not trace.empty:
             yield recorded_game(trace, scene, game)
 
 
-def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
+def watching_order(episodes: pd.DataFrame, arms: Mapping[str, Arm]) -> pd.DataFrame:
     """The rows of `episodes` that were played, in the order of `recorded_games`."""
     played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
     rows = {(game.arm, game.seed, game.episode): game.Index for game in played.itertuples()}
@@ -49,7 +50,7 @@ def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
     turn[chosen["ego_outcome"].where(chosen["ego_outcome"] != "", chosen["non_ego_outcome"]) == "goal"] = 0
     for game in chosen.loc[turn.sort_values(kind="stable").index].itertuples():
         order[game.Index] = None
-        for arm in _counterparts(game.arm):
+        for arm in _counterparts(arms.get(game.arm)):
             counterpart = rows.get((arm, game.seed, game.episode))
             if counterpart is not None:
                 order[counterpart] = None
@@ -57,11 +58,9 @@ def watching_order(episodes: pd.DataFrame) -> pd.DataFrame:
     return played.loc[list(order)]
 
 
-def _counterparts(arm: str) -> list[str]:
-    """The arms that an arm may be shown beside: naive beside retrained or reconfigured."""
-    before, against, persona = arm.partition("_vs_")
-    others = {"naive": ("retrained", "reconfigured"), "retrained": ("naive",), "reconfigured": ("naive",)}
-    return [other + against + persona for other in others.get(before, (before,))]
+def _counterparts(arm: Arm | None) -> list[str]:
+    """The names of the arms beside which an arm is shown."""
+    return [each.name for each in counterparts(arm)] if arm is not None else []
 
 
 def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedGame:
@@ -89,16 +88,19 @@ def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedG
                 )
             )
     return RecordedGame(
-        game.arm,
-        game.persona,
-        int(game.seed),
-        int(game.episode),
-        scene.world.step_s,
-        int(trace["step"].max()),
-        game.ego_outcome or game.non_ego_outcome,
-        players,
-        [Track(**_track(name, piece, sizes_m)) for name, rows in by_name.items() for piece in _pieces(rows)],
-        [Touch(touch.time_s, touch.x_m, touch.y_m, touch.label) for touch in contacts(trace, types, scene.rail_lines)],
+        arm=game.arm,
+        persona=game.persona,
+        seed=int(game.seed),
+        episode=int(game.episode),
+        step_s=scene.world.step_s,
+        steps=int(trace["step"].max()),
+        outcome=game.ego_outcome or game.non_ego_outcome,
+        players=players,
+        background=[Track(**_track(name, piece, sizes_m)) for name, rows in by_name.items() for piece in _pieces(rows)],
+        touches=[
+            Touch(time_s=contact.time_s, x_m=contact.x_m, y_m=contact.y_m, label=contact.label)
+            for contact in contacts(trace, types, scene.rail_lines)
+        ],
     )
 
 
@@ -110,7 +112,7 @@ def _track(name: str, rows: pd.DataFrame, sizes_m: Mapping[str, tuple[float, flo
 
 
 def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
-    """A road user's rows, cut where it was not there for a while."""
+    """A road user's rows, split where it was absent."""
     cuts = np.flatnonzero(np.diff(rows["step"].to_numpy()) > 1) + 1
     edges = [0, *cuts.tolist(), len(rows)]
     for first, end in pairwise(edges):
@@ -118,6 +120,11 @@ def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
 
 
 def scene_drawing(scene: OpenScene) -> SceneDrawing:
-    """What the player draws of a scene."""
+    """The parts of a scene that the page's player draws."""
     net = read_net(scene.net_file)
-    return SceneDrawing(drawing.surfaces(net), drawing.lane_marks(net), scene.rail_lines, drawing.goal_line(scene, net))
+    return SceneDrawing(
+        surfaces=drawing.surfaces(net),
+        lane_marks=drawing.lane_marks(net),
+        rails=scene.rail_lines,
+        goal=drawing.goal_line(scene, net),
+    )

@@ -1,4 +1,4 @@
-"""Finding a recorded game in a run folder and showing it: in SUMO-GUI, or as a film."""
+"""Find a recorded game in a run folder and show it in SUMO-GUI or as a film."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ from harness.traffic.scene import open_scene
 
 
 def game_table(run: Path, arm: str | None) -> Table:
-    """The games of a run, or of one arm of it, worst first, with what the non-ego did and how the ego answered."""
+    """The games of a run, or of one arm of it, worst first, with the pair of manoeuvres that led to the end."""
     folder = RunFolder(run)
     episodes = _episodes(folder)
-    named = folder.path / "manoeuvres.csv"
-    pairs = pairs_in(read_csv(named)) if named.is_file() else {}
-    missing = "" if named.is_file() else f"; name the manoeuvres: harness report {run}"
+    manoeuvres = folder.path / "manoeuvres.csv"
+    pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
+    missing = "" if manoeuvres.is_file() else f"; to name the manoeuvres: harness report {run}"
     if arm is not None:
         episodes = _of_arm(run, episodes, arm)
     table = Table(
         title=Text(f"Games of {run}, worst first"),
         title_justify="left",
-        caption=Text(f"watch one: harness replay RUN ARM EPISODE{missing}"),
+        caption=Text(f"to watch one: harness replay RUN ARM EPISODE{missing}"),
         box=SIMPLE,
         padding=0,
     )
@@ -48,13 +48,15 @@ def game_table(run: Path, arm: str | None) -> Table:
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
         pair = pairs.get((game.arm, game.seed, game.episode))
         words = (str(game.seed), str(game.episode), game.ego_outcome, game.non_ego_outcome, pair.words if pair else "")
-        table.add_row(*(Text(plain(cell)) for cell in (game.arm, *words, ttc)))  # text, whatever the table says
+        table.add_row(
+            *(Text(plain(cell)) for cell in (game.arm, *words, ttc))
+        )  # text without markup, whatever the table contains
     return table
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class FoundGame:
-    """A recorded game, ready to be shown."""
+    """A recorded game with its replay folder."""
 
     replay: Path
     trace: pd.DataFrame
@@ -64,8 +66,8 @@ class FoundGame:
 
 @contextmanager
 def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
-    """A game with a replay folder, made of its trace for as long as the block lasts. What lies under `replays/` is for
-    SUMO alone: a configuration there could have SUMO read and write anything, so it is not opened here.
+    """A game with a temporary replay folder, made from its trace. The folders under `replays/` are not opened here: a
+    changed configuration there could make SUMO read and write any file.
 
     Raises UsageError if there is no such game, or it could not be played.
     """
@@ -78,7 +80,7 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
             run,
             f"{arm} {episode}",
             f"has no such game of seed {chosen_seed}",
-            f"episodes go from {games['episode'].min()} to {games['episode'].max()}",
+            f"episodes are {games['episode'].min()} to {games['episode'].max()}",
         )
     if found.iloc[0]["error"]:
         raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {found.iloc[0]['error']}", "choose another")
@@ -86,7 +88,7 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
         raise UsageError.of(
             run,
             f"{arm} {episode}",
-            "was recorded, but the traces are not in this folder",
+            "was recorded, but this folder does not contain the traces",
             f"watch it in {run / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
         )
     scene = open_scene(folder.scene)
@@ -107,20 +109,20 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
         )
-        yield FoundGame(replay, trace, title, scene.world.step_s)
+        yield FoundGame(replay=replay, trace=trace, title=title, step_length_s=scene.world.step_s)
 
 
 def watch(game: FoundGame, console: Console) -> None:
     """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen or no SUMO-GUI."""
     message = (
-        f"SUMO-GUI plays {game.replay} at half the speed of life, following the ego. It halts at a contact and at the "
-        "end: its play button goes on. Closing it ends this command."
+        f"SUMO-GUI plays {game.replay} at half of real time and follows the ego. It halts at a contact and at the "
+        "end; the play button continues. This command ends when SUMO-GUI is closed."
     )
     follow_in_sumo_gui(game.replay, lambda: console.print(message, highlight=False, markup=False, soft_wrap=True))
 
 
 def film(game: FoundGame, file: Path, console: Console) -> None:
-    """Write a game as a film, with a bar that says how long it will take. Raises UsageError for what is missing."""
+    """Write a game as a film, with a progress bar. Raises UsageError for a missing program."""
     columns = (TextColumn("filming"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal, transient=True) as bar:
         task = bar.add_task("filming", total=None)
@@ -130,7 +132,7 @@ def film(game: FoundGame, file: Path, console: Console) -> None:
             file,
             title=game.title,
             step_length_s=game.step_length_s,
-            report=lambda done, total: bar.update(task, completed=done, total=total),
+            on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
 

@@ -1,4 +1,4 @@
-"""What a run came to: tables, replays and report, from its folder alone."""
+"""The results of a run: tables, replays and report, from its folder alone."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ from rich.console import Console
 from rich.progress import track
 
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.stages import stage_id
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
@@ -46,39 +47,42 @@ from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions
 from harness.reports.results import results
+from harness.reports.run_tables import RunTables
 from harness.reports.treatment import ARMS
 from harness.reports.wording import Conclusion
 from harness.traffic.scene import OpenScene, open_scene
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RunResult:
-    """What a run came to."""
+    """The result of a run, for the terminal and the exit code."""
 
     verdicts: Sequence[tuple[str, Conclusion]]
-    """Of each persona and question."""
+    """A persona and a conclusion, for each persona and question."""
     failed_stages: tuple[str, ...]
     error_games: int
 
 
 def write_results(folder: RunFolder, console: Console) -> RunResult:
-    """Tables, replays and report of what is done, from the run folder alone."""
+    """Write tables, replays and report of the finished stages, from the run folder alone."""
     manifest = folder.manifest()
     folder.check_whole(manifest)
     done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
     episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
-    searched = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
+    reconfiguration = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
     summary = summarise(episodes)
     campaign = _campaign(manifest)
+    stages = plan(campaign, manifest["personas"], is_tuned(manifest))
+    arms = {stage.name: stage.arm for stage in stages if isinstance(stage, AssessmentStage)}
     asked = _questions(campaign, manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
     game = _game(campaign, manifest, episodes)
     tables |= vars(game) if game is not None else {}
-    if campaign.population:
-        tables["populations"] = by_who_drove(campaign, episodes)
-    tables |= {"reconfiguration": searched} if is_tuned(manifest) else {}
+    populations = by_who_drove(campaign, episodes)
+    tables |= {"populations": populations} if campaign.population else {}
+    tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
     scene = open_scene(folder.scene)
     _check_traces(folder, episodes)
     write_model_cards(folder, manifest, summary)
@@ -88,34 +92,35 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         manoeuvres = _manoeuvres(folder, done, scene)
     write_csv(manoeuvres, folder.path / "manoeuvres.csv")
     replays = _write_replays(folder, scene, episodes, console)
+    report = RunTables(
+        manifest=manifest,
+        arms=arms,
+        strategies={stage.name: stage.strategy for stage in stages if isinstance(stage, TrainingStage)},
+        episodes=episodes,
+        summary=summary,
+        comparisons=comparisons,
+        training=training,
+        reconfiguration=reconfiguration,
+        manoeuvres=manoeuvres,
+        game=game,
+        replays=replays,
+        populations=populations,
+    )
     with console.status("writing the report"):
-        games = recorded_games(episodes, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
-        page = render_page(
-            manifest,
-            episodes,
-            summary,
-            comparisons,
-            training,
-            replays,
-            games,
-            scene_drawing(scene),
-            manoeuvres,
-            game,
-            populations=tables.get("populations"),
-            reconfiguration=searched,
-        )
+        games = recorded_games(episodes, arms, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
+        page = render_page(report, games, scene_drawing(scene))
     write_atomically(folder.path / "report.html", page.encode())
     warn(mixed_versions(manifest["stages"]), console)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] not in FINISHED)
-    found = results(manifest, episodes, summary, comparisons)
-    met = [*manifest["personas"], *(each.name for each in campaign.population)]
-    verdicts = [(persona, found.verdicts(each, persona)) for persona in met for each in ARMS]
+    found = results(report)
+    personas = [*manifest["personas"], *(each.name for each in campaign.population)]
+    verdicts = [(persona, found.verdicts(question, persona)) for persona in personas for question in ARMS]
     verdicts += gap_verdicts(game.gaps) if game is not None else []
-    return RunResult(verdicts, failed, int((episodes["error"] != "").sum()))
+    return RunResult(verdicts=verdicts, failed_stages=failed, error_games=int((episodes["error"] != "").sum()))
 
 
 def warn(sentences: Sequence[str], console: Console) -> None:
-    """Say sentences that should not be overlooked."""
+    """Print warnings."""
     for sentence in sentences:
         console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)
 
@@ -131,7 +136,7 @@ def _questions(campaign: Campaign, manifest: Mapping[str, Any]) -> list[Question
 
 
 def _game(campaign: Campaign, manifest: Mapping[str, Any], episodes: pd.DataFrame) -> GameFindings | None:
-    """What the finished arms of a run say of the game between strategies; None where it is not asked."""
+    """The findings on the game between strategies, from the finished arms of a run; None where it is not asked."""
     game = matchups_of(campaign, manifest["personas"], _done(manifest), is_tuned(manifest))
     if game is None:
         return None
@@ -155,9 +160,9 @@ def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, c
         if entry["kind"] == kind:
             file = folder.work(name) / table
             frame = read_csv(file)
-            of = frame["arm" if kind == "assessment" else "stage"]
-            theirs = ((of == entry["name"]) & (frame["seed"] == entry["seed"])).all()
-            if not theirs or (kind == "reconfiguration" and not is_of_a_search(frame)):
+            names = frame["arm" if kind == "assessment" else "stage"]
+            belong = ((names == entry["name"]) & (frame["seed"] == entry["seed"])).all()
+            if not belong or (kind == "reconfiguration" and not is_of_a_search(frame)):
                 raise UsageError.of(file, "", f"has rows that are not of {name}", "run the campaign again")
             frames.append(frame)
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=columns))

@@ -20,9 +20,9 @@ class InUse(Exception):
 @contextlib.contextmanager
 def only_one(file: Path) -> Iterator[None]:
     """Hold a lock during the block. Raises InUse, at once, if another process holds it."""
-    lock, owner = FileLock(file), file.with_name(f"{file.name}.owner")
+    lock, owner = _lock(file), file.with_name(f"{file.name}.owner")
     try:
-        lock.acquire(timeout=0)
+        _acquire(lock)
     except Timeout:
         raise InUse(_text_of(owner) or "another process") from None
     try:
@@ -36,8 +36,8 @@ def only_one(file: Path) -> Iterator[None]:
 def register_worker(folder: Path) -> None:
     """Register this process in a folder until it ends: `wait_for_workers` waits for that."""
     folder.mkdir(exist_ok=True)
-    lock = FileLock(folder / f"{os.getpid()}.lock")
-    lock.acquire()
+    lock = _lock(folder / f"{os.getpid()}.lock")
+    _acquire(lock)
     _registered.append(lock)
 
 
@@ -49,10 +49,22 @@ def wait_for_workers(folder: Path, timeout_s: float) -> None:
     until = time.monotonic() + timeout_s
     for file in sorted(folder.glob(_LOCK)):
         try:
-            with FileLock(file).acquire(timeout=max(until - time.monotonic(), 0.0)):
-                file.unlink(missing_ok=True)
+            lock = _lock(file)
+            _acquire(lock, timeout_s=max(until - time.monotonic(), 0.0))
+            file.unlink(missing_ok=True)
+            lock.release()
         except Timeout:
             raise InUse("a worker of an earlier command") from None
+
+
+def _lock(file: Path) -> FileLock:
+    return FileLock(file, fallback_to_soft=False)  # a soft lock would outlive a process that is killed
+
+
+def _acquire(lock: FileLock, timeout_s: float = 0.0) -> None:
+    """Raises Timeout if another process holds the lock. On a file system without locks it is always free."""
+    with contextlib.suppress(NotImplementedError):
+        lock.acquire(timeout=timeout_s)
 
 
 def _text_of(file: Path) -> str:

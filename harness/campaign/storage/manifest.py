@@ -84,7 +84,7 @@ def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]
     documents |= {f"persona_documents.{name}": each for name, each in manifest["persona_documents"].items()}
     for key, document in documents.items():
         try:
-            Persona.model_validate(document, strict=False)
+            Persona.from_record(document)
         except ValidationError as error:
             yield key, _words(error)
     if "harness" not in manifest.get("versions", {}):

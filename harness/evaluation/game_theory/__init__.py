@@ -1,1 +1,1 @@
-"""How near a campaign's players are to an equilibrium: pure functions from tables of games to tables of findings."""
+"""Game theory of a campaign: pure functions from tables of games to tables of gaps, cross-play and equilibria."""

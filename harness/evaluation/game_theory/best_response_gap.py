@@ -1,8 +1,8 @@
-"""The best-response gap: what a player could still gain by changing its strategy alone (SafeDriveRL, equation 2).
+"""The best-response gap (exploitability): a player's gain by a change of its strategy alone (SafeDriveRL, equation 2).
 
 For each response, games are paired by seed and episode: the pair's game against the same game with one player
 replaced by its best response. The gap is the mean difference of that player's payoff. It is a lower bound: a better
-response than the one that was found may exist, so a gap that can't be told from 0 proves no equilibrium.
+response may exist, so a gap that is not distinguishable from 0 does not prove an equilibrium.
 """
 
 from __future__ import annotations
@@ -32,27 +32,27 @@ class GapVerdict(str, Enum):
     """p_holm < significance: this player could gain."""
     BEFORE_HOLM_ONLY = "distinguishable from 0 before Holm's correction only"
     NOT_DISTINGUISHABLE = "not distinguishable from 0"
-    """The best response did better, by no more than chance would have it."""
+    """The best response earned more, but not significantly."""
     NONE_FOUND = "no better response found"
-    """The best response did worse, or just as well on average: what the player does is better than all that was
-    found. No gain, whatever the number's sign."""
+    """The best response earned less or the same on average: the training found nothing better than the player's own
+    strategy. A negative gap is not a gain."""
     NO_DIFFERENCE = "no difference"
-    """Every game came to the same payoff."""
+    """Every game has the same payoff with and without the best response."""
     ALL_EQUAL = "no t statistic: all differences equal"
-    """Better by the same number in every game."""
+    """The best response earned more by the same number in every game."""
     NOT_ENOUGH_PAIRS = "not enough pairs"
 
 
 NOTHING_TO_GAIN = frozenset({GapVerdict.NOT_DISTINGUISHABLE, GapVerdict.NONE_FOUND, GapVerdict.NO_DIFFERENCE})
-"""The verdicts on a player for whom nothing better was found."""
+"""The verdicts on a player without a distinguishable gain."""
 
 
 def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
     """A row for each response, in their order, with `GAP_COLUMNS`.
 
     `episodes` has the columns of episodes.csv. A pair is left out, and counted, when either game errored, is missing,
-    or lacks the payoff or the ego's outcome. What can't be computed is NaN; where all differences are equal there is
-    no test, as in `harness.evaluation.comparison`. Holm's correction is over all gaps of this table.
+    or lacks the payoff or the ego's outcome. A value that can't be computed is NaN; where all differences are equal
+    there is no test, as in `harness.evaluation.comparison`. Holm's correction is over all gaps of this table.
 
     Raises ValueError when significance is not in (0, 1), or when an arm has two games for one episode.
     """
@@ -66,13 +66,13 @@ def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: fl
 
 
 def nothing_to_gain(found: pd.DataFrame) -> bool:
-    """Whether both sides were searched for a better response and neither has one that can be told from 0.
+    """Whether a best response of both sides was trained and neither gap is distinguishable from 0.
 
-    Of a table of `gaps`, e.g. of the last round's: the rule by which rounds stop early. A gap that is distinguishable
-    before Holm's correction only, or can't be judged, is no reason to stop.
+    `found` is a table of `gaps`, e.g. of the last round: this is the rule by which rounds stop early. It is false for a
+    gap that is distinguishable before Holm's correction only, or that has no test.
     """
-    searched = set(found["role"]) == {"ego", "non_ego"}
-    return searched and all(GapVerdict(verdict) in NOTHING_TO_GAIN for verdict in found["verdict"])
+    both_sides = set(found["role"]) == {"ego", "non_ego"}
+    return both_sides and all(GapVerdict(verdict) in NOTHING_TO_GAIN for verdict in found["verdict"])
 
 
 def wilson(failures: float, games: int) -> tuple[float, float]:

@@ -6,7 +6,7 @@ GAP_COLUMNS = {
     "seed": "int64",
     "persona": "object",
     "round": "int64",
-    "role": "object",  # who was replaced by a best response: ego or non_ego
+    "role": "object",  # the player replaced by a best response: ego or non_ego
     "ego": "object",
     "non_ego": "object",
     "pairs": "int64",
@@ -22,7 +22,7 @@ GAP_COLUMNS = {
     "ego_failure_rate": "float64",  # of the ego in the pair
     "ego_failure_rate_low": "float64",  # 95 % Wilson interval
     "ego_failure_rate_high": "float64",
-    "ego_failure_rate_best_response": "float64",  # where role is non_ego: what a best-responding persona induces
+    "ego_failure_rate_best_response": "float64",  # where role is non_ego: induced by a best-responding persona
     "ego_failure_rate_best_response_low": "float64",
     "ego_failure_rate_best_response_high": "float64",
     "failure_difference": "float64",  # mean of ego failures with the best response - without, over the pairs
@@ -55,7 +55,7 @@ CROSSPLAY_COLUMNS = {
 
 EQUILIBRIUM_COLUMNS = {
     "seed": "int64",
-    "game": "object",  # the persona whose strategies the egos meet, or "all" non-egos, of any persona or none
+    "game": "object",  # the persona of the non-egos, or "all": every non-ego, of any persona or none
     "solution": "object",  # "nash", "safest" (game "all" only), or why there is none
     "number": "Int64",  # of the equilibrium within seed and game, from 1, the one to choose first
     "role": "object",
@@ -63,11 +63,11 @@ EQUILIBRIUM_COLUMNS = {
     "share": "float64",  # how often its role plays it in this solution; empty for the non-egos of "safest"
     "payoff": "float64",  # of this strategy against the other side's shares (nash)
     "solution_payoff": "float64",  # of its role in this solution (nash)
-    "regret": "float64",  # what its role could still gain by another strategy of the table (nash)
+    "regret": "float64",  # the possible gain of its role by another strategy of the table (nash)
     "failure_rate": "float64",  # of the ego: this strategy against the other side's shares; safest: its worst case
     "solution_failure_rate": "float64",  # of the ego in this solution; safest: the mixture's worst case
-    "dominated_in_payoff": "object",  # by which strategy or mixture of its role, strictly; empty: by none
-    "dominated_in_failures": "object",  # the same of an ego's failure rates
+    "dominated_in_payoff": "object",  # the strategy or mixture of its role that strictly dominates it; empty: none
+    "dominated_in_failures": "object",  # the same for an ego's failure rates
 }
 """Columns of `equilibria.csv`: a row for each strategy of each solution of each game."""
 
@@ -91,7 +91,7 @@ GENERALISATION_COLUMNS = {
     "p_holm": "float64",  # over the table
     "verdict": "object",  # harness.evaluation.comparison.Verdict
 }
-"""Columns of `generalisation.csv`: a row for each retrained ego and each non-ego of a persona it was not trained on."""
+"""Columns of `generalisation.csv`: a row for each retrained ego and non-ego of a persona it was not trained against."""
 
 GAME_TABLES = {
     "gaps": GAP_COLUMNS,

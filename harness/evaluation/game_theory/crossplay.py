@@ -1,4 +1,4 @@
-"""Cross-play: every ego against every non-ego, over the same starts. A table, and its cells as matrices."""
+"""Cross-play: every ego against every non-ego, over the same starts, as a table and as matrices."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ def crossplay(pairings: Iterable[Pairing], episodes: pd.DataFrame) -> pd.DataFra
     """A row for each pairing, in their order, with `CROSSPLAY_COLUMNS`.
 
     `episodes` has the columns of episodes.csv. A game counts when it was played and the ego's outcome is known; the
-    other means are over those of these games in which they were measured, and empty where there is none. Episodes that
-    another pairing of the seed has and this one lacks are counted in `left_out`, like games that errored.
+    other means are over those of these games in which they were measured, and empty without any. Episodes that only
+    another pairing of the seed has are counted in `left_out`, like games that errored.
 
-    Raises ValueError when a pairing of egos and non-egos stands twice, or an arm has two games for one episode.
+    Raises ValueError when an ego and a non-ego are paired twice, or an arm has two games for one episode.
     """
     pairings, games = list(pairings), games_by_arm(episodes)
     cells = [(pairing.seed, pairing.ego, pairing.non_ego) for pairing in pairings]
     for cell in {cell for cell in cells if cells.count(cell) > 1}:
-        raise ValueError(f"seed {cell[0]}: {cell[1]!r} against {cell[2]!r} stands twice")
+        raise ValueError(f"seed {cell[0]}: {cell[1]!r} against {cell[2]!r} are paired twice")
     played: dict[int, set[int]] = {}
     values = {}
     for pairing in pairings:
@@ -67,14 +67,14 @@ def _row(pairing: Pairing, values: pd.DataFrame, episodes: int) -> dict[str, obj
     return row
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Matrices:
     """A seed's cross-play as matrices [E, N]; NaN where a pairing was not played."""
 
     egos: Sequence[str]
     non_egos: Sequence[str]
     personas: Sequence[str]
-    """Of the non-egos."""
+    """The personas of the non-egos [N]."""
     failure_rates: Floats
     ego_payoffs: Floats
     non_ego_payoffs: Floats
@@ -83,10 +83,12 @@ class Matrices:
         """The rows and columns at these places."""
         at = np.ix_(egos, non_egos)
         return Matrices(
-            [self.egos[place] for place in egos],
-            [self.non_egos[place] for place in non_egos],
-            [self.personas[place] for place in non_egos],
-            *(each[at] for each in (self.failure_rates, self.ego_payoffs, self.non_ego_payoffs)),
+            egos=[self.egos[place] for place in egos],
+            non_egos=[self.non_egos[place] for place in non_egos],
+            personas=[self.personas[place] for place in non_egos],
+            failure_rates=self.failure_rates[at],
+            ego_payoffs=self.ego_payoffs[at],
+            non_ego_payoffs=self.non_ego_payoffs[at],
         )
 
 
@@ -100,10 +102,10 @@ def matrices(found: pd.DataFrame) -> Matrices:
         return cells.reindex(index=egos, columns=non_egos).to_numpy(dtype=np.float64)
 
     return Matrices(
-        egos,
-        non_egos,
-        [persona[name] for name in non_egos],
-        matrix("failure_rate"),
-        matrix("ego_payoff"),
-        matrix("non_ego_payoff"),
+        egos=egos,
+        non_egos=non_egos,
+        personas=[persona[name] for name in non_egos],
+        failure_rates=matrix("failure_rate"),
+        ego_payoffs=matrix("ego_payoff"),
+        non_ego_payoffs=matrix("non_ego_payoff"),
     )

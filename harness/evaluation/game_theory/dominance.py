@@ -1,6 +1,6 @@
-"""Which egos are never the better choice, and how to mix them so that the worst that can come is least bad.
+"""Dominated egos, and the mixture of egos with the least failure rate in the worst case.
 
-Everything here is of a table's means: exact for the games that were played, no test of what others would show.
+The results hold for the means of a table: they are exact for the games that were played, and are not a test.
 """
 
 from __future__ import annotations
@@ -14,19 +14,20 @@ from scipy.optimize import linprog
 Floats = npt.NDArray[np.float64]
 
 MARGIN = 1e-9
-"""What is better by less is not better: the accuracy of the linear programs, on payoffs scaled to a range of 1."""
+"""A smaller difference counts as none: the accuracy of the linear programs, on payoffs scaled to a range of 1."""
 
 
 def dominated(payoffs: Floats, names: Sequence[str]) -> list[str]:
-    """For each strategy, a row of payoffs [E, N], who strictly dominates it: is better whatever the other side does.
+    """For each strategy, a row of payoffs [E, N], the one that strictly dominates it: that is better in every column.
 
-    "" for none, the name of the first pure strategy that does, else the mixture that does so by the widest margin, as
-    "0.60 naive + 0.40 robust". To find that is a linear program: the largest margin m with x payoffs >= payoffs of the
-    strategy + m in every column, x a mixture (e.g. Shoham and Leyton-Brown, "Multiagent Systems", 2009, section 4.5).
-    To ask it of failure rates, give them with a minus sign. Raises ValueError for numbers that are not finite.
+    "" for none; the name of the first pure strategy that dominates it; else the mixture with the widest margin, e.g.
+    "0.60 naive + 0.40 robust". A linear program finds the mixture x: the largest margin m with
+    x payoffs >= payoffs of the strategy + m in every column (e.g. Shoham and Leyton-Brown, "Multiagent Systems", 2009,
+    section 4.5).
+    For failure rates, pass them with a minus sign. Raises ValueError for numbers that are not finite.
     """
     if payoffs.ndim != 2 or not payoffs.size or not np.isfinite(payoffs).all():
-        raise ValueError("dominance needs a whole table of finite numbers")
+        raise ValueError("dominance needs a complete table of finite numbers")
     spread = np.ptp(payoffs)
     scaled = (payoffs - payoffs.min()) / spread if spread > 0 else np.zeros_like(payoffs)
     return [_dominator(scaled, strategy, names) for strategy in range(len(payoffs))]
@@ -54,14 +55,14 @@ def _dominator(payoffs: Floats, strategy: int, names: Sequence[str]) -> str:
 
 
 def safest_mixture(failure_rates: Floats) -> Floats:
-    """The shares [E] of egos with the least failure rate against whichever non-ego is worst for them, of rates [E, N];
-    of those, one with the least mean over the non-egos.
+    """The shares [E] of egos with the least failure rate against the worst non-ego for them, of rates [E, N]. Of equal
+    ones, those with the least mean over the non-egos.
 
-    Two linear programs: the least worst case v, then the least mean that keeps to v. If a pure ego does as well as
-    the mixture, the first such ego is the answer. Raises ValueError for rates that are missing or not from 0 to 1.
+    Two linear programs: the least worst case v, then the least mean with at most v. If a pure ego is as safe as the
+    mixture, the result is the first such ego. Raises ValueError for rates that are missing or not from 0 to 1.
     """
     if failure_rates.ndim != 2 or not failure_rates.size or not ((failure_rates >= 0) & (failure_rates <= 1)).all():
-        raise ValueError("the safest mixture needs a whole table of rates from 0 to 1")
+        raise ValueError("the safest mixture needs a complete table of rates from 0 to 1")
     E, N = failure_rates.shape
     worst = failure_rates.max(axis=1)
     rates, ones = failure_rates.T, np.ones((N, 1))
@@ -88,6 +89,6 @@ def safest_mixture(failure_rates: Floats) -> Floats:
 
 
 def _distribution(shares: Floats) -> Floats:
-    """Shares without the rounding of a linear program: none below 0, their sum 1."""
+    """Shares without the rounding errors of a linear program: none below 0, their sum 1."""
     clean = np.where(shares < MARGIN, 0.0, shares)
     return np.asarray(clean / clean.sum(), dtype=np.float64)

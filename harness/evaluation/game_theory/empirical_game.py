@@ -1,10 +1,10 @@
-"""The empirical game: what a cross-play table says of equilibria, dominated strategies and the safest mixture.
+"""The empirical game: equilibria, dominated strategies and the safest mixture of a cross-play table.
 
 For each seed and persona the egos and that persona's strategies (its rounds) are a game of two players, with the mean
 payoffs of the cross-play as its matrix (M. P. Wellman, "Methods for Empirical Game-Theoretic Analysis", AAAI 2006). Its
-equilibria are equilibria among these strategies only, and of means over a sample of games. People of different
-personas do not share a payoff, so there is no such game of all of them; of the game "all" there are the egos that
-are dominated against every non-ego, and the safest mixture of egos, which asks for failure rates alone.
+equilibria hold among these strategies only, and for means over a sample of games. Different personas do not share a
+payoff, so there is no such game of all of them; the game "all" has the egos that are dominated against every non-ego,
+and the safest mixture of egos, which uses failure rates only.
 """
 
 from __future__ import annotations
@@ -34,23 +34,23 @@ class SolutionKind(str, Enum):
     NASH = "nash"
     SAFEST = "safest"
     NOT_VERIFIED = "none verified"
-    """No candidate equilibrium held when its regrets were looked at: there is one, and it was not found."""
+    """No candidate equilibrium was verified by its regrets: an equilibrium exists, but was not found."""
     NOT_PLAYED = "left out: not played against all"
-    """A strategy with an empty cell in this game is no part of it."""
+    """A strategy with an empty cell is not part of this game."""
 
 
 def equilibria(crossplay: pd.DataFrame) -> pd.DataFrame:
     """The solutions of every seed's games, with `EQUILIBRIUM_COLUMNS`, from a table of `crossplay`.
 
-    A strategy that was not measured against all the others of a game is left out of the game, and has a row that
-    says so; but a non-ego that no ego was measured against leaves out itself, not the egos.
+    A strategy that was not measured against every strategy of the other side is left out of the game, with a row of
+    kind `NOT_PLAYED`. A non-ego without any measured cell is left out itself; the egos stay.
     """
     rows: list[dict[str, object]] = []
     for seed, found in crossplay.groupby("seed", sort=False):
         table = matrices(found)
         for persona in dict.fromkeys(filter(None, table.personas)):
-            of = [place for place, name in enumerate(table.personas) if name == persona]
-            for row in _nash(table.among(range(len(table.egos)), of)):
+            places = [place for place, name in enumerate(table.personas) if name == persona]
+            for row in _nash(table.among(range(len(table.egos)), places)):
                 rows.append({"seed": seed, "game": persona, **row})
         rows.extend({"seed": seed, "game": ALL, **row} for row in _safest(table))
     return pd.DataFrame(rows, columns=list(EQUILIBRIUM_COLUMNS)).astype(EQUILIBRIUM_COLUMNS).fillna(_NO_TEXT)
@@ -60,14 +60,14 @@ _NO_TEXT = {name: "" for name, dtype in EQUILIBRIUM_COLUMNS.items() if dtype == 
 
 
 def _complete(table: Matrices, measured: npt.NDArray[np.bool_]) -> tuple[Matrices, list[dict[str, object]]]:
-    """The part of a game whose cells [E, N] are all measured, and rows for the strategies that are no part of it."""
-    met = [bool(column.any()) for column in measured.T]
-    egos = [place for place, row in enumerate(measured) if any(met) and row[met].all()]
-    non_egos = [place for place, anyone in enumerate(met) if egos and anyone]
+    """The part of a game whose cells [E, N] are all measured, and rows for the strategies left out."""
+    has_cells = [bool(column.any()) for column in measured.T]
+    egos = [place for place, row in enumerate(measured) if any(has_cells) and row[has_cells].all()]
+    non_egos = [place for place, has_cell in enumerate(has_cells) if egos and has_cell]
     part = table.among(egos, non_egos)
-    out = [("ego", name) for name in table.egos if name not in part.egos]
-    out += [("non_ego", name) for name in table.non_egos if name not in part.non_egos]
-    return part, [{"solution": SolutionKind.NOT_PLAYED.value, "role": role, "player": name} for role, name in out]
+    left_out = [("ego", name) for name in table.egos if name not in part.egos]
+    left_out += [("non_ego", name) for name in table.non_egos if name not in part.non_egos]
+    return part, [{"solution": SolutionKind.NOT_PLAYED.value, "role": role, "player": name} for role, name in left_out]
 
 
 def _nash(table: Matrices) -> Iterator[dict[str, Any]]:
@@ -85,7 +85,7 @@ def _nash(table: Matrices) -> Iterator[dict[str, Any]]:
 
 
 def _strategies(game: Matrices) -> list[dict[str, object]]:
-    """A row for each ego and non-ego of a game of two players, with what holds of it in every solution."""
+    """A row for each ego and non-ego of a game of two players, with the cells that are the same in every solution."""
     egos = zip(
         game.egos, dominated(game.ego_payoffs, game.egos), dominated(-game.failure_rates, game.egos), strict=True
     )

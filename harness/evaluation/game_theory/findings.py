@@ -1,4 +1,4 @@
-"""Everything the games of a campaign say of its equilibria, in one go."""
+"""All game-theoretic findings of a campaign's games."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ from harness.evaluation.game_theory.records import GameFindings, Pairing, Respon
 def find(
     pairings: Sequence[Pairing],
     responses: Sequence[Response],
-    met: Mapping[str, Collection[str]],
+    trained_against: Mapping[str, Collection[str]],
     episodes: pd.DataFrame,
     significance: float,
 ) -> GameFindings | None:
     """The findings of a run; None when it has neither best responses nor a cross-play.
 
-    `met` names for each retrained ego the personas it was trained against. Raises ValueError as the tables do.
+    `trained_against` names for each retrained ego the personas it was trained against. Raises ValueError as the
+    functions of the tables do.
     """
     if not pairings and not responses:
         return None
-    found = crossplay(pairings, episodes)
+    cells = crossplay(pairings, episodes)
     return GameFindings(
-        gaps(responses, episodes, significance),
-        found,
-        equilibria(found),
-        generalisation(met, pairings, episodes, significance),
+        gaps=gaps(responses, episodes, significance),
+        crossplay=cells,
+        equilibria=equilibria(cells),
+        generalisation=generalisation(trained_against, pairings, episodes, significance),
     )

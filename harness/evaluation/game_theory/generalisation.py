@@ -1,4 +1,4 @@
-"""Generalisation: how an ego that was retrained against some personas stands up to those it was not trained on."""
+"""Generalisation: how often a retrained ego fails against personas that it was not trained against."""
 
 from __future__ import annotations
 
@@ -17,13 +17,16 @@ NAIVE = "naive"
 
 
 def generalisation(
-    met: Mapping[str, Collection[str]], pairings: Iterable[Pairing], episodes: pd.DataFrame, significance: float
+    trained_against: Mapping[str, Collection[str]],
+    pairings: Iterable[Pairing],
+    episodes: pd.DataFrame,
+    significance: float,
 ) -> pd.DataFrame:
-    """A row for each pairing of an ego in `met` with a non-ego of a persona it did not meet in training, in the order
-    of the pairings, with `GENERALISATION_COLUMNS`. The base line is the naive ego against the same non-ego.
+    """A row for each pairing of an ego in `trained_against` with a non-ego of another persona, in the order of the
+    pairings, with `GENERALISATION_COLUMNS`. The baseline is the naive ego against the same non-ego.
 
-    `met` names for each retrained ego the personas it was trained against; the naive ego, which met none, is not in
-    it. `episodes` has the columns of episodes.csv. Pairs and tests are those of `harness.evaluation.comparison`.
+    `trained_against` names for each retrained ego the personas it was trained against; the naive ego is not in it.
+    `episodes` has the columns of episodes.csv. Pairs and tests are those of `harness.evaluation.comparison`.
 
     Raises ValueError when significance is not in (0, 1), or an arm has two games for one episode.
     """
@@ -32,9 +35,9 @@ def generalisation(
     pairings, games = list(pairings), games_by_arm(episodes)
     naive = {(each.seed, each.non_ego): each.arm for each in pairings if each.ego == NAIVE}
     rows = [
-        _row(pairing, met[pairing.ego], naive.get((pairing.seed, pairing.non_ego)), games)
+        _row(pairing, trained_against[pairing.ego], naive.get((pairing.seed, pairing.non_ego)), games)
         for pairing in pairings
-        if pairing.ego in met and pairing.persona and pairing.persona not in met[pairing.ego]
+        if pairing.ego in trained_against and pairing.persona and pairing.persona not in trained_against[pairing.ego]
     ]
     table = pd.DataFrame(rows, columns=list(GENERALISATION_COLUMNS))
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
@@ -44,14 +47,14 @@ def generalisation(
 
 
 def _row(
-    pairing: Pairing, met: Collection[str], naive_arm: str | None, games: Mapping[Any, pd.DataFrame]
+    pairing: Pairing, trained_against: Collection[str], naive_arm: str | None, games: Mapping[Any, pd.DataFrame]
 ) -> dict[str, object]:
     naive, ego, left_out = pairs_of(games, pairing.seed, naive_arm or "", pairing.arm, ["ego_failed"])
     was, now = naive[:, 0], ego[:, 0]
     row: dict[str, object] = {
         "seed": pairing.seed,
         "ego": pairing.ego,
-        "met": " + ".join(met),
+        "met": " + ".join(trained_against),
         "persona": pairing.persona,
         "non_ego": pairing.non_ego,
         "pairs": len(now),

@@ -1,16 +1,16 @@
-"""Nash equilibria of a game of two players with finitely many strategies each, every one verified by its regret.
+"""Nash equilibria of a game of two players with finitely many strategies each. Each is verified by its regret.
 
 Payoffs are matrices [E, N]: the ego chooses the row, the non-ego the column. A mixed strategy is an array of shares.
 (x, y) is a Nash equilibrium when neither player gains by changing its strategy alone (SafeDriveRL, equation 2):
 its regrets, max(A y) - x A y and max(x B) - x B y, are both 0.
 
-How they are found. Strategies that another pure one strictly dominates are in no equilibrium and are left out first,
-again and again. Pure equilibria are looked up. The others come from nashpy, where there are at most `MOST_SUPPORTS`
-pairs of supports: support enumeration, and vertex enumeration, which knows the corners of a continuum of equilibria
-too (Nisan et al., "Algorithmic Game Theory", 2007, algorithms 3.4 and 3.5). Where supports are too many to go through,
-or nothing verifies, a mixed-integer program (Sandholm, Gilpin and Conitzer, "Mixed-Integer Programming Methods for
-Finding Nash Equilibria", AAAI 2005, formulation 1, by HiGHS) finds the equilibrium of the highest ego payoff. No
-candidate is taken on trust: what is returned has a regret of at most `TOLERANCE` of its player's range of payoffs.
+Algorithm. Strategies that another pure strategy strictly dominates are in no equilibrium; they are removed first,
+repeatedly. Pure equilibria are found by checking every cell. Mixed ones come from nashpy, where there are at most
+`MOST_SUPPORTS` pairs of supports: support enumeration, and vertex enumeration, which also finds the corners of a
+continuum of equilibria (Nisan et al., "Algorithmic Game Theory", 2007, algorithms 3.4 and 3.5). With more supports, or
+when nothing verifies, a mixed-integer program (Sandholm, Gilpin and Conitzer, "Mixed-Integer Programming Methods for
+Finding Nash Equilibria", AAAI 2005, formulation 1, by HiGHS) finds the equilibrium of the highest ego payoff. Every
+candidate is verified: the regret of a returned equilibrium is at most `TOLERANCE` of its player's range of payoffs.
 """
 
 from __future__ import annotations
@@ -29,51 +29,64 @@ from harness.errors import HarnessError
 Floats = npt.NDArray[np.float64]
 
 TOLERANCE = 1e-7
-"""The largest regret of an equilibrium, as a share of the range of its player's payoffs (max - min of the matrix)."""
+"""The largest regret of an equilibrium, as a share of the range of its player's payoffs (max - min of the matrix).
+The linear programs keep it to `LP_ACCURACY`, and so does the verification."""
 MOST_SUPPORTS = 4_000
-"""Pairs of supports that are gone through: some tenths of a second."""
+"""The most pairs of supports that are enumerated: this takes some tenths of a second."""
+LP_ACCURACY = 1e-9
+"""Feasibility tolerance of the linear programs, on payoffs from 0 to 1."""
+COARSE_DIGITS = 5
+"""Digits of the payoffs from 0 to 1 in the integer program. HiGHS keeps its constraints to 1e-6: payoffs that differ by
+less than about that make it report an equilibrium that does not verify, or no solution at all."""
+SLACK = 2e-5
+"""A strategy may be played in the integer program if it earns at most this much less than the best one: twice the
+rounding of the payoffs."""
+VALUE_ACCURACY = 1e-4
+"""Accuracy of the highest ego payoff in the integer program (the default relative gap of HiGHS)."""
+MOST_CHOICES = 50
+"""The most choices of strategies that are tried with the integer program."""
 _DIGITS = 6
-"""Equilibria whose shares are equal to so many digits are one."""
+"""Equilibria whose shares agree to this many digits are the same."""
 
 
 class NoEquilibrium(HarnessError):
-    """No candidate verified. Every finite game has an equilibrium (Nash 1950): the numbers got in the way."""
+    """No candidate verified. Every finite game has an equilibrium (Nash 1950): the numerical accuracy is too low."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Equilibrium:
-    """Shares of the ego's strategies [E] and of the non-ego's [N], each a distribution."""
+    """Shares of the ego's strategies [E] and of the non-ego's strategies [N]; each sums to 1."""
 
     ego_shares: Floats
     non_ego_shares: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Solution:
     """The equilibria of a game, the one to choose first (see `equilibrium_shares`)."""
 
     equilibria: tuple[Equilibrium, ...]
-    """Empty when none verified. Of a continuum of equilibria (a degenerate game), some of its corners."""
-    went_through_all_supports: bool
-    """Otherwise there may be more than are found."""
+    """Empty when none verified. Of a continuum of equilibria (a degenerate game) it contains some corners."""
+    all_supports: bool
+    """Whether all supports were enumerated. Otherwise there may be more equilibria."""
 
 
 def equilibrium_shares(ego_payoffs: Floats, non_ego_payoffs: Floats) -> tuple[Floats, Floats]:
     """The shares [E] and [N] of one verified equilibrium of the game [E, N], always the same one.
 
-    Of those found it is the one with the highest ego payoff, of equals the one whose ego shares, then non-ego shares,
-    come first where strategies are in the order given and more of an earlier one comes before less.
+    It is the equilibrium with the highest ego payoff. Among equal payoffs it is the first one when the ego's shares,
+    then the non-ego's, are compared in the order of the strategies, larger shares first.
 
-    Raises NoEquilibrium when none verifies, ValueError when the matrices are no game.
+    Raises NoEquilibrium when none verifies, ValueError when the matrices are not a game.
     """
-    found = solve(ego_payoffs, non_ego_payoffs).equilibria
-    if not found:
-        raise NoEquilibrium("none of the candidate equilibria held when it was verified")
-    return found[0].ego_shares, found[0].non_ego_shares
+    equilibria = solve(ego_payoffs, non_ego_payoffs).equilibria
+    if not equilibria:
+        raise NoEquilibrium("no candidate equilibrium could be verified")
+    return equilibria[0].ego_shares, equilibria[0].non_ego_shares
 
 
 def regrets(ego_payoffs: Floats, non_ego_payoffs: Floats, at: Equilibrium) -> tuple[float, float]:
-    """What ego and non-ego would gain by their best pure strategy, in their own payoffs; never below 0."""
+    """The gain of ego and non-ego by their best pure strategies, each in its own payoff; never below 0."""
     against_non_ego, against_ego = ego_payoffs @ at.non_ego_shares, at.ego_shares @ non_ego_payoffs
     ego = against_non_ego.max() - at.ego_shares @ against_non_ego
     non_ego = against_ego.max() - against_ego @ at.non_ego_shares
@@ -83,40 +96,40 @@ def regrets(ego_payoffs: Floats, non_ego_payoffs: Floats, at: Equilibrium) -> tu
 def solve(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Solution:
     """The verified equilibria of the game [E, N] in the order of `equilibrium_shares`.
 
-    Raises ValueError when the matrices differ in shape, are empty, or hold what is no finite number.
+    Raises ValueError when the matrices differ in shape, are empty, or contain a number that is not finite.
     """
     ego_payoffs, non_ego_payoffs = (np.asarray(each, dtype=np.float64) for each in (ego_payoffs, non_ego_payoffs))
     if ego_payoffs.ndim != 2 or ego_payoffs.shape != non_ego_payoffs.shape or ego_payoffs.size == 0:
-        raise ValueError(f"two matrices of one shape are no {ego_payoffs.shape} and {non_ego_payoffs.shape}")
+        raise ValueError(f"two matrices of one shape are needed, not {ego_payoffs.shape} and {non_ego_payoffs.shape}")
     if not (np.isfinite(ego_payoffs).all() and np.isfinite(non_ego_payoffs).all()):
-        raise ValueError("a payoff is missing or not finite: such a game can't be solved")
-    whole = _scaled(ego_payoffs), _scaled(non_ego_payoffs)
-    rows, columns = _undominated(*whole)
-    reduced = whole[0][np.ix_(rows, columns)], whole[1][np.ix_(rows, columns)]
+        raise ValueError("a payoff is missing or not finite: the game can't be solved")
+    scaled = _scaled(ego_payoffs), _scaled(non_ego_payoffs)
+    rows, columns = _undominated(*scaled)
+    reduced = scaled[0][np.ix_(rows, columns)], scaled[1][np.ix_(rows, columns)]
     pairs = (2 ** len(rows) - 1) * (2 ** len(columns) - 1)
     few = pairs <= MOST_SUPPORTS
     found: dict[bytes, Equilibrium] = {}
 
-    def keep(candidates: Iterator[tuple[Floats, Floats]]) -> None:
+    def add_verified(candidates: Iterator[tuple[Floats, Floats]]) -> None:
         for x, y in candidates:
-            candidate = _whole(x, y, rows, columns, ego_payoffs.shape)
-            if candidate is not None and max(regrets(*whole, candidate)) <= TOLERANCE:
+            candidate = _of_all_strategies(x, y, rows, columns, ego_payoffs.shape)
+            if candidate is not None and max(regrets(*scaled, candidate)) <= TOLERANCE + 2 * LP_ACCURACY:
                 found.setdefault(_rounded(candidate).tobytes(), candidate)
 
-    keep(_pure(reduced[0].shape))
+    add_verified(_pure(reduced[0].shape))
     if few:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RuntimeWarning)  # "degenerate": the vertices are gone through anyway
-            keep(_by_supports(*reduced))
-        keep(_by_vertices(*reduced))
+            warnings.simplefilter("ignore", RuntimeWarning)  # "degenerate": the vertices are enumerated anyway
+            add_verified(_by_supports(*reduced))
+        add_verified(_by_vertices(*reduced))
     if not few or not found:
-        keep(_by_integer_program(*reduced))
-    ordered = sorted(found.values(), key=lambda each: _rank(each, whole[0]))
-    return Solution(tuple(ordered), few)
+        add_verified(_by_integer_program(*reduced))
+    ordered = sorted(found.values(), key=lambda each: _rank(each, scaled[0]))
+    return Solution(equilibria=tuple(ordered), all_supports=few)
 
 
 def _scaled(payoffs: Floats) -> Floats:
-    """Payoffs from 0 to 1, which changes no equilibrium; all 0 where they are all alike."""
+    """Payoffs scaled to 0..1, which changes no equilibrium; all 0 where they are all equal."""
     spread = np.ptp(payoffs)
     return (payoffs - payoffs.min()) / spread if spread > 0 else np.zeros_like(payoffs)
 
@@ -131,19 +144,21 @@ def _rank(each: Equilibrium, ego_payoffs: Floats) -> tuple[float, ...]:
 
 
 def _undominated(ego_payoffs: Floats, non_ego_payoffs: Floats) -> tuple[list[int], list[int]]:
-    """Rows and columns that are left when what a pure strategy strictly dominates is left out, again and again."""
+    """The rows and columns that remain after strategies strictly dominated by a pure one are removed repeatedly."""
     rows, columns = list(range(ego_payoffs.shape[0])), list(range(ego_payoffs.shape[1]))
     while True:
         game = ego_payoffs[np.ix_(rows, columns)], non_ego_payoffs[np.ix_(rows, columns)].T
-        kept = [[not (own > strategy + TOLERANCE).all(axis=1).any() for strategy in own] for own in game]
-        if all(map(all, kept)):
+        undominated = [[not (own > strategy + TOLERANCE).all(axis=1).any() for strategy in own] for own in game]
+        if all(map(all, undominated)):
             return rows, columns
-        rows = [row for row, stays in zip(rows, kept[0], strict=True) if stays]
-        columns = [column for column, stays in zip(columns, kept[1], strict=True) if stays]
+        rows = [row for row, stays in zip(rows, undominated[0], strict=True) if stays]
+        columns = [column for column, stays in zip(columns, undominated[1], strict=True) if stays]
 
 
-def _whole(x: Floats, y: Floats, rows: list[int], columns: list[int], shape: tuple[int, ...]) -> Equilibrium | None:
-    """A candidate of the reduced game as shares of all strategies; None when it is no pair of distributions."""
+def _of_all_strategies(
+    x: Floats, y: Floats, rows: list[int], columns: list[int], shape: tuple[int, ...]
+) -> Equilibrium | None:
+    """A candidate of the reduced game as shares of all strategies; None when it is not a pair of distributions."""
     sides = []
     for shares, places, strategies in ((x, rows, shape[0]), (y, columns, shape[1])):
         clean = np.clip(np.asarray(shares, dtype=np.float64), 0.0, None)
@@ -152,7 +167,7 @@ def _whole(x: Floats, y: Floats, rows: list[int], columns: list[int], shape: tup
         side = np.zeros(strategies)
         side[places] = clean / clean.sum()
         sides.append(side)
-    return Equilibrium(*sides)
+    return Equilibrium(ego_shares=sides[0], non_ego_shares=sides[1])
 
 
 def _pure(shape: tuple[int, ...]) -> Iterator[tuple[Floats, Floats]]:
@@ -170,15 +185,19 @@ def _by_supports(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterator[tuple
 def _by_vertices(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterator[tuple[Floats, Floats]]:
     from nashpy.algorithms.vertex_enumeration import vertex_enumeration
 
-    try:  # its polytopes have to be bounded: payoffs above 0
+    try:  # its polytopes must be bounded: payoffs above 0
         yield from vertex_enumeration(ego_payoffs + 1.0, non_ego_payoffs + 1.0)
     except (QhullError, np.linalg.LinAlgError, ValueError, IndexError):
         return
 
 
 def _by_integer_program(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterator[tuple[Floats, Floats]]:
-    """The equilibrium of the highest ego payoff, of payoffs from 0 to 1: which strategies are played (integers),
-    then their shares once more by themselves, for accuracy.
+    """Candidates for the equilibrium of the highest ego payoff, to `VALUE_ACCURACY`, of payoffs from 0 to 1.
+
+    The integer program chooses which strategies may be played, on payoffs of `COARSE_DIGITS` and with a `SLACK`, so
+    that every equilibrium to `TOLERANCE` is a solution of it in spite of the accuracy of HiGHS. Linear programs then
+    compute the shares to `TOLERANCE`. A choice without such shares, or with a lower payoff than the program's, is
+    excluded and the program is solved again, at most `MOST_CHOICES` times.
 
     Variables: x [E], y [N], the players' payoffs v, w, and p [E], q [N]: 1 where a strategy may be played.
     """
@@ -191,8 +210,8 @@ def _by_integer_program(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterato
     sums[0, x], sums[1, y] = 1.0, 1.0
     constraints = [LinearConstraint(sums, 1.0, 1.0)]
     for count, own, chosen, value, other, payoffs in (
-        (E, x, p, v, y, ego_payoffs),
-        (N, y, q, w, x, non_ego_payoffs.T),
+        (E, x, p, v, y, ego_payoffs.round(COARSE_DIGITS)),
+        (N, y, q, w, x, non_ego_payoffs.T.round(COARSE_DIGITS)),
     ):
         unplayed, regret = np.zeros((count, size)), np.zeros((count, size))
         unplayed[:, own], unplayed[:, chosen] = np.eye(count), -np.eye(count)
@@ -201,32 +220,44 @@ def _by_integer_program(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterato
         constraints.append(LinearConstraint(regret, 0.0, np.inf))  # nothing earns more than the value
         bounded = regret.copy()
         bounded[:, chosen] = np.eye(count)
-        constraints.append(LinearConstraint(bounded, -np.inf, 1.0))  # and what may be played earns it
+        constraints.append(LinearConstraint(bounded, -np.inf, 1.0 + SLACK))  # what may be played earns it
     objective = np.zeros(size)
     objective[v] = -1.0
     integral = np.zeros(size)
     integral[p] = integral[q] = 1
-    answer = milp(objective, integrality=integral, bounds=Bounds(0.0, 1.0), constraints=constraints)
-    if answer.x is None:
-        return
-    played = answer.x[x] > 1e-6, answer.x[y] > 1e-6
-    others = _indifferent(ego_payoffs, *played), _indifferent(non_ego_payoffs.T, *played[::-1])
-    yield answer.x[x], answer.x[y]
-    if others[0] is not None and others[1] is not None:
-        yield others[1], others[0]
+    highest = -np.inf
+    for _ in range(MOST_CHOICES):
+        answer = milp(objective, integrality=integral, bounds=Bounds(0.0, 1.0), constraints=constraints)
+        if answer.x is None or highest >= answer.x[v] - VALUE_ACCURACY:
+            return
+        yield answer.x[x], answer.x[y]
+        rows, columns = answer.x[p] > 0.5, answer.x[q] > 0.5
+        y_shares = _indifferent(ego_payoffs, rows, columns, highest=True)
+        x_shares = _indifferent(non_ego_payoffs.T, columns, rows, highest=False)
+        if x_shares is not None and y_shares is not None:
+            yield x_shares, y_shares
+            highest = max(highest, float(x_shares @ ego_payoffs @ y_shares))
+            if highest >= answer.x[v] - VALUE_ACCURACY:
+                return
+        choice = np.zeros(size)
+        choice[p], choice[q] = np.where(rows, 1.0, -1.0), np.where(columns, 1.0, -1.0)
+        constraints.append(LinearConstraint(choice, -np.inf, float(rows.sum() + columns.sum()) - 1.0))
 
 
-def _indifferent(payoffs: Floats, own: npt.NDArray[np.bool_], other: npt.NDArray[np.bool_]) -> Floats | None:
-    """Shares of the other player's strategies (those in `other`) to which all of `own` are best answers, or None."""
+def _indifferent(
+    payoffs: Floats, own: npt.NDArray[np.bool_], other: npt.NDArray[np.bool_], highest: bool
+) -> Floats | None:
+    """Shares of the other player's strategies (only those in `other`) to which all of `own` are best responses, to
+    `TOLERANCE`; None where there are none. With `highest`, the shares at which the best responses earn most."""
     count = payoffs.shape[1]
-    answers = np.hstack([payoffs, -np.ones((len(payoffs), 1))])
-    equal = np.vstack([answers[own], np.append(np.ones(count), 0.0)])
+    gains = np.hstack([payoffs, -np.ones((len(payoffs), 1))])
     answer = linprog(
-        np.zeros(count + 1),
-        A_ub=answers[~own] if (~own).any() else None,
-        b_ub=np.zeros(int((~own).sum())) if (~own).any() else None,
-        A_eq=equal,
-        b_eq=np.append(np.zeros(int(own.sum())), 1.0),
-        bounds=[(0.0, 1.0 if each else 0.0) for each in other] + [(None, None)],
+        np.append(np.zeros(count), -float(highest)),
+        A_ub=np.vstack([gains, -gains[own]]),
+        b_ub=np.append(np.zeros(len(payoffs)), np.full(int(own.sum()), TOLERANCE)),
+        A_eq=np.append(np.ones(count), 0.0)[None],
+        b_eq=[1.0],
+        bounds=[(0.0, 1.0 if each else 0.0) for each in other] + [(0.0, 1.0)],
+        options={"primal_feasibility_tolerance": LP_ACCURACY, "dual_feasibility_tolerance": LP_ACCURACY},
     )
     return answer.x[:count] if answer.status == 0 else None

@@ -1,4 +1,4 @@
-"""Who met whom: what the tables of games do not say by themselves, in the words of the findings."""
+"""The players of each arm, which the tables of games do not contain, and the tables of findings."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ Role = Literal["ego", "non_ego"]
 
 @dataclass(frozen=True)
 class Pairing:
-    """One arm as a cell of the cross-play: which ego strategy met which strategy of a non-ego."""
+    """One arm as a cell of the cross-play: an ego strategy and a non-ego strategy."""
 
     arm: str
     seed: int
     ego: str
     non_ego: str
     persona: str
-    """Of the non-ego; "" for none, as of SUMO's own driver: it has no payoff and plays no game."""
+    """Of the non-ego; "" for SUMO's own driver, which has no payoff and is in no empirical game."""
 
 
 @dataclass(frozen=True)
 class Response:
-    """In `response_arm` the player of `role` of the pair in `pair_arm` is replaced by a best response: of several
-    trainings against the other player, who stays as they are, the best by games played for this choice alone."""
+    """In `response_arm` the player of `role` of the pair in `pair_arm` is replaced by a best response: the best of
+    several trainings against the unchanged other player, chosen by separate games."""
 
     seed: int
     role: Role
@@ -37,9 +37,9 @@ class Response:
     non_ego: str
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GameFindings:
-    """The four tables of findings, each with its columns of `columns`; empty where nothing was asked."""
+    """The four tables of findings, each with its columns of `columns`; empty where the campaign does not ask for it."""
 
     gaps: pd.DataFrame
     crossplay: pd.DataFrame

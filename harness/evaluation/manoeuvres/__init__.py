@@ -1,4 +1,4 @@
-"""What the players of a recorded game did, named by stated rules, and which of it led to a failure."""
+"""Manoeuvres of the players in a recorded game, named by stated rules, and the pair that led to a failure."""
 
 from harness.evaluation.manoeuvres.naming import NAMES, Manoeuvre, find_manoeuvres, manoeuvres_in, rows_of
 from harness.evaluation.manoeuvres.pairs import Pair, pair_of, pairs_in

@@ -1,4 +1,4 @@
-"""One recorded game as the rules look at it: the quantities of every step, and where the players are to each other."""
+"""One recorded game as the rules use it: the quantities of every step, and the relative positions of the players."""
 
 from __future__ import annotations
 
@@ -17,27 +17,27 @@ from harness.game.state import EGO, ROLES, Bodies
 
 _HERE = int(np.flatnonzero(PATH_M == 0.0)[0])
 _NEARBY_M = 10.0  # of road, behind and ahead
-_LARGEST_STEP_M = 1.0  # sideways in a step; more is another lane that has become the nearest
+_LARGEST_STEP_M = 1.0  # sideways in a step; more means that another lane is now the nearest
 _USUAL_SIZE_M = (5.0, 1.8)  # of SUMO's default vehicle type
 _ROUNDING_S = 1e-9
 
 Stretch = tuple[int, int]  # its first and last step
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Course:
-    """T steps of one game; arrays are [T], or [T, P] in `quantities`, whose games' axis is the steps'."""
+    """T steps of one game; arrays are [T], or [T, P] in `quantities`: its games' axis is the steps' axis."""
 
     quantities: Quantities
-    """Of the players among everyone."""
+    """Of the players among all road users."""
     between: Quantities
-    """Of the players alone: who is ahead, and when they would touch, is the other player."""
+    """Of the players alone: the leader and the collision partner are the other player."""
     drove: BoolArray
-    """[T, P] who was driving; with an ego in the game, no longer than it."""
+    """[T, P] whether each player was driving; in a game with an ego, only until the ego's game ends."""
 
     @classmethod
     def of(cls, trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]]) -> Course:
-        """From one game's trace. `sizes_m` are length and width of vehicle types; SUMO's default for one not in it."""
+        """From one game's trace. `sizes_m` are length and width of vehicle types, by default those of SUMO."""
         kinds = trace.drop_duplicates("player")
         sizes = {
             str(name): sizes_m.get(str(kind), _USUAL_SIZE_M)
@@ -50,31 +50,31 @@ class Course:
         drove = drove_in(trace)
         if drove[:, EGO].any():
             drove[int(np.flatnonzero(drove[:, EGO])[-1]) + 1 :] = False
-        return cls(quantities, between, drove)
+        return cls(quantities=quantities, between=between, drove=drove)
 
     @property
     def step_s(self) -> float:
         return self.quantities.world.step_s
 
     def steps(self, seconds: float) -> int:
-        """How many steps a time takes at least."""
+        """The least number of steps that cover a time."""
         return int(np.ceil(seconds / self.step_s - _ROUNDING_S))
 
     def stretches(self, mask: BoolArray, least_s: float, parted: BoolArray | None = None) -> Iterator[Stretch]:
-        """Where `mask` [T] holds for at least `least_s` in all, short pauses left out of account in which `parted`
-        [T] does not hold."""
-        found: list[list[int]] = []
-        held: list[int] = []
+        """The stretches over which `mask` [T] holds for at least `least_s` in total. A pause of up to `SAME_WITHIN_S`
+        is ignored, unless `parted` [T] holds in it."""
+        spans: list[list[int]] = []
+        counts: list[int] = []
         for first, last in runs(mask):
-            pause = slice(found[-1][1] + 1 if found else 0, first)
-            one = bool(found) and first - pause.start <= self.steps(SAME_WITHIN_S)
-            if one and not (parted is not None and parted[pause].any()):
-                found[-1][1] = last
-                held[-1] += last - first + 1
+            pause = slice(spans[-1][1] + 1 if spans else 0, first)
+            continues = bool(spans) and first - pause.start <= self.steps(SAME_WITHIN_S)
+            if continues and not (parted is not None and parted[pause].any()):
+                spans[-1][1] = last
+                counts[-1] += last - first + 1
             else:
-                found.append([first, last])
-                held.append(last - first + 1)
-        for (first, last), count in zip(found, held, strict=True):
+                spans.append([first, last])
+                counts.append(last - first + 1)
+        for (first, last), count in zip(spans, counts, strict=True):
             if count >= self.steps(least_s):
                 yield first, last
 
@@ -92,7 +92,7 @@ class Course:
 
     @cached_property
     def sideways_m(self) -> FloatArray:
-        """[T, P] how far it has come to the left of the way its lane goes, since the start."""
+        """[T, P] displacement to the left, relative to the direction of the lane, since the start."""
         moved = np.diff(self._from_lane_m, axis=0, prepend=self._from_lane_m[:1])
         return np.where(np.abs(moved) < _LARGEST_STEP_M, moved, 0.0).cumsum(0)
 
@@ -103,9 +103,9 @@ class Course:
         return (turned + np.pi) % (2.0 * np.pi) - np.pi
 
     def swerving_mps2(self, player: int, side: float) -> FloatArray:
-        """[T] lateral acceleration to a side (1 left, -1 right), beyond what the road nearby takes at its tightest.
+        """[T] lateral acceleration to a side (1 left, -1 right), minus that of the tightest curve of the road nearby.
 
-        Roads are polylines: how they turn is looked at over lengths of 5 m and more.
+        Roads are polylines: their curvature is measured over lengths of 5 m and more.
         """
         near = np.flatnonzero(np.abs(PATH_M) <= _NEARBY_M)
         headings = np.unwrap(self.quantities.path.heading_rad[:, player, near], axis=-1)
@@ -113,31 +113,31 @@ class Course:
         own = side * self.quantities.lateral_acceleration_mps2[:, player]
         return own - np.maximum(curve, 0.0) * self.quantities.speed_mps[:, player] ** 2
 
-    # --- one to the other -----------------------------------------------------------------------------------------
+    # --- relative to the other player -----------------------------------------------------------------------------
 
     def ahead_m(self, player: int, of: int) -> FloatArray:
-        """[T] how far the middle of one is ahead of the other's, along the other's route."""
+        """[T] how far the centre of `player` is ahead of that of `of`, along the route of `of`."""
         return self.between.on_path.ahead_m[:, of, player]
 
     def gap_m(self, player: int, of: int) -> FloatArray:
-        """[T] from the front of `of` to the rear of who is ahead of it; negative where they are side by side."""
+        """[T] from the front of `of` to the rear of `player`; negative where they are side by side."""
         on_path = self.between.on_path
         own = 0.5 * self.quantities.world.length_m[of]
         return on_path.ahead_m[:, of, player] - on_path.half_length_m[:, of, player] - own
 
     def in_way(self, player: int, of: int) -> BoolArray:
-        """[T] whether one's body is, across the road, where the other's is: the way it would take."""
+        """[T] whether the bodies of the two overlap across the road: `player` is in the path of `of`."""
         on_path = self.between.on_path
         half_width = on_path.half_width_m[:, of, player] + 0.5 * self.quantities.world.width_m[of]
         return np.abs(on_path.left_m[:, of, player]) < half_width
 
     def left_m(self, player: int, of: int) -> FloatArray:
-        """[T] how far one is to the left of the line of the other's route."""
+        """[T] how far `player` is to the left of the route of `of`."""
         return self.between.on_path.left_m[:, of, player] + self.quantities.lateral_offset_m[:, of]
 
 
 def runs(mask: BoolArray) -> Iterator[Stretch]:
-    """The stretches over which `mask` [T] holds without a pause."""
+    """The stretches over which `mask` [T] holds without interruption."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
     for first, end in edges.reshape(-1, 2).tolist():
         yield first, end - 1

@@ -1,4 +1,4 @@
-"""From one game's trace to the manoeuvres in it, and to and from rows of the table `manoeuvres.csv`."""
+"""The manoeuvres in one game's trace, and their conversion to and from rows of `manoeuvres.csv`."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from harness.game.state import ROLES
 NAMES = tuple(RULES)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Manoeuvre:
-    """What a player did, from when to when; gap and time to collision are NaN where there is none."""
+    """A manoeuvre of a player, from `time_s` until `until_s`; gap and time to collision are NaN where there is none."""
 
     player: str
     manoeuvre: str
@@ -35,9 +35,9 @@ def find_manoeuvres(
 ) -> list[Manoeuvre]:
     """The manoeuvres of both players in one game, by the time they begin.
 
-    `trace` are the game's rows (columns as in `traces/`) on the scene that `world` is of; `sizes_m` are length and
-    width of the vehicle types in it, SUMO's default for one that it does not name. In a game with an ego what is
-    named ends with the ego's game.
+    `trace` are the game's rows (columns as in `traces/`) on the scene of `world`; `sizes_m` are length and width of
+    the vehicle types in it, with SUMO's default for the others. In a game with an ego, manoeuvres end with the ego's
+    game.
     """
     course = Course.of(trace, world, sizes_m or {})
     found = []
@@ -49,15 +49,15 @@ def find_manoeuvres(
 
 
 def _named(course: Course, role: str, name: str, span: Span) -> Manoeuvre:
-    digits = 6  # of a second: a multiple of the step, as a person would write it
+    digits = 6  # of a second: no rounding error in a multiple of the step
     return Manoeuvre(
-        role,
-        name,
-        round(span.first * course.step_s, digits),
-        round(span.last * course.step_s, digits),
-        span.gap_m if math.isfinite(span.gap_m) else math.nan,
-        span.ttc_s if math.isfinite(span.ttc_s) else math.nan,
-        span.text,
+        player=role,
+        manoeuvre=name,
+        time_s=round(span.first * course.step_s, digits),
+        until_s=round(span.last * course.step_s, digits),
+        gap_m=span.gap_m if math.isfinite(span.gap_m) else math.nan,
+        ttc_s=span.ttc_s if math.isfinite(span.ttc_s) else math.nan,
+        text=span.text,
     )
 
 
@@ -69,4 +69,4 @@ def rows_of(found: Sequence[Manoeuvre], **game: Any) -> list[dict[str, Any]]:
 def manoeuvres_in(rows: pd.DataFrame) -> list[Manoeuvre]:
     """The manoeuvres of one game from its rows of `manoeuvres.csv`."""
     columns = list(Manoeuvre.__dataclass_fields__)
-    return [Manoeuvre(*row) for row in rows[columns].itertuples(index=False, name=None)]
+    return [Manoeuvre(**row) for row in rows[columns].to_dict("records")]

@@ -1,4 +1,4 @@
-"""What the non-ego did and how the ego answered: the last of a game's manoeuvres, which led to how it ended."""
+"""The pair of manoeuvres that led to the end of a game: one of the non-ego and the ego's response to it."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from harness.evaluation.manoeuvres.thresholds import AFTERMATH_S, ANSWER_WITHIN_
 from harness.game.state import EGO, NON_EGO, ROLES
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Pair:
-    """What the non-ego did and how the ego answered; None: nothing that has a name."""
+    """A manoeuvre of the non-ego and the ego's response; None: no named manoeuvre."""
 
     non_ego: Manoeuvre | None
     ego: Manoeuvre | None
 
     @property
     def words(self) -> str:
-        """Such as "drift -> swerve"; "-" is nothing that has a name."""
+        """E.g. "drift -> swerve"; "-" stands for no named manoeuvre."""
         names = (each.manoeuvre.replace("_", " ") if each else "-" for each in (self.non_ego, self.ego))
         return " -> ".join(names)
 
@@ -30,24 +30,24 @@ class Pair:
 def pair_of(found: Sequence[Manoeuvre], ended_s: float = math.inf) -> Pair:
     """The pair of one game that led to its end at `ended_s` (manoeuvres that begin later are left out).
 
-    The ego's is its last one, the non-ego's the last that had begun when the ego's began and was not over for longer
-    than an answer takes; if there is none, what the non-ego began after that. What it began well after the ego's last
-    was over is a new cause, which the ego has not answered.
+    The ego's manoeuvre is its last one (the response). The non-ego's is the last one that began before the response and
+    ended at most `ANSWER_WITHIN_S` before it; without such a manoeuvre, the last one that began after the response. A
+    manoeuvre that the non-ego begins more than `AFTERMATH_S` after the response is a new cause without a response.
     """
     found = sorted((each for each in found if each.time_s <= ended_s), key=lambda each: each.time_s)
     non_ego = [each for each in found if each.player == ROLES[NON_EGO]]
     ego = [each for each in found if each.player == ROLES[EGO]]
     if not ego or not non_ego:
-        return Pair(non_ego[-1] if non_ego else None, ego[-1] if ego else None)
-    answer, latest = ego[-1], non_ego[-1]
-    if latest.time_s > answer.until_s + AFTERMATH_S:
-        return Pair(latest, None)
+        return Pair(non_ego=non_ego[-1] if non_ego else None, ego=ego[-1] if ego else None)
+    response, latest = ego[-1], non_ego[-1]
+    if latest.time_s > response.until_s + AFTERMATH_S:
+        return Pair(non_ego=latest, ego=None)
     causes = [
-        each for each in non_ego if each.time_s <= answer.time_s and answer.time_s - each.until_s <= ANSWER_WITHIN_S
+        each for each in non_ego if each.time_s <= response.time_s and response.time_s - each.until_s <= ANSWER_WITHIN_S
     ]
     if causes:
-        return Pair(causes[-1], answer)
-    return Pair(latest if latest.time_s > answer.time_s else None, answer)
+        return Pair(non_ego=causes[-1], ego=response)
+    return Pair(non_ego=latest if latest.time_s > response.time_s else None, ego=response)
 
 
 def pairs_in(manoeuvres: pd.DataFrame) -> Mapping[tuple[str, int, int], Pair]:

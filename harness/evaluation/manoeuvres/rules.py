@@ -1,6 +1,6 @@
-"""The rules: each finds the stretches of a game in which a player does what its name says.
+"""The rules: each finds the stretches of a game in which a player performs one manoeuvre.
 
-A rule knows the steps; its numbers are in `thresholds`. Players are rows of the game's players' axis.
+The numbers of the rules are in `thresholds`. Players are indices of the players' axis.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from harness.evaluation.manoeuvres import thresholds as least
 from harness.evaluation.manoeuvres.course import Course, runs
 from harness.game.arrays import BoolArray
 
-_SLACK = 1e-9  # of rounding: a number that is the threshold's is over it
+_SLACK = 1e-9  # of rounding: a number equal to its threshold counts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Span:
-    """One manoeuvre: its first and last step, gap and time to collision (inf: none), and what it was in words."""
+    """One manoeuvre: its first and last step, gap and time to collision (inf: none), and a description."""
 
     first: int
     last: int
@@ -29,8 +29,10 @@ class Span:
 
 
 def cut_ins(course: Course, player: int, other: int) -> Iterator[Span]:
-    """It comes into the other's way from the side, ahead of it and near, and not in a lapse, which is a drift; gap and
-    time to collision are the other's, at that moment."""
+    """The player enters the other's path from the side, ahead of it and near, and not in a lapse (that is a drift).
+
+    Gap and time to collision are the other's, at that moment.
+    """
     in_way = course.in_way(player, other)
     both = course.drove[:, player] & course.drove[:, other]
     ahead = course.ahead_m(player, other) > 0.0
@@ -46,17 +48,17 @@ def cut_ins(course: Course, player: int, other: int) -> Iterator[Span]:
         if step > same_until and _moved_more(course, player, other, step):
             last = _while(in_way & both & ahead, step)
             yield Span(
-                step,
-                _first(np.abs(course.between.on_path.left_m[:, other, player]) < 0.5, step, last),
-                float(gap[step]),
-                float(ttc[step]),
-                f"cuts in {gap[step]:.1f} m ahead{_seconds(', TTC', ttc[step])}",
+                first=step,
+                last=_first(np.abs(course.between.on_path.left_m[:, other, player]) < 0.5, step, last),
+                gap_m=float(gap[step]),
+                ttc_s=float(ttc[step]),
+                text=f"cuts in {gap[step]:.1f} m ahead{_seconds(', TTC', ttc[step])}",
             )
             same_until = step + course.steps(least.SAME_WITHIN_S)
 
 
 def _moved_more(course: Course, player: int, other: int, step: int) -> bool:
-    """Whether it is the one that has moved towards the other's way, rather than the other towards its."""
+    """Whether the player has moved more towards the other's path than the other towards the player's."""
     before = max(step - course.steps(least.CUT_IN_LOOK_BACK_S), 0)
     own = course.left_m(player, other)
     others = course.quantities.lateral_offset_m[:, other]
@@ -66,7 +68,7 @@ def _moved_more(course: Course, player: int, other: int, step: int) -> bool:
 
 
 def hard_brakes(course: Course, player: int, other: int) -> Iterator[Span]:
-    """It brakes harder than a stop without haste takes."""
+    """The player brakes harder than an ordinary stop needs."""
     braking = -course.quantities.state.acceleration_mps2[:, player]
     mask = course.drove[:, player] & (braking >= least.HARD_BRAKE_MPS2 - _SLACK)
     for first, last in course.stretches(mask, least.HARD_BRAKE_LEAST_S):
@@ -74,7 +76,7 @@ def hard_brakes(course: Course, player: int, other: int) -> Iterator[Span]:
 
 
 def swerves(course: Course, player: int, other: int) -> Iterator[Span]:
-    """It is steered sharply out of the direction of the road."""
+    """The player steers sharply out of the direction of the road."""
     for sign, side in ((1.0, "left"), (-1.0, "right")):
         sideways, turned = course.swerving_mps2(player, sign), sign * course.turned_rad[:, player]
         back = course.swerving_mps2(player, -sign) >= least.SWERVE_MPS2
@@ -87,14 +89,14 @@ def swerves(course: Course, player: int, other: int) -> Iterator[Span]:
 
 
 def drifts(course: Course, player: int, other: int) -> Iterator[Span]:
-    """It moves sideways with nobody steering: in a lapse of attention, or out of its lane with the wheel held still."""
+    """The player moves sideways without steering: in a lapse of attention, or out of its lane with a still wheel."""
     state, drove = course.quantities.state, course.drove[:, player]
     lapsed = drove & state.lapsed[:, player]
     for first, last in runs(lapsed):
         yield from _drift(course, player, first, last, "in a lapse of attention")
     steering = state.steering_rad[:, player]
     if not steering[drove].any():
-        return  # SUMO drives it, and has no wheel
+        return  # SUMO drives it and records no steering
     still = np.abs(np.diff(steering, prepend=steering[:1])) <= least.HANDS_OFF_RADPS * course.step_s
     for first, last in runs(drove & still & ~lapsed):
         out = course.quantities.lane_offset_m[first : last + 1, player] >= least.OUT_OF_LANE_M - _SLACK
@@ -103,7 +105,7 @@ def drifts(course: Course, player: int, other: int) -> Iterator[Span]:
 
 
 def _drift(course: Course, player: int, first: int, last: int, how: str) -> Iterator[Span]:
-    begin = max(first - 1, 0)  # a step's row tells where it led to
+    begin = max(first - 1, 0)  # a row has the position at the end of its step
     moved = course.sideways_m[begin : last + 1, player] - course.sideways_m[begin, player]
     most = moved[np.abs(moved).argmax()]
     if abs(most) >= least.DRIFT_M - _SLACK:
@@ -112,7 +114,7 @@ def _drift(course: Course, player: int, first: int, last: int, how: str) -> Iter
 
 
 def overtakes(course: Course, player: int, other: int) -> Iterator[Span]:
-    """On the lane that ends, it passes the other from behind until it is wholly ahead."""
+    """On the lane that ends, the player passes the other from behind until it is completely ahead."""
     both = course.drove[:, player] & course.drove[:, other]
     ahead, gap = course.ahead_m(player, other), course.gap_m(player, other)
     lane_end = course.quantities.lane_end_m[:, player]
@@ -120,9 +122,9 @@ def overtakes(course: Course, player: int, other: int) -> Iterator[Span]:
     draws_level = both & np.isfinite(lane_end) & apart & (ahead >= 0.0)
     draws_level[1:] &= (ahead[:-1] < 0.0) & both[:-1]
     draws_level[0] = False
-    begun_after = -1
+    search_from = 0
     for step in np.flatnonzero(draws_level).tolist():
-        behind = np.flatnonzero(ahead[begun_after + 1 : step] <= -least.OVERTAKE_FROM_M + _SLACK)
+        behind = np.flatnonzero(ahead[search_from:step] <= -least.OVERTAKE_FROM_M + _SLACK)
         last = _while(both & (ahead >= 0.0), step)
         past = np.flatnonzero(gap[step : last + 1] >= 0.0)
         if len(behind) and len(past):
@@ -133,11 +135,11 @@ def overtakes(course: Course, player: int, other: int) -> Iterator[Span]:
             yield _span(
                 course, player, first, until, f"overtakes on the lane that ends, {lane_end[step]:.0f} m before its end"
             )
-            begun_after = step
+            search_from = step + 1
 
 
 def tailgates(course: Course, player: int, other: int) -> Iterator[Span]:
-    """It follows somebody too closely for a while."""
+    """The player follows its leader too closely for some time."""
     quantities = course.quantities
     time_gap = quantities.time_gap_s[:, player]
     mask = course.drove[:, player] & (time_gap < least.TAILGATE_TIME_GAP_S - _SLACK)
@@ -148,7 +150,7 @@ def tailgates(course: Course, player: int, other: int) -> Iterator[Span]:
 
 
 def forced_stops(course: Course, player: int, other: int) -> Iterator[Span]:
-    """It is brought nearly to a standstill by who is ahead, or by the end of its lane."""
+    """The player is nearly stopped by its leader or by the end of its lane."""
     quantities, drove = course.quantities, course.drove[:, player]
     speed, gap = quantities.speed_mps[:, player], quantities.leader_gap_m[:, player]
     lane_end = quantities.lane_end_m[:, player]
@@ -175,10 +177,10 @@ RULES: Mapping[str, Callable[[Course, int, int], Iterator[Span]]] = {
 
 
 def _span(course: Course, player: int, first: int, last: int, text: str) -> Span:
-    """With the player's least trailing distance and time to collision while it lasts."""
+    """A span with the player's least trailing distance and time to collision during it."""
     gap = course.quantities.leader_gap_m[first : last + 1, player].min()
     ttc = course.quantities.time_to_collision_s[first : last + 1, player].min()
-    return Span(first, last, float(gap), float(ttc), text)
+    return Span(first=first, last=last, gap_m=float(gap), ttc_s=float(ttc), text=text)
 
 
 def _while(mask: BoolArray, step: int) -> int:

@@ -1,1 +1,1 @@
-"""A persona's portrait: what its document means, as numbers, words and curves, in the terminal and as a page."""
+"""The profile of a persona: its document in numbers, sentences and curves, in the terminal and as a page."""

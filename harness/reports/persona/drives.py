@@ -1,4 +1,4 @@
-"""Seeded drives of a persona: when its attention lapses in them and whom it overlooks, drawn as the game draws them."""
+"""Seeded sample drives of a persona: lapses of attention and missing blind-spot checks, drawn as in the game."""
 
 from __future__ import annotations
 
@@ -17,70 +17,73 @@ DRIFT_SPEED_MPS = 50.0 / 3.6
 WHEELBASE_M = float(Actuators.model_fields["wheelbase_m"].default)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SampleDrive:
     """One seeded drive of `DRIVE_S`."""
 
     lapses: tuple[tuple[float, float], ...]
     """Begin and end of each lapse, s."""
-    overlooks: bool
-    """Whether others are overlooked in it."""
+    no_blind_spot_check: bool
+    """Whether the person does not check the blind spot in this drive."""
 
     @property
     def lapsed_share(self) -> float:
-        """Share of the drive in which attention is elsewhere."""
+        """Share of the drive in lapses of attention."""
         return sum(end - begin for begin, end in self.lapses) / DRIVE_S
 
 
 def sample(persona: Persona) -> list[SampleDrive]:
-    """The same drives each time, for the same persona."""
+    """`DRIVES` drives, the same for equal personas."""
     human_factors, steps = persona.human_factors, round(DRIVE_S / STEP_S)
-    found = []
+    drives = []
     for k in range(DRIVES):
         lapses = Lapses.none(steps)
         if human_factors.attention is not None:
             lapses = draw_lapses(
                 human_factors.attention, steps, STEP_S, generator_of("portrait", persona.name, "attention", k)
             )
-        ahead_m = unseen_behind_m(human_factors.no_blind_spot_check, generator_of("portrait", persona.name, "start", k).random())
+        ahead_m = unseen_behind_m(
+            human_factors.no_blind_spot_check, generator_of("portrait", persona.name, "start", k).random()
+        )
         changes = np.flatnonzero(np.diff(np.concatenate(([0], lapses.lapsed.astype(int), [0])))).reshape(-1, 2) * STEP_S
-        found.append(SampleDrive(tuple((float(begin), float(end)) for begin, end in changes), math.isfinite(ahead_m)))
-    return found
+        spans = tuple((float(begin), float(end)) for begin, end in changes)
+        drives.append(SampleDrive(lapses=spans, no_blind_spot_check=math.isfinite(ahead_m)))
+    return drives
 
 
 def mean_lapse_s(attention: Attention) -> float:
-    """A lapse's mean length: it is drawn uniformly, so half-way between the shortest and the longest."""
+    """The mean length of a lapse, s: the middle of the uniform distribution it is drawn from."""
     return 0.5 * (attention.lapse_s[0] + attention.lapse_s[1])
 
 
 def lapsed_share(attention: Attention) -> float:
-    """Share of the time in which attention is elsewhere, in the long run.
+    """Share of the time in lapses of attention, in the long run.
 
-    Lapses and attentive stretches take turns, so it is mean lapse / (mean lapse + mean attentive stretch): the share
+    Lapses and attentive stretches alternate, so it is mean lapse / (mean lapse + mean attentive stretch): the share
     of time of an alternating renewal process (Ross, Introduction to Probability Models, section 7.5).
     """
     return mean_lapse_s(attention) / (mean_lapse_s(attention) + attention.mean_attentive_s)
 
 
 def lapses_per_minute(attention: Attention) -> float:
-    """Lapses that begin in a minute, in the long run: one in each mean lapse + mean attentive stretch."""
+    """Lapses per minute, in the long run: one in each mean lapse + mean attentive stretch."""
     return 60.0 / (mean_lapse_s(attention) + attention.mean_attentive_s)
 
 
 def free_share(attention: Attention, drive_s: float = DRIVE_S) -> float:
-    """Share of the drives in which attention never lapses.
+    """Share of the drives without a lapse.
 
-    They start attentive (the share of time that isn't lapsed), and their first lapse, exponentially distributed,
-    comes after the end: (1 - lapsed share) exp(-drive / mean attentive stretch).
+    Such a drive starts attentive (1 - lapsed share), and its first lapse, exponentially distributed, begins after its
+    end: (1 - lapsed share) exp(-drive / mean attentive stretch).
     """
     return (1.0 - lapsed_share(attention)) * math.exp(-drive_s / attention.mean_attentive_s)
 
 
 def drift_m(steering_rad: float, lapse_s: float, speed_mps: float = DRIFT_SPEED_MPS) -> float:
-    """How far to the side a car let go gets within a lapse, on a straight road, wheel at an angle; m, positive: left.
+    """Lateral displacement of an uncontrolled car in a lapse, on a straight road, wheel at an angle; m, positive: left.
 
-    The kinematic bicycle of harness.game.bicycle at small angles: it slips by half the angle, and turns by
-    v tan(angle) / wheelbase a second, so v t tan(angle) / 2 + v² t² tan(angle) / (2 wheelbase).
+    The kinematic bicycle of harness.game.bicycle at small angles: its slip angle is half the steering angle, and it
+    turns by v tan(angle) / wheelbase per second, so v t tan(angle) / 2 + v² t² tan(angle) / (2 wheelbase).
     """
     way, turn = speed_mps * lapse_s, math.tan(steering_rad)
     return way * turn / 2.0 + way**2 * turn / (2.0 * WHEELBASE_M)

@@ -1,4 +1,4 @@
-"""A portrait's figures, in the style of the report's."""
+"""A profile's figures, in the style of the report's."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from harness.reports.persona.drives import DRIVE_S, SampleDrive
-from harness.reports.persona.profile import number
-from harness.reports.persona.worth import Drawn
 from harness.reports.figures import GRID, INK, SERIES, figure_of, svg
+from harness.reports.persona.drives import DRIVE_S, SampleDrive
+from harness.reports.persona.profile import NO_CHECK_MARK, number
+from harness.reports.persona.worth import PayoffFunction
 
 _COLOURS = [SERIES[name] for name in ("alone", "persona", "retrained", "sumo")]
 _LINES = ("-", "--", ":", "-.")
 
 
-def function_figure(function: Drawn, name: str, alternative: str) -> Markup:
-    """The memberships of a function's sets above, what the quantity is worth below."""
+def function_figure(function: PayoffFunction, name: str, alternative: str) -> Markup:
+    """The memberships of a function's sets above, the payoff over the quantity below."""
     with figure_of(6.4, 4.6) as figure:
         memberships, worth = figure.subplots(2, 1, sharex=True, height_ratios=(2, 3))
         for place, (label, value, membership) in enumerate(function.sets):
@@ -37,14 +37,14 @@ def function_figure(function: Drawn, name: str, alternative: str) -> Markup:
 
 
 def drives_figure(drives: Sequence[SampleDrive], name: str, alternative: str) -> Markup:
-    """A row for each drive, its lapses as bars on the axis of time."""
+    """A row for each drive, with its lapses as bars over time."""
     with figure_of(9.6, 0.9 + 0.34 * len(drives)) as figure:
         axes = figure.subplots()
         for row, drive in enumerate(drives):
             axes.barh(row, DRIVE_S, 0.12, color=GRID, linewidth=0)
             for begin, end in drive.lapses:
                 axes.barh(row, end - begin, 0.6, left=begin, color=SERIES["persona"], linewidth=0)
-        names = [f"drive {k}" + (" (overlooks)" if each.overlooks else "") for k, each in enumerate(drives, 1)]
+        names = [f"drive {k}" + (NO_CHECK_MARK if each.no_blind_spot_check else "") for k, each in enumerate(drives, 1)]
         axes.set_yticks(range(len(drives)), names, fontsize=9)
         axes.tick_params(axis="y", length=0)
         axes.grid(visible=False, axis="y")

@@ -1,4 +1,4 @@
-"""Curves, bars and stretches of time in characters: Braille and blocks, or ASCII where a terminal has no more."""
+"""Curves, bars and stretches of time in characters: Braille and blocks, or ASCII on a plain terminal."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _DOTS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])  # of
 
 
 def curve(x: FloatArray, y: FloatArray, columns: int, rows: int, low: float, high: float, plain: bool) -> list[str]:
-    """A line through (x, y) [N], x rising, over the whole width; `low` at the foot and `high` at the top."""
+    """A line through (x, y) [N], x rising, over the whole width; `low` is the bottom and `high` the top."""
     down, across = (1, 1) if plain else _DOTS.shape
     dots = np.zeros((rows * down, columns * across), dtype=bool)
     at = np.interp(np.linspace(x[0], x[-1], dots.shape[1]), x, y)
     heights = np.rint((high - at) / (high - low) * (len(dots) - 1)).astype(int)
     for column, (before, here) in enumerate(zip((heights[0], *heights), heights, strict=False)):
-        first, last = sorted((before + np.sign(here - before), here))  # joined to the one before
+        first, last = sorted((before + np.sign(here - before), here))  # joined to the previous column
         dots[first : last + 1, column] = True
     if plain:
         return ["".join("*" if dot else " " for dot in row) for row in dots]
@@ -54,7 +54,7 @@ def ticks(low: float, high: float) -> list[float]:
 
 
 def axis(labels: Sequence[tuple[float, str]], columns: int) -> str:
-    """Labels at places in 0..1 of the width, as many as have room, the outermost first."""
+    """Labels at places in 0..1 of the width, as many as fit, the outermost first."""
     line = [" "] * columns
     for place, label in (labels[0], labels[-1], *labels[1:-1]):
         start = min(max(round(place * (columns - 1)) - len(label) // 2, 0), columns - len(label))

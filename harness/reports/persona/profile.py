@@ -1,4 +1,4 @@
-"""What a persona's document means: its terms, functions and drives, and what they say in words."""
+"""The meaning of a persona's document: its terms, functions and sample drives, and sentences about them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from harness.reports.persona.drives import (
     mean_lapse_s,
     sample,
 )
-from harness.reports.persona.worth import Counted, Drawn, counted, drawn
+from harness.reports.persona.worth import PayoffFunction, TermExample, payoff_functions, term_examples
 
 SHOWN = (
     "name",
@@ -33,29 +33,44 @@ SHOWN = (
     "actuators",
     "decisions",
 )
-"""The tables and keys of a persona that its portrait shows: all there are."""
+"""The tables and keys of a persona that its profile shows: all of them."""
 NEAR_M = 20.0
-"""A distance to picture errors at."""
-FORMULA = "payoff = α₀ · Σ safety + α₁ · Σ operational + α₂ · Σ human, added up over every step of the game"
+"""The distance at which errors are stated."""
+FORMULA = "payoff = α₀ · Σ safety + α₁ · Σ operational + α₂ · Σ human, summed over every step of the game"
+WANTS, ATTENDS, DECIDES = "What this person wants", "How this person attends", "How this person decides"
+NO_CHECK_MARK = " (no blind-spot check)"
+"""Marks a drive in which the person does not check the blind spot."""
+COLLISION_IS_FREE = "A collision itself costs nothing."
+NO_LAPSES = "Attention never lapses."
+STRAIGHT_WHEEL = "The wheel is then straight."
+ALWAYS_CHECKS = "The person checks the blind spot in every drive."
+AFTER_A_LAPSE = "After a lapse, the car stays uncontrolled for the same time again."
+UNIMPAIRED_IN_TRAINING = (
+    "While the person itself is trained, it checks the blind spot and sees every vehicle; all else is as in driving."
+)
+SAMPLED = "Actions are sampled from the policy's distribution, so no two drives are the same."
+MOST_LIKELY = "The action is always the policy's most likely one."
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PersonaProfile:
-    """A persona, and what follows from its document."""
+    """A persona, and what is computed from its document."""
 
     persona: Persona
-    terms: Sequence[Counted]
-    functions: Sequence[Drawn]
+    terms: Sequence[TermExample]
+    functions: Sequence[PayoffFunction]
     drives: Sequence[SampleDrive]
 
 
 def persona_profile(persona: Persona) -> PersonaProfile:
-    """A persona's portrait; equal documents give equal ones."""
-    return PersonaProfile(persona, counted(persona), drawn(persona), sample(persona))
+    """The profile of a persona; equal documents give equal profiles."""
+    return PersonaProfile(
+        persona=persona, terms=term_examples(persona), functions=payoff_functions(persona), drives=sample(persona)
+    )
 
 
 def number(value: float) -> str:
-    """A payoff with its sign, e.g. "+1.5" or "−10"; empty: not known."""
+    """A payoff with its sign, e.g. "+1.5" or "−10"; empty when it is NaN."""
     if math.isnan(value):
         return ""
     text = f"{abs(value):.3g}"
@@ -63,34 +78,34 @@ def number(value: float) -> str:
 
 
 def percent(share: float) -> str:
-    """E.g. "55 %"; what is rare, but not never, is "under 1 %"."""
+    """E.g. "55 %"; a share between 0 and 1 % is "under 1 %"."""
     return "under 1 %" if 0.0 < share < 0.01 else f"{share * 100:.0f} %"
 
 
-def wants(portrait: PersonaProfile) -> Iterator[str]:
-    """What the payoff's terms come to, against each other."""
-    worth = {each.name: each.worth for each in portrait.terms}
+def wants(profile: PersonaProfile) -> Iterator[str]:
+    """The payoff's terms compared with each other."""
+    worth = {each.name: each.worth for each in profile.terms}
     collision, progress, goal = (worth.get(name, 0.0) for name in ("collision", "progress", "goal"))
     if collision == 0.0:
-        yield "A collision costs nothing of itself."
+        yield COLLISION_IS_FREE
     elif progress:
-        yield f"A collision costs as much as {-100.0 * collision / progress:.3g} m of progress are worth."
+        yield f"A collision costs as much as {-100.0 * collision / progress:.3g} m of progress earn."
     elif goal:
-        yield f"A collision costs as much as {-collision / goal:.3g} times the goal is worth."
+        yield f"A collision costs {-collision / goal:.3g} times the payoff of the goal."
     for group in GROUPS:
-        named = any(each.group == group for each in portrait.terms) or (group == "human" and portrait.functions)
-        if named and portrait.persona.payoff.alpha[group] == 0.0:
-            yield f"The {group} terms count nothing: their alpha is 0."
+        has_terms = any(each.group == group for each in profile.terms) or (group == "human" and profile.functions)
+        if has_terms and profile.persona.payoff.alpha[group] == 0.0:
+            yield f"The {group} terms have no effect: their alpha is 0."
 
 
-def function_in_words(drawn: Drawn) -> str:
-    """Where a function is worth most and least."""
-    (most, *best), (least, *worst) = drawn.best, drawn.worst
+def function_in_words(function: PayoffFunction) -> str:
+    """Where a function is greatest and least."""
+    (most, *best), (least, *worst) = function.best, function.worst
     if most == least:
-        return f"Worth {number(most)} per second everywhere."
+        return f"{number(most)} per second everywhere."
     return (
-        f"Worth most {_stretch(best, drawn.unit)}: {number(most)} per second. "
-        f"Worth least {_stretch(worst, drawn.unit)}: {number(least)} per second."
+        f"Greatest payoff {_stretch(best, function.unit)}: {number(most)} per second. "
+        f"Least payoff {_stretch(worst, function.unit)}: {number(least)} per second."
     )
 
 
@@ -104,96 +119,105 @@ def _stretch(ends: Sequence[float], unit: str) -> str:
     return f"at {low:.3g}{unit}" if low == high else f"from {low:.3g} to {high:.3g}{unit}"
 
 
-def attends(portrait: PersonaProfile) -> Iterator[str]:
-    """When attention lapses, and what the car does then."""
-    attention = portrait.persona.human_factors.attention
+def lapses_of(profile: PersonaProfile) -> str:
+    """The text of the figure of sample drives."""
+    return f"Lapses of attention in {len(profile.drives)} drives of {DRIVE_S:g} s"
+
+
+def attends(profile: PersonaProfile) -> Iterator[str]:
+    """The lapses of attention, and the motion of the car in a lapse."""
+    attention = profile.persona.human_factors.attention
     if attention is None:
-        yield "Attention never lapses."
+        yield NO_LAPSES
         return
     lapse_s = mean_lapse_s(attention)
     shortest, longest = attention.lapse_s
     length = f"{shortest:g} s" if shortest == longest else f"{shortest:g} to {longest:g} s"
     yield (
         f"Eyes off the road {percent(lapsed_share(attention))} of the time, in the long run: lapses of {length}, "
-        f"between them {attention.mean_attentive_s:g} s of attention on average; "
-        f"{lapses_per_minute(attention):.2g} lapses a minute."
+        f"with {attention.mean_attentive_s:g} s of attention between them on average; "
+        f"{lapses_per_minute(attention):.2g} lapses per minute."
     )
-    drawn_share = sum(each.lapsed_share for each in portrait.drives) / len(portrait.drives)
+    drawn_share = sum(each.lapsed_share for each in profile.drives) / len(profile.drives)
     yield (
-        f"In the {len(portrait.drives)} drives drawn here {percent(drawn_share)}. Of drives of {DRIVE_S:g} s, "
-        f"{percent(free_share(attention))} are without a lapse."
+        f"In the {len(profile.drives)} sample drives: {percent(drawn_share)}. Of drives of {DRIVE_S:g} s, "
+        f"{percent(free_share(attention))} have no lapse."
     )
-    yield "In a lapse pedals and wheel are let go. " + _drifts(attention.crown_rad, attention.bumps_rad, lapse_s)
+    yield "In a lapse the person releases pedals and wheel. " + _drifts(
+        attention.crown_rad, attention.bumps_rad, lapse_s
+    )
 
 
 def _drifts(crown_rad: float, bumps_rad: float, lapse_s: float) -> str:
     if crown_rad == bumps_rad == 0.0:
-        return "The wheel then stands straight."
+        return STRAIGHT_WHEEL
     right_m, spread_m = drift_m(crown_rad, lapse_s), drift_m(bumps_rad, lapse_s)
-    where = f"{right_m:.2g} m to the right" if right_m else "on average where it was"
+    where = f"{right_m:.2g} m to the right" if right_m else "on average not displaced"
     spread = f" (standard deviation {spread_m:.2g} m)" if spread_m else ""
     return (
-        f"At {DRIFT_SPEED_MPS * 3.6:.0f} km/h on a straight road a car of {WHEELBASE_M:g} m wheelbase is then, after "
+        f"At {DRIFT_SPEED_MPS * 3.6:.0f} km/h on a straight road, a car of {WHEELBASE_M:g} m wheelbase is then, after "
         f"{lapse_s:g} s, {where}{spread}."
     )
 
 
-def sees(portrait: PersonaProfile) -> Iterator[str]:
-    """Who is overlooked, and how often."""
-    overlooking = portrait.persona.human_factors.no_blind_spot_check
-    if overlooking.share == 0.0:
-        yield "Nobody is overlooked."
+def sees(profile: PersonaProfile) -> Iterator[str]:
+    """The vehicles that the person does not see without a blind-spot check, and how often."""
+    check = profile.persona.human_factors.no_blind_spot_check
+    if check.share == 0.0:
+        yield ALWAYS_CHECKS
         return
-    ahead_m = overlooking.ahead_m
-    who = f"is not at least {ahead_m:g} m ahead of" if ahead_m >= 0.0 else f"is more than {-ahead_m:g} m behind"
-    count = sum(each.overlooks for each in portrait.drives)
+    ahead_m = check.ahead_m
+    where = f"is not at least {ahead_m:g} m ahead of" if ahead_m >= 0.0 else f"is more than {-ahead_m:g} m behind"
+    count = sum(each.no_blind_spot_check for each in profile.drives)
     yield (
-        f"In {percent(overlooking.share)} of the drives, others whose centre {who} its own are not seen: in {count} of "
-        f"the {len(portrait.drives)} drawn here."
+        f"No blind-spot check in {percent(check.share)} of the drives "
+        f"({count} of the {len(profile.drives)} sample drives): "
+        f"a vehicle is not seen when its centre {where} the person's own."
     )
 
 
-def body(portrait: PersonaProfile) -> Iterator[str]:
-    """How far and how exactly the person sees, how late its decisions count, how much of the car it uses."""
-    human_factors = portrait.persona.human_factors
-    sight, missing = human_factors.sight, human_factors.looked_but_failed_to_see
-    if missing.share:
+def body(profile: PersonaProfile) -> Iterator[str]:
+    """How far and how exactly the person sees, its reaction time, and how much of the car it uses."""
+    human_factors = profile.persona.human_factors
+    sight, failed_to_see = human_factors.sight, human_factors.looked_but_failed_to_see
+    if failed_to_see.share:
         yield (
-            f"In {percent(missing.share)} of the drives it looks and fails to see: others are noticed within "
-            f"{missing.within_m:g} m only."
+            f"In {percent(failed_to_see.share)} of the drives the person looks but fails to see: a vehicle is noticed "
+            f"within {failed_to_see.within_m:g} m only."
         )
     if math.isfinite(sight.range_m):
-        yield f"Others more than {sight.range_m:g} m away are never seen."
+        yield f"Vehicles more than {sight.range_m:g} m away are never seen."
     if sight.distance_error:
         low, high = (math.exp(sign * sight.distance_error) for sign in (-1, 1))
-        yield f"Two thirds of the time, 10 m to another are taken for {10 * low:.3g} to {10 * high:.3g} m."
+        yield f"Two thirds of the time, a distance of 10 m is perceived as {10 * low:.3g} to {10 * high:.3g} m."
     if sight.closing_error_per_s:
-        off_mps = NEAR_M * sight.closing_error_per_s
-        yield f"At {NEAR_M:g} m, closing speeds are off by {off_mps:.2g} m/s (standard deviation)."
+        error_mps = NEAR_M * sight.closing_error_per_s
+        yield f"At {NEAR_M:g} m, the error of closing speeds is {error_mps:.2g} m/s (standard deviation)."
     if sight.distance_error or sight.closing_error_per_s:
-        yield f"What is misjudged stays so for {sight.error_s:g} s or so."
-    yield from _slowly(human_factors.reaction.delay_s, human_factors.attention is not None)
-    uses = human_factors.uses
+        yield f"An error of perception lasts for about {sight.error_s:g} s."
+    yield from _reaction(human_factors.reaction.delay_s, human_factors.attention is not None)
+    uses = human_factors.actuator_shares
     shares = {"acceleration": uses.throttle, "braking": uses.braking, "steering": uses.steering}
-    if used := [f"{percent(share)} of its {name}" for name, share in shares.items() if share < 1.0]:
-        yield f"Of what the car can do it uses {', '.join(used)}."
+    if used := [f"{percent(share)} of the {name}" for name, share in shares.items() if share < 1.0]:
+        yield f"The person uses {', '.join(used)} of the car."
     if human_factors.looked_but_failed_to_see.share or human_factors.no_blind_spot_check.share:
-        yield "While the person itself is trained, nobody is overlooked or missed; all else is as in driving."
+        yield UNIMPAIRED_IN_TRAINING
 
 
-def _slowly(delay_s: tuple[float, float], lapses: bool) -> Iterator[str]:
+def _reaction(delay_s: tuple[float, float], lapses: bool) -> Iterator[str]:
     shortest, longest = delay_s
     if longest == 0.0:
         return
     length = f"{shortest:g}" if shortest == longest else f"{shortest:g} to {longest:g}"
-    way_m = DRIFT_SPEED_MPS * longest
-    yield f"Decisions count {length} s later: at {DRIFT_SPEED_MPS * 3.6:.0f} km/h after up to {way_m:.2g} m."
+    distance_m = DRIFT_SPEED_MPS * longest
+    speed = f"{DRIFT_SPEED_MPS * 3.6:.0f} km/h"
+    yield f"A decision takes effect {length} s later: at {speed} after up to {distance_m:.2g} m."
     if lapses:
-        yield "After a lapse the car is let go for as long again."
+        yield AFTER_A_LAPSE
 
 
-def decides(portrait: PersonaProfile) -> str:
-    """How the person makes its policy's decisions."""
-    if portrait.persona.decisions == "sampled":
-        return "Varies: actions are drawn from what its policy holds likely, so no two drives are alike."
-    return "Always takes the action that its policy holds most likely."
+def decides(profile: PersonaProfile) -> str:
+    """How actions follow from the person's policy."""
+    if profile.persona.decisions == "sampled":
+        return SAMPLED
+    return MOST_LIKELY

@@ -1,4 +1,4 @@
-"""A persona's portrait in the terminal; it can be read without colour, and where it is not a terminal at all."""
+"""A persona's profile in the terminal. It is legible without colour, and as plain text in a file."""
 
 from __future__ import annotations
 
@@ -12,8 +12,21 @@ from rich.text import Text
 
 from harness.reports.persona.drives import DRIVE_S
 from harness.reports.persona.plotting import area, axis, curve, stretches, ticks
-from harness.reports.persona.profile import FORMULA, PersonaProfile, attends, body, decides, function_in_words, number, sees, wants
-from harness.reports.persona.worth import Drawn
+from harness.reports.persona.profile import (
+    ATTENDS,
+    DECIDES,
+    FORMULA,
+    WANTS,
+    PersonaProfile,
+    attends,
+    body,
+    decides,
+    function_in_words,
+    number,
+    sees,
+    wants,
+)
+from harness.reports.persona.worth import PayoffFunction
 
 ROWS, SET_ROWS = 10, 2
 _WIDEST = 100
@@ -24,78 +37,78 @@ _SPELLING = str.maketrans({
 })  # fmt: skip
 
 
-def show(portrait: PersonaProfile, console: Console) -> None:
-    """Draw it as wide as the console is."""
-    persona = portrait.persona
+def show(profile: PersonaProfile, console: Console) -> None:
+    """Print the profile in the width of the console."""
+    persona = profile.persona
     plain = console.options.ascii_only
     columns = max(min(console.width - _LABEL - 2, _WIDEST), 20)
 
-    def say(text: str, style: str = "") -> None:
-        console.print(Text(_spelt(text, plain), style), highlight=False)
+    def write(text: str, style: str = "") -> None:
+        console.print(Text(_spelled(text, plain), style), highlight=False)
 
-    say(persona.name, "bold")
-    say(persona.description)
+    write(persona.name, "bold")
+    write(persona.description)
     for source in persona.sources:
-        text = Text(_spelt(f"{source.statistic} [{source.citation}]", plain), "dim")
+        text = Text(_spelled(f"{source.statistic} [{source.citation}]", plain), "dim")
         console.print(Padding(text, (0, 0, 0, 2), expand=False), highlight=False)
-    say("")
-    say("What this person wants", "bold")
-    say(FORMULA)
-    console.print(_terms(portrait, plain))
-    for sentence in wants(portrait):
-        say(sentence)
-    for function in portrait.functions:
-        say("")
-        say(f"{function.name}: a function of {function.quantity}", "bold")
-        say(f"{function.meaning}{f', {function.unit}' if function.unit else ''}")
+    write("")
+    write(WANTS, "bold")
+    write(FORMULA)
+    console.print(_terms(profile, plain))
+    for sentence in wants(profile):
+        write(sentence)
+    for function in profile.functions:
+        write("")
+        write(f"{function.name}: a function of {function.quantity}", "bold")
+        write(f"{function.meaning}{f', {function.unit}' if function.unit else ''}")
         for line in _function(function, columns, plain):
             console.print(line, highlight=False, no_wrap=True, overflow="crop")
-        say(function_in_words(function))
-    say("")
-    say("How this person attends", "bold")
-    for sentence in (*attends(portrait), *sees(portrait), *body(portrait)):
-        say(sentence)
+        write(function_in_words(function))
+    write("")
+    write(ATTENDS, "bold")
+    for sentence in (*attends(profile), *sees(profile), *body(profile)):
+        write(sentence)
     if persona.human_factors.attention is not None:
-        for line in _drives(portrait, columns, plain):
+        for line in _drives(profile, columns, plain):
             console.print(line, highlight=False, no_wrap=True, overflow="crop")
-    say("")
-    say("How this person decides", "bold")
-    say(decides(portrait))
+    write("")
+    write(DECIDES, "bold")
+    write(decides(profile))
 
 
-def _terms(portrait: PersonaProfile, plain: bool) -> Table:
+def _terms(profile: PersonaProfile, plain: bool) -> Table:
     table = Table(show_edge=False, pad_edge=False, header_style="", show_lines=False)
     table.add_column("term", no_wrap=True)
-    table.add_column(_spelt("α × weight", plain), justify="right", no_wrap=True)
+    table.add_column(_spelled("α × weight", plain), justify="right", no_wrap=True)
     table.add_column("counted for")
-    table.add_column("worth")
+    table.add_column("payoff")
     rows = []
-    for each in portrait.terms:
+    for each in profile.terms:
         counted = f"{each.meaning}, {each.limit}" if each.limit else each.meaning
         worth = f"{number(each.worth)} {each.moment}"
         rows.append((each.name, each.alpha, each.weight, counted, worth))
-    for function in portrait.functions:
+    for function in profile.functions:
         worth = f"{number(function.worst[0])} to {number(function.best[0])} per second"
         counted = f"a function of {function.quantity}, below"
         rows.append((function.name, function.alpha, function.weight, counted, worth))
     for name, alpha, weight, counted, worth in rows:
-        table.add_row(*(Text(_spelt(text, plain)) for text in (name, f"{alpha:g} × {weight:g}", counted, worth)))
+        table.add_row(*(Text(_spelled(text, plain)) for text in (name, f"{alpha:g} × {weight:g}", counted, worth)))
     return table
 
 
-def _function(function: Drawn, columns: int, plain: bool) -> Iterator[Text]:
-    """Each set's membership, and below them what the quantity is worth."""
+def _function(function: PayoffFunction, columns: int, plain: bool) -> Iterator[Text]:
+    """The membership of each set, and below them the payoff over the quantity."""
     even = np.linspace(function.inputs[0], function.inputs[-1], len(function.inputs))
     for name, value, membership in function.sets:
         drawing = area(np.interp(even, function.inputs, membership), columns, SET_ROWS, plain)
         for label, line in zip(
-            (*[""] * (SET_ROWS - 1), _short(_spelt(f"{name} ({number(value)})", plain))), drawing, strict=True
+            (*[""] * (SET_ROWS - 1), _short(_spelled(f"{name} ({number(value)})", plain))), drawing, strict=True
         ):
             yield Text.assemble(f"{label:>{_LABEL}} ", (line, "cyan"))
     low, high = min(float(function.worth.min()), 0.0), max(float(function.worth.max()), 0.0)
     if low == high:
         low, high = -1.0, 1.0
-    labels = {0: number(high), ROWS - 1: _spelt(number(low), plain)}
+    labels = {0: number(high), ROWS - 1: _spelled(number(low), plain)}
     zero = round(high / (high - low) * (ROWS - 1))
     labels.setdefault(zero, "0")
     for row, line in enumerate(curve(function.inputs, function.worth, columns, ROWS, low, high, plain)):
@@ -107,20 +120,20 @@ def _function(function: Drawn, columns: int, plain: bool) -> Iterator[Text]:
     yield Text(f"{function.quantity:>{_LABEL}} {axis(places, columns)}")
 
 
-def _drives(portrait: PersonaProfile, columns: int, plain: bool) -> Iterator[Text]:
+def _drives(profile: PersonaProfile, columns: int, plain: bool) -> Iterator[Text]:
     """A line for each drive, and the axis of time."""
-    for k, drive in enumerate(portrait.drives, 1):
-        label = f"drive {k}" + (", overlooks" if drive.overlooks else "")
+    for k, drive in enumerate(profile.drives, 1):
+        label = f"drive {k}" + (", no check" if drive.no_blind_spot_check else "")
         yield Text.assemble(f"{label:<{_LABEL}} ", (stretches(drive.lapses, DRIVE_S, columns, plain), "yellow"))
     places = [(time / DRIVE_S, f"{time:g} s") for time in ticks(0.0, DRIVE_S)]
     yield Text(f"{'':<{_LABEL}} {axis(places, columns)}")
     filled, empty = "#." if plain else "█·"
-    yield Text(f"{'':<{_LABEL}} {filled} attention is elsewhere   {empty} on the road")
+    yield Text(f"{'':<{_LABEL}} {filled} lapse of attention   {empty} attentive")
 
 
 def _short(text: str) -> str:
     return text if len(text) <= _LABEL else text[: _LABEL - 2] + ".."
 
 
-def _spelt(text: str, plain: bool) -> str:
+def _spelled(text: str, plain: bool) -> str:
     return text.translate(_SPELLING) if plain else text

@@ -1,4 +1,4 @@
-"""What a persona's terms and functions are worth, reckoned by the very code that the game pays by."""
+"""The payoff of a persona's terms and functions in examples, computed by the code of the game itself."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from harness.config.persona import Persona
 from harness.config.json_schema import unit_of
+from harness.config.persona import Persona
 from harness.game.arrays import FloatArray
 from harness.game.payoff import FUZZY_QUANTITIES, TERMS, Payoff, Weighted
 from harness.game.state import Outcome
@@ -28,21 +28,21 @@ EXAMPLES: Mapping[str, tuple[str, str, float]] = {
     "lateral_acceleration": ("at 3 m/s²", "lateral_acceleration_mps2", 3.0),
     "time_pressure": ("always", "advanced_m", 0.0),
 }
-"""A moment for each term without a limit: in words, and the quantity that is then not as in a calm moment."""
+"""An example for each term without a limit: in words, with the quantity that is not as in a calm moment."""
 LIMITED: Mapping[str, str] = {
     "clearance": "clearance_m",
     "vehicle_clearance": "vehicle_clearance_m",
     "time_gap": "time_gap_s",
     "time_to_collision": "time_to_collision_s",
 }
-"""The quantity of each term with a limit: its moment is half of the limit."""
+"""The quantity of each term with a limit. In the example it is half of the limit."""
 POINTS = 401
-"""Where a function is looked at, besides the points of its sets."""
+"""How many evenly spaced inputs a function is evaluated at, besides the points of its sets."""
 
 
-@dataclass(frozen=True)
-class Counted:
-    """A term of a persona's payoff."""
+@dataclass(frozen=True, kw_only=True)
+class TermExample:
+    """A term of a persona's payoff, with its value in an example."""
 
     group: str
     name: str
@@ -50,23 +50,23 @@ class Counted:
     weight: float
     meaning: str
     limit: str
-    """E.g. "within 0.6 m"; empty: it has none."""
+    """E.g. "within 0.6 m"; empty without a limit."""
     moment: str
-    """A moment, in words, e.g. "per second at 0.3 m"."""
+    """The example in words, e.g. "per second at 0.3 m"."""
     worth: float
-    """What the payoff is in that moment: once, or in a second of it."""
+    """The payoff in this example: once, or in one second."""
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """A fuzzy term over its quantity."""
+@dataclass(frozen=True, kw_only=True)
+class PayoffFunction:
+    """A fuzzy term as a function of its quantity."""
 
     name: str
     quantity: str
     meaning: str
     unit: str
     inputs: FloatArray
-    """[N] the quantity, rising over the range of the sets' points and some more on both sides."""
+    """[N] the quantity, rising over the range of the sets' points and a margin on both sides."""
     sets: tuple[tuple[str, float, FloatArray], ...]
     """Name, value and memberships [N] of each set."""
     alpha: float
@@ -76,12 +76,12 @@ class Drawn:
 
     @property
     def best(self) -> tuple[float, float, float]:
-        """The greatest payoff per second, and the first stretch of the quantity (from, to) over which it is that."""
+        """The greatest payoff per second, and its first stretch of the quantity (from, to)."""
         return self._stretch(self.worth.max())
 
     @property
     def worst(self) -> tuple[float, float, float]:
-        """The least payoff per second, and the first stretch of the quantity (from, to) over which it is that."""
+        """The least payoff per second, and its first stretch of the quantity (from, to)."""
         return self._stretch(self.worth.min())
 
     def _stretch(self, value: float) -> tuple[float, float, float]:
@@ -92,8 +92,8 @@ class Drawn:
         return float(value), float(edge[0]), float(edge[1])
 
 
-def counted(persona: Persona) -> list[Counted]:
-    """Every named term of a persona's payoff, as the document orders them."""
+def term_examples(persona: Persona) -> list[TermExample]:
+    """Every named term of a persona's payoff, in the order of the document."""
     payoff = persona.payoff
     found = []
     for each in payoff.terms:
@@ -109,11 +109,22 @@ def counted(persona: Persona) -> list[Counted]:
         if term.per_second and moment:
             moment = f"per second {moment}"
         alpha = payoff.alpha[term.group]
-        found.append(Counted(term.group, each.name, alpha, each.weight, term.meaning, limit, moment, worth))
+        found.append(
+            TermExample(
+                group=term.group,
+                name=each.name,
+                alpha=alpha,
+                weight=each.weight,
+                meaning=term.meaning,
+                limit=limit,
+                moment=moment,
+                worth=worth,
+            )
+        )
     return found
 
 
-def drawn(persona: Persona) -> list[Drawn]:
+def payoff_functions(persona: Persona) -> list[PayoffFunction]:
     """Every fuzzy term of a persona's payoff."""
     found = []
     alpha = persona.payoff.alpha["human"]
@@ -128,16 +139,16 @@ def drawn(persona: Persona) -> list[Drawn]:
             (each.name, each.value, np.interp(inputs, each.inputs, each.memberships)) for each in function.sets
         )
         found.append(
-            Drawn(
-                name,
-                function.quantity,
-                FUZZY_QUANTITIES[function.quantity],
-                unit_of(function.quantity),
-                inputs,
-                sets,
-                alpha,
-                weight,
-                alpha * weight * function(inputs),
+            PayoffFunction(
+                name=name,
+                quantity=function.quantity,
+                meaning=FUZZY_QUANTITIES[function.quantity],
+                unit=unit_of(function.quantity),
+                inputs=inputs,
+                sets=sets,
+                alpha=alpha,
+                weight=weight,
+                worth=alpha * weight * function(inputs),
             )
         )
     return found
@@ -147,7 +158,7 @@ _BELOW_ZERO = ("speed_over_limit", "goal_m")  # quantities that can be negative
 
 
 def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]) -> float:
-    """The payoff of one term alone, in one step of one second of a moment that is calm but for these quantities."""
+    """The payoff of one term in a step of one second. All quantities but these are those of a calm moment."""
 
     def array(name: str, calm: float) -> FloatArray:
         return np.array([[quantities.get(name, calm)]])
@@ -169,4 +180,4 @@ def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]
         lateral_acceleration_mps2=array("lateral_acceleration_mps2", 0.0),
         **far,
     )
-    return float(Payoff(payoff.alpha, (term,), {}).evaluate(moment, 0)[term.name][0])
+    return float(Payoff(alpha=payoff.alpha, terms=(term,), fuzzy={}).evaluate(moment, 0)[term.name][0])

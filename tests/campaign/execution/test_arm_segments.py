@@ -155,7 +155,8 @@ texts = {"player": "ego", "vehicle_type": "car", "outcome": ""}
 def game(episode):
     columns = {name: [texts.get(name, 0.5)] * 2000 for name in SCHEMA.names}
     columns |= {"episode": [episode] * 2000, "step": list(range(2000)), "lapsed": [False] * 2000}
-    return Game({"episode": episode, "ego_outcome": "goal", "ego_failed": 0, "error": ""}, columns)
+    record = {"episode": episode, "ego_outcome": "goal", "ego_failed": 0, "error": ""}
+    return Game(record=record, trace=columns)
 segments.assess = lambda arm, episodes, begin, abandoned: (game(each) for each in episodes)
 segments.name_manoeuvres = lambda table, traces, scene: segments.pd.DataFrame(columns=list(MANOEUVRE_COLUMNS))
 from harness.evaluation.tables import MANOEUVRE_COLUMNS

@@ -1,4 +1,4 @@
-"""Model cards: a README.md beside each policy, from the run's own data and nothing else."""
+"""Model cards: a README.md beside each policy, from the run's own data only."""
 
 from __future__ import annotations
 
@@ -54,7 +54,13 @@ POLICY: dict[str, Any] = {
     "began_from": None,
     "training": {"steps": 3_000_000, "early_convergence": True, "learning_rate": 1e-4, "network": [64, 64]},
 }
-PERSON = {**POLICY, "stage": "distracted-seed1", "player": "non_ego", "persona": "distracted", "against": "naive-seed1"}
+NON_EGO_POLICY = {
+    **POLICY,
+    "stage": "distracted-seed1",
+    "player": "non_ego",
+    "persona": "distracted",
+    "against": "naive-seed1",
+}
 SUMMARY = typed(
     pd.DataFrame(
         [
@@ -79,16 +85,16 @@ def lines(card: str) -> list[str]:
 def test_card__of_the_naive_ego() -> None:
     card = lines(model_card("naive-seed1", MANIFEST, SUMMARY, POLICY))
     assert card[0] == "# naive-seed1"
-    assert card[2] == "The naive ego: it learned alone on the road."
+    assert card[2] == "The naive ego: it was trained alone on the road."
     for row in (
         "| player | ego |",
         "| persona | `careful` |",
         "| scene | `merge` |",
-        "| against | nobody |",
-        "| began from | nothing |",
+        "| against | no other player |",
+        "| initial policy | none |",
         "| trained for | 1,703,936 of at most 3,000,000 steps: stopped by convergence |",
         "| convergence | stop when settled |",
-        "| safety | `collision` | 10 | as it happens | touching a vehicle or person, once |",
+        "| safety | `collision` | 10 | per event | touching a vehicle or person, once |",
         "| safety | `clearance` | 2 | per second | nearness to the nearest surface, rail or vehicle, within 0.6 m |",
         "| learning_rate | 0.0001 |",
         "| network | 64, 64 |",
@@ -111,66 +117,67 @@ def test_card__figures_are_those_of_its_own_arms_and_seed() -> None:
     ]
 
 
-def test_card__of_a_person() -> None:
-    card = lines(model_card("distracted-seed1", MANIFEST, SUMMARY, PERSON))
+def test_card__of_a_non_ego() -> None:
+    card = lines(model_card("distracted-seed1", MANIFEST, SUMMARY, NON_EGO_POLICY))
     for row in (
         "| player | non_ego |",
         "| against | `naive-seed1` |",
-        "| games without the other | 70 % |",
+        "| games without the other player | 70 % |",
         "| attention | lapses for 4–6 s after 4 s on average |",
         "| no lapses in | the first 50 % of the budget |",
         "| arm | games | reaches its goal | mean speed (m/s) |",
         "| `naive_vs_distracted` | 99 | 75 % (65.3–83.1 %) | 11.56 |",
-        'policies = "policies"    # the path of the folder that holds this one',
+        'policies = "policies"    # the path of the parent of this folder',
     ):
         assert row in card, row
     assert any(line.startswith("1. ") and "5 seconds" in line for line in card)
 
 
-def test_card__of_a_persona_with_fuzzy_terms_and_mirrors_not_looked_into() -> None:
+def test_card__of_a_persona_with_fuzzy_terms_and_no_blind_spot_check() -> None:
     manifest = {**MANIFEST, "persona_documents": {"distracted": persona("speedy")}}
-    card = lines(model_card("distracted-seed1", manifest, SUMMARY, {**PERSON, "persona": "speedy"}))
+    card = lines(model_card("distracted-seed1", manifest, SUMMARY, {**NON_EGO_POLICY, "persona": "speedy"}))
     (row,) = [line for line in card if "`speeding`" in line]
-    assert "fuzzy, of `speed_over_limit`: within (0: 1, 0.15: 0) is worth 0; over" in row
-    assert "| decisions | sampled from its distribution |" in card
-    assert any(line.startswith("| overlooks | in 85 % of drives") for line in card)
+    assert "fuzzy, of `speed_over_limit`: within (0: 1, 0.15: 0) has the value 0; over" in row
+    assert "| decisions | sampled from the distribution |" in card
+    assert any(line.startswith("| no blind-spot check | in 85 % of drives") for line in card)
 
 
-def test_card__of_a_persona_with_a_body() -> None:
+def test_card__of_a_persona_with_human_factors() -> None:
     document = {
         **persona("careful"),
         "reaction": {"delay_s": [0.2, 0.4]},
         "actuators": {"throttle_share": 0.5},
         "perception": {
-            "misses_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0, "distance_error": 0.1, "error_s": 10.0,
+            "looked_but_failed_to_see_share": 0.3, "noticed_within_m": 8.0, "range_m": 60.0,
+            "distance_error": 0.1, "error_correlation_time_s": 10.0,
         },
     }  # fmt: skip
     manifest = {**MANIFEST, "persona_documents": {"distracted": document}}
-    card = lines(model_card("distracted-seed1", manifest, SUMMARY, PERSON))
+    card = lines(model_card("distracted-seed1", manifest, SUMMARY, NON_EGO_POLICY))
     for row in (
-        "| misses | in 30 % of drives, others that are more than 8 m away |",
-        "| sees | others up to 60 m away |",
-        "| misjudges | distances by 10 %, closing speeds by 0 of the distance a second, for 10 s |",
-        "| reaction | decisions count 0.2–0.4 s later |",
-        "| uses of the car | 50 % of its acceleration, 100 % of its braking, 100 % of its steering |",
+        "| looked but failed to see | in 30 % of drives: vehicles more than 8 m away |",
+        "| range of sight | 60 m |",
+        "| errors of perception | distances by 10 %, closing speeds by 0 of the distance per second, for 10 s |",
+        "| reaction | decisions take effect 0.2–0.4 s later |",
+        "| use of the car | 50 % of the acceleration, 100 % of the braking, 100 % of the steering |",
     ):
         assert row in card, row
-    assert not any(line.startswith("| overlooks |") for line in card)
+    assert not any(line.startswith("| no blind-spot check |") for line in card)
 
 
 def test_card__of_the_retrained_ego() -> None:
     policy = {**POLICY, "against": "distracted-seed1", "began_from": "naive-seed1"}
     card = lines(model_card("retrained_distracted-seed1", MANIFEST, SUMMARY, policy))
     for row in (
-        "The ego, retrained against the person `distracted`.",
-        "| began from | `naive-seed1` |",
-        "| games without the other | 25 % |",
-        "None yet: no arm with it has been assessed.",
+        "The ego, retrained against the persona `distracted`.",
+        "| initial policy | `naive-seed1` |",
+        "| games without the other player | 25 % |",
+        "None yet: no arm with this policy has been assessed.",
     ):
         assert row in card, row
 
 
-def test_card__says_that_a_quick_run_is_one_and_tells_no_timings() -> None:
+def test_card__marks_a_quick_run_and_has_no_timings() -> None:
     card = model_card("naive-seed1", {**MANIFEST, "quick": True}, SUMMARY, POLICY)
     assert "not for conclusions" in card
     assert "not for conclusions" not in model_card("naive-seed1", MANIFEST, SUMMARY, POLICY)
@@ -193,15 +200,15 @@ def test_run__has_a_card_beside_each_policy_with_the_figures_of_its_summary(run:
         assert card.startswith(f"# {policy.name}\n")
         stage = policy.name.removesuffix("-seed1")
         arms = {arm for arm in summary["arm"] if f"`{arm}` |" in card}
-        whose = {"naive": "naive_"}.get(stage, stage.removeprefix("retrained_"))
+        player = {"naive": "naive_"}.get(stage, stage.removeprefix("retrained_"))
         if stage.startswith("retrained_"):
-            assert arms == {f"retrained_vs_{whose}", f"retrained_alone_{whose}"}
+            assert arms == {f"retrained_vs_{player}", f"retrained_alone_{player}"}
         else:
-            assert arms == {arm for arm in summary["arm"] if whose in arm and not arm.startswith("retrained_alone")}
+            assert arms == {arm for arm in summary["arm"] if player in arm and not arm.startswith("retrained_alone")}
 
 
 @pytest.mark.slow
-def test_run__cards_are_written_anew_by_report_to_the_byte(tmp_path: Path) -> None:
+def test_run__report_rewrites_the_cards_with_the_same_bytes(tmp_path: Path) -> None:
     run = shutil.copytree(learned_run(), tmp_path / "run")
     cards = {file: file.read_bytes() for file in run.glob("policies/*/README.md")}
     assert len(cards) == 3
@@ -212,7 +219,7 @@ def test_run__cards_are_written_anew_by_report_to_the_byte(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_run__of_before_there_were_cards_gets_none(tmp_path: Path) -> None:
+def test_run__of_an_older_version_without_cards_gets_none(tmp_path: Path) -> None:
     folder = RunFolder(shutil.copytree(learned_run(), tmp_path / "run"))
     manifest = folder.manifest()
     for name in ("ego_persona", "persona_documents"):
@@ -223,10 +230,10 @@ def test_run__of_before_there_were_cards_gets_none(tmp_path: Path) -> None:
     assert not list(folder.path.glob("policies/*/README.md"))
 
 
-def test_card__a_persons_words_are_one_line_of_text() -> None:
-    words = "In a hurry.\n## Figures\n| failure rate | 0 % |\n<script>alert(1)</script>"
-    documents = {"distracted": {**persona("distracted"), "description": words}}
-    card = lines(model_card("distracted-seed1", {**MANIFEST, "persona_documents": documents}, SUMMARY, PERSON))
-    (told,) = [line for line in card if "In a hurry." in line]
-    assert told.endswith("In a hurry. ## Figures \\| failure rate \\| 0 % \\| &lt;script>alert(1)&lt;/script>")
+def test_card__a_description_is_one_line_of_text() -> None:
+    description = "In a hurry.\n## Figures\n| failure rate | 0 % |\n<script>alert(1)</script>"
+    documents = {"distracted": {**persona("distracted"), "description": description}}
+    card = lines(model_card("distracted-seed1", {**MANIFEST, "persona_documents": documents}, SUMMARY, NON_EGO_POLICY))
+    (line,) = [line for line in card if "In a hurry." in line]
+    assert line.endswith("In a hurry. ## Figures \\| failure rate \\| 0 % \\| &lt;script>alert(1)&lt;/script>")
     assert [line for line in card if line.startswith("## Figures")] == ["## Figures"]

@@ -5,9 +5,13 @@ import pandas as pd
 import pytest
 
 from harness.campaign.results.recorded_games import TAKE_TURNS, recorded_game, scene_drawing, watching_order
+from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
 from harness.traffic.drawing import lane_marks
 from harness.traffic.network import read_net
 from harness.traffic.scene import open_scene
+
+NAIVE, RETRAINED, RECONFIGURED = NaiveEgo(), RetrainedEgo(against="speedy"), ReconfiguredEgo(against="speedy")
+ARMS = {arm.name: arm for arm in (against_persona(ego, "speedy") for ego in (NAIVE, RETRAINED, RECONFIGURED))}
 
 
 def episodes(*rows):
@@ -19,7 +23,7 @@ def episodes(*rows):
 
 
 def in_order(table):
-    return [(row.arm, row.episode) for row in watching_order(table).itertuples()]
+    return [(row.arm, row.episode) for row in watching_order(table, ARMS).itertuples()]
 
 
 @pytest.mark.parametrize("made", ["retrained", "reconfigured"])
@@ -45,14 +49,14 @@ def test_order__arms_take_turns_so_that_each_is_on_a_page_that_not_all_fit_on():
     ]
 
 
-def test_order__what_was_not_played_is_not_in_it():
+def test_order__has_played_games_only():
     table = episodes(("naive_alone", 0, "goal"), ("naive_alone", 1, "error"))
     table.loc[1, "error"] = "it died"
     assert in_order(table) == [("naive_alone", 0)]
 
 
 def trace(**players):
-    """A trace of road users that go straight on at 10 m/s, each given as the steps it is there in and its y (m)."""
+    """A trace of road users that drive straight at 10 m/s, each with the steps of its presence and its y (m)."""
     rows = []
     for name, (steps, y_m, outcomes) in players.items():
         for step in steps:
@@ -83,9 +87,9 @@ def test_game__is_its_trace(merge, row):
     assert touch.y_m == pytest.approx(0.0, abs=0.01)
 
 
-def test_game__another_road_user_that_comes_and_goes_is_in_pieces(merge, row):
+def test_game__a_background_vehicle_that_is_absent_for_a_while_is_in_pieces(merge, row):
     game = recorded_game(trace(ego=(range(6), -1.6, {}), van=([1, 2, 4, 5], -4.8, {})), merge, row)
-    assert [(each.name, each.first_step, len(each.x_m)) for each in game.others] == [("van", 1, 2), ("van", 4, 2)]
+    assert [(each.name, each.first_step, len(each.x_m)) for each in game.background] == [("van", 1, 2), ("van", 4, 2)]
 
 
 def test_drawing__of_the_merge(merge):

@@ -1,4 +1,4 @@
-"""Finding a game of a real run folder: the list with its manoeuvres, the folder to be shown, the film."""
+"""A game of a real run folder: the list with its manoeuvres, the replay folder, the film."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ def test_list__has_the_manoeuvre_pair_of_each_game(run: Path) -> None:
     assert line.split()[:3] == ["naive_vs_speedy", "1", "2"]
 
 
-def test_list__of_a_run_without_named_manoeuvres_says_how_to_name_them(run: Path) -> None:
+def test_list__without_manoeuvres_names_the_command_for_them(run: Path) -> None:
     (run / "manoeuvres.csv").unlink()
     assert "name the manoeuvres: harness report" in " ".join(printed(run).split())
 
 
-def test_report__names_what_an_older_run_has_not(run: Path) -> None:
+def test_report__adds_manoeuvres_to_an_older_run(run: Path) -> None:
     before = (run / "manoeuvres.csv").read_bytes()
     for file in [run / "manoeuvres.csv", *(run / ".stages").glob("*/manoeuvres.csv")]:
         file.unlink()
@@ -70,12 +70,12 @@ def test_report__names_what_an_older_run_has_not(run: Path) -> None:
     assert (run / "manoeuvres.csv").read_bytes() == before
 
 
-def test_game__is_made_of_its_trace_and_not_of_what_lies_under_replays(run: Path) -> None:
+def test_game__is_made_from_its_trace_and_not_from_the_folder_replays(run: Path) -> None:
     name = replay_name("naive_alone", 1, 3)
     with found_game(run, "naive_alone", 3, None) as game:
         before = {file.name: file.read_bytes() for file in game.replay.iterdir()}
     (run / "replays" / name).mkdir(exist_ok=True)
-    # a configuration can have SUMO write anywhere: whoever sent the folder may have put one there
+    # a configuration can make SUMO write anywhere, and the folder may come from another machine
     (run / "replays" / name / "scene.sumocfg").write_text("<configuration><log value='/tmp/mine'/></configuration>")
     with found_game(run, "naive_alone", 3, 1) as game:
         assert {file.name: file.read_bytes() for file in game.replay.iterdir()} == before
@@ -120,8 +120,8 @@ def test_film__of_a_game_without_a_replay_folder(run: Path, tmp_path: Path) -> N
         (["naive_alone", "0", "--film", "film.avi"], "neither .gif nor .mp4"),
     ],
 )
-def test_command__a_film_that_can_not_be(arguments: list[str], words: str, tmp_path: Path) -> None:
-    said = tiny.harness("replay", tiny.learned_run(), *arguments, cwd=tmp_path)
-    assert said.returncode == 2
-    assert words in said.stderr
+def test_command__refuses_an_impossible_film(arguments: list[str], words: str, tmp_path: Path) -> None:
+    result = tiny.harness("replay", tiny.learned_run(), *arguments, cwd=tmp_path)
+    assert result.returncode == 2
+    assert words in result.stderr
     assert list(tmp_path.iterdir()) == []

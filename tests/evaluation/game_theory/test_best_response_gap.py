@@ -36,7 +36,7 @@ def test_gap__agrees_with_the_arithmetic_on_paper():
     assert row["failure_difference"] == -0.25
 
 
-def test_gap__of_the_non_ego_is_of_its_own_payoff_and_says_what_it_does_to_the_ego():
+def test_gap__of_the_non_ego_has_its_own_payoff_and_the_egos_failures():
     games = 40
     pair = arm("pair", ego_failed=[1] + [0] * (games - 1), non_ego_payoff=np.linspace(9, 11, games))
     best = arm("best_non_ego", ego_failed=[1] * 10 + [0] * (games - 10), non_ego_payoff=np.linspace(9, 11, games) * 1.3)
@@ -78,7 +78,7 @@ def test_gap__is_a_share_of_the_payoffs_size_also_where_the_payoff_is_negative_o
         ([2.0], GapVerdict.NOT_ENOUGH_PAIRS),
     ],
 )
-def test_verdict__of_what_the_best_response_earned_more(better_by, verdict):
+def test_verdict__of_each_gain(better_by, verdict):
     count = len(better_by)
     payoffs = np.arange(1.0, count + 1)
     pair = arm("pair", ego_failed=[0] * count, ego_payoff=payoffs)
@@ -126,7 +126,7 @@ def test_pairs__are_of_the_responses_own_seed():
     assert one(EGO, *pair, best)["pairs"] == 0
 
 
-def test_gaps__refuse_a_significance_that_is_none_and_an_episode_twice():
+def test_gaps__refuse_a_wrong_significance_and_a_repeated_episode():
     with pytest.raises(ValueError, match="significance"):
         gaps([], table(arm("pair", ego_failed=[0])), 1.0)
     twice = [arm("pair", ego_failed=[0]), arm("pair", ego_failed=[0]), arm("best_ego", ego_failed=[0])]
@@ -152,17 +152,17 @@ def stopping(ego_gain, non_ego_gain, games=30):
     return gaps([EGO, NON_EGO], table(pair, best_ego, best_non_ego), 0.01)
 
 
-def test_nothing_to_gain__where_neither_gap_can_be_told_from_0():
+def test_nothing_to_gain__if_neither_gap_is_distinguishable_from_0():
     assert nothing_to_gain(stopping(0, 0))
     assert nothing_to_gain(stopping(-2, 0))
 
 
-def test_nothing_to_gain__not_where_either_can_be():
+def test_nothing_to_gain__not_if_one_gap_is():
     assert not nothing_to_gain(stopping(2, 0))
     assert not nothing_to_gain(stopping(0, 2))
 
 
-def test_nothing_to_gain__not_where_a_side_was_not_searched_or_not_measured():
+def test_nothing_to_gain__not_without_a_response_or_a_measurement_of_each_side():
     both = stopping(0, 0)
     assert not nothing_to_gain(both[both["role"] == "ego"])
     assert not nothing_to_gain(both[:0])

@@ -36,7 +36,7 @@ def test_crossplay__a_cell_is_the_rates_and_means_of_its_arm():
     assert math.isnan(row["non_ego_payoff_low"])  # all payoffs alike: nothing to judge an interval by
 
 
-def test_crossplay__what_is_not_measured_is_empty_and_what_was_not_played_is_counted():
+def test_crossplay__unmeasured_values_are_empty_and_unplayed_games_are_counted():
     other = arm("naive_vs_sumo", ego_failed=[0] * 5, non_ego_payoff=[math.nan] * 5)
     naive, sumo = rows([NAIVE, SUMO], arm("naive_vs_speedy", ego_failed=[1, None, 0]), other)
     assert (naive["games"], naive["left_out"], naive["failure_rate"]) == (2, 3, 0.5)
@@ -48,7 +48,7 @@ def test_crossplay__what_is_not_measured_is_empty_and_what_was_not_played_is_cou
 
 
 def test_crossplay__a_pairing_or_an_episode_twice_is_refused():
-    with pytest.raises(ValueError, match="stands twice"):
+    with pytest.raises(ValueError, match="are paired twice"):
         rows([NAIVE, NAIVE], arm("naive_vs_speedy", ego_failed=[0]))
     with pytest.raises(ValueError, match="more than once"):
         rows([NAIVE], arm("naive_vs_speedy", ego_failed=[0]), arm("naive_vs_speedy", ego_failed=[0]))

@@ -32,16 +32,16 @@ def test_dominated__equal_somewhere_is_not_strictly_better():
     assert dominated(np.array([[1.0, 2], [1, 3], [0, 2]]), NAMES) == ["", "", "retrained"]
 
 
-def test_dominated__failures_are_asked_with_a_minus():
+def test_dominated__failures_have_a_minus_sign():
     assert dominated(-np.array([[0.25, 0.2], [0.1, 0.05], [0.0, 0.5]]), NAMES) == ["retrained", "", ""]
 
 
 @pytest.mark.parametrize("table", [np.full((3, 2), 5.0), np.array([[1.0, 2.0]])])
-def test_dominated__in_a_constant_game_and_by_itself_nobody_is(table):
+def test_dominated__no_strategy_of_a_constant_game(table):
     assert dominated(table, NAMES[: len(table)]) == [""] * len(table)
 
 
-def test_dominated__needs_a_whole_table():
+def test_dominated__needs_a_complete_table():
     with pytest.raises(ValueError, match="finite"):
         dominated(np.array([[1.0, np.nan]]), NAMES)
 
@@ -58,7 +58,7 @@ def test_dominated__what_dominates_is_better_everywhere(table):
             assert (table[names.index(by)] > table[strategy]).all()
 
 
-def test_safest_mixture__evens_out_the_worst_cases():
+def test_safest_mixture__equalises_the_worst_cases():
     # against (speedy, distracted): a fails in 0.4, 0; b in 0, 0.2. x 0.4 = (1 - x) 0.2 at x = 1/3: worst 2/15
     shares = safest_mixture(np.array([[0.4, 0.0], [0.0, 0.2]]))
     assert shares == pytest.approx([1 / 3, 2 / 3], abs=1e-6)
@@ -73,12 +73,12 @@ def test_safest_mixture__of_equal_worst_cases_the_lower_mean_is_taken():
     assert safest_mixture(np.array([[0.3, 0.3], [0.3, 0.1], [0.3, 0.2]])).tolist() == [0, 1, 0]
 
 
-def test_safest_mixture__nobody_fails_nothing_to_mix():
+def test_safest_mixture__without_failures_is_a_single_ego():
     assert safest_mixture(np.zeros((3, 2))).tolist() == [1, 0, 0]
 
 
 @pytest.mark.parametrize("table", [np.array([[np.nan, 0.1]]), np.array([[1.2]]), np.zeros((0, 2))])
-def test_safest_mixture__a_rate_that_is_missing_is_no_rate(table):
+def test_safest_mixture__refuses_a_missing_rate(table):
     with pytest.raises(ValueError, match="rates from 0 to 1"):
         safest_mixture(table)
 

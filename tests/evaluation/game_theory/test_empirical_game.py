@@ -84,14 +84,14 @@ def test_dominated__egos_are_named_in_failures_and_payoffs_against_all_and_again
     assert (naive["dominated_in_payoff"], naive["dominated_in_failures"]) == ("", "robust")
 
 
-def test_left_out__a_strategy_with_an_empty_cell_is_no_part_of_the_game_and_is_said_to_be():
+def test_left_out__a_strategy_with_an_empty_cell_has_a_row_of_its_own():
     cells = [("adas", "speedy", "speedy", 0.9, -5, 9), *PENNIES]
     found = equilibria(played(cells))
     assert [row["player"] for row in rows(found, game="speedy", solution=LEFT_OUT)] == ["adas"]
     assert [row["share"] for row in rows(found, solution=NASH)] == pytest.approx([0.5] * 4)
-    # a non-ego whom nobody met leaves out itself, not the egos
-    nobody = [(ego, "speedy_round3", "speedy", math.nan, math.nan, math.nan) for ego in ("naive", "retrained")]
-    found = equilibria(played([*PENNIES, *nobody]))
+    # a non-ego without any measured cell is left out itself, not the egos
+    unmeasured = [(ego, "speedy_round3", "speedy", math.nan, math.nan, math.nan) for ego in ("naive", "retrained")]
+    found = equilibria(played([*PENNIES, *unmeasured]))
     assert [row["player"] for row in rows(found, game="speedy", solution=LEFT_OUT)] == ["speedy_round3"]
     assert [row["share"] for row in rows(found, solution=NASH)] == pytest.approx([0.5] * 4)
 
@@ -103,8 +103,8 @@ def test_left_out__when_every_ego_lacks_a_cell_there_is_no_game():
     assert found["share"].isna().all()
 
 
-def test_none_verified__is_said_and_no_number_is_given(monkeypatch):
-    monkeypatch.setattr(module, "solve", lambda *game: Solution((), True))
+def test_none_verified__has_rows_without_numbers(monkeypatch):
+    monkeypatch.setattr(module, "solve", lambda *game: Solution(equilibria=(), all_supports=True))
     found = rows(equilibria(played(PENNIES)), game="speedy")
     assert [row["solution"] for row in found] == [SolutionKind.NOT_VERIFIED.value] * 4
     for row in found:
@@ -112,7 +112,7 @@ def test_none_verified__is_said_and_no_number_is_given(monkeypatch):
         assert all(math.isnan(row[name]) for name in ("share", "payoff", "solution_payoff", "regret", "failure_rate"))
 
 
-def test_seeds__are_games_of_their_own():
+def test_seeds__are_separate_games():
     found = equilibria(pd.concat([played(PENNIES, seed=1), played(PENNIES[:1], seed=2)]))
     assert [row["share"] for row in rows(found, seed=2, solution=NASH)] == [1, 1]
     assert len(rows(found, seed=1, solution=NASH)) == 4

@@ -9,7 +9,7 @@ from harness.evaluation.game_theory.findings import find
 from harness.evaluation.game_theory.generalisation import generalisation
 from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
-from tests.support.game_tables import MET, a_campaign, arm, findings, table
+from tests.support.game_tables import TRAINED_AGAINST, a_campaign, arm, findings, table
 
 NAIVE = Pairing("naive_vs_distracted", 1, "naive", "distracted", "distracted")
 RETRAINED = Pairing("retrained_vs_distracted", 1, "retrained_speedy", "distracted", "distracted")
@@ -39,7 +39,7 @@ def test_generalisation__agrees_with_the_arithmetic_on_paper():
     assert row["verdict"] == Verdict.NOT_SIGNIFICANT.value
 
 
-def test_generalisation__is_asked_of_personas_an_ego_did_not_meet_and_of_no_others():
+def test_generalisation__has_only_personas_an_ego_was_not_trained_against():
     found = findings(games=20).generalisation
     assert [tuple(row) for row in found[["ego", "met", "non_ego"]].to_numpy()] == [
         ("retrained_speedy", "speedy", "distracted"),
@@ -48,7 +48,7 @@ def test_generalisation__is_asked_of_personas_an_ego_did_not_meet_and_of_no_othe
     ]
 
 
-def test_generalisation__without_the_naive_ego_or_its_games_there_is_no_base_line_and_no_number():
+def test_generalisation__without_the_naive_egos_games_has_no_numbers():
     played = table(arm("retrained_vs_distracted", ego_failed=[0, 1]))
     for pairings in ([RETRAINED], [NAIVE, RETRAINED]):
         (row,) = generalisation({"retrained_speedy": ("speedy",)}, pairings, played, 0.01).to_dict("records")
@@ -64,7 +64,7 @@ def test_generalisation__a_naive_ego_that_never_fails_has_no_share():
     assert row["fewer_failures"] == -0.5
 
 
-def test_generalisation__an_ego_that_met_them_all_has_no_row():
+def test_generalisation__an_ego_trained_against_all_has_no_row():
     found = generalisation({"retrained_speedy": ("speedy",)}, [ITS_OWN], table(arm("x", ego_failed=[0])), 0.01)
     assert list(found.columns) == list(TABLES["generalisation"])
     assert not len(found)
@@ -79,13 +79,13 @@ def test_generalisation__is_written_and_read_as_a_table_of_the_run(tmp_path):
 # --- all four tables at once ---
 
 
-def test_find__nothing_where_nothing_was_asked():
+def test_find__returns_none_without_pairings_and_responses():
     episodes, _, _ = a_campaign(games=4)
     assert find([], [], {}, episodes, 0.01) is None
 
 
 def test_find__gives_every_table():
     episodes, pairings, responses = a_campaign(seeds=(1, 2), games=20)
-    found = find(pairings, responses, MET, episodes, 0.01)
+    found = find(pairings, responses, TRAINED_AGAINST, episodes, 0.01)
     assert (len(found.gaps), len(found.crossplay), len(found.generalisation)) == (8, 32, 6)
     assert set(found.equilibria["game"]) == {"speedy", "distracted", "all"}

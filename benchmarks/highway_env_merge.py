@@ -1,4 +1,4 @@
-"""The arena against highway-env, the driving environment that most papers of this field start from."""
+"""The arena against highway-env, the driving environment that most papers of this field use."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from gymnasium.envs.registration import load_env_creator
 
 from benchmarks.arena import arena_side
 from benchmarks.budget import Budget
+from benchmarks.figures import Measured
 from benchmarks.games import GAMES
-from benchmarks.sides import Pace, Side, Tell, best, described, take_turns
+from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers, take_turns
 
 _WARM_UP_STEPS = 50
 _ACTIONS_KEPT = 509
-_IDLE = 1  # of its discrete actions: no lane change
+_IDLE = 1  # the discrete action that changes no lane
 
 
 def newest_merge() -> str:
@@ -26,12 +27,12 @@ def newest_merge() -> str:
     return max(names, key=lambda name: int(name.rpartition("v")[2]))
 
 
-def highway_env_side(pace: Pace) -> None:
-    """Steps of its merge, of its own defaults but for the harness's 10 Hz and pedals and wheel as actions."""
+def highway_env_side(timer: LapTimer) -> None:
+    """Steps of its merge with its own defaults, except for the harness's 10 Hz and continuous actions."""
     config = {"policy_frequency": 10, "simulation_frequency": 10, "action": {"type": "ContinuousAction"}}
     name = newest_merge()
     merge: Any = load_env_creator(str(gymnasium.spec(name).entry_point))
-    # The reward of this scene understands discrete actions alone (1.12): it gets the one of no lane change.
+    # The reward of this scene accepts only discrete actions (1.12): it gets the one that changes no lane.
     rewards = merge._rewards
     merge._rewards = lambda self, action: rewards(self, _IDLE)
     environment = gymnasium.make(name, config=config, disable_env_checker=True)
@@ -50,24 +51,24 @@ def highway_env_side(pace: Pace) -> None:
 
     for _ in range(_WARM_UP_STEPS):
         step()
-    pace.begin()
+    timer.ready()
     while True:
         before = steps
-        while not pace.due():
+        while not timer.lap_is_over():
             step()
-        pace.lap(steps - before, vehicles=len(game.road.vehicles))
+        timer.finish_lap(steps - before, vehicles=len(game.road.vehicles))
 
 
-def vs_highway_env(budget: Budget, tell: Tell) -> tuple[dict[str, float], dict[str, Any]]:
-    """How many times as many game-steps one process plays on the arena."""
+def vs_highway_env(budget: Budget, on_progress: OnProgress) -> Measured:
+    """Game-steps per second of one process on the arena, in multiples of those on highway-env."""
     if importlib.util.find_spec("highway_env") is None:
         return {}, {"not_measured": "highway-env is not installed: pip install -e '.[bench]'"}
-    sides = {"arena": Side(arena_side, (GAMES,)), "highway_env": Side(highway_env_side)}
-    laps = take_turns(sides, budget.repeats, budget.stretch_s, tell)
+    sides = {"arena": Side(run=arena_side, arguments=(GAMES,)), "highway_env": Side(run=highway_env_side)}
+    laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.lap_s, on_progress=on_progress)
     details = {
         "unit": "game-steps/s of one process",
         "environment": newest_merge(),
         "version": importlib.metadata.version("highway-env"),
-        **described(laps),
+        **raw_numbers(laps),
     }
-    return {"vs_highway_env": best(laps["arena"]) / best(laps["highway_env"])}, details
+    return {"vs_highway_env": best_rate(laps["arena"]) / best_rate(laps["highway_env"])}, details

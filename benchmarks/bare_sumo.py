@@ -1,4 +1,4 @@
-"""SUMO alone: the placements of an arena that was recorded, and SUMO's steps, with nothing of the harness between."""
+"""SUMO alone: recorded placements of an arena's vehicles and SUMO's steps, without the harness."""
 
 from __future__ import annotations
 
@@ -18,25 +18,25 @@ import sumo
 import traci
 from sumolib.miscutils import getFreeSocketPort
 
-from benchmarks.games import Played
+from benchmarks.games import CoastingGames
 from harness.game.state import ROLES
 from harness.traffic.scene import OpenScene
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
-EXACTLY_THERE = 2  # moveToXY's keepRoute: as given, on the road or off it
+KEEP_ROUTE = 2  # of moveToXY: place the vehicle exactly as given, on the road or off it
 
 Placement = tuple[str, float, float, float]
-"""A vehicle, the x and y of its front bumper in metres, its compass angle in degrees."""
+"""A vehicle's name, the x and y of its front bumper in metres, its compass angle in degrees."""
 
 
-def record(played: Played, steps: int, restart: bool = True) -> list[list[Placement]]:
-    """Play on, and keep where both players of every game are after each step."""
-    return [_step_and_look(played, restart) for _ in range(steps)]
+def record_placements(coasting: CoastingGames, steps: int, reset_ended: bool = True) -> list[list[Placement]]:
+    """Play some steps and return where both players of every game are after each of them."""
+    return [_step_and_read(coasting, reset_ended) for _ in range(steps)]
 
 
-def _step_and_look(played: Played, restart: bool) -> list[Placement]:
-    played.step(restart)
-    arena = played.arena
+def _step_and_read(coasting: CoastingGames, reset_ended: bool) -> list[Placement]:
+    coasting.step(reset_ended)
+    arena = coasting.arena
     state, games = arena.state, arena.games
     offset_m = tile_offset_m(arena.scene.net_file, games) * np.arange(games)[:, None]
     half_m = 0.5 * arena.world.length_m
@@ -51,17 +51,19 @@ def _step_and_look(played: Played, restart: bool) -> list[Placement]:
 
 
 def place_and_step(placements: list[Placement], api: Any = libsumo) -> None:
-    """A step of SUMO alone. `api` is libsumo, or a TraCI connection, which has the same words."""
+    """Place vehicles and step SUMO. `api` is libsumo or a TraCI connection, which has the same functions."""
     move = api.vehicle.moveToXY
     for name, x, y, angle in placements:
-        move(name, "", -1, x, y, angle, EXACTLY_THERE)
+        move(name, "", -1, x, y, angle, KEEP_ROUTE)
     api.simulationStep()
 
 
 @contextlib.contextmanager
-def own_sumo(scene: OpenScene, games: int, by_socket: bool = False) -> Iterator[Any]:
-    """SUMO with the two vehicles of each game in it, as anybody would add them, and nothing of the harness: libsumo, or
-    `sumo` reached by TraCI."""
+def start_bare_sumo(scene: OpenScene, games: int, by_socket: bool = False) -> Iterator[Any]:
+    """SUMO with the two vehicles of each game, without the harness: libsumo, or `sumo` behind a TraCI connection.
+
+    The vehicles are added as in any SUMO script.
+    """
     with tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
         types = Path(folder) / "types.rou.xml"
         types.write_text(scene.routes.types_xml, encoding="utf-8")
@@ -70,7 +72,7 @@ def own_sumo(scene: OpenScene, games: int, by_socket: bool = False) -> Iterator[
             *("--step-length", str(scene.world.step_s), "--collision.action", "none"),
             *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
         ]
-        with _reached_by_socket(options) if by_socket else _in_process(options) as api:
+        with _behind_socket(options) if by_socket else _in_process(options) as api:
             for game, (player, role) in itertools.product(range(games), enumerate(ROLES)):
                 prefix = tile_prefix(game, games)
                 api.route.add(f"{prefix}route {role}", [prefix + edge for edge in scene.edges[player]])
@@ -90,14 +92,14 @@ def _in_process(options: list[str]) -> Iterator[Any]:
 
 
 @contextlib.contextmanager
-def _reached_by_socket(options: list[str]) -> Iterator[Any]:
+def _behind_socket(options: list[str]) -> Iterator[Any]:
     program = shutil.which("sumo", path=str(Path(sumo.SUMO_HOME) / "bin"))
-    assert program is not None, "eclipse-sumo brings it"
+    assert program is not None, "eclipse-sumo contains sumo"
     port = getFreeSocketPort()
-    nowhere = subprocess.DEVNULL
-    process = subprocess.Popen([program, *options, "--remote-port", str(port)], stdout=nowhere, stderr=nowhere)
+    command = [program, *options, "--remote-port", str(port)]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        with contextlib.redirect_stdout(io.StringIO()):  # traci prints each try
+        with contextlib.redirect_stdout(io.StringIO()):  # traci prints each attempt to connect
             connection = traci.connect(port, numRetries=100, proc=process, waitBetweenRetries=0.1)
         yield connection
     finally:

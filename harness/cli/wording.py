@@ -1,0 +1,117 @@
+"""The sentences that the commands print."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from harness.campaign.plan.stages import Stage
+    from harness.campaign.preflight import OpenCampaign
+
+NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
+INTERRUPTED = "Interrupted. Finished work is kept: run the same command again to continue."
+NOTHING_TO_TUNE = "It has nothing to train or to tune: the campaign has rounds 0 and 1 only."
+KEPT = "finished work is kept"
+
+# --- errors: message and remedy ---
+FILM_NEEDS_A_GAME = ("shows one game", "name the game: harness replay RUN ARM EPISODE")
+NOT_A_FOLDER = ("is not a folder", "name a folder")
+NOT_A_TOML_FILE = ("is not the name of a TOML file", "the name must end with .toml")
+FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
+
+
+def no_folder(folder: Path) -> tuple[str, str]:
+    return f"there is no folder {folder}", "create it, or name another file"
+
+
+def no_document_kind(kinds: Sequence[str]) -> tuple[str, str]:
+    return "is missing", f"name one of {', '.join(kinds)}, or write all of them with --out DIR"
+
+
+def bad_persona_name(name: str, suggestion: str) -> tuple[str, str]:
+    message = f"{name!r} can't be the name of a persona: use letters, digits and _, a letter first, at most 40"
+    return message, f"did you mean {suggestion!r}?" if suggestion else "for instance 'late_merger'"
+
+
+def reserved_persona_name(name: str) -> tuple[str, str]:
+    message = f"{name!r} can't be the name of a persona: stages and arms of every campaign have this name"
+    return message, f"for instance '{name}_driver'"
+
+
+def out_of_memory(error: BaseException) -> str:
+    return f"the machine is short of memory: {error or 'none is left'}; {KEPT}"
+
+
+def machine_error(error: OSError) -> str:
+    return f"{error.filename or 'the run folder'}: {error.strerror}; {KEPT}"
+
+
+# --- results ---
+
+
+def persona_created(file: Path) -> str:
+    return f"{file}: a valid persona, a careful driver. To see what it means: harness persona show {file}"
+
+
+def page_written(file: Path) -> str:
+    return f"Page: {file}"
+
+
+def report_written(run: Path) -> str:
+    return f"Report: {run / 'report.html'}"
+
+
+def failed_stages(names: Sequence[str]) -> str:
+    return f"Not finished: {', '.join(names)}"
+
+
+def error_games(count: int) -> str:
+    return f"{count} games could not be played; their pairs are left out"
+
+
+# --- harness check ---
+
+
+def in_order(file: Path) -> str:
+    return f"{file} is in order."
+
+
+def ego(campaign: OpenCampaign) -> str:
+    """The external driver of the ego, and its round 2."""
+    if campaign.ego_driver is None:
+        return f"The ego: SUMO's own models. {NOTHING_TO_TUNE}"
+    if not campaign.tunable:
+        return f"The ego: {campaign.ego_driver.in_words}. {NOTHING_TO_TUNE}"
+    search = campaign.document.reconfiguration
+    ranges = ", ".join(f"{key} from {low:g} to {high:g}" for key, low, high in campaign.ego_driver.searched)
+    round_2 = f"Round 2 searches its parameters in {search.trials} trials of {search.games} games: {ranges}."
+    return f"The ego: {campaign.ego_driver.in_words}. {round_2}"
+
+
+def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
+    """How many trainings and arms there are."""
+    from harness.campaign.plan.stages import AssessmentStage, TrainingStage
+
+    document = campaign.document
+    trainings = [stage for stage in stages if isinstance(stage, TrainingStage)]
+    responses = sum(stage.is_best_response for stage in trainings)
+    arms = sum(isinstance(stage, AssessmentStage) for stage in stages)
+    if campaign.policies is None:
+        parts = [f"{len(trainings) - responses} trainings of up to {document.training.steps:,} steps"]
+    else:
+        parts = [f"Trained players are read from {campaign.policies}: nothing is trained"]
+    if document.best_response is not None:
+        parts.append(f"{responses} trainings of best responses of up to {document.best_response.steps:,} steps")
+    return ", ".join([*parts, f"{arms} arms of {document.assessment.episodes} episodes:"])
+
+
+def stage_lines(stages: Sequence[Stage]) -> Iterator[str]:
+    """A line for each stage: its kind, its name, the stages before it, and the policies that it reads."""
+    from harness.campaign.plan.stages import TrainingStage
+
+    for stage in stages:
+        reads = () if isinstance(stage, TrainingStage) else stage.reads
+        after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
+        yield f"  {stage.verb:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else "")

@@ -1,0 +1,54 @@
+"""The files of driver documents: their paths, and their hashes."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+from pathlib import Path
+
+from harness.config.campaign import resolve
+from harness.errors import UsageError
+
+
+def find_program(name: str, folder: Path, document: Path) -> Path:
+    """The file of a program: relative to the folder it runs in if its name contains a `/`, otherwise on PATH."""
+    # Links are not resolved: the python of a virtual environment is a link, and its path selects the packages.
+    found = shutil.which(os.path.abspath(folder / name) if "/" in name else name)
+    if found is None:
+        where = f"in {folder}" if "/" in name else "on PATH"
+        message = f"there is no executable program {name!r} {where}"
+        raise UsageError.of(document, "command", message, "build or install it, or correct its name or permissions")
+    return Path(found)
+
+
+def resolve_in(folder: Path, written: str) -> Path:
+    """A path in a driver document, which is relative to the document's folder."""
+    return resolve(folder / "document", written)
+
+
+def relative_to(folder: Path, file: Path) -> str:
+    """A file's path relative to a folder, in the notation of documents."""
+    return Path(os.path.relpath(file, os.path.realpath(folder))).as_posix()
+
+
+def is_file(folder: Path, written: str) -> bool:
+    """Whether a path in a driver document leads to a file."""
+    try:
+        return resolve_in(folder, written).is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def names_beside(path: Path) -> list[str]:
+    """The names in a path's folder, as candidates for a remedy."""
+    names = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
+    return names or ["(its folder is empty)"]
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file's content. Raises UsageError if it can't be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise UsageError.of(path, "", f"cannot be read: {error}", "correct its permissions") from None

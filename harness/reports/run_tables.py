@@ -1,0 +1,67 @@
+"""The contents of a run's report: its manifest, its tables and its replays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pandas as pd
+
+from harness.evaluation.game_theory.records import GameFindings
+from harness.evaluation.strategies import Arm, Strategy
+from harness.evaluation.tables import TABLES, typed
+
+
+def _empty(name: str) -> Callable[[], pd.DataFrame]:
+    return lambda: pd.DataFrame(columns=list(TABLES[name]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunTables:
+    """What a report is made of. The frames have the columns of `harness.evaluation.tables.TABLES`."""
+
+    manifest: Mapping[str, Any]
+    """The content of manifest.json."""
+    arms: Mapping[str, Arm] = field(default_factory=dict)
+    """The planned arms by name."""
+    strategies: Mapping[str, Strategy] = field(default_factory=dict)
+    """The strategies that are trained, by name."""
+    episodes: pd.DataFrame = field(default_factory=_empty("episodes"))
+    summary: pd.DataFrame = field(default_factory=_empty("summary"))
+    comparisons: pd.DataFrame = field(default_factory=_empty("comparisons"))
+    training: pd.DataFrame = field(default_factory=_empty("training"))
+    reconfiguration: pd.DataFrame = field(default_factory=_empty("reconfiguration"))
+    """Empty: the report has no section on searches."""
+    populations: pd.DataFrame = field(default_factory=_empty("populations"))
+    manoeuvres: pd.DataFrame | None = None
+    """None: the report has no section on manoeuvres."""
+    game: GameFindings | None = None
+    """None: the report has no section on the game."""
+    replays: Sequence[str] = ()
+    """Names of the folders under `replays/`, in any order."""
+
+    def with_types(self) -> RunTables:
+        """The same with the dtypes of `TABLES`. Raises ValueError when a frame does not have a table's columns."""
+        return replace(
+            self,
+            episodes=typed(self.episodes),
+            summary=typed(self.summary),
+            comparisons=typed(self.comparisons),
+            training=typed(self.training),
+            reconfiguration=typed(self.reconfiguration),
+            populations=typed(self.populations),
+            manoeuvres=None if self.manoeuvres is None else typed(self.manoeuvres),
+        )
+
+    @property
+    def stages(self) -> Mapping[str, Mapping[str, Any]]:
+        """The stages of the manifest, by id."""
+        stages: Mapping[str, Mapping[str, Any]] = self.manifest.get("stages", {})
+        return stages
+
+    @property
+    def personas(self) -> list[str]:
+        """Every persona that the manifest or a table names, in order of first appearance."""
+        names = (*self.manifest.get("personas", ()), *self.comparisons["persona"], *self.summary["persona"])
+        return [name for name in dict.fromkeys(names) if name]

@@ -1,0 +1,97 @@
+"""Turns of compilation: one thread of one process at a time, and no failure without a writable cache."""
+
+from __future__ import annotations
+
+import errno
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.game import jit
+from tests.support.repository import REPOSITORY
+
+HOLD_TURN = """
+import sys
+from harness.game import jit
+print("waiting", flush=True)
+with jit._turn():
+    print("in turn", flush=True)
+    sys.stdin.readline()
+"""
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The cache's folder, moved to a temporary one that does not exist yet."""
+    folder = tmp_path / "compiled"
+    monkeypatch.setattr(jit, "_folder", lambda: str(folder))
+    return folder
+
+
+def turn_holder(cache_home: Path) -> subprocess.Popen[str]:
+    """A process that takes the turn and keeps it until its input ends."""
+    return subprocess.Popen(
+        [sys.executable, "-c", HOLD_TURN],
+        cwd=REPOSITORY,
+        env={**os.environ, "XDG_CACHE_HOME": str(cache_home)},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def line_of(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="XDG_CACHE_HOME")
+def test_turn__passes_to_the_next_process_when_its_process_dies(tmp_path: Path) -> None:
+    first = turn_holder(tmp_path)
+    second = None
+    try:
+        assert [line_of(first), line_of(first)] == ["waiting", "in turn"]
+        second = turn_holder(tmp_path)
+        assert line_of(second) == "waiting"
+        with pytest.raises(subprocess.TimeoutExpired):
+            second.communicate(timeout=0.5)  # the end of its input does not end it: it is not in turn
+        first.kill()
+        assert second.communicate(timeout=30)[0].split("\n")[-2] == "in turn"
+    finally:
+        for process in filter(None, (first, second)):
+            process.kill()
+            process.communicate()
+
+
+def test_turn__is_reentrant(cache: Path) -> None:
+    with jit._turn(), jit._turn():
+        assert jit._depth == 2
+    assert jit._depth == 0
+    assert [each.name for each in cache.iterdir()] == ["turn"]
+
+
+def test_turn__does_not_need_a_writable_folder(cache: Path) -> None:
+    cache.write_text("a file, not a folder")
+    with jit._turn():
+        assert jit._depth == 1
+
+
+def test_turn__does_not_need_a_writable_file(cache: Path) -> None:
+    (cache / "turn").mkdir(parents=True)
+    with jit._turn():
+        assert jit._depth == 1
+
+
+def test_turn__does_not_need_locks_of_the_file_system(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    fcntl: Any = pytest.importorskip("fcntl")
+
+    def no_locks(*_: object) -> None:
+        raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
+
+    monkeypatch.setattr(fcntl, "flock", no_locks)
+    with jit._turn():
+        assert jit._depth == 1
