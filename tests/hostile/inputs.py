@@ -23,6 +23,7 @@ from harness.cli.main import main
 from harness.drivers.policy_file import write_policy
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
+from tests.support.shared import built_once
 from tests.support.tiny import CAREFUL, PATIENCE_S, sumo_run
 
 MOST_CPU_S = 5.0
@@ -258,8 +259,11 @@ def changed(file: str, *rows: tuple[str, str, str, tuple[str, ...]]) -> list[Bad
 
 
 def write_project(folder: Path) -> Path:
-    """A campaign and everything it names, in order, and a run folder."""
-    project = folder / "project"
+    """A campaign and everything it names, in order: a copy of one that is written once."""
+    return Path(shutil.copytree(built_once("project", _build_project), folder / "project"))
+
+
+def _build_project(project: Path) -> None:
     for name in ("campaigns", "personas", "policies"):
         (project / name).mkdir(parents=True)
     (project / CAMPAIGN).write_text(CAMPAIGN_TEXT, encoding="utf-8")
@@ -267,20 +271,22 @@ def write_project(folder: Path) -> Path:
     shutil.copyfile(CAREFUL, project / EGO)
     shutil.copytree(REPOSITORY / "tests" / "data" / "merge", project / "networks" / "road")
     write_policy(some_policy(), project / "policies" / "mine")
-    return project
 
 
 def write_run(folder: Path) -> Path:
     """A run folder, in order, without what no command reads, and without seals: who changes a file on purpose can seal
-    it as well."""
+    it as well. A copy of one that is written once."""
+    return Path(shutil.copytree(built_once("run_without_seals", _build_run) / "run", folder / "project" / "run"))
+
+
+def _build_run(folder: Path) -> None:
     unread = shutil.ignore_patterns("tensorboard", "checkpoint.safetensors")
-    run = shutil.copytree(sumo_run(), folder / "project" / "run", ignore=unread)
+    run = shutil.copytree(sumo_run(), folder / "run", ignore=unread)
     for seal in run.glob(".stages/*/done.json"):
         seal.write_text(json.dumps({**json.loads(seal.read_text(encoding="utf-8")), "files": {}}), encoding="utf-8")
     manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
     del manifest["hashes"]
     (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
-    return run
 
 
 def traces_of(folder: Path) -> dict[str, str]:
