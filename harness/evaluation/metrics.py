@@ -14,7 +14,7 @@ from harness.game.arrays import FloatArray
 from harness.game.state import Outcome
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PlayerSeries:
     """One player's game, step by step while it drove, [T]; inf: no leader, or no collision course."""
 

@@ -8,7 +8,7 @@ from typing import Literal
 ResearchQuestion = Literal["RQ1", "RQ2"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Question:
     """One research question, asked of one persona and training seed: two arms of the same episodes."""
 

@@ -377,7 +377,16 @@ class Coin:
         )
 
     def gap(self, response: Driver) -> pd.Series:
-        asked = Response(1, "ego", "blind", 2, "pair", "response", "coin", "coin")
+        asked = Response(
+            seed=1,
+            role="ego",
+            persona="blind",
+            round=2,
+            pair_arm="pair",
+            response_arm="response",
+            ego="coin",
+            non_ego="coin",
+        )
         episodes = pd.concat([self.games("pair", self.player), self.games("response", response)], ignore_index=True)
         (row,) = gaps([asked], episodes, 0.01).iloc
         return row

@@ -198,7 +198,9 @@ def test_campaign__comparisons_are_what_pandas_and_scipy_make_of_the_episodes(
 
 @pytest.mark.parametrize("arm", [arm for arm in ARMS if arm != "speedy_alone"])
 def test_campaign__an_arm_against_itself_rejects_nothing(arm: str, run: Path) -> None:
-    asked = [Question(question, "", 1, arm, arm) for question in ("RQ1", "RQ2")]
+    asked = [
+        Question(question=question, persona="", seed=1, baseline=arm, treatment=arm) for question in ("RQ1", "RQ2")
+    ]
     compared = compare(asked, read_csv(run / "episodes.csv"), 0.01)
     assert not compared["rejects_h0"].any()
     assert set(compared["verdict"]) == {"no difference"}

@@ -12,8 +12,8 @@ from scipy import stats
 from harness.evaluation.comparison import COMPARISON_COLUMNS, METRICS, Verdict, compare, holm
 from harness.evaluation.research_questions import Question
 
-RQ1 = Question("RQ1", "speedy", 1, "naive_alone", "naive_vs_speedy")
-RQ2 = Question("RQ2", "speedy", 1, "naive_vs_speedy", "retrained_vs_speedy")
+RQ1 = Question(question="RQ1", persona="speedy", seed=1, baseline="naive_alone", treatment="naive_vs_speedy")
+RQ2 = Question(question="RQ2", persona="speedy", seed=1, baseline="naive_vs_speedy", treatment="retrained_vs_speedy")
 
 p_value_lists = st.lists(st.floats(0, 1) | st.just(math.nan), max_size=12)
 
@@ -154,7 +154,7 @@ def test_compare__pairs_by_episode_whatever_the_order_of_rows():
 
 
 def test_compare__training_seeds_are_not_mixed():
-    other_seed = Question("RQ1", "speedy", 2, "naive_alone", "naive_vs_speedy")
+    other_seed = Question(question="RQ1", persona="speedy", seed=2, baseline="naive_alone", treatment="naive_vs_speedy")
     episodes = pd.concat(
         [
             games("naive_alone", [0, 0, 0]),
@@ -229,7 +229,10 @@ def test_compare__verdict_says_when_only_the_uncorrected_p_value_is_significant(
 
 
 def test_compare__holm_is_over_all_rows_that_have_a_p_value():
-    questions = [Question("RQ1", str(k), k, "naive_alone", "naive_vs_x") for k in (1, 2, 3)]
+    questions = [
+        Question(question="RQ1", persona=str(k), seed=k, baseline="naive_alone", treatment="naive_vs_x")
+        for k in (1, 2, 3)
+    ]
     random = np.random.default_rng(9)
     episodes = pd.concat(
         games(arm, [0] * 20, random.normal(speed, 2, 20), seed=k)
@@ -268,7 +271,10 @@ def test_compare__refuses_two_games_of_one_episode():
 )
 @settings(max_examples=50, deadline=None)
 def test_compare__an_arm_against_itself_rejects_nothing(failed, speeds, significance):
-    itself = [Question(rq, "x", 1, "naive_vs_x", "naive_vs_x") for rq in ("RQ1", "RQ2")]
+    itself = [
+        Question(question=rq, persona="x", seed=1, baseline="naive_vs_x", treatment="naive_vs_x")
+        for rq in ("RQ1", "RQ2")
+    ]
     table = compare(itself, games("naive_vs_x", failed, speeds[: len(failed)]), significance)
     assert not table["rejects_h0"].any()
     assert set(table["verdict"]) <= {Verdict.NO_DIFFERENCE.value, Verdict.NOT_ENOUGH_PAIRS.value}
@@ -283,7 +289,7 @@ def test_compare__rejects_random_arms_without_a_difference_at_the_rate_of_signif
         start = random.normal(20, 2, count)  # the pair's common start, so that pairs correlate
         for arm in ("one", "other"):
             arms.append(games(arm, random.random(count) < 0.2, start + random.normal(0, 1, count), seed=k))
-        questions.append(Question("RQ1", "x", k, "one", "other"))
+        questions.append(Question(question="RQ1", persona="x", seed=k, baseline="one", treatment="other"))
     table = compare(questions, pd.concat(arms), 0.05)
     three_deviations = 3 * math.sqrt(0.05 * 0.95 / campaigns)
     assert table.groupby("metric")["rejects_h0"].mean().max() < 0.05 + three_deviations

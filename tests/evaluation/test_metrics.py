@@ -26,7 +26,9 @@ def drive(**changes: Any) -> PlayerSeries:
         "payoff": [0.25, 0.5, -1.0, 5.0],
     }
     outcome = changes.pop("outcome", Outcome.GOAL)
-    return PlayerSeries(outcome, 0.5, **{name: np.array(values) for name, values in {**series, **changes}.items()})
+    return PlayerSeries(
+        outcome=outcome, step_s=0.5, **{name: np.array(values) for name, values in {**series, **changes}.items()}
+    )
 
 
 def test_metrics__by_hand() -> None:

@@ -179,7 +179,9 @@ def test_write_csv__writes_exactly_these_bytes(tmp_path):
 def test_write_csv__truth_values_are_true_and_false(tmp_path):
     path = tmp_path / "comparisons.csv"
     episodes = episodes_of(game("a"), game("a", 1), game("b"), game("b", 1))
-    write_csv(compare([Question("RQ1", "x", 1, "a", "b")], episodes, 0.01), path)
+    write_csv(
+        compare([Question(question="RQ1", persona="x", seed=1, baseline="a", treatment="b")], episodes, 0.01), path
+    )
     assert path.read_text().splitlines()[1] == "RQ1,x,1,failure,2,0,0.0,,,,,,,1.0,false,no difference"
 
 

@@ -413,14 +413,19 @@ def test_observation__can_be_made_at_every_place_of_every_route(everywhere: Quan
 @pytest.mark.parametrize("name", [*OF_EGO, *OF_NON_EGO])
 def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
     q, metric = everywhere, (OF_EGO | OF_NON_EGO)[name]
-    series = (
-        *(q.state.speed_mps, q.state.acceleration_mps2, q.lateral_acceleration_mps2),
-        *(q.leader_gap_m, q.time_to_collision_s, np.zeros_like(q.state.x_m)),
-    )
-    assert not any(np.isnan(each).any() for each in series)
+    series = {
+        "speed_mps": q.state.speed_mps,
+        "acceleration_mps2": q.state.acceleration_mps2,
+        "lateral_acceleration_mps2": q.lateral_acceleration_mps2,
+        "leader_gap_m": q.leader_gap_m,
+        "time_to_collision_s": q.time_to_collision_s,
+        "payoff": np.zeros_like(q.state.x_m),
+    }
+    assert not any(np.isnan(each).any() for each in series.values())
     for outcome in (Outcome.GOAL, Outcome.RAIL):
         for game in (0, len(q.state.step) - 1):
-            value = metric(PlayerSeries(outcome, 0.1, *(each[game, :1] for each in series)))
+            of_game = {each: values[game, :1] for each, values in series.items()}
+            value = metric(PlayerSeries(outcome=outcome, step_s=0.1, **of_game))
             assert value is None or np.isfinite(value)
 
 

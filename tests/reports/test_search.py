@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.strategies import ReconfiguredEgo, against_persona
 from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed
 from harness.reports.page_wording import changed_ego_alone, rounds
 from harness.reports.provenance import mixed_versions
@@ -56,6 +57,8 @@ def reconfigured(**options: Any) -> dict[str, Any]:
     for name in ("episodes", "summary"):
         given[name]["arm"] = given[name]["arm"].str.replace("retrained", "reconfigured")
     given["training"] = given["training"][:0]
+    arm = against_persona(ReconfiguredEgo(against="speedy"), "speedy")
+    given["arms"] = {**given["arms"], arm.name: arm}
     return given | {"replays": [], "reconfiguration": trials()}
 
 

@@ -100,7 +100,7 @@ def a_campaign(
             name = f"{ego}_vs_{non_ego}"
             failed = [int(place < rate * games) for place in range(games)]
             arms.append(_noisy(name, seed, failed, persona, random))
-            pairings.append(Pairing(name, seed, ego, non_ego, persona))
+            pairings.append(Pairing(arm=name, seed=seed, ego=ego, non_ego=non_ego, persona=persona))
         for (role, persona), gain in gains.items():
             non_ego = {"speedy": "speedy_round2"}.get(persona, persona)
             ego = f"retrained_{persona}"
@@ -112,7 +112,18 @@ def a_campaign(
             if role == "non_ego" and gain > 1:
                 best.loc[: games // 4, ["ego_failed", "ego_outcome"]] = [1, "collision"]
             arms.append(best)
-            responses.append(Response(seed, role, persona, 2, pair["arm"][0], best["arm"][0], ego, non_ego))
+            responses.append(
+                Response(
+                    seed=seed,
+                    role=role,
+                    persona=persona,
+                    round=2,
+                    pair_arm=pair["arm"][0],
+                    response_arm=best["arm"][0],
+                    ego=ego,
+                    non_ego=non_ego,
+                )
+            )
     return table(*arms), pairings, responses
 
 

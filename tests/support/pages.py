@@ -72,7 +72,7 @@ def campaign(
     ]
     episodes = typed(pd.DataFrame(rows, columns=list(TABLES["episodes"])))
     questions = [
-        Question(question, persona, seed, before, after)
+        Question(question=question, persona=persona, seed=seed, baseline=before, treatment=after)
         for persona in personas
         for seed in seeds
         for question, before, after in _asked(persona)
@@ -276,11 +276,11 @@ def recomputed(arguments: dict[str, Any]) -> dict[str, Any]:
     old = arguments["comparisons"]
     questions = [
         Question(
-            row["question"],
-            row["persona"],
-            row["seed"],
-            "naive_alone" if row["question"] == "RQ1" else f"naive_vs_{row['persona']}",
-            f"{'naive' if row['question'] == 'RQ1' else 'retrained'}_vs_{row['persona']}",
+            question=row["question"],
+            persona=row["persona"],
+            seed=row["seed"],
+            baseline="naive_alone" if row["question"] == "RQ1" else f"naive_vs_{row['persona']}",
+            treatment=f"{'naive' if row['question'] == 'RQ1' else 'retrained'}_vs_{row['persona']}",
         )
         for row in old[old["metric"] == "failure"].to_dict("records")
     ]

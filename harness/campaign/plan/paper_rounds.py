@@ -157,7 +157,17 @@ def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False
         elif tunable:
             round_2 = ReconfiguredEgo(against=name)
         for seed in campaign.seeds:
-            asked.append(Question("RQ1", name, seed, naive_alone.name, naive.name))
+            asked.append(
+                Question(question="RQ1", persona=name, seed=seed, baseline=naive_alone.name, treatment=naive.name)
+            )
             if round_2 is not None:
-                asked.append(Question("RQ2", name, seed, naive.name, Arm(ego=round_2, non_ego=non_ego).name))
+                asked.append(
+                    Question(
+                        question="RQ2",
+                        persona=name,
+                        seed=seed,
+                        baseline=naive.name,
+                        treatment=Arm(ego=round_2, non_ego=non_ego).name,
+                    )
+                )
     return asked

@@ -10,7 +10,7 @@ import pandas as pd
 Role = Literal["ego", "non_ego"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Pairing:
     """One arm as a cell of the cross-play: an ego strategy and a non-ego strategy."""
 
@@ -22,7 +22,7 @@ class Pairing:
     """Of the non-ego; "" for SUMO's own driver, which has no payoff and is in no empirical game."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Response:
     """In `response_arm` the player of `role` of the pair in `pair_arm` is replaced by a best response: the best of
     several trainings against the unchanged other player, chosen by separate games."""

@@ -11,8 +11,26 @@ from harness.evaluation.game_theory.columns import GAP_COLUMNS
 from harness.evaluation.game_theory.records import Response
 from tests.support.game_tables import arm, table
 
-EGO = Response(1, "ego", "speedy", 2, "pair", "best_ego", "retrained_speedy", "speedy")
-NON_EGO = Response(1, "non_ego", "speedy", 2, "pair", "best_non_ego", "retrained_speedy", "speedy")
+EGO = Response(
+    seed=1,
+    role="ego",
+    persona="speedy",
+    round=2,
+    pair_arm="pair",
+    response_arm="best_ego",
+    ego="retrained_speedy",
+    non_ego="speedy",
+)
+NON_EGO = Response(
+    seed=1,
+    role="non_ego",
+    persona="speedy",
+    round=2,
+    pair_arm="pair",
+    response_arm="best_non_ego",
+    ego="retrained_speedy",
+    non_ego="speedy",
+)
 
 
 def one(response, *arms, significance=0.01):

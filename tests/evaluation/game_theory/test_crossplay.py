@@ -11,9 +11,9 @@ from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
 from tests.support.game_tables import arm, table
 
-NAIVE = Pairing("naive_vs_speedy", 1, "naive", "speedy", "speedy")
-RETRAINED = Pairing("retrained_vs_speedy", 1, "retrained_speedy", "speedy", "speedy")
-SUMO = Pairing("naive_vs_sumo", 1, "naive", "sumo", "")
+NAIVE = Pairing(arm="naive_vs_speedy", seed=1, ego="naive", non_ego="speedy", persona="speedy")
+RETRAINED = Pairing(arm="retrained_vs_speedy", seed=1, ego="retrained_speedy", non_ego="speedy", persona="speedy")
+SUMO = Pairing(arm="naive_vs_sumo", seed=1, ego="naive", non_ego="sumo", persona="")
 
 
 def rows(pairings, *arms):

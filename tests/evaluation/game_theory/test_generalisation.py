@@ -11,9 +11,11 @@ from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
 from tests.support.game_tables import TRAINED_AGAINST, a_campaign, arm, findings, table
 
-NAIVE = Pairing("naive_vs_distracted", 1, "naive", "distracted", "distracted")
-RETRAINED = Pairing("retrained_vs_distracted", 1, "retrained_speedy", "distracted", "distracted")
-ITS_OWN = Pairing("retrained_vs_speedy", 1, "retrained_speedy", "speedy", "speedy")
+NAIVE = Pairing(arm="naive_vs_distracted", seed=1, ego="naive", non_ego="distracted", persona="distracted")
+RETRAINED = Pairing(
+    arm="retrained_vs_distracted", seed=1, ego="retrained_speedy", non_ego="distracted", persona="distracted"
+)
+ITS_OWN = Pairing(arm="retrained_vs_speedy", seed=1, ego="retrained_speedy", non_ego="speedy", persona="speedy")
 
 
 def test_generalisation__agrees_with_the_arithmetic_on_paper():
