@@ -426,7 +426,7 @@ class Opposite:
             self._before.pop(game, None)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        seen = self._car.seen(observation)
+        seen = self._car.physical(observation)
         speeds = seen[:, LAYOUT.index("speed_mps")] + seen[:, LAYOUT.index("other0_ahead_mps")]
         before = [self._before.get(game, speed) for game, speed in zip(games.tolist(), speeds, strict=True)]
         self._before.update(zip(games.tolist(), speeds, strict=True))

@@ -18,6 +18,7 @@ import pytest
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
+from harness.campaign.plan.planned_drivers import Reconfigured
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, TrainingStage
 from harness.campaign.preflight import QUICK_TRIALS, open_campaign
 from harness.config.driver import read_driver
@@ -69,7 +70,7 @@ def test_plan__of_an_ego_with_something_to_tune(tmp_path: Path) -> None:
             stage = trained[f"reconfigured_{arm}-seed{seed}"]
             assert isinstance(stage, AssessmentStage)
             assert search.id in stage.needs
-            assert (stage.ego.kind, stage.ego.stage) == ("reconfigured", search.id)  # type: ignore[union-attr]
+            assert stage.ego == Reconfigured(stage=search.id)
     assert not [id for id in trained if "retrained" in id]
 
     before, _ = planned(write(tmp_path))

@@ -56,7 +56,7 @@ def test_plan__has_the_same_arms_and_no_trainings(tmp_path: Path, policies: Path
 
 def test_plan__says_which_policies_an_arm_reads(tmp_path: Path, policies: Path) -> None:
     stages = plan(open_campaign(write_played(tmp_path)).document, ["speedy"])
-    assert {stage.arm: stage.reads for stage in stages if isinstance(stage, AssessmentStage)} == {
+    assert {stage.name: stage.reads for stage in stages if isinstance(stage, AssessmentStage)} == {
         "naive_alone": ("naive-seed1",),
         "naive_vs_sumo": ("naive-seed1",),
         "speedy_alone": ("speedy-seed1",),

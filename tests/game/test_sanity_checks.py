@@ -248,14 +248,14 @@ def test_motion__a_car_that_the_harness_moves_follows_its_speed_to_a_millimetre(
 
 @pytest.mark.parametrize("name", ["x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"])
 def test_motion__that_is_not_finite_is_named(name: str, merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    take_back = Arena._take_back
+    read_sumo_players = Arena._read_sumo_players
 
     def lose(arena: Arena, *arguments: Any) -> None:
-        take_back(arena, *arguments)
+        read_sumo_players(arena, *arguments)
         if arena.state.step[0] + 1 == STEP:
             getattr(arena.state, name)[0, NON_EGO] = np.nan
 
-    monkeypatch.setattr(Arena, "_take_back", lose)
+    monkeypatch.setattr(Arena, "_read_sumo_players", lose)
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
     assert f"the motion of non_ego is not finite in step {STEP}: " in game.record["error"]
 
