@@ -26,7 +26,7 @@ StageT = TypeVar("StageT", bound=Schedulable)
 
 
 class PlanError(HarnessError):
-    """A plan that can't be carried out: a stage needs one that nobody plans, or needs run in a circle."""
+    """A plan that can't be carried out: a stage needs one that is not planned, or needs run in a circle."""
 
 
 @dataclass(frozen=True, kw_only=True)
