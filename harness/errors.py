@@ -64,6 +64,10 @@ class UsageError(HarnessError):
         return cls([Problem(str(file), key, message, remedy)])
 
 
+class PlanError(HarnessError):
+    """A plan that can't be carried out: a stage needs one that is not planned, or needs run in a circle."""
+
+
 class StageFailed(HarnessError):
     """A training or an assessment could not be finished."""
 
