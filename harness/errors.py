@@ -2,6 +2,7 @@
 
 HarnessError                 any error that the harness raises
 ├── UsageError               an error of the user: printed without a traceback, exit code 2
+├── PlanError                the stages of a campaign can't be carried out in any order
 ├── StageFailed              a training or an assessment could not be finished; the message names the stage
 ├── SimulationError          SUMO refused a command, died or lost a vehicle
 └── DriverError              an external driver died, was late or gave an invalid answer
@@ -61,6 +62,10 @@ class UsageError(HarnessError):
     def of(cls, file: object, key: str, message: str, remedy: str = "") -> UsageError:
         """An error with one problem."""
         return cls([Problem(str(file), key, message, remedy)])
+
+
+class PlanError(HarnessError):
+    """A plan that can't be carried out: a stage needs one that is not planned, or needs run in a circle."""
 
 
 class StageFailed(HarnessError):

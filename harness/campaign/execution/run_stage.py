@@ -180,7 +180,14 @@ def _search(stage: SearchStage, run: StageRun) -> Made:
     versions = _versions_since(trials, version_of_search())
     labels = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed}
     try:
-        info, files = reconfigure(search, labels, trials, folder.policy(stage.id), run.on_progress, run.on_start)
+        info, files = reconfigure(
+            search,
+            labels=labels,
+            trials_file=trials,
+            folder=folder.policy(stage.id),
+            on_progress=run.on_progress,
+            on_start=run.on_start,
+        )
     except StageFailed as error:
         raise StageFailed(f"{stage.id}: {error}") from error
     return {**info, "versions": versions}, files

@@ -8,7 +8,7 @@ from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from typing import Generic, Protocol, TypeVar
 
-from harness.errors import HarnessError
+from harness.errors import PlanError
 
 
 class Schedulable(Protocol):
@@ -23,10 +23,6 @@ class Schedulable(Protocol):
 
 
 StageT = TypeVar("StageT", bound=Schedulable)
-
-
-class PlanError(HarnessError):
-    """A plan that can't be carried out: a stage needs one that nobody plans, or needs run in a circle."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""The manifest of a run folder, as far as others rely on it: written by the harness, read as anybody's."""
+"""The manifest of a run folder: the parts that other modules rely on, checked like any file from outside."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from harness.config.toml_reading import Document
 
 Count = Annotated[int, Field(ge=0, le=10**15)]
 Text = Annotated[str, Field(max_length=10_000)]
-_SAID = 3
+_MOST_LISTED = 3
 FINISHED = ("done", "settled")
 """Statuses of a finished stage; `settled`: an approximate equilibrium left nothing to do."""
 
 
 class _Record(Document):
-    model_config = ConfigDict(extra="ignore")  # a later version of the same format may say more
+    model_config = ConfigDict(extra="ignore")  # a later version of the same format may have more keys
 
 
 class StageEntry(_Record):
-    """What a manifest says of a stage."""
+    """A stage in the manifest."""
 
     kind: Literal["training", "assessment", "reconfiguration"]
     name: Text
@@ -46,7 +46,7 @@ class StageEntry(_Record):
 
 
 class Manifest(_Record):
-    """What a manifest says."""
+    """The content of a manifest."""
 
     format: int
     name: CampaignName
@@ -73,13 +73,13 @@ def check_manifest(content: bytes, known_format: int) -> Manifest:
 
 
 def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Key and what is wrong there, of what only reports and model cards rely on."""
+    """Key and problem of each part that only reports and model cards rely on."""
     try:
         Campaign.model_validate(manifest["campaign"], strict=False)
     except ValidationError as error:
         yield "campaign", _words(error)
     if "persona_documents" not in manifest:
-        return  # a run of before there were model cards
+        return  # runs of earlier versions have no model cards
     documents = {"ego_persona": manifest.get("ego_persona")}
     documents |= {f"persona_documents.{name}": each for name, each in manifest["persona_documents"].items()}
     for key, document in documents.items():
@@ -100,11 +100,11 @@ def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]
 
 
 def is_tuned(manifest: Mapping[str, Any]) -> bool:
-    """Whether the campaign's ego has something to tune, which round 2 searches."""
+    """Whether the campaign's ego has tunable parameters, which round 2 searches."""
     return any(entry["kind"] == "reconfiguration" for entry in manifest["stages"].values())
 
 
 def _words(error: ValidationError) -> str:
     found = [f"{'.'.join(map(str, each['loc'])) or 'it'}: {each['msg']}" for each in error.errors()]
-    more = f"; and {len(found) - _SAID} more" if len(found) > _SAID else ""
-    return "; ".join(found[:_SAID]) + more
+    more = f"; and {len(found) - _MOST_LISTED} more" if len(found) > _MOST_LISTED else ""
+    return "; ".join(found[:_MOST_LISTED]) + more

@@ -1,4 +1,4 @@
-"""The manoeuvres of an arm as a table beside its records: `manoeuvres.csv` among what the stage keeps."""
+"""The manoeuvres of an arm as a table beside its records: `manoeuvres.csv` among the stage's files."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EPISODES, MANOEUVRES = "episodes.csv", "manoeuvres.csv"
 
 
 def name_manoeuvres(episodes: pd.DataFrame, traces: Path, scene: OpenScene) -> pd.DataFrame:
-    """Name the manoeuvres of games from their traces; `episodes` has a row for each of them."""
+    """The manoeuvres of games, named from their traces; `episodes` has a row per game."""
     sizes_m = {name: (kind.length_m, kind.width_m) for name, kind in scene.routes.types.items()}
     games = {game.episode: game for game in episodes.itertuples() if not game.error}
     rows = []
@@ -28,7 +28,7 @@ def name_manoeuvres(episodes: pd.DataFrame, traces: Path, scene: OpenScene) -> p
 
 
 def manoeuvres_of(folder: RunFolder, stage: str, scene: OpenScene) -> pd.DataFrame:
-    """The manoeuvres of an arm; named now, where the stage was carried out before there were any."""
+    """The manoeuvres of an arm. They are named now if an earlier version carried out the stage without naming them."""
     file = folder.work(stage) / MANOEUVRES
     if file.is_file():
         return read_csv(file)

@@ -1,4 +1,4 @@
-"""Which programs a run's numbers were made by."""
+"""The versions of the programs that make a run's numbers."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ _PACKAGES = (
     *("harness", "eclipse-sumo", "libsumo", "sumolib", "numpy", "scipy", "numba", "pandas", "torch"),
     *("stable-baselines3", "gymnasium", "pyarrow", "safetensors"),
 )
-NUMBERS_FORMAT = 2  # to be raised when the same inputs give other numbers, so that no old stage is taken for a new one
+NUMBERS_FORMAT = 2  # raised when the same inputs give other numbers, so that finished stages are carried out again
 _OF_NUMBERS = ("python", "platform", "harness", "libsumo", "numpy", "numba", "torch", "stable-baselines3")
 
 
 @cache
 def versions() -> dict[str, str]:
-    """Every program a run uses, and the system it runs on."""
+    """The version of every program that a run uses, and the system it runs on."""
     system = " ".join((platform.system(), platform.machine(), *platform.libc_ver())).strip()
     found = {"python": platform.python_version(), "platform": system}
     return found | {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 
 def versions_of_numbers() -> dict[str, str]:
-    """Those that a stage's numbers depend on: with any other, they are not promised to be the same."""
+    """The versions that a stage's numbers depend on: with others the numbers may differ."""
     return {name: versions()[name] for name in _OF_NUMBERS} | {"numbers": str(NUMBERS_FORMAT)}

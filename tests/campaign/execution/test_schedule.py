@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from harness.campaign.execution.schedule import PlanError, Schedule
+from harness.campaign.execution.schedule import Schedule
 from harness.campaign.plan.planned_drivers import Trained
 from harness.campaign.plan.stages import Stage, TrainingStage
+from harness.errors import PlanError
 from harness.evaluation.strategies import PersonaNonEgo
 
 
