@@ -133,7 +133,8 @@ def _pictures(
             for step in range(-1, shown[-1] + 1):
                 if step == -1 or step in shown:
                     x_m, y_m = centres[max(step, 0)].tolist()
-                    window.look_at(x_m, y_m, WIDTH_M, height_m)
+                    look = window.wait_until_it_looks_at if step == -1 else window.look_at
+                    look(x_m, y_m, WIDTH_M, height_m)
                     window.photograph_next(picture, SIZE_PX)
                 window.step()
                 if step in shown:

@@ -27,6 +27,9 @@ _ANSWERS_WITHIN_S = 60.0
 _ENDS_WITHIN_S = 10.0
 
 
+_STAYS_FOR, _LOOKS_EVERY_S, _CENTRED_M = 5, 0.05, 0.1  # looks in a row at which the view is where it should be
+
+
 class WindowClosed(SimulationError):
     """SUMO-GUI has ended, or its user closed it."""
 
@@ -65,6 +68,22 @@ class GuiWindow:
             self._connection.gui.setBoundary(
                 self._view, x_m - half_width, y_m - half_height, x_m + half_width, y_m + half_height
             )
+
+    def wait_until_it_looks_at(self, x_m: float, y_m: float, width_m: float, height_m: float) -> None:
+        """Show an area and wait until the view stays there: while SUMO-GUI starts, it still applies its own view.
+
+        Raises WindowClosed if the view does not stay there.
+        """
+        stays, until = 0, time.monotonic() + _ANSWERS_WITHIN_S
+        while stays < _STAYS_FOR:
+            if time.monotonic() > until:
+                raise WindowClosed("SUMO-GUI does not show the requested area")
+            self.look_at(x_m, y_m, width_m, height_m)
+            time.sleep(_LOOKS_EVERY_S)
+            with self._open():
+                (left, bottom), (right, top) = self._connection.gui.getBoundary(self._view)
+            centred = abs(0.5 * (left + right) - x_m) < _CENTRED_M and abs(0.5 * (bottom + top) - y_m) < _CENTRED_M
+            stays = stays + 1 if centred else 0
 
     def photograph_next(self, file: Path, size_px: tuple[int, int]) -> None:
         """Take a screenshot of the next step. The file exists after that step."""

@@ -88,7 +88,7 @@ def test_film__leaves_no_part_of_one_behind(merge_net: Path, tmp_path: Path, mon
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        write_film(folder, clean_game(), tmp_path / "film.gif", title="", step_length_s=STEP_S, report=tired)
+        write_film(folder, clean_game(), tmp_path / "film.gif", title="", step_length_s=STEP_S, on_progress=tired)
     assert [path.name for path in tmp_path.iterdir()] == ["replay"]
 
 
