@@ -174,7 +174,7 @@ REFUSED: dict[str, tuple[Callable[[Path], dict[str, Any]], str, str, list[str]]]
         ["holds no policy 'spedy-seed1'", "did you mean 'speedy'?"],
     ),
     "policy of other shapes": (of_other_shapes, "policy.safetensors", "", ["do not fit"]),
-    "policy of other observations": (of_other_observations, "policy.json", "observation", ["other observations"]),
+    "policy of other observations": (of_other_observations, "policy.json", "observation", ["observation layout"]),
     "policy of another player": (another_player, "speedy-seed1", "stage", ["'naive-seed1'", "called 'speedy-seed1'"]),
     "training, which would be ignored": (
         lambda policies: {"training": TRAINING},

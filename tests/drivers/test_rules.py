@@ -78,7 +78,7 @@ def test_shipped_egos__are_documents_of_rules(repository: Path, name: str) -> No
 
 
 def test_rules__have_at_most_one_reaction_to_danger() -> None:
-    with pytest.raises(ValidationError, match="in one way"):
+    with pytest.raises(ValidationError, match="one reaction to danger"):
         rules(rss={}, fuzzy={})
 
 
