@@ -12,9 +12,9 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from harness.evaluation.strategies import NaiveEgo, against_persona
-from harness.reports.treatment import RETRAINED, Change
 from harness.reports.figures import INK, SERIES, figure_of, svg
 from harness.reports.player_data import FloatArray
+from harness.reports.treatment import RETRAINED, Change
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

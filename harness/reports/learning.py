@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import pandas as pd
 from markupsafe import Markup
@@ -14,6 +13,7 @@ from harness.game.state import EGO
 from harness.reports.figures import Curve, learning_figure
 from harness.reports.page_wording import curve_alternative, stop
 from harness.reports.run_tables import RunTables
+
 
 @dataclass(frozen=True, kw_only=True)
 class Learning:

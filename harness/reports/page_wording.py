@@ -267,4 +267,3 @@ def _ego_in_words(ego: EgoStrategy) -> str:
             return f"the ego retrained against {against}"
         case _:
             return f"the ego {strategy_name(ego)}"
-

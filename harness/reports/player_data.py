@@ -30,7 +30,7 @@ class Track:
 
 @dataclass(frozen=True, kw_only=True)
 class PlayerTrack(Track):
-    """The track of a player with its measurements; gap and time are inf or NaN without a leader or a collision course."""
+    """The track of a player and its measurements; gap and time are inf or NaN without leader or collision course."""
 
     acceleration_mps2: FloatArray
     steering_rad: FloatArray

@@ -368,7 +368,7 @@ def test_replay__arms_are_not_cut_off_in_a_narrow_terminal(
     ("arguments", "words"),
     [
         (["naive_vs_spedy", "1"], ["naive_vs_spedy", "has no such arm", "'naive_vs_speedy'"]),
-        (["naive_vs_speedy", "7"], ["naive_vs_speedy 7", "no such game", "episodes are 0 to 3"]),
+        (["naive_vs_speedy", "7"], ["naive_vs_speedy 7", "no such game", "0 to 3"]),
         (["naive_vs_speedy", "1", "--seed", "9"], ["seed 9"]),
         (["naive_vs_spedy", "--list"], ["'naive_vs_speedy'"]),
     ],

@@ -140,9 +140,7 @@ def test_open_campaign__reports_the_egos_problems_with_all_others(tmp_path: Path
 def test_open_campaign__an_unknown_vehicle_type_is_an_error(tmp_path: Path) -> None:
     driver = document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_cra"')
     (message,) = problems(write_campaign(tmp_path, ego=ego(driver)))
-    assert (
-        "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego (did you mean 'ego_car'?)" in message
-    )
+    assert "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego (did you mean 'ego_car'?)" in message
 
 
 def test_open_campaign__hashes_the_files_of_the_driver(tmp_path: Path) -> None:

@@ -77,9 +77,9 @@ def counted_sumo(counts: Counter[str]) -> Iterator[None]:
 
 
 def counted(function: Callable[..., Any], counts: Counter[str], name: str) -> Callable[..., Any]:
-    def called(*arguments: Any, **keywords: Any) -> Any:
+    def called(*arguments: Any, **options: Any) -> Any:
         counts[name] += 1
-        return function(*arguments, **keywords)
+        return function(*arguments, **options)
 
     return called
 

@@ -193,7 +193,7 @@ RUNS = [
             "columns alone": traces(lambda table: table[:0]),
         }.items()
     ),
-    Bad("replay: a trace with somebody twice", traces(lambda table: pa.concat_tables([table, table[:1]])), ("naive_alone-seed1.parquet", "two places"), ("replay", "run", "naive_alone", "0")),
+    Bad("replay: a trace with somebody twice", traces(lambda table: pa.concat_tables([table, table[:1]])), ("naive_alone-seed1.parquet", "two rows in one step"), ("replay", "run", "naive_alone", "0")),
     Bad("replay: a trace before the beginning", column("step", -1), ("naive_alone-seed1.parquet", "steps"), ("replay", "run", "naive_alone", "0")),
     Bad("replay: a trace of a thousand million steps", column("step", 10**9), ("naive_alone-seed1.parquet", "steps"), ("replay", "run", "naive_alone", "0")),
     *(Bad(f"{command[0]}: {name} leads out of the run", led_out(name), (f"run/{name}", "leads out of the run folder"), command) for command in (REPORT, LIST) for name in ("replays", "traces", "policies", "scene", ".stages", "tensorboard", "policies/other")),

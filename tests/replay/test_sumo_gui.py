@@ -47,9 +47,11 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
     )
     (folder / "view.xml").write_text(settings.replace("</viewsettings>", taken + "</viewsettings>"))
     command = [str(find_sumo_gui()), "-c", str(folder / "scene.sumocfg"), "--quit-on-end"]
-    done = subprocess.run(
-        command, env=os.environ | {"DISPLAY": screen}, capture_output=True, text=True, timeout=300, check=False
-    )
+    environment = os.environ | {"DISPLAY": screen}
+    for _ in range(3):  # SUMO-GUI dies of SIGSEGV now and then
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=300, check=False)
+        if done.returncode >= 0:
+            break
     assert done.returncode == 0, done.stderr
     return [np.asarray(Image.open(file).convert("RGB")).astype(int) for file in files]
 

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.support.pages import campaign, recordings, rendered, with_errors
 from tests.support.chromium import launched, opener
-from tests.support.pages import CONTRAST, campaign, recordings, with_errors
+from tests.support.pages import CONTRAST, campaign, recordings, rendered, with_errors
 
 
 @pytest.fixture(scope="module")

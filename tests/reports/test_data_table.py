@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from harness.evaluation.tables import write_csv
-from tests.support.pages import campaign, recordings, rendered, with_errors
 from tests.support.chromium import launched, opener, until
-from tests.support.pages import campaign, recordings, with_errors
+from tests.support.pages import campaign, recordings, rendered, with_errors
 
 
 @pytest.fixture(scope="module")

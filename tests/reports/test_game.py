@@ -26,11 +26,9 @@ from harness.reports.game_wording import (
     gap_verdicts,
 )
 from harness.reports.heatmaps import views
-from tests.support.pages import CONTRAST
-from tests.support.pages import Page, campaign, rendered
 from tests.support.chromium import launched, opener
 from tests.support.game_tables import arm, findings, table
-from tests.support.pages import CONTRAST, Page, campaign
+from tests.support.pages import CONTRAST, Page, campaign, rendered
 
 PERSONAS = ("speedy", "distracted")
 
@@ -145,8 +143,26 @@ def test_section__gaps_alone_or_a_crossplay_alone_are_a_section_too(found):
 
 # --- words ---
 
-EGO = Response(seed=1, role="ego", persona="speedy", round=3, pair_arm="pair", response_arm="best_ego", ego="retrained_speedy", non_ego="speedy")
-NON_EGO = Response(seed=1, role="non_ego", persona="speedy", round=3, pair_arm="pair", response_arm="best_non_ego", ego="retrained_speedy", non_ego="speedy")
+EGO = Response(
+    seed=1,
+    role="ego",
+    persona="speedy",
+    round=3,
+    pair_arm="pair",
+    response_arm="best_ego",
+    ego="retrained_speedy",
+    non_ego="speedy",
+)
+NON_EGO = Response(
+    seed=1,
+    role="non_ego",
+    persona="speedy",
+    round=3,
+    pair_arm="pair",
+    response_arm="best_non_ego",
+    ego="retrained_speedy",
+    non_ego="speedy",
+)
 
 
 def verdict_texts(ego_gain, non_ego_gain, responses=(EGO, NON_EGO), failing=0, games=100):
@@ -415,7 +431,16 @@ def test_browser__prints_the_verdicts_and_the_maps_chosen(opened):
 
 def test_browser__hostile_names_are_inert(opened, found, tmp_path):
     hostile = "<img src=x onerror='alert(2)'>"
-    response = Response(seed=1, role="ego", persona=hostile, round=1, pair_arm="pair", response_arm="best_ego", ego=hostile, non_ego=hostile)
+    response = Response(
+        seed=1,
+        role="ego",
+        persona=hostile,
+        round=1,
+        pair_arm="pair",
+        response_arm="best_ego",
+        ego=hostile,
+        non_ego=hostile,
+    )
     episodes = table(arm("pair", ego_failed=[0, 0]), arm("best_ego", ego_failed=[0, 0], ego_payoff=[11, 12]))
     crossplay = found.crossplay.assign(ego=hostile)[:1]
     game = replace(found, gaps=gaps([response], episodes, 0.01), crossplay=crossplay)

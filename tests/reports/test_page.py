@@ -4,19 +4,15 @@ import csv
 import math
 import re
 
-import pandas as pd
 import pytest
 
-from harness.evaluation.comparison import Verdict, compare
-from harness.evaluation.research_questions import Question
+from harness.evaluation.comparison import Verdict
 from harness.evaluation.summary import summarise
-from harness.evaluation.tables import TABLES, typed, write_csv
+from harness.evaluation.tables import write_csv
 from harness.replay.selection import choose_games, replay_name, worst_first
 from harness.reports import page as page_module
 from harness.reports.numbers import duration, number, p_number, p_text, percent
-from harness.reports.page import render_page
 from harness.reports.page_wording import FAILS_ALONE, QUICK, as_many_failures
-from harness.reports.run_tables import RunTables
 from harness.reports.wording import (
     BEFORE_HOLM_ONLY,
     NO_DIFFERENCE,
@@ -28,8 +24,7 @@ from harness.reports.wording import (
     too_few,
     verdicts,
 )
-from tests.support.recorded import SCENE, manoeuvres, recorded
-from tests.support.pages import Page, blank_figures, rendered, campaign, recomputed, recordings, with_errors
+from tests.support.pages import Page, blank_figures, campaign, recomputed, recordings, rendered, with_errors
 
 
 @pytest.fixture(scope="module")

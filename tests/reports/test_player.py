@@ -8,8 +8,8 @@ import pytest
 
 from harness.reports.page import GAMES_BYTES, PAGE_BYTES
 from harness.reports.player_data import key
-from tests.support.pages import campaign, recordings, rendered
 from tests.support.chromium import launched, opener, until
+from tests.support.pages import campaign, recordings, rendered
 from tests.support.recorded import STEP_S, recorded
 
 GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and the same episode after retraining

@@ -17,6 +17,7 @@ from harness.campaign.execution.worker_pool import run_stages
 from harness.campaign.execution.worker_process import Event
 from harness.campaign.plan.planned_drivers import Trained
 from harness.campaign.plan.stages import Stage, TrainingStage
+from harness.cli.wording import INTERRUPTED
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.errors import StageFailed
@@ -249,7 +250,7 @@ def test_campaign__interrupted_and_killed_and_run_again_is_uninterrupted(tmp_pat
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     printed = process.communicate(timeout=PATIENCE_S)[0]
     assert process.returncode == 130
-    assert "run the same command again to go on" in printed
+    assert INTERRUPTED in printed
     assert "Traceback" not in printed
     wait_for(lambda: not in_session(process.pid), "no process of it is left")
     assert not (run_folder / "episodes.csv").exists()
