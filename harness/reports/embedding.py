@@ -1,8 +1,8 @@
 """The recorded games in the page: small numbers, packed, as many games as fit.
 
-A game's columns are whole numbers of centimetres, milliradians and so on (`SCALES`), each number but a column's first is
-the difference to the previous one. Their bytes are arranged in four planes (all lowest bytes, all second ones, ...), of
-which all but the first are mostly zeros, deflated, and written in base64. `recorded.js` reads them.
+A game's columns are whole numbers of centimetres, milliradians and so on (`SCALES`), each number but a column's first
+is the difference to the previous one. Their bytes are arranged in four planes (all lowest bytes, all second ones, ...),
+of which all but the first are mostly zeros, deflated, and written in base64. `recorded.js` reads them.
 """
 
 from __future__ import annotations

@@ -252,6 +252,10 @@ def arm_in_words(arm: Arm) -> str:
             return f"{_ego_in_words(ego)}, without the non-ego"
         case Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()):
             return "the naive ego with an ordinary law-abiding SUMO driver in the non-ego's place"
+        case Arm(ego=RetrainedEgo(against=against) | ReconfiguredEgo(against=against) as ego, non_ego=non_ego) if (
+            non_ego is not None and against == strategy_name(non_ego)
+        ):
+            return f"{_ego_in_words(ego)}, against the same {against}"
         case Arm(ego=ego, non_ego=non_ego) if ego is not None and non_ego is not None:
             return f"{_ego_in_words(ego)} against the non-ego {strategy_name(non_ego)}"
     raise ValueError("an arm has at least one player")

@@ -265,8 +265,8 @@ def test_campaign__the_driver_that_was_found_is_an_ego_that_plays_the_same_games
         rows = [games.drop(columns=["arm", "persona"]).reset_index(drop=True) for games in both]
         pd.testing.assert_frame_equal(*rows)
     page = html.unescape((tmp_path / "run" / "report.html").read_text())
-    assert "0 and 1: there is nothing to train or to tune in this ego" in page
-    assert "Round 2 was not played: there is nothing to train or to tune in this ego." in page
+    assert "0 and 1: this ego has nothing to train or to tune" in page
+    assert "Round 2 was not played: this ego has nothing to train or to tune." in page
     assert not (tmp_path / "run" / "reconfiguration.csv").exists()
 
 
@@ -308,7 +308,7 @@ def test_campaign__what_is_damaged_of_a_search_is_noticed_and_made_again(
     damage(again)
     refused = harness("report", again)
     assert refused.returncode == 2
-    assert "is gone, or is not what the campaign wrote" in refused.stderr
+    assert "is missing, or is not what the campaign wrote" in refused.stderr
     done = harness("campaign", campaign, "--out", again)
     assert done.returncode == 0, done.stdout + done.stderr
     assert f"started  {redone}" in done.stdout
@@ -319,7 +319,7 @@ def test_campaign__what_is_damaged_of_a_search_is_noticed_and_made_again(
 def test_campaign__a_program_that_plays_one_game_at_a_time_is_searched_so(tmp_path: Path) -> None:
     shutil.copytree(REPOSITORY / "egos" / "examples" / "process", tmp_path / "perl")
     program = (tmp_path / "perl" / "drive.pl").read_text()
-    alone = program.replace("my ($views)", 'die "one at a time" if $line =~ /"games": \\[0, /; my ($views)', 1)
+    alone = program.replace("my ($rows)", 'die "one at a time" if $line =~ /"games": \\[0, /; my ($rows)', 1)
     assert alone != program
     (tmp_path / "perl" / "drive.pl").write_text(alone)
     text = (tmp_path / "perl" / "perl.toml").read_text()

@@ -42,7 +42,7 @@ def test_published__report_names_what_is_missing_and_changes_nothing(published: 
     command = harness("report", published)
     assert command.returncode == 2
     (line,) = command.stderr.strip().splitlines()
-    assert line.startswith(f"{published}: holds a report and its tables, but not what they are made of (")
+    assert line.startswith(f"{published}: holds a report and its tables, but not the files that they are made from (")
     assert "report.html" in line
     assert files_in(published) == before
 
