@@ -12,7 +12,6 @@ from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
 
 LEARNED, SUMO = "learned", "sumo"  # drivers of an ego that have a name
-ROBUST = "robust"  # the name of the ego that is retrained against several personas at once
 TRAINING_TABLES = ("training", "non_ego_training", "retraining")
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]
