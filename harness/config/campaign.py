@@ -64,6 +64,9 @@ class Training(Document):
     are clipped together: with large payoffs, the errors of the critic would leave little of the step to the actor."""
     segment_steps: int = Field(131_072, ge=1_024, le=100_000_000)
     """A checkpoint is written, and the learning curve evaluated, each time after this many steps."""
+    learner: Literal["compiled", "stable_baselines3"] = "compiled"
+    """`compiled`: Stable-Baselines3's PPO with its gradient steps in machine code, several times as fast.
+    `stable_baselines3`: the reference; the numbers of an update are the same but for rounding."""
 
     @model_validator(mode="after")
     def _sizes_are_consistent(self) -> Training:

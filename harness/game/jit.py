@@ -27,7 +27,7 @@ def compiled(function: _Function) -> _Function:
     """
     config: Any = numba.config
     default = config.CACHE_DIR
-    config.CACHE_DIR = default or _folder()
+    config.CACHE_DIR = default or _folder(Path(function.__code__.co_filename).parent)
     options: dict[str, Any] = {"error_model": "numpy"}
     try:
         dispatcher: Any = numba.njit(cache=True, **options)(function)
@@ -71,17 +71,21 @@ def _lock() -> contextlib.AbstractContextManager[object]:
     """The lock of all processes that use the same cache. Entering it raises OSError if it can't be written."""
     from filelock import FileLock  # imports asyncio and sqlite3: only for processes that run compiled code
 
-    folder = Path(_folder())
+    folder = _cache()
     folder.mkdir(parents=True, exist_ok=True)
     return FileLock(folder / "turn", fallback_to_soft=False)
 
 
+def _cache() -> Path:
+    return Path(platformdirs.user_cache_dir("harness")) / "compiled"
+
+
 @cache
-def _folder() -> str:
-    """The cache's folder, named by a digest of all sources of this package.
+def _folder(package: Path) -> str:
+    """The cache's folder for functions of a package, named by a digest of all its sources and of this package's.
 
     numba invalidates its cache by a function's own file only, not by the functions and constants that it uses.
     """
-    sources = sorted((Path(__file__).parent).glob("*.py"))
+    sources = [each for folder in (Path(__file__).parent, package) for each in sorted(folder.glob("*.py"))]
     digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:24]
-    return str(Path(platformdirs.user_cache_dir("harness")) / "compiled" / digest)
+    return str(_cache() / digest)

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 import torch
 from stable_baselines3 import PPO
-from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 
@@ -24,18 +23,19 @@ from harness.config.persona import Persona
 from harness.drivers.mixture import Mixture, Player, mixture_of
 from harness.drivers.policy_file import Policy
 from harness.environments.arena import Arena, Seat
-from harness.environments.vector_env import ArenaVecEnv, Finished
+from harness.environments.vector_env import ArenaVecEnv
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution
 from harness.game.observation import OF_OTHERS
 from harness.game.seeding import seed_of
-from harness.game.state import Outcome
 from harness.traffic.scene import OpenScene
-from harness.training.checkpoint import CurvePoint, Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
+from harness.training.callbacks import CurveRecorder, DeviationBound
+from harness.training.checkpoint import Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
+from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import has_converged
 
-CURVE_WINDOW_STEPS = 16_384
 _GAE_LAMBDA = 0.95
+_ALGORITHMS: dict[str, type[PPO]] = {"compiled": CompiledPPO, "stable_baselines3": PPO}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +162,7 @@ def _attentive_steps(spec: TrainingSpec) -> float:
 def _learner(spec: TrainingSpec, environment: ArenaVecEnv, tensorboard: Path | None) -> PPO:
     settings = spec.settings
     set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
-    model = PPO(
+    model = _ALGORITHMS[settings.learner](
         "MlpPolicy",
         environment,
         learning_rate=settings.learning_rate,
@@ -208,11 +208,11 @@ def _segment(
     environment.sample_from(_start_distribution(spec, progress.steps), *parts)
     environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
     steps = min(spec.settings.segment_steps, spec.settings.steps - progress.steps)
-    curve = _CurveRecorder(environment, progress, on_progress, spec)
+    curve = CurveRecorder(environment, progress, spec.settings.steps, spec.scene.world.step_s, on_progress)
     model.num_timesteps = progress.steps
     model._last_obs = None  # SB3 then resets the games
     try:
-        bound = _DeviationBound(spec.settings.max_deviation)
+        bound = DeviationBound(spec.settings.max_deviation)
         model.learn(steps, callback=[curve, bound], reset_num_timesteps=False)
     except FloatingPointError as error:
         raise FloatingPointError(f"{error}, after {model.num_timesteps} steps") from error
@@ -227,74 +227,3 @@ def _segment(
         segment_payoffs=[*progress.segment_payoffs, mean],
         curve=curve.windows,
     )
-
-
-class _DeviationBound(BaseCallback):
-    """Bounds the standard deviation of actions. Actions are clipped at ±1: beyond the bound the entropy term of PPO
-    still rewards a larger deviation, which is no exploration any more, but full throttle and full brake in turn."""
-
-    def __init__(self, largest: float) -> None:
-        super().__init__()
-        self._largest_log = float(np.log(largest))
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_start(self) -> None:
-        self._bound()
-
-    def _on_training_end(self) -> None:
-        self._bound()  # the stored policy is within the bound as well
-
-    def _bound(self) -> None:
-        deviation: Any = self.model.policy.log_std
-        with torch.no_grad():
-            deviation.clamp_(max=self._largest_log)
-
-
-class _CurveRecorder(BaseCallback):
-    """Records the learning curve of a segment and reports progress."""
-
-    def __init__(
-        self,
-        environment: ArenaVecEnv,
-        progress: Progress,
-        on_progress: Callable[[int, int], None],
-        spec: TrainingSpec,
-    ) -> None:
-        super().__init__()
-        self._environment, self._on_progress, self._spec = environment, on_progress, spec
-        self._window: list[Finished] = []
-        self._window_start = progress.steps
-        self.windows, self.games = list(progress.curve), list[Finished]()
-
-    def _on_step(self) -> bool:
-        return True
-
-    def _on_rollout_end(self) -> None:
-        finished = self._environment.take_finished()
-        self._window += finished
-        self.games += finished
-        if self.num_timesteps - self._window_start >= CURVE_WINDOW_STEPS:
-            self._close_window()
-        self._on_progress(self.num_timesteps, self._spec.settings.steps)
-
-    def _on_training_end(self) -> None:
-        self._close_window()  # a window contains games of one segment only, so a short segment has a short window
-        self.logger.dump(self.num_timesteps)
-
-    def _close_window(self) -> None:
-        games = self._window
-        if not games:
-            return
-        window = CurvePoint(
-            steps=self.num_timesteps,
-            mean_payoff=float(np.mean([game.payoff for game in games])),
-            failure_rate=float(np.mean([game.outcome != Outcome.GOAL for game in games])),
-            games=len(games),
-            mean_duration_s=float(np.mean([game.steps for game in games])) * self._spec.scene.world.step_s,
-        )
-        for name in ("mean_payoff", "failure_rate", "mean_duration_s"):
-            self.logger.record(f"games/{name}", getattr(window, name))
-        self.windows.append(window)
-        self._window, self._window_start = [], self.num_timesteps

@@ -28,7 +28,7 @@ with jit._turn():
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The cache's folder, moved to a temporary one that does not exist yet."""
     folder = tmp_path / "compiled"
-    monkeypatch.setattr(jit, "_folder", lambda: str(folder))
+    monkeypatch.setattr(jit, "_cache", lambda: folder)
     return folder
 
 
