@@ -11,7 +11,7 @@ PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo campaign quick test test-fast coverage bench check lock clean
+.PHONY: help install demo campaign quick test test-fast coverage bench publish check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
@@ -41,6 +41,9 @@ coverage: install ## run every test and print the share of each module's lines t
 bench: install ## what the harness costs, as ratios measured side by side: benchmarks/results.json, 20 minutes
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -c requirements.lock -e '.[bench]'
 	$(BIN)/python -m benchmarks $(ARGS)
+
+publish: install ## make policies, published runs and tables of documents anew: hours; `ARGS=--cost` says how many
+	$(BIN)/python docs/publish/publish.py $(ARGS)
 
 check: install ## lint, formatting and types, in under half a minute
 	$(BIN)/ruff check .

@@ -1,6 +1,6 @@
-"""Training as in a campaign, against the same training on an environment that costs nothing and on SB3's subprocesses.
+"""Training as in a campaign: against SB3's own learner, on an environment that costs nothing, on SB3's subprocesses.
 
-All sides call `harness.training.ppo.train` with a campaign's own settings; only the environment differs.
+All sides call `harness.training.ppo.train` with a campaign's own settings; only the learner or the environment differs.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from unittest.mock import patch
 
 import gymnasium
 import numpy as np
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
 
 from benchmarks.budget import Budget
@@ -83,6 +84,41 @@ def train_in_laps(timer: LapTimer, settings: Training, values: Callable[[], dict
 def arena_side(timer: LapTimer) -> None:
     """Training on the arena."""
     train_in_laps(timer, endless_training())
+
+
+def sb3_side(timer: LapTimer) -> None:
+    """Training on the arena with Stable-Baselines3's own learner."""
+    train_in_laps(timer, endless_training(learner="stable_baselines3"))
+
+
+def update_side(timer: LapTimer, learner: str) -> None:
+    """Updates of a learner from one rollout, again and again. The unit is a gradient step."""
+    settings = endless_training()
+
+    class Repeated(BaseCallback):
+        def _on_step(self) -> bool:
+            return True
+
+        def _on_rollout_end(self) -> None:
+            gradient_steps = settings.epochs * -(-settings.buffer // settings.minibatch)
+            model: Any = self.model
+            for _ in range(_WARM_UP_UPDATES):
+                model.train()
+            timer.ready()
+            while True:
+                updates = 0
+                while not timer.lap_is_over():
+                    model.train()
+                    updates += 1
+                timer.finish_lap(updates * gradient_steps)
+
+    replaced: Any = {"Arena": _NoArena, "ArenaVecEnv": _FreeVecEnv, "CurveRecorder": lambda *_, **__: Repeated()}
+    with (
+        patch.multiple("harness.training.ppo", **replaced),
+        tempfile.TemporaryDirectory(prefix="benchmark-") as scratch,
+    ):
+        spec = training_spec(endless_training(learner=learner))
+        train(spec, checkpoint=Path(scratch) / "checkpoint", key="benchmark", card={})
 
 
 def free_side(timer: LapTimer) -> None:
@@ -190,6 +226,23 @@ def training_vs_free_env(budget: Budget, on_progress: OnProgress) -> Measured:
     laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.training_lap_s, on_progress=on_progress)
     value = best_rate(laps["arena"]) / best_rate(laps["free"])
     return {"training_vs_free_env": value}, {"unit": "training steps/s", "games": GAMES, **raw_numbers(laps)}
+
+
+def training_vs_sb3(budget: Budget, on_progress: OnProgress) -> Measured:
+    """Rate of training on the arena, in multiples of its rate with Stable-Baselines3's own learner."""
+    sides = {"compiled": Side(run=arena_side), "stable_baselines3": Side(run=sb3_side)}
+    laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.training_lap_s, on_progress=on_progress)
+    value = best_rate(laps["compiled"]) / best_rate(laps["stable_baselines3"])
+    return {"training_vs_sb3": value}, {"unit": "training steps/s", "games": GAMES, **raw_numbers(laps)}
+
+
+def update_vs_sb3(budget: Budget, on_progress: OnProgress) -> Measured:
+    """Rate of the learner's gradient steps, in multiples of Stable-Baselines3's own."""
+    learners = ("compiled", "stable_baselines3")
+    sides = {learner: Side(run=update_side, arguments=(learner,)) for learner in learners}
+    laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.lap_s, on_progress=on_progress)
+    value = best_rate(laps["compiled"]) / best_rate(laps["stable_baselines3"])
+    return {"update_vs_sb3": value}, {"unit": "gradient steps/s", **raw_numbers(laps)}
 
 
 def vs_subproc(budget: Budget, on_progress: OnProgress) -> Measured:

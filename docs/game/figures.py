@@ -2,7 +2,7 @@
 
     python docs/game/figures.py gaps reports/merge-seeds              # best-response gaps
     python docs/game/figures.py failures reports/merge-arms-race      # failure rates of every ego against every non-ego
-    python docs/game/figures.py strangers reports/merge-arms-race     # egos against non-egos new to them
+    python docs/game/figures.py generalisation reports/merge-arms-race     # egos against non-egos new to them
 
 Each command prints a table in Markdown. The argument is a run folder with gaps.csv, crossplay.csv or
 generalisation.csv, or such a file.
@@ -61,7 +61,7 @@ def failures_table(found: pd.DataFrame) -> str:
     return "\n".join(lines)
 
 
-def strangers_table(found: pd.DataFrame) -> str:
+def generalisation_table(found: pd.DataFrame) -> str:
     """A row for each ego and each non-ego that it was not trained against."""
     lines = [
         "| ego | trained against | plays against | fails (95 %) | naive ego fails | share | p (Holm) |",
@@ -97,9 +97,9 @@ def failures(run: Run) -> None:
 
 
 @app.command()
-def strangers(run: Run) -> None:
+def generalisation(run: Run) -> None:
     """Print how often egos fail against non-egos that they were not trained against."""
-    print(strangers_table(read(run, "generalisation")))
+    print(generalisation_table(read(run, "generalisation")))
 
 
 if __name__ == "__main__":

@@ -46,6 +46,7 @@ class CurveRecorder(BaseCallback):
         self,
         environment: ArenaVecEnv,
         progress: Progress,
+        *,
         steps: int,
         step_s: float,
         on_progress: Callable[[int, int], None],

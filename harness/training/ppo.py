@@ -208,7 +208,13 @@ def _segment(
     environment.sample_from(_start_distribution(spec, progress.steps), *parts)
     environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
     steps = min(spec.settings.segment_steps, spec.settings.steps - progress.steps)
-    curve = CurveRecorder(environment, progress, spec.settings.steps, spec.scene.world.step_s, on_progress)
+    curve = CurveRecorder(
+        environment,
+        progress,
+        steps=spec.settings.steps,
+        step_s=spec.scene.world.step_s,
+        on_progress=on_progress,
+    )
     model.num_timesteps = progress.steps
     model._last_obs = None  # SB3 then resets the games
     try:

@@ -62,7 +62,7 @@ def test_failures__a_cell_is_the_mean_over_seeds_and_a_dash_without_games() -> N
     ]
 
 
-def test_strangers__a_row_compares_with_the_naive_ego() -> None:
+def test_generalisation__a_row_compares_with_the_naive_ego() -> None:
     row = {
         "ego": "robust",
         "met": "anna + bert",
@@ -74,7 +74,7 @@ def test_strangers__a_row_compares_with_the_naive_ego() -> None:
         "share_of_naive": 0.25,
         "p_holm": float("nan"),
     }
-    assert figures.strangers_table(pd.DataFrame([row])).splitlines()[-1] == (
+    assert figures.generalisation_table(pd.DataFrame([row])).splitlines()[-1] == (
         "| `robust` | anna + bert | `cleo` | 5% (2.1% to 11.2%) | 20% | 0.25 | – |"
     )
 
@@ -85,7 +85,7 @@ def test_strangers__a_row_compares_with_the_naive_ego() -> None:
         ("gaps_table", FOLDER / "gaps-of-five-seeds.csv", "gaps"),
         ("gaps_table", PUBLISHED / "gaps.csv", "gaps"),
         ("failures_table", PUBLISHED / "crossplay.csv", "crossplay"),
-        ("strangers_table", PUBLISHED / "generalisation.csv", "generalisation"),
+        ("generalisation_table", PUBLISHED / "generalisation.csv", "generalisation"),
     ],
 )
 def test_page__shows_the_output_of_the_script(table: str, source: Path, name: str) -> None:

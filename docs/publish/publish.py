@@ -1,0 +1,130 @@
+"""Make everything anew that the project publishes: policies, run folders, tables, the tables in documents.
+
+    python docs/publish/publish.py --cost         # what it would take
+    python docs/publish/publish.py                # the steps of docs/publish/published.toml, then the documents
+    python docs/publish/publish.py --documents    # only the tables in documents, from the run folders that are there
+
+A campaign continues where it was interrupted, and a finished one is not run again: so does this script.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from cost import cost_table
+from output_blocks import blocks_in, with_outputs
+from pydantic import Field, model_validator
+
+from harness.config.toml_reading import Document, read_document
+from harness.files import write_atomically
+
+ROOT = Path(__file__).parents[2]
+PUBLISHED = Path(__file__).with_name("published.toml")
+DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+
+
+class Step(Document):
+    """One step: a campaign to run, a file or folder to copy, or a command."""
+
+    campaign: str = ""
+    copy_from: str = Field("", alias="copy")
+    to: str = ""
+    command: str = ""
+    cost: str = ""
+    """The cost of a command, in words."""
+
+    @model_validator(mode="after")
+    def _is_one_step(self) -> Step:
+        if sum(map(bool, (self.campaign, self.copy_from, self.command))) != 1:
+            raise ValueError("a step has one of `campaign`, `copy` and `command`")
+        if bool(self.copy_from) != bool(self.to):
+            raise ValueError("`copy` and `to` belong together")
+        return self
+
+    def __str__(self) -> str:
+        return self.command or (
+            f"copy {self.copy_from} to {self.to}" if self.to else f"harness campaign {self.campaign}"
+        )
+
+
+class Published(Document):
+    """The document published.toml."""
+
+    step: list[Step] = Field(min_length=1)
+
+
+def main(
+    cost: Annotated[bool, typer.Option("--cost", help="Print what the steps would take, and end.")] = False,
+    documents: Annotated[bool, typer.Option("--documents", help="Only write the tables in documents anew.")] = False,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="TEXT", help="Only the steps and tables that contain this text.")
+    ] = None,
+) -> None:
+    """Make everything anew that the project publishes, and say first what it costs."""
+    chosen = only or [""]
+    steps = [each for each in read_document(PUBLISHED, Published).step if any(text in str(each) for text in chosen)]
+    if not documents:
+        print(cost_table([ROOT / each.campaign for each in steps if each.campaign], ROOT))
+        for each in steps:
+            if each.cost:
+                print(f"{each.command}: {each.cost}")
+        if cost:
+            return
+        for number, step in enumerate(steps, 1):
+            print(f"\nstep {number} of {len(steps)}: {step}", flush=True)
+            carry_out(step, ROOT)
+    for document in DOCUMENTS:
+        write_outputs(document, ROOT, chosen)
+
+
+def carry_out(step: Step, root: Path) -> None:
+    """Carry out one step in a checkout. Raises CalledProcessError or OSError if it fails."""
+    if step.campaign:
+        _run(f"harness campaign {step.campaign}", root, capture=False)
+    elif step.command:
+        _run(step.command, root, capture=False)
+    else:
+        source, target = root / step.copy_from, root / step.to
+        if source.is_dir():
+            fresh = target.with_name(f"{target.name}.new")
+            shutil.rmtree(fresh, ignore_errors=True)
+            shutil.copytree(source, fresh)
+            shutil.rmtree(target, ignore_errors=True)
+            fresh.rename(target)
+        else:
+            write_atomically(target, source.read_bytes())
+
+
+def write_outputs(document: Path, root: Path, chosen: list[str]) -> None:
+    """Write the output of each of a document's commands that contain one of `chosen` anew.
+
+    A command without its run folder is left out, and named. Raises CalledProcessError if a command fails.
+    """
+    text = document.read_text(encoding="utf-8")
+    outputs: dict[str, str] = {}
+    for command in blocks_in(text):
+        missing = [word for word in command.split() if word.startswith("reports/") and not (root / word).exists()]
+        if missing:
+            print(f"{document.name}: left as it is, {missing[0]} is not there: {command}")
+        elif any(each in command for each in chosen):
+            outputs[command] = _run(command, root, capture=True)
+    changed = with_outputs(text, outputs)
+    if changed != text:
+        write_atomically(document, changed.encode())
+        print(f"{document.name}: written anew")
+
+
+def _run(command: str, root: Path, capture: bool) -> str:
+    program, *arguments = command.split()
+    words = [sys.executable, *(arguments if program == "python" else ["-m", "harness.cli.main", *arguments])]
+    output = subprocess.PIPE if capture else None
+    return subprocess.run(words, cwd=root, check=True, stdout=output, text=True, encoding="utf-8").stdout or ""
+
+
+if __name__ == "__main__":
+    typer.run(main)

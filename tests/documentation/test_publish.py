@@ -1,0 +1,113 @@
+"""`make publish`: its steps, the parts of documents that it writes, and what it says that it costs."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from tests.support.repository import REPOSITORY
+
+FOLDER = REPOSITORY / "docs" / "publish"
+PAGE = """# A page
+
+<!-- output of: python table.py reports/one -->
+
+| old |
+
+<!-- end of output -->
+
+In between.
+
+<!-- output of: python table.py reports/two -->
+<!-- end of output -->
+"""
+
+
+def script(name: str) -> ModuleType:
+    sys.path.insert(0, str(FOLDER))
+    try:
+        return importlib.import_module(name)
+    finally:
+        sys.path.remove(str(FOLDER))
+
+
+publish, output_blocks = script("publish"), script("output_blocks")
+
+
+def test_blocks__are_found_by_their_command() -> None:
+    assert output_blocks.blocks_in(PAGE) == {
+        "python table.py reports/one": "| old |",
+        "python table.py reports/two": "",
+    }
+
+
+def test_outputs__replace_those_of_their_command_and_nothing_else() -> None:
+    page = output_blocks.with_outputs(PAGE, {"python table.py reports/two": "| \\1 new |\n"})
+    assert output_blocks.blocks_in(page) == {
+        "python table.py reports/one": "| old |",
+        "python table.py reports/two": "| \\1 new |",
+    }
+    assert page.replace("\n| \\1 new |\n\n", "") == PAGE
+    assert output_blocks.with_outputs(page, {"python table.py reports/two": "| \\1 new |"}) == page
+
+
+def test_write_outputs__runs_the_commands_whose_run_folders_are_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "reports" / "one").mkdir(parents=True)
+    (tmp_path / "table.py").write_text("import sys; print('| new:', sys.argv[1], '|')")
+    page = tmp_path / "page.md"
+    page.write_text(PAGE)
+    publish.write_outputs(page, tmp_path, [""])
+    assert output_blocks.blocks_in(page.read_text()) == {
+        "python table.py reports/one": "| new: reports/one |",
+        "python table.py reports/two": "",
+    }
+    assert "reports/two is not there" in capsys.readouterr().out
+
+
+def test_carry_out__a_copied_folder_replaces_the_one_before(tmp_path: Path) -> None:
+    for folder, names in {"reports/merge/policies": ["a", "b"], "policies/merge": ["b", "c"]}.items():
+        (tmp_path / folder).mkdir(parents=True)
+        for name in names:
+            (tmp_path / folder / name).write_text(folder)
+    step = publish.Step.model_validate({"copy": "reports/merge/policies", "to": "policies/merge"})
+    publish.carry_out(step, tmp_path)
+    found = {each.name: each.read_text() for each in (tmp_path / "policies" / "merge").iterdir()}
+    assert found == {"a": "reports/merge/policies", "b": "reports/merge/policies"}
+    assert [each.name for each in (tmp_path / "policies").iterdir()] == ["merge"]
+
+
+@pytest.mark.parametrize("keys", [{}, {"campaign": "a.toml", "command": "python b.py"}, {"copy": "a"}], ids=str)
+def test_step__is_one_of_three(keys: dict[str, str]) -> None:
+    with pytest.raises(ValueError, match=r"a step has one of|belong together"):
+        publish.Step.model_validate(keys)
+
+
+def test_steps__name_campaigns_and_scripts_that_exist() -> None:
+    steps = publish.read_document(publish.PUBLISHED, publish.Published).step
+    named = [each.campaign or each.command.split()[1] for each in steps if not each.copy_from]
+    assert [name for name in named if not (REPOSITORY / name).is_file()] == []
+    shipped = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "campaigns").glob("*.toml")}
+    assert shipped <= set(named)
+
+
+def test_documents__every_block_is_of_a_command_that_exists() -> None:
+    blocks = [command for page in publish.DOCUMENTS for command in output_blocks.blocks_in(page.read_text("utf-8"))]
+    assert len(blocks) >= 8
+    scripts = [command.split()[1] for command in blocks if not command.startswith("python -m ")]
+    assert [name for name in scripts if not (REPOSITORY / name).is_file()] == []
+
+
+def test_cost__counts_trainings_steps_and_arms_of_the_plan() -> None:
+    merge = REPOSITORY / "campaigns" / "merge.toml"
+    header, _, row, total = script("cost").cost_table([merge], REPOSITORY).splitlines()
+    cells = dict(zip(header.split("|"), row.split("|"), strict=True))
+    assert [cells[f" {name} "].strip() for name in ("trainings", "steps", "arms")] == ["5", "15.0 M", "10"]
+    hours = float(cells[" core-hours "])
+    assert 0.05 < hours < 1.0
+    assert float(total.split("|")[5]) == hours
