@@ -110,6 +110,16 @@ def step(
     print(step_table(seconds, background))
 
 
+@app.command()
+def training(
+    seconds: Annotated[float, typer.Option(metavar="S", help="How long to measure.")] = 20.0,
+) -> None:
+    """Print where the time of a training goes, as a table in Markdown."""
+    from benchmarks.training_parts import training_table
+
+    print(training_table(seconds))
+
+
 def _measure_all(
     measurements: Sequence[Measurement], budget: Budget, results: dict[str, Any], out: Path, console: Console
 ) -> list[str]:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from benchmarks.bare_sumo import Placement, place_and_step, record_placements
 from benchmarks.games import GAMES, CoastingGames, merge_scene
+from benchmarks.profiler import Profiler
 from benchmarks.traffic import write_scene
 from harness.environments import arena as arena_module
 from harness.traffic.background_traffic import BackgroundTraffic
@@ -31,40 +31,6 @@ _PARTS = (
     ("players that ended are removed or halted", "finish", arena_module.Arena, "_finish"),
     ("ended games are reset", "reset", CoastingGames, "reset"),
 )
-
-
-class _Profiler:
-    """Seconds of each part, without those of the parts inside it."""
-
-    def __init__(self) -> None:
-        self.total_s: dict[str, float] = {}
-        self._pending_s: dict[str, float] = {}
-        self._inner_s = [0.0]  # of the parts inside each part that is running, outermost first
-
-    def commit(self) -> None:
-        """Add the seconds since the last call of `commit` or `discard` to the total."""
-        for part, seconds in self._pending_s.items():
-            self.total_s[part] = self.total_s.get(part, 0.0) + seconds
-        self._pending_s.clear()
-
-    def discard(self) -> None:
-        """Forget the seconds since the last call of `commit` or `discard`."""
-        self._pending_s.clear()
-
-    def wrap(self, part: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function, with its time counted to the part."""
-
-        def timed(*arguments: Any, **keywords: Any) -> Any:
-            self._inner_s.append(0.0)
-            start_s = time.perf_counter()
-            try:
-                return function(*arguments, **keywords)
-            finally:
-                taken_s = time.perf_counter() - start_s
-                self._pending_s[part] = self._pending_s.get(part, 0.0) + taken_s - self._inner_s.pop()
-                self._inner_s[-1] += taken_s
-
-        return timed
 
 
 def step_table(seconds: float, background: int = 0) -> str:
@@ -99,7 +65,7 @@ def _table(coasting: CoastingGames, seconds: float, steps_per_pass: int, reset_e
 
 def _time_parts(coasting: CoastingGames, seconds: float, steps_per_pass: int, reset_ended: bool) -> dict[str, float]:
     """Microseconds per game-step of each part; `simulation` and `rest` included."""
-    profiler = _Profiler()
+    profiler = Profiler()
     for _, part, owner, name in _PARTS:
         if hasattr(owner, name):
             setattr(owner, name, profiler.wrap(part, getattr(owner, name)))
