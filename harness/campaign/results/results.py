@@ -40,7 +40,7 @@ from harness.evaluation.tables import (
     typed,
     write_csv,
 )
-from harness.evaluation.trace_file import check_traces, read_trace
+from harness.evaluation.trace_file import TraceReader, check_traces
 from harness.files import write_atomically
 from harness.replay import choose_games, replay_name, worst_first, write_replay
 from harness.reports.game_wording import gap_verdicts
@@ -181,10 +181,10 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
     folder.replays.mkdir(exist_ok=True)
     names = [replay_name(game.arm, game.seed, game.episode) for game in chosen.itertuples()]
     games = list(zip(chosen.itertuples(), names, strict=True))
-    quiet = not console.is_terminal
+    quiet, reader = not console.is_terminal, TraceReader()
     for game, name in track(games, "writing replays", console=console, transient=True, disable=quiet):
         write_replay(
-            read_trace(folder.traces(stage_id(game.arm, game.seed)), game.episode),
+            reader.read(folder.traces(stage_id(game.arm, game.seed)), game.episode),
             scene.net_file,
             scene.routes.path,
             folder.replays / name,
