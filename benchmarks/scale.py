@@ -94,9 +94,7 @@ def study_of(results: Mapping[str, Any]) -> Study:
     """The study, with the times of results. Raises KeyError where they have no campaign."""
     measured = results["details"]["campaign"]
     paper = _plan(["speedy", "distracted"], seeds=1, rounds=2)
-    seconds = {
-        kind: mean(measured["seconds"][stage.id] for stage in paper if _kind(stage) == kind) for kind in _KINDS
-    }
+    seconds = {kind: mean(measured["seconds"][stage.id] for stage in paper if _kind(stage) == kind) for kind in _KINDS}
     arms = sum(isinstance(stage, AssessmentStage) for stage in paper)
     planned = _plan(PERSONAS, SEEDS, ROUNDS)
     per_arm_s = 60.0 * measured["report_minutes"] / arms
@@ -155,7 +153,7 @@ def _stage_table(study: Study) -> str:
 
 def _wall_table(study: Study) -> str:
     lines = [
-        "| cores | in turn: hours | efficiency | at once: hours | efficiency | at once, no seed first: hours | at least |",
+        "| cores | in turn: hours | efficiency | at once: hours | efficiency | no seed first: hours | at least |",
         "| ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
     for cores in CORES:

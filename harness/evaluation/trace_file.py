@@ -132,7 +132,7 @@ class TraceReader:
         frame = file.read_row_group(group).to_pandas()
         _check_game(frame, ["episode", "step", "player"])
         rows = _with_strings(frame).groupby("episode", sort=False)
-        games = {int(episode): game.reset_index(drop=True) for episode, game in rows}  # type: ignore[call-overload]
+        games = {int(episode): game.reset_index(drop=True) for episode, game in rows}
         self._kept[path, group] = games
         self._rows += len(frame)
         while self._rows > MOST_KEPT_ROWS and len(self._kept) > 1:

@@ -17,7 +17,6 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
 
-import harness
 from harness.campaign.storage.checksums import checksums_of, mismatches, read_checksums
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import Document
@@ -97,7 +96,7 @@ def _key(folder: RunFolder, manifest: Mapping[str, Any]) -> str:
 @cache
 def _digest_of_sources() -> str:
     """A digest of this program: a version number does not tell one state of a working copy from another."""
-    top = Path(harness.__file__).parent
+    top = Path(__file__).parents[2]
     return _digest((file.relative_to(top).as_posix().encode(), file.read_bytes()) for file in sorted(_sources(top)))
 
 
