@@ -1,6 +1,6 @@
 """`python -m benchmarks`: measure, print and store. `python -m benchmarks table`: the stored results in Markdown.
 
-`python -m benchmarks step`: where the time of a step goes.
+`python -m benchmarks step`: where the time of a step goes. `python -m benchmarks scale`: what a large study would take.
 """
 
 from __future__ import annotations
@@ -93,6 +93,27 @@ def table(
         print(markdown_table(read(file)))
     except (OSError, ValueError, KeyError) as error:
         typer.echo(f"{file}: can't be read as results: {error!r}", err=True)
+        raise typer.Exit(USERS_MISTAKE) from None
+
+
+@app.command()
+def scale(
+    file: Annotated[
+        Path, typer.Argument(metavar="[FILE]", help="Stored results.", show_default="benchmarks/results.json")
+    ] = RESULTS,
+    write_page: Annotated[bool, typer.Option("--write", help="Replace the tables in docs/scaling.md instead.")] = False,
+) -> None:
+    """Print what a study of many campaigns would take on 2, 64 and 1,024 cores, by the times of stored results."""
+    from benchmarks import scale
+
+    try:
+        results = read(file)
+        if write_page:
+            scale.write_page(results)
+        else:
+            print(scale.scale_text(results))
+    except (OSError, ValueError, KeyError) as error:
+        typer.echo(f"{file}: can't be read as results with a campaign: {error!r}", err=True)
         raise typer.Exit(USERS_MISTAKE) from None
 
 

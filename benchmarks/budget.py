@@ -28,6 +28,8 @@ class Budget:
     """How often an arm of 100 episodes is played, after a first time that does not count."""
     starts: int
     """How often a command is started, after a first time that does not count."""
+    seeds: int
+    """Training seeds of the campaign with many arms, of 34 arms each."""
 
 
 FULL = Budget(
@@ -42,6 +44,7 @@ FULL = Budget(
     episodes=100,
     arms=3,
     starts=9,
+    seeds=3,
 )
 FAST = Budget(
     lap_s=0.3,
@@ -55,4 +58,5 @@ FAST = Budget(
     episodes=5,
     arms=1,
     starts=3,
+    seeds=1,
 )

@@ -82,6 +82,8 @@ class _EventRecorder:
 
     def emit(self, event: Event) -> None:
         """Record an event. Raises RuntimeError if a stage failed."""
+        if event.kind == "progress" and event.message:
+            return  # it prepares: its own work has not started
         if event.kind == "progress":
             self.progress.setdefault(event.stage, []).append((time.perf_counter(), event.done))
         elif event.kind == "done":

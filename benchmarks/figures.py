@@ -114,6 +114,14 @@ FIGURES = (
     ),
     Figure(key="help_seconds", meaning="harness --help", unit=" s", target=0.4),
     Figure(key="check_seconds", meaning="harness check campaigns/merge.toml", unit=" s", target=1.5),
+    Figure(
+        key="first_line_seconds",
+        meaning="harness campaign, from its start to the first text on the terminal",
+        unit=" s",
+        target=1.0,
+    ),
+    Figure(key="resume_seconds", meaning="a finished campaign of 100 arms, run again", unit=" s", target=3.0),
+    Figure(key="report_100_arms_seconds", meaning="harness report of 100 arms of 20 episodes", unit=" s", target=90.0),
     Figure(key="worker_peak_mb", meaning="peak memory of a training worker", unit=" MB", target=1000.0),
     Figure(
         key="worker_growth_mb",
@@ -167,6 +175,20 @@ MEASUREMENTS = (
         module="commands",
         function="command_seconds",
         seconds=lambda budget: 2.0 * budget.starts,
+    ),
+    Measurement(
+        name="first line",
+        keys=("first_line_seconds",),
+        module="commands",
+        function="first_line_seconds",
+        seconds=lambda budget: 1.0 * budget.starts,
+    ),
+    Measurement(
+        name="many arms",
+        keys=("resume_seconds", "report_100_arms_seconds"),
+        module="commands",
+        function="many_arms_seconds",
+        seconds=lambda budget: 20.0 + 80.0 * budget.seeds,
     ),
     Measurement(
         name="arena",

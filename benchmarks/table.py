@@ -25,7 +25,7 @@ def terminal_table(results: Mapping[str, Any], keys: Sequence[str] = KEYS) -> Ta
     table.add_column("reached")
     for figure in FIGURES:
         if figure.key in keys:
-            value = results[figure.key]
+            value = results.get(figure.key)
             style = _STYLES[figure.reached(value)] if value is not None else "dim"
             row = (
                 figure.key,
@@ -42,7 +42,7 @@ def markdown_table(results: Mapping[str, Any]) -> str:
     """A table of all figures for the documentation, with the machine and the versions below it."""
     lines = ["| figure | what | value | target | reached |", "| --- | --- | ---: | ---: | --- |"]
     for figure in FIGURES:
-        value = results[figure.key]
+        value = results.get(figure.key)
         cells = (f"`{figure.key}`", figure.meaning, figure.format_value(value), figure.format_target())
         lines.append(f"| {' | '.join(cells)} | {_reached(figure, value)} |")
     lines += ["", described_machine(results)]

@@ -57,7 +57,15 @@ GAME_MAY_IMPORT = {
     *("__future__", "abc", "bisect", "collections", "dataclasses", "enum", "functools", "harness", "hashlib"),
     *("itertools", "math", "numpy", "operator", "typing"),
 }
-JIT_MAY_IMPORT = GAME_MAY_IMPORT | {"contextlib", "filelock", "numba", "pathlib", "platformdirs", "threading"}
+JIT_MAY_IMPORT = GAME_MAY_IMPORT | {
+    "contextlib",
+    "filelock",
+    "logging",
+    "numba",
+    "pathlib",
+    "platformdirs",
+    "threading",
+}
 FILE_ACCESS_CALLS = {
     *("fromfile", "genfromtxt", "load", "loadtxt", "memmap", "open", "save", "savetxt", "savez", "tofile"),
 }
@@ -178,6 +186,12 @@ def test_checking__loads_no_learner_and_no_statistics() -> None:
     loaded = loaded_with("harness.campaign.preflight")
     assert "numpy" in loaded
     assert loaded.isdisjoint(LEARNERS | {"pandas", "scipy.stats", "optuna"})
+
+
+def test_resuming__loads_no_learner_and_no_statistics() -> None:
+    """A campaign that is finished is looked through and left as it is; one that is not says so before it loads them."""
+    loaded = loaded_with("harness.campaign.execution.run_campaign")
+    assert loaded.isdisjoint(LEARNERS | {"pandas", "scipy.stats", "scipy.optimize", "matplotlib", "optuna"})
 
 
 def loaded_with(*modules: str) -> set[str]:

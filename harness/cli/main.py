@@ -7,7 +7,7 @@ import signal
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
@@ -17,7 +17,7 @@ from harness.cli.documents import AllowCode, check_driver, persona_app, schema
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from harness.campaign.results.results import RunResult
+    from harness.campaign.results.kept_results import RunResult, ShownVerdict
 
 MACHINE_ERRORS = (
     errno.ENOSPC,
@@ -93,15 +93,16 @@ def campaign(
     """
     from rich.console import Console
 
-    from harness.campaign.execution.run_campaign import run_campaign
-    from harness.campaign.execution.worker_pool import cores
-    from harness.campaign.preflight import open_campaign
-    from harness.campaign.storage.run_folder import RunFolder
+    console = Console()
+    with console.status(wording.reading(file)):  # shown before what takes time to import
+        from harness.campaign.execution.run_campaign import run_campaign
+        from harness.campaign.execution.worker_pool import cores
+        from harness.campaign.preflight import open_campaign
+        from harness.campaign.storage.run_folder import RunFolder
 
-    opened = open_campaign(file, quick, allow_code)
+        opened = open_campaign(file, quick, allow_code)
     name = opened.document.name + ("-quick" if opened.quick else "")
     folder = RunFolder(out or Path("reports") / name)
-    console = Console()
     if quick and not opened.quick:
         console.print(wording.NOTHING_TO_SHORTEN)
     _handle_termination_signals()
@@ -212,10 +213,10 @@ def _handle_termination_signals() -> None:
             signal.signal(getattr(signal, name), terminate)
 
 
-def _show(verdicts: Any, run: Path, console: Console) -> None:
+def _show(verdicts: Iterable[ShownVerdict], run: Path, console: Console) -> None:
     styles = {"harm": "red", "mended": "green", "open": "yellow"}
-    for persona, verdict in verdicts:
-        label = f"{persona}, {verdict.question}: {verdict.label}"
+    for verdict in verdicts:
+        label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
         console.print(label, style=f"bold {styles[verdict.tone]}", highlight=False, markup=False)
         for sentence in (verdict.sentence, verdict.speed):
             if sentence:

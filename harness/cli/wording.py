@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rich.markup import escape
+
 if TYPE_CHECKING:
     from harness.campaign.plan.stages import Stage
     from harness.campaign.preflight import OpenCampaign
@@ -20,6 +22,10 @@ FILM_NEEDS_A_GAME = ("shows one game", "name the game: harness replay RUN ARM EP
 NOT_A_FOLDER = ("is not a folder", "name a folder")
 NOT_A_TOML_FILE = ("is not the name of a TOML file", "the name must end with .toml")
 FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
+
+
+def reading(file: Path) -> str:
+    return f"reading {escape(str(file))}"
 
 
 def no_folder(folder: Path) -> tuple[str, str]:

@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from enum import Enum
 from typing import Any
 
 import numpy as np
@@ -32,7 +31,7 @@ import numpy.typing as npt
 import pandas as pd
 from scipy import stats
 
-from harness.evaluation.research_questions import Question, ResearchQuestion
+from harness.evaluation.research_questions import Question, ResearchQuestion, Verdict
 
 Floats = npt.NDArray[np.float64]
 
@@ -62,22 +61,6 @@ CONFIDENCE = 0.95
 ROUNDING = 1e-12
 """Differences with a spread below this share of the largest value count as equal: otherwise the rounding of
 0.3 - 0.2 against 0.2 - 0.1 would give a tiny standard deviation and a huge t."""
-
-
-class Verdict(str, Enum):
-    """Every value the column `verdict` can have."""
-
-    SIGNIFICANT = "significant"
-    """p_holm < significance (and so p_value < significance)."""
-    BEFORE_HOLM_ONLY = "significant before Holm's correction only"
-    """p_value < significance <= p_holm."""
-    NOT_SIGNIFICANT = "not significant"
-    NO_DIFFERENCE = "no difference"
-    """Every difference is 0, so there is no t statistic."""
-    ALL_EQUAL = "no t statistic: all differences equal"
-    """Every difference is the same number, not 0. For failures `mcnemar_p` still exists."""
-    NOT_ENOUGH_PAIRS = "not enough pairs"
-    """Fewer than two pairs could be compared."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ not depend on whether the segments were played in one run.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +22,8 @@ from harness.files import check_file, replace_durably, scratch_beside
 from harness.game.arrays import FloatArray
 
 _MOST_BYTES = 10**12
+MOST_KEPT_ROWS = 1_000_000
+"""Of segments in memory: about 150 MB."""
 _LARGEST, _MOST_STEPS = 1e8, 1_000_000
 
 _TEXT = pa.dictionary(pa.int32(), pa.string())
@@ -99,6 +102,52 @@ def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
         yield int(rest["episode"].iloc[0]), rest.reset_index(drop=True)
 
 
+class TraceReader:
+    """Reads many games, of several files: a segment is read and checked once for all its games, and kept in memory as
+    long as the segments that were read last have no more than `MOST_KEPT_ROWS` rows."""
+
+    def __init__(self) -> None:
+        self._kept: OrderedDict[tuple[Path, int], dict[int, pd.DataFrame]] = OrderedDict()
+        self._rows = 0
+
+    def read(self, path: Path, episode: int) -> pd.DataFrame:
+        """As `read_trace`. Damage to any game of the segment is raised."""
+        try:
+            check_file(path, _MOST_BYTES)
+            with pq.ParquetFile(path) as file:
+                _check_schema(file.schema_arrow)
+                groups = _groups_with(file.metadata, episode)
+                if len(groups) > 1:
+                    return read_trace(path, episode)
+                games = self._segment(file, path, groups[0]) if groups else {}
+        except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
+            raise _damaged(path, error) from None
+        return games[episode].copy() if episode in games else _frame(SCHEMA.empty_table())
+
+    def _segment(self, file: pq.ParquetFile, path: Path, group: int) -> dict[int, pd.DataFrame]:
+        """The games of a row group, by episode."""
+        if (path, group) in self._kept:
+            self._kept.move_to_end((path, group))
+            return self._kept[path, group]
+        frame = file.read_row_group(group).to_pandas()
+        _check_game(frame, ["episode", "step", "player"])
+        rows = _with_strings(frame).groupby("episode", sort=False)
+        games = {int(episode): game.reset_index(drop=True) for episode, game in rows}
+        self._kept[path, group] = games
+        self._rows += len(frame)
+        while self._rows > MOST_KEPT_ROWS and len(self._kept) > 1:
+            self._rows -= sum(map(len, self._kept.popitem(last=False)[1].values()))
+        return games
+
+
+def _groups_with(metadata: pq.FileMetaData, episode: int) -> list[int]:
+    """The row groups that may have rows of an episode."""
+    column = SCHEMA.get_field_index("episode")
+    groups = range(metadata.num_row_groups)
+    spans = [metadata.row_group(group).column(column).statistics for group in groups]
+    return [group for group, span in zip(groups, spans, strict=True) if span is None or span.min <= episode <= span.max]
+
+
 def _write(groups: Iterable[pa.Table], path: Path) -> None:
     scratch = scratch_beside(path)
     try:
@@ -149,12 +198,12 @@ def _check_schema(schema: pa.Schema) -> None:
         raise ValueError(f"its columns are not those of a trace: {', '.join(different)[:200]}")
 
 
-def _check_game(frame: pd.DataFrame) -> None:
+def _check_game(frame: pd.DataFrame, unique: Sequence[str] = ("step", "player")) -> None:
     _check_numbers(frame[_NUMBERS].to_numpy(float))
     steps = frame["step"]
     if frame.isna().any(axis=None) or (len(frame) and not (0 <= steps.min() <= steps.max() <= _MOST_STEPS)):
         raise ValueError("it has empty cells, or steps out of range")
-    if frame.duplicated(["step", "player"]).any():
+    if frame.duplicated(list(unique)).any():
         raise ValueError("a road user has two rows in one step")
 
 

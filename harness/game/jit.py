@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import threading
 from collections.abc import Callable, Iterator
 from functools import cache
@@ -15,8 +16,13 @@ from typing import Any, TypeVar, cast
 
 import numba
 import platformdirs
+from numba.core import event
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
+
+COMPILING = "compiling numeric loops, once per installation"
+_LOGGER = logging.getLogger("harness.preparation")
+_functions = 0
 
 
 def compiled(function: _Function) -> _Function:
@@ -25,6 +31,8 @@ def compiled(function: _Function) -> _Function:
     Processes compile in turns, so that each finds the machine code of the others on disk. If no folder is writable,
     every process compiles for itself.
     """
+    global _functions
+    _functions += 1
     config: Any = numba.config
     default = config.CACHE_DIR
     config.CACHE_DIR = default or _folder(Path(function.__code__.co_filename).parent)
@@ -37,6 +45,22 @@ def compiled(function: _Function) -> _Function:
     finally:
         config.CACHE_DIR = default
     return cast(_Function, dispatcher)
+
+
+class _Compilations(event.Listener):
+    """Logs each function that is compiled. One whose machine code is on disk is only loaded, and is not logged."""
+
+    def __init__(self) -> None:
+        self._done: set[object] = set()
+
+    def on_start(self, event: event.Event) -> None:
+        _LOGGER.info(COMPILING, extra={"done": len(self._done), "total": _functions})
+
+    def on_end(self, event: event.Event) -> None:
+        self._done.add(event.data["dispatcher"])  # once per function, however many types it is compiled for
+
+
+event.register("numba:compile", _Compilations())
 
 
 def _in_turn(work: Callable[..., object]) -> Callable[..., object]:

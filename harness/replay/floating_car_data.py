@@ -15,6 +15,8 @@ Requirements of the device for an exact replay (measured on SUMO 1.28):
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -43,10 +45,10 @@ def write_recording(
     written = pd.concat([first, records, after_end]).sort_values(["step", "id"], kind="stable")
 
     root = ElementTree.Element("fcd-export")
-    for step, frame in written.groupby("step"):
+    for step, rows in groupby(_rows(written), itemgetter(0)):
         # step 0 of the game is shown by SUMO's second step
         timestep = ElementTree.SubElement(root, "timestep", time=f"{(step + 1) * step_length_s:.3f}")
-        for attributes in _rows(frame):
+        for _, attributes in rows:
             ElementTree.SubElement(timestep, "vehicle", attributes)
     write_xml(root, file)
 
@@ -84,13 +86,13 @@ def _records(
     )
 
 
-def _rows(frame: pd.DataFrame) -> Iterator[dict[str, str]]:
-    columns = [name for name in frame.columns if name != "step"]
-    for values in frame[columns].itertuples(index=False):
-        yield {
-            name: value if isinstance(value, str) else f"{value + 0.0:.6f}"
-            for name, value in zip(columns, values, strict=True)
-        }
+def _rows(frame: pd.DataFrame) -> Iterator[tuple[int, dict[str, str]]]:
+    """The step and the attributes of each row."""
+    names = [name for name in frame.columns if name != "step"]
+    columns = [frame[name].tolist() for name in names]
+    texts = [column if isinstance(column[0], str) else [f"{x + 0.0:.6f}" for x in column] for column in columns]
+    for step, *values in zip(frame["step"].tolist(), *texts, strict=True):
+        yield step, dict(zip(names, values, strict=True))
 
 
 def write_xml(root: ElementTree.Element, file: Path) -> None:

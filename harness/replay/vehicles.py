@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 import defusedxml.ElementTree as SafeXml
@@ -72,8 +73,7 @@ def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, DrawnV
     The players get types of their own. Background vehicles keep their type, in grey where it has no colour. A type that
     the route file does not define is SUMO's default.
     """
-    root = SafeXml.parse(route_file).getroot()
-    defined = {str(element.get("id")): dict(element.attrib) for element in root.iter("vType")}
+    defined = _defined_types(route_file, route_file.stat().st_mtime_ns)
     vehicles = trace.drop_duplicates("player")
     types = {}
     for vehicle, type_id in sorted(zip(vehicles["player"], vehicles["vehicle_type"], strict=True)):
@@ -83,6 +83,13 @@ def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, DrawnV
         builtin = {"vClass": _DEFAULT_CLASSES.get(type_id, "passenger")}
         types[vehicle] = _drawn(name, defined.get(type_id, builtin))
     return types
+
+
+@lru_cache(maxsize=8)
+def _defined_types(route_file: Path, modified_ns: int) -> dict[str, dict[str, str]]:
+    """The attributes of each type in a route file. It is read again when it has been modified."""
+    root = SafeXml.parse(route_file).getroot()
+    return {str(element.get("id")): dict(element.attrib) for element in root.iter("vType")}
 
 
 def _drawn(name: str, attributes: Mapping[str, str]) -> DrawnVehicle:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from harness.evaluation.comparison import Verdict
+from harness.evaluation.research_questions import Verdict
 from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, Arm, NaiveEgo, against_persona, persona_alone
 from harness.reports import page_wording
 from harness.reports.distributions import MOST_LINES, Pairs, paired_figure, pairs_of, spread_figure, spreads_of

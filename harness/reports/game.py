@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from harness.evaluation.comparison import Verdict
 from harness.evaluation.game_theory.records import GameFindings
+from harness.evaluation.research_questions import Verdict
 from harness.evaluation.tables import typed
 from harness.reports.data_table import Table, table
 from harness.reports.game_wording import (

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from harness.reports.page_wording import MIXED_VERSIONS, UNKNOWN_VERSION, made_with
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 def mixed_versions(stages: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -36,6 +39,12 @@ def mixed_versions(stages: Mapping[str, Mapping[str, Any]]) -> list[str]:
         if group:
             groups.setdefault(group, []).append(name)
     return [MIXED_VERSIONS, *(made_with(group, names) for group, names in groups.items())]
+
+
+def warn(sentences: Sequence[str], console: Console) -> None:
+    """Print warnings."""
+    for sentence in sentences:
+        console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)
 
 
 def _kind(stage: Mapping[str, Any]) -> str:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from harness.evaluation.comparison import Verdict
+from harness.evaluation.research_questions import Verdict
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, p_text, trimmed
 from harness.reports.treatment import ARMS, RETRAINED, Change
 

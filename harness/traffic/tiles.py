@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import hashlib
 import importlib.metadata
+import logging
 import os
 import shutil
 import subprocess
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import platformdirs
@@ -21,6 +23,8 @@ from harness.errors import SimulationError
 from harness.traffic.xml_file import parse_xml
 
 _GAP_M = 200.0
+_MOST_AT_ONCE = 8  # netconverts that shift a tile each
+_LOGGER = logging.getLogger("harness.preparation")
 
 
 def tile_prefix(game: int, games: int) -> str:
@@ -56,24 +60,27 @@ def tiled_net(net_file: Path, games: int) -> Path:
 
 
 def _merge(net_file: Path, games: int, scratch: Path) -> Path:
-    offset = tile_offset_m(net_file, games)
+    offset_m = tile_offset_m(net_file, games)
+
+    def tile(game: int) -> str:
+        copy, shift_m = scratch / f"{game}.net.xml", game * offset_m
+        options = ("--prefix", tile_prefix(game, games), "--offset.y", str(shift_m), "-o", str(copy))
+        _netconvert("-s", str(net_file), *options)
+        return str(copy)
+
     tiles = []
-    for game in range(games):
-        tile = scratch / f"{game}.net.xml"
-        _netconvert(
-            "-s",
-            str(net_file),
-            "--prefix",
-            tile_prefix(game, games),
-            "--offset.y",
-            str(game * offset),
-            "-o",
-            str(tile),
-        )
-        tiles.append(str(tile))
+    _log_merging(0, games)
+    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_AT_ONCE)) as threads:
+        for copy in threads.map(tile, range(games)):
+            tiles.append(copy)
+            _log_merging(len(tiles), games)
     merged = scratch / "merged.net.xml"
     _netconvert("-s", ",".join(tiles), "--offset.disable-normalization", "-o", str(merged))
     return merged
+
+
+def _log_merging(done: int, games: int) -> None:
+    _LOGGER.info("merging %d copies of the network, once per scene", games, extra={"done": done, "total": games + 1})
 
 
 def _netconvert(*arguments: str) -> None:

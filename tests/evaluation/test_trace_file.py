@@ -8,7 +8,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from harness.evaluation.trace_file import SCHEMA, TraceWriter, read_trace
+from harness.evaluation import trace_file
+from harness.evaluation.trace_file import SCHEMA, TraceReader, TraceWriter, join_traces, read_trace
 
 
 def game(episode: int, steps: int = 3) -> dict[str, list[Any]]:
@@ -57,6 +58,31 @@ def test_trace__no_games_at_all_is_a_file_too(tmp_path: Path) -> None:
     trace = read_trace(tmp_path / "t.parquet", 0)
     assert trace.empty
     assert list(trace.columns) == SCHEMA.names
+
+
+@pytest.mark.parametrize("most_rows", [4, 1_000])
+def test_reader__gives_what_is_read_game_by_game(
+    most_rows: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(trace_file, "MOST_KEPT_ROWS", most_rows)
+    parts, arm = [tmp_path / name for name in ("0", "1")], tmp_path / "arm.parquet"
+    write(parts[0], game(0), game(1, steps=5))
+    write(parts[1], game(2, steps=4), game(3))
+    join_traces(parts, arm)
+    reader = TraceReader()
+    for episode in (3, 0, 1, 7, 2, 3):
+        pd.testing.assert_frame_equal(reader.read(arm, episode), read_trace(arm, episode))
+
+
+def test_reader__reads_a_segment_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write(tmp_path / "t.parquet", game(0), game(1))
+    checked: list[int] = []
+    monkeypatch.setattr(trace_file, "_check_game", lambda frame, unique: checked.append(len(frame)))
+    reader = TraceReader()
+    changed = reader.read(tmp_path / "t.parquet", 1)
+    changed["x_m"] = 0.0  # a caller may change its copy
+    assert reader.read(tmp_path / "t.parquet", 1)["x_m"].tolist() == game(1)["x_m"]
+    assert checked == [6]
 
 
 def test_trace__equal_games_are_equal_bytes(tmp_path: Path) -> None:

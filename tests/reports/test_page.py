@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from harness.evaluation.comparison import Verdict
+from harness.evaluation.research_questions import Verdict
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import write_csv
 from harness.replay.selection import choose_games, replay_name, worst_first

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import pandas as pd
-
 from harness.campaign.plan.stages import EquilibriumGate, Stage
 from harness.campaign.storage.run_folder import RunFolder
-from harness.evaluation.game_theory.best_response_gap import gaps, nothing_to_gain
-from harness.evaluation.game_theory.records import Response, Role
-from harness.evaluation.tables import read_csv
 
 
 def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> EquilibriumGate | None:
@@ -17,6 +12,12 @@ def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> 
 
 
 def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, significance: float) -> bool:
+    import pandas as pd  # slow to import, and few stages have gates
+
+    from harness.evaluation.game_theory.best_response_gap import gaps, nothing_to_gain
+    from harness.evaluation.game_theory.records import Response, Role
+    from harness.evaluation.tables import read_csv
+
     episodes = pd.concat([read_csv(folder.work(each) / "episodes.csv") for each in gate.stages], ignore_index=True)
     pair, *responses = (str(name) for name in episodes["arm"].unique())
     roles: tuple[Role, Role] = ("ego", "non_ego")

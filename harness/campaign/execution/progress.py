@@ -1,4 +1,7 @@
-"""Shows the progress of a run: a line per running stage with its rate and time left, and one for the whole campaign."""
+"""Shows the progress of a run: a line per running stage with its rate and time left, and one for the whole campaign.
+
+A stage's line appears when the stage starts. Until its own work starts, it says what is prepared first.
+"""
 
 from __future__ import annotations
 
@@ -21,12 +24,14 @@ from rich.text import Text
 from harness.campaign.execution.worker_process import Event
 from harness.campaign.plan.stages import Stage
 
+STARTING = "starting"
+
 
 class _Rate(ProgressColumn):
     """Steps, episodes or trials a second."""
 
     def render(self, task: Task) -> Text:
-        rate = task.finished_speed or task.speed
+        rate = (task.finished_speed or task.speed) if task.total is not None else None
         return Text((f"{rate:,.0f}/s" if rate >= 10 else f"{rate:.2g}/s") if rate else "", style="progress.data.speed")
 
 
@@ -36,7 +41,7 @@ class StageProgress:
     def __init__(self, stages: Sequence[Stage], finished: int, console: Console) -> None:
         self._console = console
         self._units = {stage.id: stage.unit for stage in stages}
-        self._bars = Progress(
+        self.bars = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
             MofNCompleteColumn(),
@@ -48,33 +53,47 @@ class StageProgress:
             disable=not console.is_terminal,
             transient=True,
         )
-        self._whole = self._bars.add_task("campaign", total=len(stages), completed=finished, unit="stages")
+        self._whole = self.bars.add_task("campaign", total=len(stages), completed=finished, unit="stages")
         self._rows: dict[str, TaskID] = {}
+        self._preparing: dict[str, str] = {}
+        """What each running stage is waiting for, if its own work has not started."""
 
     def __enter__(self) -> StageProgress:
-        self._bars.start()
+        self.bars.start()
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._bars.stop()
+        self.bars.stop()
 
     def show(self, event: Event) -> None:
         """Show an event."""
         if event.kind == "progress":
-            if event.stage not in self._rows:
-                self._rows[event.stage] = self._bars.add_task(event.stage, unit=self._units[event.stage])
-            self._bars.update(self._rows[event.stage], completed=event.done, total=event.total)
-            return
+            self._show_progress(event)
+        if event.kind == "started":
+            self._preparing[event.stage] = STARTING
+            self._rows[event.stage] = self.bars.add_task(event.stage, total=None, unit=STARTING)
         if event.kind in ("done", "failed", "crashed", "skipped") and event.stage in self._rows:
-            self._bars.remove_task(self._rows.pop(event.stage))
+            self.bars.remove_task(self._rows.pop(event.stage))
         if event.kind in ("done", "failed", "skipped"):
-            self._bars.advance(self._whole)
+            self.bars.advance(self._whole)
         line = self._line(event)
         if line:
-            self._bars.console.print(line, highlight=False, soft_wrap=True, markup=False)
+            self.bars.console.print(line, highlight=False, soft_wrap=True, markup=False)
+
+    def _show_progress(self, event: Event) -> None:
+        """Move a stage's bar; it starts again where another kind of work starts."""
+        row, unit = self._rows[event.stage], event.message or self._units[event.stage]
+        if event.message != self._preparing[event.stage]:
+            self._preparing[event.stage] = event.message
+            self.bars.reset(row, unit=unit)
+            if event.message and not self._console.is_terminal:
+                self._console.print(f"waiting  {event.stage}: {event.message}", highlight=False, markup=False)
+        self.bars.update(row, completed=event.done, total=event.total or None)
 
     def _line(self, event: Event) -> str:
         match event.kind:
+            case "progress":
+                return ""
             case "started":
                 return "" if self._console.is_terminal else f"started  {event.stage}"
             case "done":

@@ -15,11 +15,14 @@ from harness.campaign.execution.worker_process import Event
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import OpenCampaign
-from harness.campaign.results.results import RunResult, warn, write_results
+from harness.campaign.results.kept_results import RunResult, kept_result
 from harness.campaign.storage.manifest import FINISHED
 from harness.campaign.storage.run_folder import FORMAT, RunFolder
 from harness.campaign.storage.versions import versions, versions_of_numbers
-from harness.reports.provenance import mixed_versions
+from harness.reports.provenance import mixed_versions, warn
+
+CHECKING = "checking what is finished"
+NOTHING_TO_DO = "Nothing to do: every stage is finished, and the results are those of this version."
 
 
 def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: Console) -> RunResult:
@@ -31,10 +34,16 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
     with folder.held():
         stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
-        manifest = _ManifestKeeper(campaign, folder, stages, keys)
-        scene = campaign.scene.document
-        folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
-        finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
+        with console.status(CHECKING):
+            manifest = _ManifestKeeper(campaign, folder, stages, keys)
+            scene = campaign.scene.document
+            folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
+            finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
+            kept = kept_result(folder, manifest.content) if len(finished) == len(stages) else None
+        if kept is not None:
+            warn(mixed_versions(manifest.content["stages"]), console)
+            console.print(NOTHING_TO_DO, highlight=False)
+            return kept
         if len(finished) < len(stages):
             manifest.warn_of_versions(console)
             with StageProgress(stages, len(finished), console) as progress:
@@ -44,6 +53,8 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
                     progress.show(event)
 
                 run_stages(stages, finished, run_context_of(campaign, folder, keys), jobs, emit)
+        from harness.campaign.results.results import write_results  # imports pandas and statistics
+
         return write_results(folder, console)
 
 
@@ -69,6 +80,11 @@ class _ManifestKeeper:
             "stages": {stage.id: _entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages},
         }
         self._folder.write_manifest(self._manifest)
+
+    @property
+    def content(self) -> Mapping[str, Any]:
+        """The manifest as it is on the disk."""
+        return self._manifest
 
     def status(self, stage: Stage) -> str:
         """done, settled, failed or pending."""

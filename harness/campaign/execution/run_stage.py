@@ -6,33 +6,34 @@ A stage is a function of its inputs alone, which `cache_keys` hashes: a stage th
 from __future__ import annotations
 
 import json
+import logging
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, TypeAlias
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from harness.campaign.execution.crash_retries import FIRST, Attempt, OnProgress, OnStart
 from harness.campaign.execution.equilibrium_stop import equilibrium_before
-from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.planned_drivers import BestOf, description, persona_of
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
-from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.config.campaign import Training
 from harness.drivers.mixture import Player
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
-from harness.evaluation.tables import TRAINING_COLUMNS, typed, write_csv
 from harness.files import make_folder, write_atomically
 from harness.game.state import EGO, NON_EGO, ROLES
 from harness.traffic.scene import OpenScene, open_scene
+
+if TYPE_CHECKING:
+    from harness.campaign.execution.player_factory import PlayerFactory
+
+_LOGGER = logging.getLogger("harness.preparation")
 
 Made: TypeAlias = tuple[dict[str, Any], list[Path]]
 """What a stage made: facts for the manifest, and the files that its numbers are read from."""
@@ -52,6 +53,8 @@ class StageRun:
     @property
     def players(self) -> PlayerFactory:
         """Makes the stage's players."""
+        from harness.campaign.execution.player_factory import PlayerFactory  # imports statistics
+
         return PlayerFactory(context=self.context, folder=self.folder, scene=self.scene)
 
 
@@ -98,6 +101,10 @@ def carry_out(
 
 
 def _train(stage: TrainingStage, run: StageRun) -> Made:
+    _LOGGER.info("loading PyTorch")
+    import pandas as pd
+
+    from harness.evaluation.tables import TRAINING_COLUMNS, typed, write_csv
     from harness.training.early_stopping import RULE  # torch is slow to import, and assessment does without
     from harness.training.ppo import TrainingSpec, train
 
@@ -195,6 +202,7 @@ def _search(stage: SearchStage, run: StageRun) -> Made:
 
 def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     from harness.campaign.execution.arm_segments import join_segments, play_segments, segments_of
+    from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES
     from harness.environments.rollout import Arm  # the parent process plays nothing and does without
 
     context, folder = run.context, run.folder

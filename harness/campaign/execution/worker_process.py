@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from harness.campaign.execution.crash_retries import Attempt, OnProgress, OnStart
+from harness.campaign.execution.preparation import preparations_reported
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.locks import register_worker
@@ -43,7 +44,7 @@ class Event:
 
     kind: Literal["started", "progress", "segment", "done", "failed", "crashed", "skipped"]
     """segment: a segment of a training, a game of an arm or a trial of a search starts, and `done` is its number. It is
-    for the pool alone and is not emitted."""
+    for the pool alone and is not emitted. progress with a message: what the stage waits for before its own work."""
     stage: str
     done: int = 0
     total: int = 0
@@ -116,9 +117,13 @@ def _carry_out(stage: Stage, attempt: Attempt, connection: Connection, work: Wor
     def on_start(place: int) -> None:
         connection.send(Event(kind="segment", stage=stage.id, done=place))
 
+    def on_preparation(what: str, done: int, total: int) -> None:
+        connection.send(Event(kind="progress", stage=stage.id, done=done, total=total, message=what))
+
     try:
         _register(context.folder)
-        return Event(kind="done", stage=stage.id, info=work(stage, context, on_progress, on_start, attempt))
+        with preparations_reported(on_preparation):
+            return Event(kind="done", stage=stage.id, info=work(stage, context, on_progress, on_start, attempt))
     except (HarnessError, OSError) as error:
         return Event(kind="failed", stage=stage.id, message=str(error))
     except Exception as error:

@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.strategies import Arm, counterparts
-from harness.evaluation.trace_file import read_trace
+from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.trace_quantities import series_of
 from harness.game.state import ROLES
 from harness.replay import choose_games, worst_first
@@ -34,8 +34,9 @@ def recorded_games(
     of the same episode that it is compared with; then the rest. `arms` are the arms by name; `traces` gives the traces
     file of an arm and seed.
     """
+    reader = TraceReader()
     for game in watching_order(episodes, arms).itertuples():
-        trace = read_trace(traces(game.arm, game.seed), game.episode)
+        trace = reader.read(traces(game.arm, game.seed), game.episode)
         if not trace.empty:
             yield recorded_game(trace, scene, game)
 

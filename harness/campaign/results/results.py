@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from rich.progress import track
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
+from harness.campaign.results.kept_results import RunResult, ShownVerdict, forget_result, keep_result
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
@@ -40,12 +40,12 @@ from harness.evaluation.tables import (
     typed,
     write_csv,
 )
-from harness.evaluation.trace_file import check_traces, read_trace
+from harness.evaluation.trace_file import TraceReader, check_traces
 from harness.files import write_atomically
 from harness.replay import choose_games, replay_name, worst_first, write_replay
 from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
-from harness.reports.provenance import mixed_versions
+from harness.reports.provenance import mixed_versions, warn
 from harness.reports.results import results
 from harness.reports.run_tables import RunTables
 from harness.reports.treatment import ARMS
@@ -53,20 +53,11 @@ from harness.reports.wording import Conclusion
 from harness.traffic.scene import OpenScene, open_scene
 
 
-@dataclass(frozen=True, kw_only=True)
-class RunResult:
-    """The result of a run, for the terminal and the exit code."""
-
-    verdicts: Sequence[tuple[str, Conclusion]]
-    """A persona and a conclusion, for each persona and question."""
-    failed_stages: tuple[str, ...]
-    error_games: int
-
-
 def write_results(folder: RunFolder, console: Console) -> RunResult:
     """Write tables, replays and report of the finished stages, from the run folder alone."""
     manifest = folder.manifest()
     folder.check_whole(manifest)
+    forget_result(folder)
     done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
     episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
@@ -116,13 +107,18 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     personas = [*manifest["personas"], *(each.name for each in campaign.population)]
     verdicts = [(persona, found.verdicts(question, persona)) for persona in personas for question in ARMS]
     verdicts += gap_verdicts(game.gaps) if game is not None else []
-    return RunResult(verdicts=verdicts, failed_stages=failed, error_games=int((episodes["error"] != "").sum()))
+    result = RunResult(
+        verdicts=tuple(_shown(persona, verdict) for persona, verdict in verdicts),
+        failed_stages=failed,
+        error_games=int((episodes["error"] != "").sum()),
+    )
+    keep_result(folder, manifest, result)
+    return result
 
 
-def warn(sentences: Sequence[str], console: Console) -> None:
-    """Print warnings."""
-    for sentence in sentences:
-        console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)
+def _shown(persona: str, verdict: Conclusion) -> ShownVerdict:
+    told = {name: getattr(verdict, name) for name in ("question", "label", "tone", "sentence", "speed")}
+    return ShownVerdict(persona=persona, **told)
 
 
 def _questions(campaign: Campaign, manifest: Mapping[str, Any]) -> list[Question]:
@@ -185,10 +181,10 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
     folder.replays.mkdir(exist_ok=True)
     names = [replay_name(game.arm, game.seed, game.episode) for game in chosen.itertuples()]
     games = list(zip(chosen.itertuples(), names, strict=True))
-    quiet = not console.is_terminal
+    quiet, reader = not console.is_terminal, TraceReader()
     for game, name in track(games, "writing replays", console=console, transient=True, disable=quiet):
         write_replay(
-            read_trace(folder.traces(stage_id(game.arm, game.seed)), game.episode),
+            reader.read(folder.traces(stage_id(game.arm, game.seed)), game.episode),
             scene.net_file,
             scene.routes.path,
             folder.replays / name,

@@ -19,12 +19,16 @@ _MOST_BYTES = 50_000_000
 
 def write_checksums(path: Path, top: Path, files: Iterable[Path], facts: Mapping[str, Any]) -> None:
     """Write the checksums of files below `top`, beside `facts` about them, once the files are safely on the disk."""
-    checksums = {}
+    files = list(files)
     for file in files:
         sync_file(file)
         sync_folder(file.parent)
-        checksums[file.relative_to(top).as_posix()] = _checksum(file)
-    write_atomically(path, (json.dumps({**facts, "files": checksums}, indent=2) + "\n").encode())
+    write_atomically(path, (json.dumps({**facts, "files": checksums_of(top, files)}, indent=2) + "\n").encode())
+
+
+def checksums_of(top: Path, files: Iterable[Path]) -> dict[str, dict[str, Any]]:
+    """The checksum of each file, by its path below `top`. Raises OSError."""
+    return {file.relative_to(top).as_posix(): _checksum(file) for file in files}
 
 
 def read_checksums(path: Path) -> dict[str, Any] | None:

@@ -7,6 +7,7 @@
     scene/                   a copy of the scene's files
     .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, trials, segments, tables,
                              done.json
+    .stages/results.json     what the tables, replays and report were made from, and their checksums
     .stages/lock             held by the command that is running; lock.owner names its process
     .stages/worker_locks/    a lock per running worker
     .stages/scratch/         temporary files of the workers

@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from harness.evaluation.comparison import Verdict
 from harness.evaluation.game_theory.findings import find
 from harness.evaluation.game_theory.generalisation import generalisation
 from harness.evaluation.game_theory.records import Pairing
+from harness.evaluation.research_questions import Verdict
 from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
 from tests.support.game_tables import TRAINED_AGAINST, a_campaign, arm, findings, table
 

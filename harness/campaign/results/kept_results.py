@@ -1,0 +1,111 @@
+"""What the results of a run were made from, and their checksums: the same results are not made again.
+
+<run>/.stages/results.json holds a key of everything that results depend on (the manifest, the checksums of the stages'
+files, this program and its libraries), the verdicts for the terminal, and the checksums of every file of the results.
+It is written last. Where an input has changed, or a file is missing or damaged, the results are made anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError
+
+from harness.campaign.storage.checksums import checksums_of, mismatches, read_checksums
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.toml_reading import Document
+from harness.files import write_atomically
+
+_SOURCES = {".py", ".jinja", ".css", ".js"}
+_DRAWN_WITH = ("jinja2", "markupsafe", "matplotlib", "shapely")
+"""Libraries that a report depends on, beside those that the manifest names."""
+
+Line = Annotated[str, Field(max_length=10_000, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+"""A text that is safe to print on a terminal."""
+
+
+class ShownVerdict(Document):
+    """A conclusion as the terminal shows it."""
+
+    persona: Line
+    question: Line
+    label: Line
+    tone: Line
+    sentence: Line
+    speed: Line
+
+
+class RunResult(Document):
+    """The result of a run, for the terminal and the exit code."""
+
+    verdicts: tuple[ShownVerdict, ...]
+    """One for each persona and question."""
+    failed_stages: tuple[Line, ...]
+    error_games: int = Field(ge=0)
+
+
+def kept_result(folder: RunFolder, manifest: Mapping[str, Any]) -> RunResult | None:
+    """The result of a run whose results are all there, as this program would make them; None if they are not."""
+    record = read_checksums(_file(folder))
+    if record is None or record.get("key") != _key(folder, manifest) or mismatches(record, folder.path):
+        return None
+    if set(record["files"]) != {file.relative_to(folder.path).as_posix() for file in _results(folder)}:
+        return None
+    try:
+        return RunResult.model_validate_json(json.dumps(record["result"]))
+    except (ValidationError, LookupError, ValueError, RecursionError):
+        return None
+
+
+def keep_result(folder: RunFolder, manifest: Mapping[str, Any], result: RunResult) -> None:
+    """Write down that the results in the folder are those of this manifest."""
+    record = {"key": _key(folder, manifest), "result": result.model_dump(mode="json")}
+    record["files"] = checksums_of(folder.path, _results(folder))
+    write_atomically(_file(folder), (json.dumps(record, indent=1) + "\n").encode())
+
+
+def forget_result(folder: RunFolder) -> None:
+    """Results are about to be made: what is in the folder vouches for nothing until they are complete."""
+    _file(folder).unlink(missing_ok=True)
+
+
+def _file(folder: RunFolder) -> Path:
+    return folder.path / ".stages" / "results.json"
+
+
+def _results(folder: RunFolder) -> Iterator[Path]:
+    """Every file of the results: tables, report, model cards, replays."""
+    yield from (folder.path / "report.html", *sorted(folder.path.glob("*.csv")))
+    yield from sorted((folder.path / "policies").glob("*/README.md"))
+    yield from (file for file in sorted(folder.replays.rglob("*")) if file.is_file())
+
+
+def _key(folder: RunFolder, manifest: Mapping[str, Any]) -> str:
+    stages = {name: (folder.done(name) or {}).get("files") for name in manifest["stages"]}
+    libraries = {name: importlib.metadata.version(name) for name in _DRAWN_WITH}
+    made_from = [dict(manifest), stages, libraries, _digest_of_sources()]
+    return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
+
+
+@cache
+def _digest_of_sources() -> str:
+    """A digest of this program: a version number does not tell one state of a working copy from another."""
+    top = Path(__file__).parents[2]
+    return _digest((file.relative_to(top).as_posix().encode(), file.read_bytes()) for file in sorted(_sources(top)))
+
+
+def _sources(top: Path) -> Iterator[Path]:
+    return (file for file in top.rglob("*") if file.suffix in _SOURCES)
+
+
+def _digest(parts: Iterable[tuple[bytes, bytes]]) -> str:
+    digest = hashlib.sha256()
+    for name, content in parts:
+        digest.update(b"%d %s %d " % (len(name), name, len(content)) + content)
+    return digest.hexdigest()

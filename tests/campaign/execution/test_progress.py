@@ -1,0 +1,70 @@
+"""What a user sees of a stage before its first step: what it is waiting for, at once, and with time left."""
+
+from __future__ import annotations
+
+import io
+import logging
+
+import pytest
+from rich.console import Console
+
+from harness.campaign.execution.preparation import preparations_reported
+from harness.campaign.execution.progress import STARTING, StageProgress
+from harness.campaign.execution.worker_process import Event
+from harness.campaign.plan.plan import plan
+from harness.config.campaign import Campaign
+
+STAGES = plan(Campaign.model_validate({"name": "a", "scene": "b", "personas": ["speedy.toml"]}), ["speedy"])
+NAIVE = STAGES[0].id
+STARTED = Event(kind="started", stage=NAIVE)
+MERGING = [Event(kind="progress", stage=NAIVE, message="merging", done=done, total=3) for done in (0, 2)]
+STEP = Event(kind="progress", stage=NAIVE, done=2048, total=4096)
+
+
+def shown(*events: Event, terminal: bool) -> list[str]:
+    """The rows on a terminal, or the lines that are printed elsewhere, after the events."""
+    printed = io.StringIO()
+    console = Console(file=io.StringIO(), force_terminal=terminal, width=160)
+    with StageProgress(STAGES, 0, console) as progress:
+        for event in events:
+            progress.show(event)
+        if terminal:
+            Console(file=printed, width=160).print(progress.bars)
+        else:
+            console.file, printed = io.StringIO(), console.file  # type: ignore[assignment]
+    return printed.getvalue().splitlines()
+
+
+def row(*events: Event) -> str:
+    (line,) = (line for line in shown(*events, terminal=True) if NAIVE in line)
+    return line
+
+
+def test_terminal__a_stage_has_a_row_from_its_start() -> None:
+    assert STARTING in row(STARTED)
+
+
+def test_terminal__the_row_names_what_is_prepared_and_how_far_it_is() -> None:
+    assert "2/3" in row(STARTED, *MERGING)
+    assert "merging" in row(STARTED, *MERGING)
+
+
+def test_terminal__its_own_work_replaces_what_was_prepared() -> None:
+    line = row(STARTED, *MERGING, STEP)
+    assert "2048/4096" in line
+    assert "steps" in line
+    assert "merging" not in line
+
+
+def test_elsewhere__each_preparation_is_one_line() -> None:
+    lines = shown(STARTED, *MERGING, STEP, terminal=False)
+    assert lines == [f"started  {NAIVE}", f"waiting  {NAIVE}: merging"]
+
+
+def test_preparations__are_the_log_of_what_is_prepared(caplog: pytest.LogCaptureFixture) -> None:
+    told, log = [], logging.getLogger("harness.preparation")
+    with preparations_reported(lambda *what: told.append(what)):
+        log.info("merging %d copies", 3, extra={"done": 1, "total": 3})
+        log.info("loading")
+    log.info("after the block")
+    assert told == [("merging 3 copies", 1, 3), ("loading", 0, 0)]
