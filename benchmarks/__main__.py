@@ -1,6 +1,7 @@
 """`python -m benchmarks`: measure, print and store. `python -m benchmarks table`: the stored results in Markdown.
 
-`python -m benchmarks step`: where the time of a step goes. `python -m benchmarks scale`: what a large study would take.
+`python -m benchmarks step` and `training`: where the time of a step and of a training goes. `python -m benchmarks reads`:
+the cost of reading vehicles. `python -m benchmarks scale`: what a large study would take.
 """
 
 from __future__ import annotations
@@ -139,6 +140,16 @@ def training(
     from benchmarks.training_parts import training_table
 
     print(training_table(seconds))
+
+
+@app.command()
+def reads(
+    laps: Annotated[int, typer.Option(metavar="N", min=1, help="How often to measure each way of reading.")] = 8,
+) -> None:
+    """Print what it costs to read background vehicles out of SUMO, by each way that libsumo offers, in Markdown."""
+    from benchmarks.reads import reads_table
+
+    print(reads_table(laps))
 
 
 def _measure_all(

@@ -153,6 +153,10 @@ def distance_to_nearest_box(own: Box, others: Box, among: BoolArray, limit_m: fl
     for n, p, b in np.ndindex(among.shape):
         if among[n, p, b]:
             a, other = _own(own, n, p), _other(others, n, b)
+            dx, dy = abs(a.x_m - other.x_m), abs(a.y_m - other.y_m)
+            extents = 0.5 * (a.length_m + a.width_m + other.length_m + other.width_m)  # at least the radii below
+            if max(dx, dy) - extents >= nearest_m[n, p]:
+                continue
             radii = 0.5 * (hypot(a.length_m, a.width_m) + hypot(other.length_m, other.width_m))
             if hypot(a.x_m - other.x_m, a.y_m - other.y_m) - radii < nearest_m[n, p]:
                 nearest_m[n, p] = min(nearest_m[n, p], box_distance(a, other))

@@ -18,8 +18,9 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.jit import compiled
-from harness.game.quantities import PATH_M, Quantities, along_route, row_ahead
+from harness.game.quantities import Quantities
 from harness.game.road import Routes, lane_at, row_at
+from harness.game.route_coordinates import PATH_M, half_extents_m, place_along_route, row_ahead
 
 _BEHIND = int(np.searchsorted(PATH_M, 0.0))  # number of entries of PATH_M behind the player
 AHEAD_M = PATH_M[_BEHIND:]
@@ -145,9 +146,13 @@ def _observe(
                 seen[b] = body_present[g, b] and b != p and in_view
                 if seen[b]:
                     error = distance_error[g, p]
-                    pose = (body_x_m[g, b] + error * dx, body_y_m[g, b] + error * dy, body_heading_rad[g, b])
-                    size = (body_length_m[g, b], body_width_m[g, b])
-                    _narrow(view, *along_route(row, station, offset, p, routes, *pose, *size))
+                    seen_at = (body_x_m[g, b] + error * dx, body_y_m[g, b] + error * dy)
+                    ahead, left, frame = place_along_route(row, station, offset, p, routes, *seen_at)
+                    length, width = body_length_m[g, b], body_width_m[g, b]
+                    extent = 0.5 * (length + width)  # at least the half extents, which take longer to compute
+                    if ahead + extent > _EDGES[0] and ahead - extent < _EDGES[-1]:
+                        turned = body_heading_rad[g, b] - routes.heading_rad[frame]
+                        _narrow(view, ahead, left, *half_extents_m(turned, length, width))
             for k in range(_COUNT):
                 view[_LEFT + k] /= _SIDE_M
                 view[_RIGHT + k] /= _SIDE_M

@@ -15,14 +15,12 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Actuators, lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
-from harness.game.road import MARGIN_M, SPACING_M, Along, Road, Routes, row_at
+from harness.game.road import Along, Road, Routes, row_at
+from harness.game.route_coordinates import PATH_M, along_route, row_ahead
 from harness.game.state import Bodies, Outcome, State
 
-# distances ahead of a player at which its route is sampled
-PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])
 SIGHT_M = 60.0  # a body farther ahead than this is not a leader
 REACH_M = 10.0  # largest clearance that is computed
-_PATH_ROWS = np.rint(PATH_M / SPACING_M).astype(np.int64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,16 +212,10 @@ def terminations(
 
 
 @compiled
-def row_ahead(row: int, k: int, first_row: int, last_row: int) -> int:
-    """The row of a route at the distance `PATH_M[k]` from another row, clamped to the route."""
-    return min(max(row + _PATH_ROWS[k], first_row), last_row)
-
-
-@compiled
 def _path_rows(rows: IntArray, first_row: IntArray, last_row: IntArray) -> IntArray:
-    path_rows = np.empty((*rows.shape, len(_PATH_ROWS)), dtype=rows.dtype)
+    path_rows = np.empty((*rows.shape, len(PATH_M)), dtype=rows.dtype)
     for g, p in np.ndindex(rows.shape):
-        for k in range(len(_PATH_ROWS)):
+        for k in range(len(PATH_M)):
             path_rows[g, p, k] = row_ahead(rows[g, p], k, first_row[p], last_row[p])
     return path_rows
 
@@ -263,36 +255,3 @@ def _on_path(
             extent = along_route(row, station, offset, p, routes, *box)
             ahead[g, p, b], left[g, p, b], half_length[g, p, b], half_width[g, p, b] = extent
     return ahead, left, half_length, half_width
-
-
-@compiled
-def along_route(
-    row: int,
-    station_m: float,
-    offset_m: float,
-    player: int,
-    routes: Routes,
-    x_m: float,
-    y_m: float,
-    heading_rad: float,
-    length_m: float,
-    width_m: float,
-) -> tuple[float, float, float, float]:
-    """A body in route coordinates relative to a player (m): centre ahead and to the left, half length, half width.
-    The frame is the nearest one of the route at `PATH_M`."""
-    first, last = routes.first_row[player], routes.last_row[player]
-    nearest, nearest2 = 0, np.inf
-    for k in range(len(_PATH_ROWS)):
-        sample = row_ahead(row, k, first, last)
-        distance2 = (x_m - routes.x_m[sample]) ** 2 + (y_m - routes.y_m[sample]) ** 2
-        if distance2 < nearest2:
-            nearest, nearest2 = k, distance2
-    frame = row_ahead(row, nearest, first, last)
-    dx, dy = x_m - routes.x_m[frame], y_m - routes.y_m[frame]
-    cosine, sine = routes.cos[frame], routes.sin[frame]
-    ahead, left = dx * cosine + dy * sine + PATH_M[nearest], dy * cosine - dx * sine
-    to_row_m = (row - first) * SPACING_M - MARGIN_M - station_m  # rows are rounded stations
-    turned = heading_rad - routes.heading_rad[frame]
-    along, across = abs(np.cos(turned)), abs(np.sin(turned))
-    half_length = 0.5 * (length_m * along + width_m * across)
-    return ahead + to_row_m, left - offset_m, half_length, 0.5 * (length_m * across + width_m * along)

@@ -137,6 +137,7 @@ def _first_fault(
     """The first fault, its game and its player."""
     x_m, y_m, speed_mps = now[0], now[1], now[2]
     players = drove.shape[1]
+    body_x_m, body_y_m, body_speed_mps, body_heading_rad = bodies
     for g, p in np.ndindex(drove.shape):
         if drove[g, p]:
             for values in now:
@@ -145,11 +146,12 @@ def _first_fault(
             speed = min(max(before[2][g, p], speed_mps[g, p]), max_speed_mps[p])
             if not np.hypot(x_m[g, p] - before[0][g, p], y_m[g, p] - before[1][g, p]) <= speed * step_s + slack[p]:
                 return _MOVED, g, p
-        for b in range(players, present.shape[1]):
-            if present[g, b]:
-                for values in bodies:
-                    if not np.isfinite(values[g, b]):
-                        return _BACKGROUND, g, p
+        if p == 0:  # the players of a game have the same bodies
+            for b in range(players, present.shape[1]):
+                finite = np.isfinite(body_x_m[g, b]) and np.isfinite(body_y_m[g, b])
+                finite = finite and np.isfinite(body_speed_mps[g, b]) and np.isfinite(body_heading_rad[g, b])
+                if present[g, b] and not finite:
+                    return _BACKGROUND, g, p
         if not abs(payoff[g, p]) <= _LARGEST:
             return _PAYOFF, g, p
     return _NO_FAULT, 0, 0

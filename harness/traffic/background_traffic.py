@@ -7,19 +7,19 @@ player is therefore read again only when it may have come near, at the top speed
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from itertools import chain
 from typing import Any
 
 import libsumo
 import numpy as np
-from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
+from numpy.typing import NDArray
 
 from harness.errors import SimulationError
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.neighbours import near_players, rows_by_game
+from harness.game.neighbours import Search, rows_by_game
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.route_file import Departure
 from harness.traffic.simulation import Reading
+from harness.traffic.vehicle_reads import DIRECT, read_near, string_record
 
 _LONGEST_WAIT = 50  # steps
 _NEVER = -1
@@ -34,6 +34,8 @@ class _Table:
         self.count = [0] * games  # places taken
         self.due = np.full(shape, _NEVER)  # the step in which to read it; _NEVER while it is not in the traffic
         self.sumo_name = np.empty(shape, dtype=object)
+        self.sumo_text = np.empty(shape, dtype=object)  # the bytes of that name, which the records point to
+        self.sumo_record = np.zeros((*shape, 4), dtype=np.uint64)
         self.name = np.empty(shape, dtype=object)  # without the prefix of the tile
         self.kind = np.empty(shape, dtype=object)
         self.length_m = np.zeros(shape)
@@ -123,20 +125,17 @@ class BackgroundTraffic:
         due = np.flatnonzero(table.due == self._step)  # by game, then by departure
         if not len(due):
             return self._empty_reading
-        names = table.sumo_name.ravel()[due].tolist()
-        fronts = np.fromiter(chain.from_iterable(map(_libsumo.vehicle_getPosition, names)), float, 2 * len(due))
-        fronts = fronts.reshape(-1, 2)
-        near = near_players(
-            *(due, fronts, table.due, table.length_m, table.max_speed_mps, self._offsets_m),
+        search = Search(
+            *(table.due, table.length_m, table.max_speed_mps, self._offsets_m),
             *(players_x_m, players_y_m, players_present, self._fastest_player_mps),
             *(self._step, self._step_s, 1 if self._recorded else _LONGEST_WAIT, self._recorded),
         )
-        names = [names[k] for k in near.tolist()]
-        motion = np.empty((4, len(near)))
-        motion[:2] = fronts[near].T
-        motion[2] = np.fromiter(map(_libsumo.vehicle_getAngle, names), float, len(near))
-        motion[3] = np.fromiter(map(_libsumo.vehicle_getSpeed, names), float, len(near))
-        return self._reading(due[near], motion)
+        direct = DIRECT and self._sumo_has_all(players_present)
+        return self._reading(*read_near(search, table.sumo_name, table.sumo_record, due, direct))
+
+    def _sumo_has_all(self, players_present: BoolArray) -> bool:
+        """Whether SUMO has as many vehicles as were inserted and have neither arrived nor been removed."""
+        return libsumo.simulation.getMinExpectedNumber() == len(self._places) + np.count_nonzero(players_present)
 
     def _depart(self, game: int) -> None:
         now = (self._step - self._first_step[game]) * self._step_s + 1e-9
@@ -144,10 +143,13 @@ class BackgroundTraffic:
         while waiting and waiting[-1].depart_s <= now:
             departure = waiting.pop()
             sumo_name, vehicle = self._prefixes[game] + departure.name, libsumo.vehicle
+            sumo_text = sumo_name.encode()
             self._insert(game, sumo_name, departure)
             place = self._table.add(
                 game,
                 sumo_name=sumo_name,
+                sumo_text=sumo_text,
+                sumo_record=string_record(sumo_text),
                 name=departure.name,
                 kind=vehicle.getTypeID(sumo_name),
                 length_m=vehicle.getLength(sumo_name),
@@ -161,12 +163,18 @@ class BackgroundTraffic:
     def _reading(self, places: IntArray, motion: FloatArray) -> Reading:
         """The reading of vehicles at flat places [n] of the table; motion [4, n] is front x, y, SUMO's angle, speed."""
         table, (front_x, front_y, angle, speed) = self._table, motion
-        length, width, heading = table.length_m.ravel()[places], table.width_m.ravel()[places], heading_rad_of(angle)
+        length, heading = table.length_m.ravel()[places], heading_rad_of(angle)
         x = front_x - 0.5 * length * np.cos(heading)
         y = front_y - 0.5 * length * np.sin(heading)
-        games, room = len(self._prefixes), table.due.shape[1]
-        columns, present = rows_by_game(places // room, games, np.stack((x, y, heading, speed, length, width)))
-        names, types = (np.full(present.shape, None, dtype=object) for _ in range(2))
-        names[present], types[present] = table.name.ravel()[places], table.kind.ravel()[places]
+        columns, present, index = rows_by_game(places, (x, y, heading, speed), (table.length_m, table.width_m))
+        names, types = (_in_rows(words, places, index) for words in (table.name, table.kind))
         x_m, y_m, heading_rad, speed_mps, length_m, width_m = columns
         return Reading(names, types, x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
+
+
+def _in_rows(words: NDArray[np.object_], places: IntArray, index: IntArray) -> NDArray[np.object_]:
+    """[G, M] the words [G, N] of vehicles at flat places [n] in rows of their indices [G, M]; None where it is n."""
+    of_vehicles = np.empty(len(places) + 1, dtype=object)  # filled with None
+    of_vehicles[:-1] = words.ravel()[places]
+    rows: NDArray[np.object_] = of_vehicles[index]
+    return rows

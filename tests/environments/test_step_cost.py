@@ -31,7 +31,9 @@ from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.game.state import Outcome
+from harness.traffic import background_traffic
 from harness.traffic.scene import OpenScene, open_scene
+from harness.traffic.vehicle_reads import DIRECT
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
 
@@ -39,6 +41,7 @@ from tests.support.scenes import build_scene
 PLACEMENTS_PER_GAME = 2  # moveToXY, with two players that the harness drives
 PER_STEP = {"simulationStep": 1, "simulation.getArrivedIDList": 1}
 PER_STEP_WITH_TRAFFIC = {"simulation.getDepartedIDList": 1}
+PER_STEP_WITH_DIRECT_READS = {"simulation.getMinExpectedNumber": 1}
 READS_PER_VEHICLE = ("getPosition", "getAngle", "getSpeed")
 
 # Upper bounds: the measured counts plus a margin. `python -m tests.environments.test_step_cost` prints the counts.
@@ -225,6 +228,22 @@ def test_step__calls_sumo_for_placements_and_a_step_only(games: int, scenes: Sce
     assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * games * STEPS}
 
 
+@pytest.mark.skipif(not DIRECT, reason="vehicles can't be read directly on this platform")
+def test_step__calls_no_function_per_vehicle_if_vehicles_are_read_directly(scenes: Scenes) -> None:
+    with counting(scenes.busy, FEW) as counted:
+        calls = counted.libsumo_calls(counted.steps)
+    of_steps = PER_STEP | PER_STEP_WITH_TRAFFIC | PER_STEP_WITH_DIRECT_READS
+    expected = {name: number * STEPS for name, number in of_steps.items()}
+    assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * FEW * STEPS}
+
+
+@pytest.fixture
+def through_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Vehicles are read through Python, whatever the platform allows."""
+    monkeypatch.setattr(background_traffic, "DIRECT", False)
+
+
+@pytest.mark.usefixtures("through_python")
 def test_step__reads_each_vehicle_near_a_player_once(scenes: Scenes) -> None:
     with counting(scenes.busy, FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)
@@ -233,6 +252,7 @@ def test_step__reads_each_vehicle_near_a_player_once(scenes: Scenes) -> None:
     assert calls == expected | {"vehicle.moveToXY": PLACEMENTS_PER_GAME * FEW * STEPS}
 
 
+@pytest.mark.usefixtures("through_python")
 def test_step__seldom_reads_vehicles_far_away(scenes: Scenes) -> None:
     with counting(scenes.far, FEW) as counted:
         calls = counted.libsumo_calls(counted.steps)

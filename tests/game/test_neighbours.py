@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.game.neighbours import NOTICED_M, near_players, rows_by_game
+from harness.game.neighbours import NOTICED_M, Search, near_players, rows_by_game
 
 STEP_S, FASTEST_MPS = 0.1, 40.0
 
@@ -28,9 +27,8 @@ def look(
     due_in = np.full((2, count), 100)
     table = (np.full((2, count), length_m), np.full((2, count), speed_mps), np.array([0.0, 500.0]))
     players = (np.zeros((2, 2)), np.zeros((2, 2)), np.array([[True, True], [present, False]]))
-    near = near_players(
-        np.arange(count, 2 * count), fronts, due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, all_vehicles
-    )
+    search = Search(due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, all_vehicles)
+    near = near_players(search, np.arange(count, 2 * count), fronts)
     assert (fronts[:, 1] == 0.0).all()  # without the offset of the tile
     assert (due_in[0] == 100).all()  # the other game is unchanged
     return near.tolist(), due_in[1].tolist()
@@ -66,21 +64,27 @@ def test_near__no_vehicle_is_missed_at_any_closing_speed(distances: list[float],
             assert each - (due[k] - 101) * STEP_S * (speed + FASTEST_MPS) > NOTICED_M
 
 
+def test_rows__one_of_the_second_game_and_two_of_the_third() -> None:
+    values, length_m = np.array([7.0, 8.0, 9.0]), np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
+    rows, present, index = rows_by_game(np.array([3, 4, 5]), (values, -values), (length_m,))
+    assert rows[0].tolist() == [[0, 0], [7, 0], [8, 9]]
+    assert rows[2].tolist() == [[0, 0], [4, 0], [5, 6]]
+    assert present.tolist() == [[False, False], [True, False], [True, True]]
+    assert index.tolist() == [[3, 3], [0, 3], [1, 2]]
+
+
+@settings(deadline=None)  # the first call compiles
 @given(counts=st.lists(st.integers(0, 5), min_size=1, max_size=6))
 def test_rows__have_all_vehicles_of_a_game_from_the_first_place_on(counts: list[int]) -> None:
-    games = np.repeat(np.arange(len(counts)), counts)
-    values = np.arange(float(2 * len(games))).reshape(2, -1) + 1.0
-    rows, present = rows_by_game(games, len(counts), values)
+    places = np.concatenate([10 * game + np.arange(count) for game, count in enumerate(counts)])
+    motion, length_m = np.arange(1.0, len(places) + 1.0), np.arange(10.0 * len(counts)).reshape(-1, 10) + 1.0
+    rows, present, index = rows_by_game(places, (motion, -motion), (length_m,))
     assert present.sum(1).tolist() == counts
     assert present.shape[1] == max(counts)
-    for column in range(2):
-        assert rows[column][present].tolist() == values[column].tolist()
-        assert not rows[column][~present].any()
-        for game, count in enumerate(counts):
-            assert present[game, :count].all()
-
-
-def test_rows__one_of_the_second_game_and_two_of_the_third() -> None:
-    rows, present = rows_by_game(np.array([1, 2, 2]), 3, np.array([[7.0, 8.0, 9.0]]))
-    assert rows[0] == pytest.approx(np.array([[0, 0], [7, 0], [8, 9]]))
-    assert present.tolist() == [[False, False], [True, False], [True, True]]
+    assert index[present].tolist() == list(range(len(places)))
+    assert (index[~present] == len(places)).all()
+    for column, values in zip(rows, (motion, -motion, length_m.ravel()[places]), strict=True):
+        assert column[present].tolist() == values.tolist()
+        assert not column[~present].any()
+    for game, count in enumerate(counts):
+        assert present[game, :count].all()

@@ -1,0 +1,123 @@
+"""What it costs to read background vehicles out of SUMO, by each way that libsumo offers.
+
+Each way reads position, angle and speed of the same vehicles after every step. Its cost is the time by which step and
+reading together exceed a step alone, so that it includes results that SUMO prepares during its step.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import libsumo
+import numpy as np
+from libsumo import constants
+
+from benchmarks.bare_sumo import Placement, place_and_step, record_placements
+from benchmarks.games import GAMES, CoastingGames
+from benchmarks.traffic import write_scene
+from harness.game.neighbours import NOTICED_M, Search
+from harness.traffic.scene import open_scene
+from harness.traffic.vehicle_reads import DIRECT, read_near, string_record
+
+_STEPS = 60  # the players have not met any vehicle by then, and no vehicle has left
+_NEAREST = 17  # as many vehicles of a game as are near its players, of 50
+_VARIABLES = (constants.VAR_POSITION, constants.VAR_ANGLE, constants.VAR_SPEED)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Way:
+    words: str
+    prepare: Callable[[list[str]], object] = lambda names: None
+    read: Callable[[list[str]], object] = lambda names: None
+
+
+def _read_as_arena(direct: bool) -> Callable[[list[str]], object]:
+    """The reading of `BackgroundTraffic`, in which every vehicle counts as near."""
+    texts: list[bytes] = []
+    tables: list[object] = []
+
+    def read(names: list[str]) -> object:
+        if not texts:  # as the arena, which prepares the names once
+            texts.extend(name.encode() for name in names)
+            shape, nobody = (1, len(names)), np.zeros((1, 1))
+            record = np.array([[string_record(text) for text in texts]], dtype=np.uint64)
+            numbers = (np.zeros(shape, dtype=np.int64), np.ones(shape), np.ones(shape), np.zeros(1))
+            search = Search(*numbers, nobody, nobody, nobody > 0.0, 1.0, 0, 1.0, 1, True)
+            tables.extend((search, np.array([names], dtype=object), record, np.arange(len(names))))
+        return read_near(*tables, direct)  # type: ignore[arg-type]
+
+    return read
+
+
+def _subscribe(names: list[str]) -> None:
+    for name in names:
+        libsumo.vehicle.subscribe(name, _VARIABLES)
+
+
+def _subscribe_around_egos(names: list[str]) -> None:
+    for game in range(GAMES):
+        libsumo.vehicle.subscribeContext(f"g{game}_ego", constants.CMD_GET_VEHICLE_VARIABLE, NOTICED_M, _VARIABLES)
+
+
+_ALONE = _Way(words="a step alone")
+_WAYS = (
+    _Way(words="three getters, called from Python", read=_read_as_arena(direct=False)),
+    _Way(words="the same C++ functions, called directly", read=_read_as_arena(direct=True)),
+    _Way(words="subscriptions, results not fetched", prepare=_subscribe),
+    _Way(
+        words="subscriptions, results fetched at once",
+        prepare=_subscribe,
+        read=lambda names: libsumo.vehicle.getAllSubscriptionResults(),
+    ),
+    _Way(
+        words=f"context subscriptions of the egos ({NOTICED_M:.0f} m), results fetched at once",
+        prepare=_subscribe_around_egos,
+        read=lambda names: libsumo.vehicle.getAllContextSubscriptionResults(),
+    ),
+)
+
+
+def reads_table(laps: int, background: int = 50) -> str:
+    """In Markdown: per way of reading, nanoseconds per vehicle, and the share of SUMO's step.
+
+    The vehicles are the 17 nearest of each of 64 games. Of each step, the fastest of `laps` counts.
+    """
+    with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
+        coasting = CoastingGames(open_scene(write_scene(Path(scratch) / "scene", background)), GAMES)
+        try:
+            coasting.reset_all()
+            placements = record_placements(coasting, _STEPS, reset_ended=False)
+            ways = [_ALONE, *(way for way in _WAYS if DIRECT or way is not _WAYS[1])]
+            seconds = {way.words: np.full(_STEPS, np.inf) for way in ways}
+            for _ in range(laps):
+                for way in ways:
+                    np.minimum(seconds[way.words], _lap(coasting, placements, way), out=seconds[way.words])
+        finally:
+            coasting.arena.close()
+    step_s = seconds.pop(_ALONE.words)[1:].sum()
+    lines = ["| read by | ns per vehicle | share of SUMO's step |", "| --- | ---: | ---: |"]
+    for words, with_reading_s in seconds.items():
+        cost_s = with_reading_s[1:].sum() - step_s
+        per_vehicle_ns = 1e9 * cost_s / ((_STEPS - 1) * GAMES * _NEAREST)
+        lines.append(f"| {words} | {per_vehicle_ns:,.0f} | {cost_s / step_s:.2f} |")
+    return "\n".join(lines)
+
+
+def _lap(coasting: CoastingGames, placements: list[list[Placement]], way: _Way) -> list[float]:
+    """Seconds of each step and the reading after it; the vehicles depart in the first, which is not read."""
+    coasting.reset_all()
+    place_and_step(placements[0])
+    names = [f"g{game}_other{k}" for game in range(GAMES) for k in range(_NEAREST)]
+    way.prepare(names)
+    way.read(names)  # compiles
+    seconds = [np.inf]
+    for of_step in placements[1:]:
+        start_s = time.perf_counter()
+        place_and_step(of_step)
+        way.read(names)
+        seconds.append(time.perf_counter() - start_s)
+    return seconds

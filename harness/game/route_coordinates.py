@@ -1,0 +1,64 @@
+"""Bodies in the coordinates of a player's route: ahead and to the left of the player, in metres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from harness.game.jit import compiled
+from harness.game.road import MARGIN_M, SPACING_M, Routes
+
+# distances ahead of a player at which its route is sampled
+PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])
+_PATH_ROWS = np.rint(PATH_M / SPACING_M).astype(np.int64)
+
+
+@compiled
+def row_ahead(row: int, k: int, first_row: int, last_row: int) -> int:
+    """The row of a route at the distance `PATH_M[k]` from another row, clamped to the route."""
+    return min(max(row + _PATH_ROWS[k], first_row), last_row)
+
+
+@compiled
+def along_route(
+    row: int,
+    station_m: float,
+    offset_m: float,
+    player: int,
+    routes: Routes,
+    x_m: float,
+    y_m: float,
+    heading_rad: float,
+    length_m: float,
+    width_m: float,
+) -> tuple[float, float, float, float]:
+    """A body in route coordinates relative to a player (m): centre ahead and to the left, half length, half width.
+    The frame is the nearest one of the route at `PATH_M`."""
+    ahead, left, frame = place_along_route(row, station_m, offset_m, player, routes, x_m, y_m)
+    return ahead, left, *half_extents_m(heading_rad - routes.heading_rad[frame], length_m, width_m)
+
+
+@compiled
+def place_along_route(
+    row: int, station_m: float, offset_m: float, player: int, routes: Routes, x_m: float, y_m: float
+) -> tuple[float, float, int]:
+    """A point in route coordinates relative to a player: ahead and to the left (m), and the row of its frame."""
+    first, last = routes.first_row[player], routes.last_row[player]
+    nearest, nearest2 = 0, np.inf
+    for k in range(len(_PATH_ROWS)):
+        sample = row_ahead(row, k, first, last)
+        distance2 = (x_m - routes.x_m[sample]) ** 2 + (y_m - routes.y_m[sample]) ** 2
+        if distance2 < nearest2:
+            nearest, nearest2 = k, distance2
+    frame = row_ahead(row, nearest, first, last)
+    dx, dy = x_m - routes.x_m[frame], y_m - routes.y_m[frame]
+    cosine, sine = routes.cos[frame], routes.sin[frame]
+    ahead, left = dx * cosine + dy * sine + PATH_M[nearest], dy * cosine - dx * sine
+    to_row_m = (row - first) * SPACING_M - MARGIN_M - station_m  # rows are rounded stations
+    return ahead + to_row_m, left - offset_m, frame
+
+
+@compiled
+def half_extents_m(turned_rad: float, length_m: float, width_m: float) -> tuple[float, float]:
+    """Half the extents, along and across, of a body at an angle. Neither exceeds half of length plus width."""
+    along, across = abs(np.cos(turned_rad)), abs(np.sin(turned_rad))
+    return 0.5 * (length_m * along + width_m * across), 0.5 * (length_m * across + width_m * along)
