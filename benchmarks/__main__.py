@@ -1,7 +1,7 @@
 """`python -m benchmarks`: measure, print and store. `python -m benchmarks table`: the stored results in Markdown.
 
-`python -m benchmarks step` and `training`: where the time of a step and of a training goes. `python -m benchmarks reads`:
-the cost of reading vehicles. `python -m benchmarks scale`: what a large study would take.
+`python -m benchmarks step` and `training`: where the time of a step and of a training goes. `python -m benchmarks
+reads`: the cost of reading vehicles. `python -m benchmarks scale`: what a large study would take.
 """
 
 from __future__ import annotations
