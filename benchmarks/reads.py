@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import libsumo
 import numpy as np
@@ -38,17 +39,18 @@ class _Way:
 def _read_as_arena(direct: bool) -> Callable[[list[str]], object]:
     """The reading of `BackgroundTraffic`, in which every vehicle counts as near."""
     texts: list[bytes] = []
-    tables: list[object] = []
+    tables: list[Any] = []
 
     def read(names: list[str]) -> object:
         if not texts:  # as the arena, which prepares the names once
             texts.extend(name.encode() for name in names)
-            shape, nobody = (1, len(names)), np.zeros((1, 1))
+            shape, no_player = (1, len(names)), np.zeros((1, 1))
             record = np.array([[string_record(text) for text in texts]], dtype=np.uint64)
             numbers = (np.zeros(shape, dtype=np.int64), np.ones(shape), np.ones(shape), np.zeros(1))
-            search = Search(*numbers, nobody, nobody, nobody > 0.0, 1.0, 0, 1.0, 1, True)
+            search = Search(*numbers, no_player, no_player, no_player > 0.0, 1.0, 0, 1.0, 1, True)
             tables.extend((search, np.array([names], dtype=object), record, np.arange(len(names))))
-        return read_near(*tables, direct)  # type: ignore[arg-type]
+        search, texts_of_names, records, due = tables
+        return read_near(search, texts_of_names, records, due, direct)
 
     return read
 
