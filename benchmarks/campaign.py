@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -27,7 +28,8 @@ from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.schedule import Schedule
-from harness.campaign.execution.worker_process import Event
+from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
@@ -100,7 +102,8 @@ def campaign_side(timer: LapTimer, steps: int, episodes: int) -> None:
         with patch.object(campaign_module, "StageProgress", recorder):
             start_s = time.perf_counter()
             folder = RunFolder(Path(scratch) / "run")
-            campaign_module.run_campaign(opened_campaign, folder, _WORKERS, Console(file=io.StringIO()))
+            start_workers = partial(WorkerPool, jobs=_WORKERS)
+            campaign_module.run_campaign(opened_campaign, folder, start_workers, Console(file=io.StringIO()))
             end_s = time.perf_counter()
         stages = {}
         for stage in recorder.stages:

@@ -13,8 +13,9 @@ import pytest
 
 from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
 from harness.campaign.execution.run_context import RunContext
-from harness.campaign.execution.worker_pool import run_stages
-from harness.campaign.execution.worker_process import Event
+from harness.campaign.execution.run_stages import run_stages
+from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.planned_drivers import Trained
 from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.cli.wording import INTERRUPTED
@@ -58,7 +59,8 @@ def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2, finished: t
         keys={},
     )
     events: list[Event] = []
-    run_stages(stages, [f"{name}-seed1" for name in finished], context, jobs, events.append, work)
+    workers = WorkerPool(context, len(stages) - len(finished), jobs, work)
+    run_stages(stages, [f"{name}-seed1" for name in finished], workers, events.append)
     return events
 
 
