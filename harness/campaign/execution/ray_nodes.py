@@ -109,7 +109,8 @@ class Nodes:
             problem = None if late else _problem_of(check.node, self.ray.get(ref), self.context, self.token)
             problem = _problem(check.node, f"does not answer within {_ANSWER_S:g} s", "") if late else problem
         except self.ray.exceptions.RayTaskError as error:
-            problem = _problem(check.node, f"can't run the harness: {error.cause!r}", _INSTALL)
+            last_line = str(error).strip().splitlines()[-1]
+            problem = _problem(check.node, f"can't run the harness: {last_line}", _INSTALL)
         except self.ray.exceptions.RayError:  # the node is dead
             return None
         if problem is None:

@@ -9,16 +9,8 @@ import pytest
 from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt
 from harness.campaign.execution.run_stages import run_stages
 from harness.campaign.execution.stage_events import Event
-from harness.campaign.plan.planned_drivers import Trained
-from harness.campaign.plan.stages import Stage, TrainingStage
-from harness.evaluation.strategies import PersonaNonEgo
-
-
-def stage(name: str, *needs: str) -> Stage:
-    """A training that needs others: as its initial policy and as its opponent."""
-    initial, opponent, *_ = [*(Trained(stage=f"{each}-seed1") for each in needs), None, None]
-    strategy = PersonaNonEgo(persona=name)
-    return TrainingStage(seed=1, persona="", strategy=strategy, opponent=opponent, initial=initial, alone_share=0.0)
+from harness.campaign.plan.stages import Stage
+from tests.support.plans import training_of as stage
 
 
 class Scripted:
