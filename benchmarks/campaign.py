@@ -53,7 +53,8 @@ episodes = {episodes}
 """
 
 
-def _write_document(folder: Path, steps: int, episodes: int) -> Path:
+def write_document(folder: Path, steps: int, episodes: int) -> Path:
+    """Write the campaign with trainings of `steps` and arms of `episodes`."""
     personas = {name: persona_file(name).as_posix() for name in ("careful", "speedy", "distracted")}
     file = folder / "benchmark.toml"
     text = _DOCUMENT.format(scene=MERGE.as_posix(), steps=steps, episodes=episodes, **personas)
@@ -96,7 +97,7 @@ class _EventRecorder:
 def campaign_side(timer: LapTimer, steps: int, episodes: int) -> None:
     """One shortened campaign in one lap; the lap's values are the seconds of its parts."""
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
-        opened_campaign = open_campaign(_write_document(Path(scratch), steps, episodes))
+        opened_campaign = open_campaign(write_document(Path(scratch), steps, episodes))
         recorder = _EventRecorder(timer)
         timer.ready()
         with patch.object(campaign_module, "StageProgress", recorder):

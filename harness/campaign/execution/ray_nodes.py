@@ -106,7 +106,7 @@ class Nodes:
     def _end_check(self, ref: Any, late: bool) -> Problem | None:
         check = self._checks.pop(ref)
         try:
-            problem = None if late else _problem_of(check.node, self.ray.get(ref), self.context, self.token)
+            problem = None if late else problem_of(check.node, self.ray.get(ref), self.context, self.token)
             problem = _problem(check.node, f"does not answer within {_ANSWER_S:g} s", "") if late else problem
         except self.ray.exceptions.RayTaskError as error:
             last_line = str(error).strip().splitlines()[-1]
@@ -153,7 +153,8 @@ def _needed_files(context: RunContext) -> list[Path]:
     return [*policies, *(Path(file) for driver in drivers for file in driver.files)]
 
 
-def _problem_of(node: Node, answer: NodeAnswer, context: RunContext, token: str) -> Problem | None:
+def problem_of(node: Node, answer: NodeAnswer, context: RunContext, token: str) -> Problem | None:
+    """What is wrong with a node; None if it can be used."""
     pairs = [(name, answer.versions.get(name), ours) for name, ours in versions_of_numbers().items()]
     other = [f"{name} {theirs}, here {ours}" for name, theirs, ours in pairs if theirs != ours]
     if other:
