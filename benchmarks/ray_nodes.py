@@ -69,7 +69,7 @@ def ray_two_nodes(budget: Budget, on_progress: OnProgress) -> Measured:
             laps[name] = [runner.lap()]
             on_progress(done / len(runners))
     ratio = laps["ray"][0].seconds / laps["workers"][0].seconds
-    return {"ray_two_nodes": ratio}, {"unit": "campaigns", "sides": raw_numbers(laps)}
+    return {"ray_two_nodes": ratio}, {"unit": "campaigns", **raw_numbers(laps)}
 
 
 def _run(start_workers: StartWorkers, steps: int, episodes: int) -> None:

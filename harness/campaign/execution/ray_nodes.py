@@ -50,12 +50,10 @@ class NodeAnswer:
     """Files that it needs and does not see."""
 
 
-@dataclass(kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class _Check:
     node: Node
     until_s: float
-    known: bool = False
-    """Whether the node passed a check before."""
 
 
 @dataclass(kw_only=True)
@@ -83,7 +81,7 @@ class Nodes:
     def suspect(self, node: Node) -> None:
         """Use a node again only after it has answered."""
         if self.usable.pop(node.id, None) is not None:
-            self._start_check(node, known=True)
+            self._start_check(node)
 
     def settle(self, timeout_s: float) -> list[Problem]:
         """Wait for at most `timeout_s` until a check ends. Returns what is wrong with nodes that are refused."""
@@ -98,10 +96,10 @@ class Nodes:
         """Whether checks have not ended."""
         return bool(self._checks)
 
-    def _start_check(self, node: Node, known: bool = False) -> None:
+    def _start_check(self, node: Node) -> None:
         task = self.ray.remote(num_cpus=0, max_retries=0, scheduling_strategy=pinned(node.id))(answer_of_node)
         ref = task.remote(self.context.folder, _needed_files(self.context))
-        self._checks[ref] = _Check(node=node, until_s=time.monotonic() + _ANSWER_S, known=known)
+        self._checks[ref] = _Check(node=node, until_s=time.monotonic() + _ANSWER_S)
 
     def _end_check(self, ref: Any, late: bool) -> Problem | None:
         check = self._checks.pop(ref)

@@ -79,6 +79,7 @@ class RayWorkers:
         )
         self._ray, self._jobs, self._warn, self._work = ray, min(jobs or stages_left, stages_left), warn, work
         self._nodes = Nodes(ray=ray, context=self._context, token=f"{os.getpid()} {time.time_ns()}")
+        self._remote = ray.remote(num_cpus=1, max_retries=0)(_carry_out)
         self._tasks: dict[Any, _Task] = {}
         self._started = 0
         self._looked_s = 0.0
@@ -94,10 +95,10 @@ class RayWorkers:
             self._settle(_POLL_S)
         if not self._nodes.usable:
             remedy = "start nodes and run the same command again: finished work is kept"
-            raise UsageError.of(OPTION, "", "no node of the cluster is left", remedy)
+            raise UsageError.of(OPTION, "", "the cluster has no node with a core", remedy)
         node = max(self._nodes.usable.values(), key=lambda each: each.cpus - each.running)
         task = _Task(number=self._started, stage=stage, node=node)
-        remote = self._ray.remote(num_cpus=1, max_retries=0, scheduling_strategy=pinned(node.id))(_carry_out)
+        remote = self._remote.options(scheduling_strategy=pinned(node.id))
         ref = remote.remote(task.number, stage, attempt, self._context, self._work, self._inbox)
         self._tasks[ref] = task
         self._started += 1
