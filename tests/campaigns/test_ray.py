@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -109,6 +110,34 @@ def test_ray__nodes_of_other_versions_are_refused_by_name(cluster: Any, tmp_path
     assert refused.returncode == 2, refused.stdout + refused.stderr
     (line,) = refused.stderr.splitlines()
     assert line.startswith("--ray: node old-machine: has other versions than this machine: numba 0.1, here ")
+    assert "started" not in refused.stdout
+
+
+def test_ray__a_node_that_does_not_see_the_run_folder_is_refused_by_name(cluster: Any, tmp_path: Path) -> None:
+    """A node with an empty disk where the others have the run folder, where the machine lets us mount one."""
+    folder = tmp_path / "shared"
+    folder.mkdir()
+    start = f"{Path(sys.executable).with_name('ray')} start --address={cluster.address} --num-cpus=1 --node-name=island"
+    script = f"mount -t tmpfs tmpfs {folder} && {start} --object-store-memory=80000000"
+    island = subprocess.Popen(
+        ["unshare", "--mount", "sh", "-c", script],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        if island.wait(PATIENCE_S):
+            assert island.stderr is not None
+            pytest.skip(f"no node with a disk of its own: {island.stderr.read()}")
+        campaign = write_campaign(tmp_path, **BY_SUMO)
+        refused = harness("campaign", campaign, "--out", folder / "run", "--ray", cluster.address)
+    finally:
+        for pid in in_session(island.pid):
+            os.kill(pid, signal.SIGKILL)
+    assert refused.returncode == 2, refused.stdout + refused.stderr
+    (line,) = refused.stderr.splitlines()
+    assert line.startswith(f"--ray: node island: does not see the run folder {folder / 'run'} (use a folder that ")
     assert "started" not in refused.stdout
 
 
