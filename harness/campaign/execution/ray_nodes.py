@@ -22,6 +22,7 @@ from harness.errors import Problem
 _ANSWER_S = 120.0  # the time that a node has to answer: a busy one imports the harness slowly
 _INSTALL = "install the versions of requirements.lock on every node"
 _SHARE = "use a folder that all nodes share under the same path; --out names the run folder"
+_RESTART = "stop Ray on it, or restart it"
 _LOCKS = "mount the file system with locks (NFS without local_lock and nolock, Lustre with flock)"
 
 
@@ -103,9 +104,12 @@ class Nodes:
 
     def _end_check(self, ref: Any, late: bool) -> Problem | None:
         check = self._checks.pop(ref)
+        problem: Problem | None
         try:
-            problem = None if late else problem_of(check.node, self.ray.get(ref), self.context, self.token)
-            problem = _problem(check.node, f"does not answer within {_ANSWER_S:g} s", "") if late else problem
+            if late:
+                problem = _problem(check.node, f"does not answer within {_ANSWER_S:g} s", _RESTART)
+            else:
+                problem = problem_of(check.node, self.ray.get(ref), self.context, self.token)
         except self.ray.exceptions.RayTaskError as error:
             last_line = str(error).strip().splitlines()[-1]
             problem = _problem(check.node, f"can't run the harness: {last_line}", _INSTALL)
