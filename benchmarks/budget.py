@@ -24,6 +24,9 @@ class Budget:
     memory_steps: int
     episodes: int
     """Episodes of each arm of that campaign."""
+    ray_steps: int
+    """Steps of each training of the campaign that is carried out on Ray and without."""
+    ray_episodes: int
     arms: int
     """How often an arm of 100 episodes is played, after a first time that does not count."""
     starts: int
@@ -42,6 +45,8 @@ FULL = Budget(
     memory_warm_up_steps=262_144,
     memory_steps=1_000_000,
     episodes=100,
+    ray_steps=131_072,
+    ray_episodes=30,
     arms=3,
     starts=9,
     seeds=3,
@@ -56,6 +61,8 @@ FAST = Budget(
     memory_warm_up_steps=8_192,
     memory_steps=32_768,
     episodes=5,
+    ray_steps=8_192,
+    ray_episodes=2,
     arms=1,
     starts=3,
     seeds=1,

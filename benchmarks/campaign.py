@@ -11,6 +11,7 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -27,7 +28,8 @@ from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.schedule import Schedule
-from harness.campaign.execution.worker_process import Event
+from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
@@ -51,7 +53,8 @@ episodes = {episodes}
 """
 
 
-def _write_document(folder: Path, steps: int, episodes: int) -> Path:
+def write_document(folder: Path, steps: int, episodes: int) -> Path:
+    """Write the campaign with trainings of `steps` and arms of `episodes`."""
     personas = {name: persona_file(name).as_posix() for name in ("careful", "speedy", "distracted")}
     file = folder / "benchmark.toml"
     text = _DOCUMENT.format(scene=MERGE.as_posix(), steps=steps, episodes=episodes, **personas)
@@ -96,13 +99,14 @@ class _EventRecorder:
 def campaign_side(timer: LapTimer, steps: int, episodes: int) -> None:
     """One shortened campaign in one lap; the lap's values are the seconds of its parts."""
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch:
-        opened_campaign = open_campaign(_write_document(Path(scratch), steps, episodes))
+        opened_campaign = open_campaign(write_document(Path(scratch), steps, episodes))
         recorder = _EventRecorder(timer)
         timer.ready()
         with patch.object(campaign_module, "StageProgress", recorder):
             start_s = time.perf_counter()
             folder = RunFolder(Path(scratch) / "run")
-            campaign_module.run_campaign(opened_campaign, folder, _WORKERS, Console(file=io.StringIO()))
+            start_workers = partial(WorkerPool, jobs=_WORKERS)
+            campaign_module.run_campaign(opened_campaign, folder, start_workers, Console(file=io.StringIO()))
             end_s = time.perf_counter()
         stages = {}
         for stage in recorder.stages:

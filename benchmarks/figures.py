@@ -107,6 +107,12 @@ FIGURES = (
         target=9.0,
     ),
     Figure(
+        key="ray_two_nodes",
+        meaning="wall time of a small campaign on two local Ray nodes of one core, in multiples of that on two workers",
+        unit="×",
+        target=1.15,
+    ),
+    Figure(
         key="assessment_seconds",
         meaning="an arm of 100 episodes with traces and metrics, on one core",
         unit=" s",
@@ -273,6 +279,13 @@ MEASUREMENTS = (
         module="campaign",
         function="campaign_minutes",
         seconds=lambda budget: 40.0 + 600.0 * budget.campaign_share + 0.6 * budget.episodes,
+    ),
+    Measurement(
+        name="ray",
+        keys=("ray_two_nodes",),
+        module="ray_nodes",
+        function="ray_two_nodes",
+        seconds=lambda budget: 40.0 + budget.ray_steps / 1_500 + 2.0 * budget.ray_episodes,
     ),
 )
 

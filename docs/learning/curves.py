@@ -10,6 +10,7 @@ Each learner runs the same campaign of three trainings per seed: the naive ego, 
 from __future__ import annotations
 
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +22,7 @@ from rich.console import Console
 from scipy.stats import ttest_ind
 
 from harness.campaign.execution.run_campaign import run_campaign
-from harness.campaign.execution.worker_pool import cores
+from harness.campaign.execution.worker_pool import WorkerPool, cores
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import StageFailed
@@ -59,7 +60,7 @@ def run(
             file = Path(scratch) / "learning.toml"
             file.write_text(tomli_w.dumps(document), encoding="utf-8")
             folder = RunFolder(runs / learner)
-            result = run_campaign(open_campaign(file), folder, cores(), Console())
+            result = run_campaign(open_campaign(file), folder, partial(WorkerPool, jobs=cores()), Console())
         if result.failed_stages:
             raise StageFailed(f"failed: {', '.join(result.failed_stages)}; see {folder.path}")
         curves.append(read_csv(runs / learner / "training.csv").assign(learner=learner))

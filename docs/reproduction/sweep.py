@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,7 +22,7 @@ from pydantic import Field
 from rich.console import Console
 
 from harness.campaign.execution.run_campaign import run_campaign
-from harness.campaign.execution.worker_pool import cores
+from harness.campaign.execution.worker_pool import WorkerPool, cores
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import Document, read_document
@@ -81,7 +82,7 @@ def main(
         console.rule(f"{number} of {len(settings)}: {setting.name}")
         folder = out / setting.name
         campaign = _write_campaign(file.parent, sweep, setting, out / "documents" / setting.name)
-        run_campaign(open_campaign(campaign), RunFolder(folder), cores(), console)
+        run_campaign(open_campaign(campaign), RunFolder(folder), partial(WorkerPool, jobs=cores()), console)
         rows.append(_rows(folder, setting))
         pd.concat(rows)[COLUMNS].to_csv(table or file.with_suffix(".csv"), index=False)
         for heavy in ("traces", "replays", "tensorboard"):

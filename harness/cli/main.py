@@ -13,6 +13,7 @@ import typer
 
 from harness.cli import wording
 from harness.cli.documents import AllowCode, check_driver, persona_app, schema
+from harness.cli.workers import Ray, started_on
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -85,6 +86,7 @@ def campaign(
     out: RunOut = None,
     jobs: Jobs = None,
     allow_code: AllowCode = False,
+    ray: Ray = None,
 ) -> None:
     """Run a campaign: train, assess, retrain and compare.
 
@@ -96,10 +98,11 @@ def campaign(
     console = Console()
     with console.status(wording.reading(file)):  # shown before what takes time to import
         from harness.campaign.execution.run_campaign import run_campaign
-        from harness.campaign.execution.worker_pool import cores
         from harness.campaign.preflight import open_campaign
         from harness.campaign.storage.run_folder import RunFolder
 
+        if ray is not None:  # the nodes of a cluster know no working folder
+            file, out = file.absolute(), out.absolute() if out is not None else None
         opened = open_campaign(file, quick, allow_code)
     name = opened.document.name + ("-quick" if opened.quick else "")
     folder = RunFolder(out or Path("reports") / name)
@@ -107,7 +110,8 @@ def campaign(
         console.print(wording.NOTHING_TO_SHORTEN)
     _handle_termination_signals()
     try:
-        outcome = run_campaign(opened, folder, jobs or cores(), console)
+        with started_on(ray, jobs, lambda line: _print_plain([line], console)) as start_workers:
+            outcome = run_campaign(opened, folder, start_workers, console)
     except KeyboardInterrupt as interrupt:
         console.print(wording.INTERRUPTED)
         raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None

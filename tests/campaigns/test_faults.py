@@ -16,12 +16,12 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from harness.campaign.execution import run_campaign as campaign_run
 from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
 from harness.campaign.execution.run_campaign import run_campaign
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.worker_pool import Work, run_stages
+from harness.campaign.execution.stage_events import Work
+from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import open_campaign
 from harness.campaign.results.results import RunResult
@@ -71,16 +71,17 @@ def die_in_game_1(
     return carry_out(stage, conditions, report, begin_or_die, attempt)
 
 
-def run_by(work: Work, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[RunResult, str]:
+def run_by(work: Work, folder: Path) -> tuple[RunResult, str]:
     """The campaign of `sumo_run`, its stages carried out by `work`; what came of it, and what was said."""
     said = io.StringIO()
-    monkeypatch.setattr(campaign_run, "run_stages", partial(run_stages, work=work))
     campaign = open_campaign(write_campaign(folder, **BY_SUMO))
-    return run_campaign(campaign, RunFolder(folder / "run"), 1, Console(file=said, width=200)), said.getvalue()
+    start_workers = partial(WorkerPool, jobs=1, work=work)
+    outcome = run_campaign(campaign, RunFolder(folder / "run"), start_workers, Console(file=said, width=200))
+    return outcome, said.getvalue()
 
 
-def test_sigsegv__of_a_game_is_one_error_and_of_a_segment_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    outcome, said = run_by(die_in_game_1, tmp_path, monkeypatch)
+def test_sigsegv__of_a_game_is_one_error_and_of_a_segment_none(tmp_path: Path) -> None:
+    outcome, said = run_by(die_in_game_1, tmp_path)
     assert (outcome.error_games, outcome.failed_stages) == (1, ())  # for which the command's exit code is 1
     assert (
         f"naive_vs_sumo-seed1: the worker died of SIGSEGV, {MOST_CRASHES} times in game 1, which is abandoned" in said
@@ -92,7 +93,7 @@ def test_sigsegv__of_a_game_is_one_error_and_of_a_segment_none(tmp_path: Path, m
     assert games.drop(bad).equals(expected.drop(bad))
     assert (tmp_path / "run" / "training.csv").read_bytes() == (sumo_run() / "training.csv").read_bytes()
 
-    outcome, said = run_by(carry_out, tmp_path, monkeypatch)  # mended: the games in error are played again
+    outcome, said = run_by(carry_out, tmp_path)  # mended: the games in error are played again
     assert outcome.error_games == 0
     assert [line for line in said.splitlines() if line.startswith("started")] == ["started  naive_vs_sumo-seed1"]
     assert tables(tmp_path / "run") == tables(sumo_run())

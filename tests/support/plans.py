@@ -1,4 +1,4 @@
-"""The plan of a tiny campaign."""
+"""The plan of a tiny campaign, and stages that are only names."""
 
 from __future__ import annotations
 
@@ -6,9 +6,14 @@ from pathlib import Path
 from typing import Any
 
 from harness.campaign.execution.cache_keys import stage_keys
+from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import Stage
+from harness.campaign.plan.planned_drivers import Trained
+from harness.campaign.plan.stages import Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
+from harness.config.campaign import Campaign
+from harness.config.persona import Persona
+from harness.evaluation.strategies import PersonaNonEgo
 from tests.support.tiny import write_campaign
 
 
@@ -18,3 +23,27 @@ def planned(folder: Path, **changes: Any) -> tuple[dict[str, Stage], dict[str, s
     stages = plan(campaign.document, [persona.name for persona in campaign.personas])
     assert len({stage.id for stage in stages}) == len(stages)
     return {stage.id: stage for stage in stages}, stage_keys(campaign, stages)
+
+
+def training_of(name: str, *needs: str) -> Stage:
+    """A training that needs others: as its initial policy and as its opponent."""
+    initial, opponent, *_ = [*(Trained(stage=f"{each}-seed1") for each in needs), None, None]
+    strategy = PersonaNonEgo(persona=name)
+    return TrainingStage(seed=1, persona="", strategy=strategy, opponent=opponent, initial=initial, alone_share=0.0)
+
+
+def empty_context(folder: Path) -> RunContext:
+    """The context of stages that do without one."""
+    document: Any = Campaign
+    persona: Any = Persona
+    return RunContext(
+        folder=folder,
+        scene_folder=folder,
+        document=document.model_construct(),
+        ego_persona=persona.model_construct(name="anyone"),
+        personas={},
+        ego_driver=None,
+        other_egos={},
+        policies=None,
+        keys={},
+    )

@@ -44,3 +44,16 @@ def started(tmp_path: Path, car: Car, change: str = "pass") -> tuple[ProcessDriv
     mine = driver(tmp_path, car, f'open("pid", "w").write(str(os.getpid())); {change}')
     mine.reset(np.array([3, 7]))
     return mine, int((tmp_path / "pid").read_text())
+
+
+def children_of(parent: int) -> list[int]:
+    """The processes that a process has started and that run."""
+    found = []
+    for folder in Path("/proc").iterdir():
+        try:
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if folder.name.isdigit() and int(fields[1]) == parent and fields[0] != "Z":
+            found.append(int(folder.name))
+    return found

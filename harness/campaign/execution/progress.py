@@ -21,7 +21,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from harness.campaign.execution.worker_process import Event
+from harness.campaign.execution.stage_events import Event
 from harness.campaign.plan.stages import Stage
 
 STARTING = "starting"

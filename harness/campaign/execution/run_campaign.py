@@ -10,8 +10,8 @@ from rich.console import Console
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.progress import StageProgress
 from harness.campaign.execution.run_context import run_context_of
-from harness.campaign.execution.worker_pool import run_stages
-from harness.campaign.execution.worker_process import Event
+from harness.campaign.execution.run_stages import StartWorkers, run_stages
+from harness.campaign.execution.stage_events import Event
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import OpenCampaign
@@ -25,7 +25,7 @@ CHECKING = "checking what is finished"
 NOTHING_TO_DO = "Nothing to do: every stage is finished, and the results are those of this version."
 
 
-def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: Console) -> RunResult:
+def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console) -> RunResult:
     """Carry out what is left of a campaign, and write its tables, replays and report.
 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
@@ -52,7 +52,8 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, jobs: int, console: 
                     manifest.note(event)
                     progress.show(event)
 
-                run_stages(stages, finished, run_context_of(campaign, folder, keys), jobs, emit)
+                workers = start_workers(run_context_of(campaign, folder, keys), len(stages) - len(finished))
+                run_stages(stages, finished, workers, emit)
         from harness.campaign.results.results import write_results  # imports pandas and statistics
 
         return write_results(folder, console)

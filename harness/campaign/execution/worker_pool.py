@@ -1,29 +1,30 @@
-"""Carrying a plan out in worker processes: independent stages at the same time, libsumo only ever in a worker.
+"""Workers in processes of this machine: libsumo only ever runs in a worker.
 
-A worker that crashes affects no other: its stage continues from its last segment in a new one. After `MOST_CRASHES`
-crashes in the same segment a training has failed, by name, and the stages that don't need it continue; after as many in
-the same game an arm continues without that game, which is an error.
+The pools of `concurrent.futures` and loky can't replace this one: there, one worker that dies ends the stages of all
+others and the pool. Ray can, but takes seconds to start and reports no signal (`ray_workers`).
 """
 
 from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
+from types import TracebackType
 
-from harness.campaign.execution.crash_retries import Crashes
+from harness.campaign.execution.crash_retries import Attempt
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.schedule import Schedule
-from harness.campaign.execution.worker_process import Event, Work, start_process
+from harness.campaign.execution.stage_events import Event, Work
+from harness.campaign.execution.worker_process import start_process
 from harness.campaign.plan.stages import Stage
 
-Emit = Callable[[Event], None]
+
+def cores() -> int:
+    """Cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass
@@ -33,85 +34,77 @@ class _Worker:
     stage: Stage | None = None
 
 
-Spawn = Callable[[], _Worker]
+class WorkerPool:
+    """Processes of this machine, at most `jobs` and no more than `stages_left`; see `run_stages.Workers`.
 
-
-def cores() -> int:
-    """Cores this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def run_stages(
-    stages: Sequence[Stage],
-    finished: Iterable[str],
-    context: RunContext,
-    jobs: int,
-    emit: Emit,
-    work: Work = carry_out,
-) -> None:
-    """Carry out every stage that is not finished, at most `jobs` at a time, each after the stages that it needs.
-
-    Everything that happens is emitted; nothing is raised for a stage that fails. `work` carries out a stage, in a
-    worker. Raises PlanError where the stages can't all be carried out in some order.
+    `work` carries out a stage, in a worker.
     """
-    finished = set(finished)
-    schedule, crashes = Schedule(stages, finished), Crashes()
-    spawn = partial(_spawn, work, context)
-    with _workers(min(jobs, sum(stage.id not in finished for stage in stages)), spawn) as workers:
-        while True:
-            _dispatch(schedule, workers, crashes, spawn, emit)
-            busy = [worker for worker in workers if worker.stage]
-            if not busy:
-                return
-            ready = wait([*(w.connection for w in busy), *(w.process.sentinel for w in busy)])
-            for worker in busy:
-                if worker.connection in ready or worker.process.sentinel in ready:
-                    _handle(worker, schedule, crashes, spawn, emit)
 
+    def __init__(self, context: RunContext, stages_left: int, jobs: int, work: Work = carry_out) -> None:
+        self._context, self._work = context, work
+        self._count = min(jobs, stages_left)
+        self._workers: list[_Worker] = []
 
-def _dispatch(schedule: Schedule[Stage], workers: list[_Worker], crashes: Crashes, spawn: Spawn, emit: Emit) -> None:
-    """Give every idle worker a stage, as long as there are any."""
-    for worker in workers:
-        if worker.stage is not None or (stage := schedule.take()) is None:
-            continue
+    @property
+    def capacity(self) -> int:
+        """The number of processes."""
+        return self._count
+
+    def submit(self, stage: Stage, attempt: Attempt) -> None:
+        """Give a stage to an idle worker."""
+        worker = next(each for each in self._workers if each.stage is None)
         worker.stage = stage
-        task = (stage, crashes.next_attempt(stage))
         try:
-            worker.connection.send(task)
+            worker.connection.send((stage, attempt))
         except OSError:  # it died while it was idle
-            _replace(worker, spawn)
-            worker.connection.send(task)
-        emit(Event(kind="started", stage=stage.id))
+            self._replace(worker)
+            worker.connection.send((stage, attempt))
 
+    def next_events(self) -> Sequence[Event]:
+        """Wait for the busy workers: at most one event of each."""
+        busy = [worker for worker in self._workers if worker.stage]
+        ready = wait([*(w.connection for w in busy), *(w.process.sentinel for w in busy)])
+        reported = [w for w in busy if w.connection in ready or w.process.sentinel in ready]
+        return [event for worker in reported if (event := self._event_of(worker)) is not None]
 
-def _handle(worker: _Worker, schedule: Schedule[Stage], crashes: Crashes, spawn: Spawn, emit: Emit) -> None:
-    """Receive one event of a busy worker, and let schedule and crash counts follow."""
-    event, stage = _receive(worker), worker.stage
-    if event is None or stage is None:
-        return
-    match event.kind:
-        case "segment":
-            crashes.note_start(event.stage, event.done)
-            return
-        case "progress":
-            emit(event)
-            return
-        case "crashed":
-            response = crashes.note_crash(stage, event.message)
-            event = Event(
-                kind="failed" if response.stage_fails else "crashed", stage=stage.id, message=response.message
-            )
-            if not response.stage_fails:
-                schedule.put_back(stage)
-            _replace(worker, spawn)
-        case "done":
-            schedule.done(stage.id)
-    worker.stage = None
-    emit(event)
-    if event.kind == "failed":
-        for each in schedule.fail(stage.id):
-            message = f"needs {', '.join(each.failed)}, which failed"
-            emit(Event(kind="skipped", stage=each.stage, message=message))
+    def __enter__(self) -> WorkerPool:
+        try:
+            while len(self._workers) < self._count:
+                self._workers.append(self._spawn())
+        except BaseException:
+            self._end()
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        self._end()
+
+    def _event_of(self, worker: _Worker) -> Event | None:
+        event = _receive(worker)
+        if event is not None and event.kind == "crashed":
+            self._replace(worker)
+        if event is not None and event.kind in ("crashed", "done", "failed"):
+            worker.stage = None
+        return event
+
+    def _spawn(self) -> _Worker:
+        return _Worker(*start_process(self._work, self._context))
+
+    def _replace(self, worker: _Worker) -> None:
+        worker.connection.close()
+        fresh = self._spawn()
+        worker.process, worker.connection = fresh.process, fresh.connection
+
+    def _end(self) -> None:
+        for worker in self._workers:
+            worker.process.terminate()
+        for worker in self._workers:
+            worker.process.join(5.0)
+            if worker.process.is_alive():
+                worker.process.kill()
+            worker.connection.close()
 
 
 def _receive(worker: _Worker) -> Event | None:
@@ -133,31 +126,3 @@ def _cause(exitcode: int | None) -> str:
     if exitcode is not None and exitcode < 0:
         return signal.Signals(-exitcode).name
     return f"exit code {exitcode}"
-
-
-@contextmanager
-def _workers(count: int, spawn: Spawn) -> Iterator[list[_Worker]]:
-    workers: list[_Worker] = []
-    try:
-        for _ in range(count):
-            workers.append(spawn())
-        yield workers
-    finally:
-        for worker in workers:
-            worker.process.terminate()
-        for worker in workers:
-            worker.process.join(5.0)
-            if worker.process.is_alive():
-                worker.process.kill()
-            worker.connection.close()
-
-
-def _spawn(work: Work, context: RunContext) -> _Worker:
-    process, connection = start_process(work, context)
-    return _Worker(process, connection)
-
-
-def _replace(worker: _Worker, spawn: Spawn) -> None:
-    worker.connection.close()
-    fresh = spawn()
-    worker.process, worker.connection = fresh.process, fresh.connection

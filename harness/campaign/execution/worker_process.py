@@ -10,46 +10,22 @@ import os
 import signal
 import tempfile
 import threading
-import time
-import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
 from functools import cache
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
-from typing import Any, Literal
 
-from harness.campaign.execution.crash_retries import Attempt, OnProgress, OnStart
-from harness.campaign.execution.preparation import preparations_reported
 from harness.campaign.execution.run_context import RunContext
-from harness.campaign.plan.stages import Stage
+from harness.campaign.execution.stage_events import Work, carry_out_with_events
 from harness.campaign.storage.locks import register_worker
 from harness.campaign.storage.run_folder import RunFolder
-from harness.errors import HarnessError, is_of_memory
 from harness.files import make_folder
 
-_PROGRESS_EVERY_S = 0.25
 _TERMINATING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _CONTEXT = multiprocessing.get_context("spawn")
-
-Work = Callable[[Stage, RunContext, OnProgress, OnStart, Attempt], dict[str, Any]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Event:
-    """Something that happened to a stage."""
-
-    kind: Literal["started", "progress", "segment", "done", "failed", "crashed", "skipped"]
-    """segment: a segment of a training, a game of an arm or a trial of a search starts, and `done` is its number. It is
-    for the pool alone and is not emitted. progress with a message: what the stage waits for before its own work."""
-    stage: str
-    done: int = 0
-    total: int = 0
-    message: str = ""
-    info: dict[str, Any] = field(default_factory=dict)
 
 
 def start_process(work: Work, context: RunContext) -> tuple[BaseProcess, Connection]:
@@ -88,52 +64,34 @@ def _work(connection: Connection, work: Work, context: RunContext) -> None:
     try:
         while True:
             stage, attempt = connection.recv()
-            connection.send(_carry_out(stage, attempt, connection, work, context))
+            connection.send(
+                carry_out_with_events(stage, attempt, context, work, connection.send, _registered(context.folder))
+            )
     except (EOFError, OSError):  # the parent is gone
         return
 
 
+@contextmanager
+def _registered(run: Path) -> Iterator[None]:
+    """This process is registered as a worker of a run folder, from the first time until it ends."""
+    _register(run)
+    yield
+
+
 @cache
 def _register(run: Path) -> None:
-    """Register this process as a worker of a run folder, and put its temporary files into it: the next command removes
-    those of a worker that was killed."""
+    put_scratch_into(run)
+    register_worker(RunFolder(run).workers)
+
+
+@cache
+def put_scratch_into(run: Path) -> None:
+    """Put the temporary files of this process into a run folder: the next command removes those of a worker that was
+    killed."""
     folder = RunFolder(run)
     make_folder(folder.scratch)
     os.environ["TMPDIR"] = str(folder.scratch.resolve())
     tempfile.tempdir = None
-    register_worker(folder.workers)
-
-
-def _carry_out(stage: Stage, attempt: Attempt, connection: Connection, work: Work, context: RunContext) -> Event:
-    last = 0.0
-
-    def on_progress(done: int, total: int) -> None:
-        nonlocal last
-        now = time.monotonic()
-        if now - last >= _PROGRESS_EVERY_S or done >= total:
-            last = now
-            connection.send(Event(kind="progress", stage=stage.id, done=done, total=total))
-
-    def on_start(place: int) -> None:
-        connection.send(Event(kind="segment", stage=stage.id, done=place))
-
-    def on_preparation(what: str, done: int, total: int) -> None:
-        connection.send(Event(kind="progress", stage=stage.id, done=done, total=total, message=what))
-
-    try:
-        _register(context.folder)
-        with preparations_reported(on_preparation):
-            return Event(kind="done", stage=stage.id, info=work(stage, context, on_progress, on_start, attempt))
-    except (HarnessError, OSError) as error:
-        return Event(kind="failed", stage=stage.id, message=str(error))
-    except Exception as error:
-        if is_of_memory(error):
-            return Event(
-                kind="failed", stage=stage.id, message=f"the machine is short of memory: {error or 'none is left'}"
-            )
-        return Event(
-            kind="failed", stage=stage.id, message=traceback.format_exc()
-        )  # a bug: its traceback is the message
 
 
 def _end_with_parent() -> None:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from harness.errors import StageFailed
+
 _LOCK = "*.lock"
 
 
@@ -39,6 +41,37 @@ def register_worker(folder: Path) -> None:
     lock = _lock(folder / f"{os.getpid()}.lock")
     _acquire(lock)
     _registered.append(lock)
+
+
+@contextlib.contextmanager
+def held_by_worker(folder: Path, name: str, timeout_s: float) -> Iterator[None]:
+    """Register this process in a folder under a name, during the block: `wait_for_workers` waits for that.
+
+    At most one process at a time has a name. Raises StageFailed if another one still has it after `timeout_s`.
+    """
+    folder.mkdir(exist_ok=True)
+    lock = _lock(folder / f"{name}.lock")
+    try:
+        _acquire(lock, timeout_s)
+    except Timeout:
+        raise StageFailed(f"{name}: a process that was lost still has its lock, after {timeout_s:g} s") from None
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def is_held(file: Path) -> bool:
+    """Whether a process has a lock, as far as this machine can see."""
+    lock = _lock(file)
+    try:
+        lock.acquire(timeout=0.0)
+    except Timeout:
+        return True
+    except (OSError, NotImplementedError):
+        return False
+    lock.release()
+    return False
 
 
 _registered: list[FileLock] = []  # a lock is released when its object is gone

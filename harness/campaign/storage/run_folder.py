@@ -111,6 +111,11 @@ class RunFolder:
         """Where every worker registers as long as it lives."""
         return self.path / ".stages" / "worker_locks"
 
+    @property
+    def lock(self) -> Path:
+        """Held by the command that is running."""
+        return self.path / ".stages" / "lock"
+
     def segments(self, stage: str) -> Path:
         """The segments of an arm that is not done."""
         return self.work(stage) / "segments"
@@ -249,12 +254,11 @@ class RunFolder:
 
         Raises UsageError if another command holds it.
         """
-        lock = self.path / ".stages" / "lock"
-        if not lock.parent.is_dir():  # a published folder: it holds nothing to write from
+        if not self.lock.parent.is_dir():  # a published folder: it holds nothing to write from
             yield
             return
         try:
-            with only_one(lock):
+            with only_one(self.lock):
                 wait_for_workers(self.workers, _PATIENCE_S)
                 drop_scratch(self.path)
                 shutil.rmtree(self.scratch, ignore_errors=True)

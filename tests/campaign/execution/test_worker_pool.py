@@ -13,15 +13,14 @@ import pytest
 
 from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
 from harness.campaign.execution.run_context import RunContext
-from harness.campaign.execution.worker_pool import run_stages
-from harness.campaign.execution.worker_process import Event
-from harness.campaign.plan.planned_drivers import Trained
-from harness.campaign.plan.stages import Stage, TrainingStage
+from harness.campaign.execution.run_stages import run_stages
+from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.worker_pool import WorkerPool
+from harness.campaign.plan.stages import Stage
 from harness.cli.wording import INTERRUPTED
-from harness.config.campaign import Campaign
-from harness.config.persona import Persona
 from harness.errors import StageFailed
-from harness.evaluation.strategies import PersonaNonEgo
+from tests.support.plans import empty_context
+from tests.support.plans import training_of as stage
 from tests.support.tiny import (
     BY_SUMO,
     PATIENCE_S,
@@ -37,28 +36,10 @@ from tests.support.tiny import (
 )
 
 
-def stage(name: str, *needs: str) -> Stage:
-    """A training that needs others: as its initial policy and as its opponent."""
-    initial, opponent, *_ = [*(Trained(stage=f"{each}-seed1") for each in needs), None, None]
-    strategy = PersonaNonEgo(persona=name)
-    return TrainingStage(seed=1, persona="", strategy=strategy, opponent=opponent, initial=initial, alone_share=0.0)
-
-
 def run(folder: Path, stages: list[Stage], work: Any, jobs: int = 2, finished: tuple[str, ...] = ()) -> list[Event]:
-    nobody = Persona.model_construct(name="nobody")
-    context = RunContext(
-        folder=folder,
-        scene_folder=folder,
-        document=Campaign.model_construct(),
-        ego_persona=nobody,
-        personas={},
-        ego_driver=None,
-        other_egos={},
-        policies=None,
-        keys={},
-    )
     events: list[Event] = []
-    run_stages(stages, [f"{name}-seed1" for name in finished], context, jobs, events.append, work)
+    workers = WorkerPool(empty_context(folder), len(stages) - len(finished), jobs, work)
+    run_stages(stages, [f"{name}-seed1" for name in finished], workers, events.append)
     return events
 
 

@@ -1,0 +1,179 @@
+"""Workers on the nodes of a Ray cluster: each stage is a task of one core, on a node that was checked.
+
+Ray repeats no task: what follows from a death is decided by `run_stages`, as on one machine. A process of Ray carries
+several stages out, one after the other, as a worker of `worker_pool` does.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import Any
+
+from harness.campaign.execution.crash_retries import Attempt
+from harness.campaign.execution.ray_cluster import OPTION
+from harness.campaign.execution.ray_nodes import Node, Nodes, pinned, token_file
+from harness.campaign.execution.run_context import RunContext
+from harness.campaign.execution.run_stage import carry_out
+from harness.campaign.execution.stage_events import Event, Work, carry_out_with_events
+from harness.campaign.execution.worker_process import put_scratch_into
+from harness.campaign.plan.stages import Stage
+from harness.campaign.storage.locks import held_by_worker
+from harness.campaign.storage.run_folder import RunFolder
+from harness.errors import UsageError
+from harness.files import make_folder, write_atomically
+
+_POLL_S = 0.25
+_LOOK_EVERY_S = 5.0  # for nodes that joined
+_END_S = 10.0
+_LOST_S = 120.0  # the time that a process on a lost node has to end: Ray ends it, or the file system gives up its lock
+
+
+class Inbox:
+    """Keeps the events of all tasks until they are taken. An actor on the node of the command."""
+
+    def __init__(self) -> None:
+        self._events: list[tuple[int, Event]] = []
+
+    def send(self, task: int, event: Event) -> None:
+        """Add an event of a task."""
+        self._events.append((task, event))
+
+    def take(self) -> list[tuple[int, Event]]:
+        """The events since the last time."""
+        events, self._events = self._events, []
+        return events
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Task:
+    number: int
+    stage: Stage
+    node: Node
+
+
+class RayWorkers:
+    """The nodes of a cluster, for at most `jobs` stages at a time; see `run_stages.Workers`.
+
+    `ray` is connected to the cluster. Entering it checks all nodes, and raises UsageError with what is wrong with them.
+    """
+
+    def __init__(
+        self,
+        context: RunContext,
+        stages_left: int,
+        ray: Any,
+        jobs: int | None,
+        warn: Callable[[str], None],
+        work: Work = carry_out,
+    ) -> None:
+        policies = context.policies.absolute() if context.policies is not None else None
+        self._context = replace(
+            context,
+            folder=context.folder.absolute(),
+            scene_folder=context.scene_folder.absolute(),
+            policies=policies,
+        )
+        self._ray, self._jobs, self._warn, self._work = ray, min(jobs or stages_left, stages_left), warn, work
+        self._nodes = Nodes(ray=ray, context=self._context, token=f"{os.getpid()} {time.time_ns()}")
+        self._remote = ray.remote(num_cpus=1, max_retries=0)(_carry_out)
+        self._tasks: dict[Any, _Task] = {}
+        self._started = 0
+        self._looked_s = 0.0
+
+    @property
+    def capacity(self) -> int:
+        """Cores of the nodes that can be used now, at most `jobs`. At least 1: `submit` waits for a node in doubt."""
+        return max(min(self._jobs, sum(node.cpus for node in self._nodes.usable.values())), 1)
+
+    def submit(self, stage: Stage, attempt: Attempt) -> None:
+        """Start a stage on the node with most free cores. Raises UsageError if no node is left."""
+        while not self._nodes.usable and self._nodes.waiting:
+            self._settle(_POLL_S)
+        if not self._nodes.usable:
+            remedy = "start nodes and run the same command again: finished work is kept"
+            raise UsageError.of(OPTION, "", "the cluster has no node with a core", remedy)
+        node = max(self._nodes.usable.values(), key=lambda each: each.cpus - each.running)
+        task = _Task(number=self._started, stage=stage, node=node)
+        remote = self._remote.options(scheduling_strategy=pinned(node.id))
+        ref = remote.remote(task.number, stage, attempt, self._context, self._work, self._inbox)
+        self._tasks[ref] = task
+        self._started += 1
+        node.running += 1
+
+    def next_events(self) -> Sequence[Event]:
+        """Wait a moment for the end of a task: what has happened since the last time."""
+        ended, _ = self._ray.wait(list(self._tasks), num_returns=1, timeout=_POLL_S)
+        running = {task.number for task in self._tasks.values()}
+        # what a task sent before it ended is there: of its messages those that matter were acknowledged
+        events = [event for number, event in self._ray.get(self._inbox.take.remote()) if number in running]
+        events += [self._end_of(ref) for ref in ended]
+        if time.monotonic() - self._looked_s > _LOOK_EVERY_S:
+            self._looked_s = time.monotonic()
+            self._nodes.look()
+        self._settle(0.0)
+        return events
+
+    def __enter__(self) -> RayWorkers:
+        make_folder(token_file(self._context.folder).parent)
+        write_atomically(token_file(self._context.folder), self._nodes.token.encode())
+        self._nodes.look()
+        problems = []
+        while self._nodes.waiting:
+            problems += self._nodes.settle(_POLL_S)
+        if problems:
+            raise UsageError(problems)
+        here = pinned(self._ray.get_runtime_context().get_node_id())
+        self._inbox = self._ray.remote(num_cpus=0, scheduling_strategy=here)(Inbox).remote()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        for ref in self._tasks:
+            self._ray.cancel(ref, force=True)
+        if self._tasks:
+            self._ray.wait(list(self._tasks), num_returns=len(self._tasks), timeout=_END_S)
+        self._tasks.clear()
+        self._ray.kill(self._inbox)
+
+    def _settle(self, timeout_s: float) -> None:
+        for problem in self._nodes.settle(timeout_s):
+            self._warn(f"{problem}; it is not used")
+
+    def _end_of(self, ref: Any) -> Event:
+        task, errors = self._tasks.pop(ref), self._ray.exceptions
+        task.node.running -= 1
+        try:
+            event: Event = self._ray.get(ref)
+            return event
+        except errors.RayTaskError as error:
+            return Event(kind="failed", stage=task.stage.id, message=str(error))
+        except errors.RayError as error:
+            self._nodes.suspect(task.node)
+            return Event(kind="crashed", stage=task.stage.id, message=_cause(errors, error, task.node))
+
+
+def _cause(errors: Any, error: Exception, node: Node) -> str:
+    if isinstance(error, errors.OutOfMemoryError):
+        return f"node {node.name} is short of memory"
+    if isinstance(error, errors.WorkerCrashedError):
+        return f"the worker on node {node.name} died"
+    return f"node {node.name} is lost ({type(error).__name__})"
+
+
+def _carry_out(number: int, stage: Stage, attempt: Attempt, context: RunContext, work: Work, inbox: Any) -> Event:
+    """Carry a stage out in a process of Ray."""
+    import ray
+
+    def send(event: Event) -> None:
+        message = inbox.send.remote(number, event)
+        if event.kind == "segment":
+            ray.get(message)  # if the process dies now, the place is known
+
+    put_scratch_into(context.folder)
+    registered = held_by_worker(RunFolder(context.folder).workers, stage.id, _LOST_S)
+    return carry_out_with_events(stage, attempt, context, work, send, registered)

@@ -1,0 +1,206 @@
+"""Stages on a Ray cluster: the bytes of a run on this machine, whatever dies. A node that does not fit is refused."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
+from harness.campaign.execution.ray_cluster import ray_cluster
+from harness.campaign.execution.ray_workers import RayWorkers
+from harness.campaign.execution.run_context import RunContext
+from harness.campaign.execution.run_stages import run_stages
+from harness.campaign.execution.stage_events import Event
+from harness.campaign.plan.stages import Stage
+from harness.campaign.storage.run_folder import RunFolder
+from harness.cli.wording import INTERRUPTED
+from tests.support.plans import empty_context, training_of
+from tests.support.ray_nodes import add_node, busy_process, cluster_of, pull_the_plug
+from tests.support.tiny import (
+    BY_SUMO,
+    PATIENCE_S,
+    begin,
+    end,
+    harness,
+    in_session,
+    numbers,
+    sumo_run,
+    wait_for,
+    write_campaign,
+)
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[Any]:
+    with cluster_of(2) as running:
+        yield running
+
+
+def begin_campaign(tmp_path: Path, address: str) -> tuple[Any, Path, list[object]]:
+    """The campaign of `sumo_run`, begun on a cluster, one stage at a time; returned when its training has a segment."""
+    run = tmp_path / "run"
+    command: list[object] = ["campaign", write_campaign(tmp_path, **BY_SUMO), "--out", run]
+    command += ["--jobs", 1, "--ray", address]
+    process = begin(*command)
+    checkpoint = run / ".stages" / "speedy-seed1" / "checkpoint.safetensors"
+    wait_for(lambda: checkpoint.exists() or process.poll() is not None, "the first segment")
+    assert checkpoint.exists(), end(process)
+    return process, run, command
+
+
+# --- the real command -------------------------------------------------------------------------------------------------
+
+
+def test_ray__a_node_that_dies_costs_nothing_but_time(cluster: Any, tmp_path: Path) -> None:
+    process, run, _ = begin_campaign(tmp_path, cluster.address)
+    (node,) = (node for node in cluster.worker_nodes if busy_process(node))
+    pull_the_plug(cluster, node)
+    printed = end(process)
+    add_node(cluster)
+    assert process.returncode == 0, printed
+    assert "crashed  speedy-seed1: " in printed
+    assert "failed" not in printed
+    assert numbers(run) == numbers(sumo_run())
+
+
+def test_ray__a_command_that_is_killed_and_run_again_is_uninterrupted(cluster: Any, tmp_path: Path) -> None:
+    """The second command waits until Ray has ended the worker of the first one, which has no command any more."""
+    process, run, command = begin_campaign(tmp_path, cluster.address)
+    os.kill(process.pid, signal.SIGKILL)
+    end(process)
+    again = harness(*command)
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert numbers(run) == numbers(sumo_run())
+
+
+def test_ray__on_this_machine_alone_interrupted_leaves_nothing(tmp_path: Path) -> None:
+    process, run, command = begin_campaign(tmp_path, "local")
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
+    printed = process.communicate(timeout=PATIENCE_S)[0]
+    assert process.returncode == 130, printed
+    assert printed.splitlines()[-1] == INTERRUPTED
+    assert "Traceback" not in printed
+    wait_for(lambda: not in_session(process.pid), "no process of it is left")
+    again = harness(*command[:-2])  # without Ray: either continues what the other began
+    assert again.returncode == 0, again.stdout + again.stderr
+    assert numbers(run) == numbers(sumo_run())
+
+
+def test_ray__nodes_of_other_versions_are_refused_by_name(cluster: Any, tmp_path: Path) -> None:
+    """A node on which another release of numba is found before the one that is installed."""
+    (tmp_path / "other" / "numba-0.1.dist-info").mkdir(parents=True)
+    metadata = "Metadata-Version: 2.1\nName: numba\nVersion: 0.1\n"
+    (tmp_path / "other" / "numba-0.1.dist-info" / "METADATA").write_text(metadata)
+    path = os.pathsep.join([str(tmp_path / "other"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    node = add_node(cluster, env_vars={"PYTHONPATH": path}, node_name="old-machine")
+    try:
+        campaign = write_campaign(tmp_path, **BY_SUMO)
+        refused = harness("campaign", campaign, "--out", tmp_path / "run", "--ray", cluster.address)
+    finally:
+        cluster.remove_node(node)
+    assert refused.returncode == 2, refused.stdout + refused.stderr
+    (line,) = refused.stderr.splitlines()
+    assert line.startswith("--ray: node old-machine: has other versions than this machine: numba 0.1, here ")
+    assert "started" not in refused.stdout
+
+
+def test_ray__a_node_that_does_not_see_the_run_folder_is_refused_by_name(cluster: Any, tmp_path: Path) -> None:
+    """A node with an empty disk where the others have the run folder, where the machine lets us mount one."""
+    folder = tmp_path / "shared"
+    folder.mkdir()
+    start = f"{Path(sys.executable).with_name('ray')} start --address={cluster.address} --num-cpus=1 --node-name=island"
+    script = f"mount -t tmpfs tmpfs {folder} && {start} --object-store-memory=80000000"
+    island = subprocess.Popen(
+        ["unshare", "--mount", "sh", "-c", script],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        if island.wait(PATIENCE_S):
+            assert island.stderr is not None
+            pytest.skip(f"no node with a disk of its own: {island.stderr.read()}")
+        campaign = write_campaign(tmp_path, **BY_SUMO)
+        refused = harness("campaign", campaign, "--out", folder / "run", "--ray", cluster.address)
+    finally:
+        for pid in in_session(island.pid):
+            os.kill(pid, signal.SIGKILL)
+    assert refused.returncode == 2, refused.stdout + refused.stderr
+    (line,) = refused.stderr.splitlines()
+    assert line.startswith(f"--ray: node island: does not see the run folder {folder / 'run'} (use a folder that ")
+    assert "started" not in refused.stdout
+
+
+@pytest.mark.parametrize(
+    ("address", "message"),
+    [
+        ("127.0.0.1:1", "--ray: 127.0.0.1:1: no Ray cluster answers: [Errno 111] Connection refused (start one with: "),
+        ("somewhere", "--ray: somewhere: is not an address of a Ray cluster (write local, auto or HOST:PORT, "),
+    ],
+)
+def test_ray__a_bad_address_is_refused_at_once(address: str, message: str, tmp_path: Path) -> None:
+    refused = harness("campaign", write_campaign(tmp_path, **BY_SUMO), "--ray", address, timeout_s=60.0)
+    assert refused.returncode == 2
+    assert refused.stderr.startswith(message), refused.stderr
+
+
+def test_ray__that_is_not_installed_is_named_with_the_remedy(tmp_path: Path) -> None:
+    (tmp_path / "sitecustomize.py").write_text(
+        "import sys\n"
+        "class Blocks:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'ray':\n"
+        "            raise ModuleNotFoundError(name)\n"
+        "sys.meta_path.insert(0, Blocks())\n"
+    )
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    campaign = write_campaign(tmp_path, **BY_SUMO)
+    refused = harness("campaign", campaign, "--ray", "local", env={**os.environ, "PYTHONPATH": path})
+    assert refused.returncode == 2
+    assert refused.stderr == "--ray: local: needs Ray, which is not installed (pip install 'harness[ray]')\n"
+
+
+# --- deaths of workers ------------------------------------------------------------------------------------------------
+
+
+def die_in_segments(
+    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
+) -> dict[str, Any]:
+    """`a` dies in its second segment twice, `b` in every attempt."""
+    times = context.folder / f"{stage.id}.times"
+    times.write_text(times.read_text() + "x" if times.exists() else "x")
+    begin(0)
+    begin(1)
+    if stage.id == "b-seed1" or (stage.id == "a-seed1" and len(times.read_text()) < MOST_CRASHES):
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return {"first": attempt.first}
+
+
+def test_ray__deaths_of_workers_follow_the_rule_of_the_harness(cluster: Any, tmp_path: Path) -> None:
+    stages = [training_of("a"), training_of("b"), training_of("c", "b"), training_of("d", "a")]
+    events: list[Event] = []
+    folder = RunFolder(tmp_path / "run")
+    folder.claim("deaths")
+    with ray_cluster(cluster.address, None) as ray, folder.held():
+        context = empty_context(folder.path)
+        workers = RayWorkers(context, len(stages), ray=ray, jobs=2, warn=pytest.fail, work=die_in_segments)
+        run_stages(stages, [], workers, events.append)
+    told = [f"{event.kind} {event.stage.removesuffix('-seed1')}" for event in events]
+    assert told.count("crashed a") == told.count("crashed b") == MOST_CRASHES - 1
+    assert told.count("started b") == MOST_CRASHES
+    assert {"done a", "done d", "failed b", "skipped c"} <= set(told)
+    (failed,) = (event.message for event in events if event.kind == "failed")
+    assert failed.startswith("the worker on node ")
+    assert failed.endswith(f" died, {MOST_CRASHES} times")
+    (done,) = (event.info for event in events if event.kind == "done" and event.stage == "a-seed1")
+    assert done == {"first": False}
