@@ -40,7 +40,7 @@ Curves = Annotated[Path, typer.Argument(metavar="FILE", help="The table that `ru
 @app.command()
 def run(
     out: Annotated[Path, typer.Option(metavar="FILE", help="The table.")] = Path("docs/learning/curves.csv"),
-    steps: Annotated[int, typer.Option(help="Budget of each training.")] = 400_000,
+    steps: Annotated[int, typer.Option(help="Budget of each training.")] = 300_000,
     seeds: Annotated[int, typer.Option(help="Number of training seeds.")] = 5,
     runs: Annotated[Path, typer.Option(metavar="DIR", help="The folder of run folders.")] = Path("reports/learning"),
 ) -> None:
