@@ -22,8 +22,9 @@ def cluster_of(nodes: int) -> Iterator[Any]:
     os.environ.setdefault("RAY_AUTH_MODE", "disabled")
     from ray.cluster_utils import Cluster
 
-    cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 0, "_system_config": _QUICK, **_SMALL})
+    cluster = Cluster()
     try:
+        _start(cluster, num_cpus=0, _system_config=_QUICK)
         for _ in range(nodes):
             add_node(cluster)
         yield cluster
@@ -33,7 +34,7 @@ def cluster_of(nodes: int) -> Iterator[Any]:
 
 def add_node(cluster: Any, **options: Any) -> Any:
     """Add a node of one core."""
-    return cluster.add_node(num_cpus=1, **_SMALL, **options)
+    return _start(cluster, num_cpus=1, **options)
 
 
 def busy_process(node: Any) -> int | None:
@@ -52,6 +53,17 @@ def pull_the_plug(cluster: Any, node: Any) -> None:
     cluster.remove_node(node, allow_graceful=False)
     for pid in processes:
         os.kill(pid, signal.SIGKILL)
+
+
+def _start(cluster: Any, **options: Any) -> Any:
+    """Start a node. Ray gives up after 30 s, which a busy machine may need: it is tried three times."""
+    for _ in range(2):
+        try:
+            return cluster.add_node(**_SMALL, **options)
+        except Exception as error:
+            if "timed out during startup" not in str(error):
+                raise
+    return cluster.add_node(**_SMALL, **options)
 
 
 def _command(pid: int) -> bytes:

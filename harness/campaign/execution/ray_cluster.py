@@ -52,7 +52,7 @@ def ray_cluster(address: str, jobs: int | None) -> Iterator[Any]:
         with _handlers_kept():
             try:
                 ray.init(**options)
-            except (ConnectionError, RuntimeError, ValueError, ray.exceptions.RayError) as error:
+            except Exception as error:  # Ray raises errors of many kinds here, and `Exception` itself
                 message = f"no connection to Ray: {' '.join(str(error).split())}"
                 raise UsageError.of(OPTION, address, message, _START) from None
         yield ray
