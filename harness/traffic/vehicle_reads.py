@@ -15,6 +15,7 @@ from __future__ import annotations
 import ctypes
 import platform
 from itertools import chain
+from typing import Any
 
 import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
@@ -34,9 +35,9 @@ _SYMBOLS = {
 }
 # A position is returned in memory of the caller, whose address is the first argument. It is a TraCIPosition: the
 # address of its virtual functions, then x, y, z.
-_position = types.ExternalFunction("harness_vehicle_position", types.void(types.intp, types.intp, types.int32))
-_angle = types.ExternalFunction("harness_vehicle_angle", types.float64(types.intp))
-_speed = types.ExternalFunction("harness_vehicle_speed", types.float64(types.intp))
+_position: Any = types.ExternalFunction("harness_vehicle_position", types.void(types.intp, types.intp, types.int32))
+_angle: Any = types.ExternalFunction("harness_vehicle_angle", types.float64(types.intp))
+_speed: Any = types.ExternalFunction("harness_vehicle_speed", types.float64(types.intp))
 _X, _Y, _ROOM = 1, 2, 8  # a position in units of 8 bytes; the room exceeds it
 _RECORD_BYTES = 32
 
