@@ -10,8 +10,8 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import libsumo
 import numpy as np
@@ -38,19 +38,19 @@ class _Way:
 
 def _read_as_arena(direct: bool) -> Callable[[list[str]], object]:
     """The reading of `BackgroundTraffic`, in which every vehicle counts as near."""
-    texts: list[bytes] = []
-    tables: list[Any] = []
+    prepared: list[Callable[[], object]] = []
+    texts: list[bytes] = []  # the records point to them
 
     def read(names: list[str]) -> object:
-        if not texts:  # as the arena, which prepares the names once
+        if not prepared:  # the arena prepares a name once as well
             texts.extend(name.encode() for name in names)
-            shape, no_player = (1, len(names)), np.zeros((1, 1))
             record = np.array([[string_record(text) for text in texts]], dtype=np.uint64)
+            shape, no_player = (1, len(names)), np.zeros((1, 1))
             numbers = (np.zeros(shape, dtype=np.int64), np.ones(shape), np.ones(shape), np.zeros(1))
             search = Search(*numbers, no_player, no_player, no_player > 0.0, 1.0, 0, 1.0, 1, True)
-            tables.extend((search, np.array([names], dtype=object), record, np.arange(len(names))))
-        search, texts_of_names, records, due = tables
-        return read_near(search, texts_of_names, records, due, direct)
+            named, due = np.array([names], dtype=object), np.arange(len(names))
+            prepared.append(partial(read_near, search, named, record, due, direct))
+        return prepared[0]()
 
     return read
 

@@ -147,12 +147,12 @@ def _observe(
                 if seen[b]:
                     error = distance_error[g, p]
                     seen_at = (body_x_m[g, b] + error * dx, body_y_m[g, b] + error * dy)
-                    forward, left, frame = place_along_route(row, station, offset, p, routes, *seen_at)
+                    along, beside, frame = place_along_route(row, station, offset, p, routes, *seen_at)
                     length, width = body_length_m[g, b], body_width_m[g, b]
                     extent = 0.5 * (length + width)  # at least the half extents, which take longer to compute
-                    if forward + extent > _EDGES[0] and forward - extent < _EDGES[-1]:
+                    if along + extent > _EDGES[0] and along - extent < _EDGES[-1]:
                         turned = body_heading_rad[g, b] - routes.heading_rad[frame]
-                        _narrow(view, forward, left, *half_extents_m(turned, length, width))
+                        _narrow(view, along, beside, *half_extents_m(turned, length, width))
             for k in range(_COUNT):
                 view[_LEFT + k] /= _SIDE_M
                 view[_RIGHT + k] /= _SIDE_M
