@@ -10,7 +10,7 @@ from rich.console import Console
 
 from harness.campaign.execution.preparation import preparations_reported
 from harness.campaign.execution.progress import STARTING, StageProgress
-from harness.campaign.execution.worker_process import Event
+from harness.campaign.execution.stage_events import Event
 from harness.campaign.plan.plan import plan
 from harness.config.campaign import Campaign
 
