@@ -57,7 +57,6 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     """Write tables, replays and report of the finished stages, from the run folder alone."""
     manifest = folder.manifest()
     folder.check_whole(manifest)
-    forget_result(folder)
     done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
     episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
@@ -76,6 +75,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
     scene = open_scene(folder.scene)
     _check_traces(folder, episodes)
+    forget_result(folder)  # the first change: what is refused above leaves the folder as it is
     write_model_cards(folder, manifest, summary)
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
