@@ -2,7 +2,8 @@
 
 <run>/.stages/results.json holds a key of everything that results depend on (the manifest, the checksums of the stages'
 files, this program and its libraries), the verdicts for the terminal, and the checksums of every file of the results.
-It is written last. Where an input has changed, or a file is missing or damaged, the results are made anew.
+It is written last. Where an input has changed, or a file is missing or damaged, the results are made anew: a record of
+earlier results fits neither inputs that have changed nor results that are half made.
 """
 
 from __future__ import annotations
@@ -68,11 +69,6 @@ def keep_result(folder: RunFolder, manifest: Mapping[str, Any], result: RunResul
     record = {"key": _key(folder, manifest), "result": result.model_dump(mode="json")}
     record["files"] = checksums_of(folder.path, _results(folder))
     write_atomically(_file(folder), (json.dumps(record, indent=1) + "\n").encode())
-
-
-def forget_result(folder: RunFolder) -> None:
-    """Results are about to be made: what is in the folder vouches for nothing until they are complete."""
-    _file(folder).unlink(missing_ok=True)
 
 
 def _file(folder: RunFolder) -> Path:

@@ -15,7 +15,7 @@ from rich.progress import track
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
-from harness.campaign.results.kept_results import RunResult, ShownVerdict, forget_result, keep_result
+from harness.campaign.results.kept_results import RunResult, ShownVerdict, keep_result
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
@@ -75,7 +75,6 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
     scene = open_scene(folder.scene)
     _check_traces(folder, episodes)
-    forget_result(folder)  # the first change: what is refused above leaves the folder as it is
     write_model_cards(folder, manifest, summary)
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
