@@ -1,7 +1,7 @@
 """What it costs to read background vehicles out of SUMO, by each way that libsumo offers.
 
-Each way reads position, angle and speed of the same vehicles after every step. Its cost is the time by which step and
-reading together exceed a step alone, so that it includes results that SUMO prepares during its step.
+Each way reads position, angle and speed of the same vehicles after every step. What SUMO prepares for it during the
+step counts as well: the time by which such a step exceeds a step alone.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from libsumo import constants
 from benchmarks.bare_sumo import Placement, place_and_step, record_placements
 from benchmarks.games import GAMES, CoastingGames
 from benchmarks.traffic import write_scene
+from harness.game.arrays import FloatArray
 from harness.game.neighbours import NOTICED_M, Search
 from harness.traffic.scene import open_scene
 from harness.traffic.vehicle_reads import DIRECT, read_near, string_record
@@ -32,7 +33,8 @@ _VARIABLES = (constants.VAR_POSITION, constants.VAR_ANGLE, constants.VAR_SPEED)
 @dataclass(frozen=True, kw_only=True)
 class _Way:
     words: str
-    prepare: Callable[[list[str]], object] = lambda names: None
+    prepare: Callable[[list[str]], object] | None = None
+    """Makes SUMO prepare results in every step."""
     read: Callable[[list[str]], object] = lambda names: None
 
 
@@ -94,32 +96,37 @@ def reads_table(laps: int, background: int = 50) -> str:
             coasting.reset_all()
             placements = record_placements(coasting, _STEPS, reset_ended=False)
             ways = [_ALONE, *(way for way in _WAYS if DIRECT or way is not _WAYS[1])]
-            seconds = {way.words: np.full(_STEPS, np.inf) for way in ways}
+            seconds = {way.words: np.full((2, _STEPS - 1), np.inf) for way in ways}
             for _ in range(laps):
                 for way in ways:
                     np.minimum(seconds[way.words], _lap(coasting, placements, way), out=seconds[way.words])
         finally:
             coasting.arena.close()
-    step_s = seconds.pop(_ALONE.words)[1:].sum()
-    lines = ["| read by | ns per vehicle | share of SUMO's step |", "| --- | ---: | ---: |"]
-    for words, with_reading_s in seconds.items():
-        cost_s = with_reading_s[1:].sum() - step_s
-        per_vehicle_ns = 1e9 * cost_s / ((_STEPS - 1) * GAMES * _NEAREST)
-        lines.append(f"| {words} | {per_vehicle_ns:,.0f} | {cost_s / step_s:.2f} |")
+    alone_s = seconds[_ALONE.words][0].sum()
+    lines = ["| read by | in SUMO's step, ns per vehicle | after it, ns per vehicle | share of SUMO's step |"]
+    lines.append("| --- | ---: | ---: | ---: |")
+    for way in ways[1:]:
+        step_s, reading_s = seconds[way.words].sum(1)
+        prepared_s = step_s - alone_s if way.prepare else 0.0
+        per_vehicle_ns = 1e9 / ((_STEPS - 1) * GAMES * _NEAREST)
+        costs = f"{per_vehicle_ns * prepared_s:,.0f} | {per_vehicle_ns * reading_s:,.0f}"
+        lines.append(f"| {way.words} | {costs} | {(prepared_s + reading_s) / alone_s:.2f} |")
     return "\n".join(lines)
 
 
-def _lap(coasting: CoastingGames, placements: list[list[Placement]], way: _Way) -> list[float]:
-    """Seconds of each step and the reading after it; the vehicles depart in the first, which is not read."""
+def _lap(coasting: CoastingGames, placements: list[list[Placement]], way: _Way) -> FloatArray:
+    """[2, steps] seconds of each step, and of the reading after it. The vehicles depart in a first step before."""
     coasting.reset_all()
     place_and_step(placements[0])
     names = [f"g{game}_other{k}" for game in range(GAMES) for k in range(_NEAREST)]
-    way.prepare(names)
+    if way.prepare is not None:
+        way.prepare(names)
     way.read(names)  # compiles
-    seconds = [np.inf]
+    seconds = []
     for of_step in placements[1:]:
         start_s = time.perf_counter()
         place_and_step(of_step)
+        stepped_s = time.perf_counter()
         way.read(names)
-        seconds.append(time.perf_counter() - start_s)
-    return seconds
+        seconds.append((stepped_s - start_s, time.perf_counter() - stepped_s))
+    return np.array(seconds).T
