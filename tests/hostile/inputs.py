@@ -18,7 +18,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
+from harness.campaign.results.results import write_results
+from harness.campaign.storage.run_folder import RunFolder
 from harness.cli.main import main
 from harness.drivers.policy_file import write_policy
 from tests.support.policies import some_policy
@@ -287,6 +290,7 @@ def _build_run(folder: Path) -> None:
     manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
     del manifest["hashes"]
     (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    write_results(RunFolder(run), Console(quiet=True))  # its record of what the results were made from fits again
 
 
 def traces_of(folder: Path) -> dict[str, str]:
