@@ -83,7 +83,7 @@ class _EventRecorder:
     def __exit__(self, *exception: object) -> None:
         """Nothing to close."""
 
-    def emit(self, event: Event) -> None:
+    def show(self, event: Event) -> None:
         """Record an event. Raises RuntimeError if a stage failed."""
         if event.kind == "progress" and event.message:
             return  # it prepares: its own work has not started
