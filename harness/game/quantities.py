@@ -15,6 +15,8 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import Actuators, lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
+from harness.game.meetings import Meetings, meetings
+from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Along, Road, Routes, row_at
 from harness.game.route_coordinates import PATH_M, along_route, row_ahead
 from harness.game.state import Bodies, Outcome, State
@@ -25,7 +27,7 @@ REACH_M = 10.0  # largest clearance that is computed
 
 @dataclass(frozen=True, kw_only=True)
 class World:
-    """The constants of a game: road, cars, step length, time limit. Sizes are [P]."""
+    """The constants of a game: road, right of way, cars, step length, time limit. Sizes are [P]."""
 
     road: Road
     actuators: Actuators
@@ -33,6 +35,7 @@ class World:
     width_m: FloatArray
     step_s: float
     time_limit_s: float
+    right_of_way: RightOfWay = NO_JUNCTIONS
 
     @property
     def steps(self) -> int:
@@ -144,6 +147,25 @@ class Quantities:
     def time_gap_s(self) -> FloatArray:
         """Time headway without the leader's length: gap over own speed; inf without a leader."""
         return self.leader_gap_m / np.maximum(self.state.speed_mps, 0.1)
+
+    # --- conflicts at junctions ---------------------------------------------------------------------------------------
+
+    @cached_property
+    def signals(self) -> IntArray:
+        """[G, L] states (`Signal`) of the links `World.right_of_way.signal_links`."""
+        return np.zeros((len(self.state.step), len(self.world.right_of_way.signal_links)), dtype=np.int8)
+
+    @cached_property
+    def meetings(self) -> Meetings:
+        """Each player's conflict with each body at a junction."""
+        state, bodies, tables = self.state, self.bodies, self.world.right_of_way
+        return Meetings(
+            *meetings(
+                *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
+                (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),
+                *(self.visible, self.signals, tuple(tables.conflicts), tuple(tables.streams)),
+            )
+        )
 
     # --- surfaces ------------------------------------------------------------------------------------------------
 
