@@ -6,13 +6,13 @@ from dataclasses import dataclass
 
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import Actuators
-from harness.game.right_of_way import RightOfWay
+from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Road
 
 
 @dataclass(frozen=True, kw_only=True)
 class World:
-    """The constants of a game: road, cars, step length, time limit. Sizes are [P]."""
+    """The constants of a game: road, right of way, cars, step length, time limit. Sizes are [P]."""
 
     road: Road
     actuators: Actuators
@@ -20,7 +20,7 @@ class World:
     width_m: FloatArray
     step_s: float
     time_limit_s: float
-    right_of_way: RightOfWay
+    right_of_way: RightOfWay = NO_JUNCTIONS
 
     @property
     def steps(self) -> int:

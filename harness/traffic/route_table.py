@@ -37,6 +37,35 @@ class _Piece:
     is_junction: bool = False
 
 
+@dataclass(frozen=True, kw_only=True)
+class JunctionOnRoute:
+    """The junction between two edges of a route."""
+
+    link: Connection  # that the route's line follows
+    links: list[Connection]  # all that cars may take from the one edge to the other
+    begin_m: float  # stations of the route's line
+    end_m: float
+
+
+def junctions_on_route(net: Net, edges: Sequence[Edge]) -> list[JunctionOnRoute]:
+    """The junctions of a route along connected edges, in order, with the stations of its table."""
+    starts = _join([piece.line for piece in _pieces(net, edges)])[1].tolist()
+    return [
+        JunctionOnRoute(
+            link=link,
+            links=_car_links(edges[k], edges[k + 1]),
+            begin_m=starts[2 * k + 1],
+            end_m=starts[2 * k + 2],
+        )
+        for k, link in enumerate(_links(edges))
+    ]
+
+
+def line_over_junction(net: Net, link: Connection) -> FloatArray:
+    """[n, 2] line of a link over its junction."""
+    return _over_junction(net, link)[0]
+
+
 def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Edge, goal_position_m: float) -> Route:
     """The table of a route along connected edges; `area` is the net's drivable area.
 

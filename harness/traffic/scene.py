@@ -27,6 +27,7 @@ from harness.traffic import network
 from harness.traffic.departures import check_departures
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
+from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType, read_route_file
 from harness.traffic.start_ranges import start_range
 
@@ -141,6 +142,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         width_m=np.array([each.width_m for each in types]),
         step_s=document.step_length_s,
         time_limit_s=document.time_limit_s,
+        right_of_way=right_of_way(net, [[net.getEdge(name) for name in player.edges] for player in players]),
     )
     return OpenScene(
         folder=folder,
