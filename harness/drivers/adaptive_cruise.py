@@ -48,7 +48,9 @@ def waiting_gap_m(motion: OwnMotion, encounters: Encounters, law: Cruise) -> Flo
     before the own car has driven through the place where the two ways meet.
     """
     moderate2 = 2.0 * AMBER_MPS2 * np.maximum(motion.stop_line_m, 0.0)
-    stops = motion.signal_red & (motion.speed_mps**2 <= 2.0 * law.max_braking_mps2 * np.maximum(motion.stop_line_m, 0.0))
+    stops = motion.signal_red & (
+        motion.speed_mps**2 <= 2.0 * law.max_braking_mps2 * np.maximum(motion.stop_line_m, 0.0)
+    )
     stops |= motion.signal_yellow & (motion.speed_mps**2 <= moderate2)
     at_line = np.where(stops, motion.stop_line_m, np.inf)
     through_m = np.maximum(encounters.own_to_conflict_m, 0.0) + _THROUGH_M

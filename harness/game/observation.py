@@ -21,9 +21,10 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
+from harness.game.meetings import Meetings
 from harness.game.observation_layout import AHEAD_M, BEHIND, COMPRESSED, ENTRIES, LAYOUT, OTHERS, SCALE, SIZE
 from harness.game.quantities import Quantities
-from harness.game.right_of_way import Control, Meetings, Signal, StopLines
+from harness.game.right_of_way import Control, Signal, StopLines
 from harness.game.road import Routes, lane_at, row_at
 from harness.game.route_coordinates import half_extents_m, place_along_route, row_ahead
 

@@ -70,7 +70,9 @@ _OTHER: Mapping[str, Scale] = {
     "has_priority": _ONE,  # 1: over the player; -1: must yield to it; 0: no conflict
 }
 
-SCALES: Mapping[str, Scale] = _OWN | {f"other{k}_{name}": scale for k in range(OTHERS) for name, scale in _OTHER.items()}
+SCALES: Mapping[str, Scale] = _OWN | {
+    f"other{k}_{name}": scale for k in range(OTHERS) for name, scale in _OTHER.items()
+}
 """The scale of each entry, by name, in the order of the entries."""
 LAYOUT: tuple[str, ...] = tuple(SCALES)
 """The names of the entries in their order. A name ends with the unit."""
