@@ -26,7 +26,8 @@ from harness.traffic import network
 from harness.traffic.departures import check_departures
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
-from harness.traffic.route_file import Departure, RouteFile, VehicleType, read_route_file
+from harness.traffic.route_file import Departure, RouteFile, VehicleType
+from harness.traffic.route_reading import read_route_file
 
 
 @dataclass(frozen=True, kw_only=True)
