@@ -105,6 +105,7 @@ def test_train__a_continued_converged_training_stays_converged(
     alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(harness.training.ppo, "has_converged", lambda payoffs: len(payoffs) >= 2)
+    monkeypatch.setattr(harness.training.ppo, "still_fails", lambda games, failures: False)
     converged = in_one_go(alone, tmp_path)
     assert (converged.stopped, converged.progress.steps) == ("converged", 2048)
     assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), converged, tmp_path)
