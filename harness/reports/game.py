@@ -117,7 +117,7 @@ def _gap(row: Row) -> Gap:
         payoff=number(row["payoff"], 2),
         best=number(row["payoff_best_response"], 2),
         gap=gap,
-        share=percent(row["gap_share"]) if not row["gap"] <= 0 else NONE_FOUND,
+        share=NONE_FOUND if row["gap"] <= 0 and not row["reason"] else percent(row["gap_share"]),
         p_holm=p_number(row["p_holm"]),
         failures=_rate(row, "ego_failure_rate"),
         failures_best=_rate(row, "ego_failure_rate_best_response"),
