@@ -37,7 +37,10 @@ def read_net(path: Path) -> Net:
     except Exception as error:  # sumolib does not document its errors
         raise UsageError.of(path, "", f"is not a SUMO net: {error!r}", "build it with netconvert or netedit") from error
     if not any(car_lanes(edge) for edge in net.getEdges(withInternal=False)):
-        raise UsageError.of(path, "", "has no lane that cars may use", "build it with netconvert or netedit")
+        lanes = [lane for edge in net.getEdges(withInternal=False) for lane in edge.getLanes()]
+        classes = sorted({each for lane in lanes for each in lane.getPermissions()})
+        message = f"has no lane that cars may use: its lanes are for {', '.join(classes) or 'no vehicle'}"
+        raise UsageError.of(path, "", message, f"allow vehicle class {_CAR!r} on the lanes of the road")
     return net
 
 

@@ -211,7 +211,7 @@ def _lane_ends(edges: Sequence[Edge], end_of_edge_m: Sequence[float]) -> list[di
 
 def _offsets(points: FloatArray, headings: FloatArray, lane_points: FloatArray) -> FloatArray:
     """[N] lateral offsets of a line [n, 2] from points [N, 2] with headings [N], left positive."""
-    line = shapely.LineString(lane_points)
+    line = shapely.LineString(lane_points if len(lane_points) > 1 else np.repeat(lane_points, 2, axis=0))
     nearest = shapely.line_interpolate_point(line, shapely.line_locate_point(line, shapely.points(points)))
     dx, dy = (shapely.get_coordinates(nearest) - points).T
     return dy * np.cos(headings) - dx * np.sin(headings)
