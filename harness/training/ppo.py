@@ -26,7 +26,7 @@ from harness.environments.arena import Arena, Seat
 from harness.environments.vector_env import ArenaVecEnv
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution
-from harness.game.observation import OF_OTHERS
+from harness.game.observation_layout import OF_OTHERS
 from harness.game.seeding import seed_of
 from harness.traffic.scene import OpenScene
 from harness.training.callbacks import CurveRecorder, DeviationBound

@@ -11,7 +11,7 @@ import pandas as pd
 
 from harness.evaluation.manoeuvres.course import Course
 from harness.evaluation.manoeuvres.rules import RULES, Span
-from harness.game.quantities import World
+from harness.game.world import World
 from harness.game.state import ROLES
 
 NAMES = tuple(RULES)
