@@ -44,11 +44,13 @@ def target_speed_mps(limit_mps: FloatArray, path_turned_rad: FloatArray, law: Cr
 def waiting_gap_m(motion: OwnMotion, encounters: Encounters, law: Cruise) -> FloatArray:
     """[N] distance to the place before which the car has to stop; inf without one.
 
-    It stops on red, and on yellow if moderate braking is enough. It waits for a road user with priority that would arrive
-    before the own car has driven through the place where the two ways meet.
+    It stops on red, and on yellow if moderate braking is enough. It waits for a road user with priority that would
+    arrive before the own car has driven through the place where the two ways meet.
     """
     moderate2 = 2.0 * AMBER_MPS2 * np.maximum(motion.stop_line_m, 0.0)
-    stops = motion.signal_red & (motion.speed_mps**2 <= 2.0 * law.max_braking_mps2 * np.maximum(motion.stop_line_m, 0.0))
+    stops = motion.signal_red & (
+        motion.speed_mps**2 <= 2.0 * law.max_braking_mps2 * np.maximum(motion.stop_line_m, 0.0)
+    )
     stops |= motion.signal_yellow & (motion.speed_mps**2 <= moderate2)
     at_line = np.where(stops, motion.stop_line_m, np.inf)
     through_m = np.maximum(encounters.own_to_conflict_m, 0.0) + _THROUGH_M

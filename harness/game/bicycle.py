@@ -50,9 +50,9 @@ def requests(
 ) -> tuple[FloatArray, FloatArray]:
     """The accelerations (m/s^2) and steering angles (rad), [G, P], that actions request of the cars.
 
-    action [G, P, 2] in [-1, 1]: the pedals (-1 full brake, 0 coast, 1 full throttle) and the wheel. A wheel of 0 follows
-    the road (road_steering_rad [G, P]); -1 and 1 add the largest useful angle to the right and left at speeds [G, P];
-    progressive from the centre.
+    action [G, P, 2] in [-1, 1]: the pedals (-1 full brake, 0 coast, 1 full throttle) and the wheel. A wheel of 0
+    follows the road (road_steering_rad [G, P]); -1 and 1 add the largest useful angle to the right and left at speeds
+    [G, P]; progressive from the centre.
     """
     acceleration, steering = np.empty(speed_mps.shape), steering_range_rad(speed_mps, actuators)
     for g, p in np.ndindex(speed_mps.shape):

@@ -14,6 +14,9 @@ STANDING_MPS = 0.1  # a body that is not faster does not arrive
 _MOST_TURNED = float(np.cos(np.pi / 4.0))  # a body drives in a stream if its heading is within 45 degrees
 
 
+_OFF = int(Signal.OFF)  # a plain integer: compiled code can't convert a member
+
+
 class Meetings(NamedTuple):
     """Each player's conflict with each body, [G, P, B]: the first one on the player's way that neither has passed.
 
@@ -173,7 +176,7 @@ def _must_yield(
     A signal counts for a side that has not passed its stop line: a stream on red has no priority, a player on red has
     none over a stream that is not, and a player on 'G' yields to no stream. Otherwise the signs of the junction decide.
     """
-    own, other = int(Signal.OFF), int(Signal.OFF)
+    own, other = _OFF, _OFF
     if conflicts.own_link[c] >= 0 and front_m <= conflicts.stop_m[c] and len(signals):
         own = signals[conflicts.own_link[c]]
     if conflicts.other_link[c] >= 0 and other_along_m <= 0.0 and len(signals):

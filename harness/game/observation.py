@@ -21,9 +21,10 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
+from harness.game.meetings import Meetings
 from harness.game.observation_layout import AHEAD_M, BEHIND, COMPRESSED, ENTRIES, LAYOUT, OTHERS, SCALE, SIZE
 from harness.game.quantities import Quantities
-from harness.game.right_of_way import Control, Meetings, Signal, StopLines
+from harness.game.right_of_way import Control, Signal, StopLines
 from harness.game.road import Routes, lane_at, row_at
 from harness.game.route_coordinates import half_extents_m, place_along_route, row_ahead
 
@@ -46,8 +47,10 @@ def observe(q: Quantities) -> FloatArray:
         *(state.station_m, q.lateral_offset_m, state.present, q.road_steering_rad),
         (state.unseen_behind_m, state.sight_m, state.distance_error, state.closing_error_per_s),
         *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
-        *(bodies.present, actuators.max_steering_rad, q.world.length_m, q.world.width_m, tuple(q.world.road.routes)),
-        *(tuple(q.world.right_of_way.stop_lines), q.next_stop_line, state.signals, state.signal_s, tuple(q.meetings)),
+        bodies.present,
+        *(actuators.max_steering_rad, q.world.length_m, q.world.width_m, state.signal_s),
+        *(q.next_stop_line, state.signals),
+        (tuple(q.world.road.routes), tuple(q.world.right_of_way.stop_lines), tuple(q.meetings)),
     )
 
 
@@ -74,15 +77,13 @@ def _observe(
     max_steering_rad: FloatArray,
     length_m: FloatArray,
     width_m: FloatArray,
-    table: tuple[Any, ...],
-    stop_line_table: tuple[Any, ...],
+    signal_s: FloatArray,
     next_stop_line: IntArray,
     signals: IntArray,
-    signal_s: FloatArray,
-    meeting_table: tuple[Any, ...],
+    tables: tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]],
 ) -> FloatArray:
     """One compiled pass: for the few games of a reset, several calls would cost more than their work."""
-    routes, stop_lines, meetings = Routes(*table), StopLines(*stop_line_table), Meetings(*meeting_table)
+    routes, stop_lines, meetings = Routes(*tables[0]), StopLines(*tables[1]), Meetings(*tables[2])
     unseen_behind_m, sight_m, distance_error, closing_error_per_s = sight
     observation = np.zeros((*present.shape, SIZE), dtype=np.float32)
     view = np.empty(SIZE)

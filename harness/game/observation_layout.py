@@ -1,8 +1,8 @@
 """The entries of an observation: their names, their order and their scales.
 
-Every entry is scaled to [-1, 1]. Bounded quantities are divided by a scale and clipped. Distances, speeds and times that
-have no bound are compressed: x becomes x / (|x| + scale), so that near values are told apart finely, far ones coarsely,
-and none is clipped. `LAYOUT` is stored with every policy; a policy with another layout is refused.
+Every entry is scaled to [-1, 1]. Bounded quantities are divided by a scale and clipped. Distances, speeds and times
+that have no bound are compressed: x becomes x / (|x| + scale), so that near values are told apart finely, far ones
+coarsely, and none is clipped. `LAYOUT` is stored with every policy; a policy with another layout is refused.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Scale(NamedTuple):
 
 
 _SPEED, _ONE, _SIDE, _ANGLE = Scale(30.0), Scale(1.0), Scale(8.0), Scale(0.5)
-_OWN: Mapping[str, Scale] = {
+_OWN: dict[str, Scale] = {
     "speed_mps": _SPEED,
     "speed_limit_mps": _SPEED,
     "speed_over_limit": _ONE,
@@ -70,7 +70,9 @@ _OTHER: Mapping[str, Scale] = {
     "has_priority": _ONE,  # 1: over the player; -1: must yield to it; 0: no conflict
 }
 
-SCALES: Mapping[str, Scale] = _OWN | {f"other{k}_{name}": scale for k in range(OTHERS) for name, scale in _OTHER.items()}
+SCALES: Mapping[str, Scale] = _OWN | {
+    f"other{k}_{name}": scale for k in range(OTHERS) for name, scale in _OTHER.items()
+}
 """The scale of each entry, by name, in the order of the entries."""
 LAYOUT: tuple[str, ...] = tuple(SCALES)
 """The names of the entries in their order. A name ends with the unit."""
@@ -89,8 +91,8 @@ _NEAR_BOUND = 1.0 - 2.0**-20  # of a compressed entry: rounding to 32 bits must 
 def in_units(observation: FloatArray, max_steering_rad: float) -> FloatArray:
     """[..., SIZE] float64: observations [..., SIZE] in the units named in `LAYOUT`.
 
-    A divided entry at its bound stands for all values beyond it: a goal at 200 m may be farther away. A compressed entry
-    at its bound is a very large number.
+    A divided entry at its bound stands for all values beyond it: a goal at 200 m may be farther away. A compressed
+    entry at its bound is a very large number.
     """
     scaled = np.asarray(observation, dtype=np.float64)
     bounded = np.clip(scaled, -_NEAR_BOUND, _NEAR_BOUND)

@@ -24,6 +24,7 @@ from harness.game.jit import compiled
 from harness.game.payoff_terms import TERMS, Form
 from harness.game.quantities import Quantities
 
+
 @dataclass(frozen=True, kw_only=True)
 class Weighted:
     """A term of a payoff: its name, its weight and its parameter (None if it has none)."""

@@ -124,9 +124,7 @@ class Quantities:
     @cached_property
     def _passed(self) -> tuple[FloatArray, FloatArray]:
         state, lines = self.state, tuple(self.world.right_of_way.stop_lines)
-        return passed_stop_lines(
-            self.front_m, self.advanced_m, state.speed_mps, state.signals, state.signal_s, lines
-        )
+        return passed_stop_lines(self.front_m, self.advanced_m, state.speed_mps, state.signals, state.signal_s, lines)
 
     @property
     def passed_red_s(self) -> FloatArray:

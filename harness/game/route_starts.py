@@ -22,8 +22,8 @@ def draw_along_route(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray] | None:
     """x_m, y_m, heading_rad, speed_mps and station_m [P] of the centres of players of `length_m` [P].
 
-    None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P]. A lane and a
-    station are drawn uniformly, the speed uniformly from 0 to the speed limit.
+    None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P]. A lane and
+    a station are drawn uniformly, the speed uniformly from 0 to the speed limit.
     """
     if generator.random() >= share:
         return None

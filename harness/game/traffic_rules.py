@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.meetings import Meetings
 from harness.game.right_of_way import Conflicts, Control, Signal, StopLines
@@ -21,9 +21,7 @@ ROLLING_MPS = 0.5  # speed at a stop sign that the rules take for a stop
 
 
 @compiled
-def next_stop_lines(
-    front_m: FloatArray, player: IntArray, station_m: FloatArray
-) -> IntArray:
+def next_stop_lines(front_m: FloatArray, player: IntArray, station_m: FloatArray) -> IntArray:
     """The first stop line of each player that its front at `front_m` has not passed; -1 without one."""
     lines = np.full(front_m.shape, -1)
     for g, p in np.ndindex(front_m.shape):
@@ -36,7 +34,12 @@ def next_stop_lines(
 
 @compiled
 def passed_stop_lines(
-    front_m: FloatArray, advanced_m: FloatArray, speed_mps: FloatArray, signals: IntArray, signal_s: FloatArray, table: tuple[Any, ...]
+    front_m: FloatArray,
+    advanced_m: FloatArray,
+    speed_mps: FloatArray,
+    signals: IntArray,
+    signal_s: FloatArray,
+    table: tuple[Any, ...],
 ) -> tuple[FloatArray, FloatArray]:
     """Seconds since the signal became red, for players that passed its stop line on red in this step; and the speed
     (m/s) of players that passed a stop sign. -1 for all others."""
@@ -75,7 +78,7 @@ def permitted_mps(
             room_m = max(lines.station_m[line] - front_m[g, p], 0.0)
             stopping2 = 2.0 * COMFORTABLE_MPS2 * room_m
             control, link = lines.control[line], lines.link[line]
-            signal = signals[g, link] if link >= 0 else int(Signal.OFF)
+            signal = signals[g, link] if link >= 0 else 0  # off
             amber = signal == Signal.YELLOW and speed_mps[g, p] ** 2 <= 2.0 * AMBER_MPS2 * room_m
             if signal == Signal.RED or amber:
                 permitted[g, p] = min(permitted[g, p], np.sqrt(stopping2))
@@ -93,9 +96,7 @@ def permitted_mps(
 
 
 @compiled
-def wrong_way(
-    offset_m: FloatArray, row: IntArray, own_left_m: FloatArray, own_right_m: FloatArray
-) -> FloatArray:
+def wrong_way(offset_m: FloatArray, row: IntArray, own_left_m: FloatArray, own_right_m: FloatArray) -> FloatArray:
     """1 for players whose centre is among oncoming lanes, else 0."""
     wrong = np.zeros(offset_m.shape)
     for g, p in np.ndindex(offset_m.shape):

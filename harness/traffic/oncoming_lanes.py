@@ -24,8 +24,8 @@ def own_side(
 ) -> tuple[FloatArray, FloatArray]:
     """[N] lateral offsets, left and right, of the marks between own and oncoming lanes; inf and -inf without.
 
-    points [N, 2] and headings [N] are those of a route's line, offsets_m [N, L] those of its lanes of width_m [N]. Inside
-    a junction, where `on_edge` [N] is false, there is no such mark.
+    points [N, 2] and headings [N] are those of a route's line, offsets_m [N, L] those of its lanes of width_m [N].
+    Inside a junction, where `on_edge` [N] is false, there is no such mark.
     """
     segments, directions, half_widths = _car_lane_segments(net)
     tree = shapely.STRtree(shapely.buffer(segments, half_widths, cap_style="flat"))

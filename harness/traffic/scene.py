@@ -20,9 +20,9 @@ from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
 from harness.game.initial_state import StartDistribution, StartRange
 from harness.game.quantities import REACH_M
-from harness.game.world import World
 from harness.game.road import Road, Routes
 from harness.game.state import ROLES
+from harness.game.world import World
 from harness.traffic import network
 from harness.traffic.departures import check_departures
 from harness.traffic.net_file import check_net

@@ -42,9 +42,7 @@ class Simulation(Protocol):
     def reload(self, seed: int) -> None:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
 
-    def reset(
-        self, game: int, start: InitialState, departures: list[Departure]
-    ) -> tuple[IntArray, FloatArray]:
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> tuple[IntArray, FloatArray]:
         """Clear a game's tile and place its players at their start. Background vehicles depart at their times.
 
         Traffic lights are set to their place in the cycle. Returns the states of the signal links [L], and the seconds

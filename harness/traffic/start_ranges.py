@@ -90,7 +90,8 @@ def _on_lane(role: str, *, file: Path, document: Scene, net: Net, lane: Lane, ro
 def _beside_ego(role: str, *, file: Path, document: Scene, lane: Lane, net: Net) -> tuple[float, float]:
     """The range of positions along its lane of a player that starts beside the ego."""
     ego_m, ego_lane_name = document.ego.position_m, document.ego.lane
-    assert ego_m is not None and ego_lane_name is not None, "the document says that the ego has both"
+    assert ego_m is not None, "the document says that the ego has a position"
+    assert ego_lane_name is not None, "a position is along a lane"
     ego_lane = network.find_lane(net, file, "ego.lane", ego_lane_name)
     if ego_lane.getEdge() is not lane.getEdge():
         message = "needs both to start on the same edge"
@@ -104,7 +105,8 @@ def _arrival(role: str, *, file: Path, document: Scene, route: Route, ego_route:
     player: Player = getattr(document, role)
     key, ego = f"{role}.arrival_after_ego_s", document.ego
     ego_m = ego.position_m or ego.route_m
-    assert player.arrival_after_ego_s is not None and ego_m is not None, "the document has both"
+    assert player.arrival_after_ego_s is not None, "the start is of this kind"
+    assert ego_m is not None, "the document says that the ego has a position"
     place = meeting(ego_route, route)
     if place is None:
         raise UsageError.of(file, key, "its route never meets the ego's", "give route_m, or another route")
@@ -121,6 +123,4 @@ def _arrival(role: str, *, file: Path, document: Scene, route: Route, ego_route:
         message = f"it would have to start up to {-first_m:.0f} m before its route"
         remedy = "let it arrive earlier or drive more slowly, start the ego nearer, or add edges before its route"
         raise UsageError.of(file, key, message, remedy)
-    return ArrivesAfterEgo(
-        after_s=player.arrival_after_ego_s, meeting_m=place.other_m, ego_meeting_m=place.ego_m
-    )
+    return ArrivesAfterEgo(after_s=player.arrival_after_ego_s, meeting_m=place.other_m, ego_meeting_m=place.ego_m)

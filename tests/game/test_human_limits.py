@@ -30,8 +30,8 @@ from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT
 from harness.game.quantities import Quantities
-from harness.game.world import World
 from harness.game.state import State
+from harness.game.world import World
 from harness.traffic.scene import OpenScene
 from tests.support.scenes import build_scene, drawn
 

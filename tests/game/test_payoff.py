@@ -17,8 +17,8 @@ from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.payoff import Payoff, Weighted
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.quantities import Quantities
-from harness.game.world import World
 from harness.game.state import Outcome
+from harness.game.world import World
 from harness.traffic.scene import OpenScene
 
 Moment = Callable[..., Quantities]
