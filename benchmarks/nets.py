@@ -24,7 +24,7 @@ from harness.traffic import network
 from harness.traffic.net_file import check_net
 from harness.traffic.route_table import route_table
 
-_ROUTES = 40
+_ROUTES = 12
 _EDGES = 4
 
 
