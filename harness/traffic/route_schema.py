@@ -25,7 +25,16 @@ _DRAWN_ONLY = ("imgFile", "osgFile", "emissionClass")
 _RECORDERS = r"(battery|elechybrid|emissions|fcd|tripinfo|vehroute)"
 _RECORDED_ONLY = re.compile(rf"has\.{_RECORDERS}\.device|device\.{_RECORDERS}\..*")
 _NO_EFFECT = {
-    "vehicle": ("color", "line", "personNumber", "containerNumber", "parkingBadges", "arrivalPosLat", "fromTaz", "toTaz"),
+    "vehicle": (
+        "color",
+        "line",
+        "personNumber",
+        "containerNumber",
+        "parkingBadges",
+        "arrivalPosLat",
+        "fromTaz",
+        "toTaz",
+    ),
     "stop": ("arrival", "actType", "tripId", "line", "started", "ended", "actualArrival", "depart", "priority"),
     "busStop": ("name", "lines", "personCapacity", "parkingLength", "color", "angle", "friendlyPos"),
     "route": ("color", "cost", "savings", "probability", "routeLength"),
@@ -135,7 +144,9 @@ def _supported_kinds() -> Mapping[str, Kind]:
         "vTypeDistribution": Kind({each: need for each, need in mix.attributes.items()}, mix.children),
         "route": Kind({"id": True, "edges": True, **route}, {"stop": "stop", "param": "param"}),
         "route within": Kind({"id": False, "edges": True, **route}, {"stop": "stop", "param": "param"}),
-        "route listed": Kind({"id": False, "refId": False, "edges": False, **route}, {"stop": "stop", "param": "param"}),
+        "route listed": Kind(
+            {"id": False, "refId": False, "edges": False, **route}, {"stop": "stop", "param": "param"}
+        ),
         "routeDistribution": Kind(
             {"id": True, "last": False, "routes": False, "probabilities": False}, {"route": "route listed"}
         ),
@@ -146,7 +157,13 @@ def _supported_kinds() -> Mapping[str, Kind]:
         "interval": Kind({"begin": True, "end": True, "id": False}, {"flow": "flow"}),
         "stop": Kind(dict.fromkeys((*STOP_ATTRIBUTES, *_NO_EFFECT["stop"]), False), {"param": "param"}),
         "busStop": Kind(
-            {"id": True, "lane": True, "startPos": False, "endPos": False, **dict.fromkeys(_NO_EFFECT["busStop"], False)},
+            {
+                "id": True,
+                "lane": True,
+                "startPos": False,
+                "endPos": False,
+                **dict.fromkeys(_NO_EFFECT["busStop"], False),
+            },
             {"param": "param", "access": "access"},
         ),
         "access": Kind(dict.fromkeys(("lane", "pos", "length", "friendlyPos"), False)),
