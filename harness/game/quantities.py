@@ -7,40 +7,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.bicycle import Actuators, lateral_acceleration_mps2
+from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
-from harness.game.meetings import Meetings, meetings
-from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
-from harness.game.road import Along, Road, Routes, row_at
-from harness.game.route_coordinates import PATH_M, along_route, row_ahead
+from harness.game.meetings import Meetings, entered_before_s, least_gap_s, meetings
+from harness.game.road import Along
+from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
 from harness.game.state import Bodies, Outcome, State
+from harness.game.traffic_rules import next_stop_lines, passed_stop_lines, permitted_mps, wrong_way
+from harness.game.world import World
 
 SIGHT_M = 60.0  # a body farther ahead than this is not a leader
 REACH_M = 10.0  # largest clearance that is computed
-
-
-@dataclass(frozen=True, kw_only=True)
-class World:
-    """The constants of a game: road, right of way, cars, step length, time limit. Sizes are [P]."""
-
-    road: Road
-    actuators: Actuators
-    length_m: FloatArray
-    width_m: FloatArray
-    step_s: float
-    time_limit_s: float
-    right_of_way: RightOfWay = NO_JUNCTIONS
-
-    @property
-    def steps(self) -> int:
-        """Steps until the time limit."""
-        return round(self.time_limit_s / self.step_s)
 
 
 class Path(NamedTuple):
@@ -49,15 +32,6 @@ class Path(NamedTuple):
     heading_rad: FloatArray
     left_edge_m: FloatArray
     right_edge_m: FloatArray
-
-
-class OnPath(NamedTuple):
-    """Bodies in route coordinates, [G, P, B]: centres relative to the player's centre, and half extents."""
-
-    ahead_m: FloatArray
-    left_m: FloatArray
-    half_length_m: FloatArray
-    half_width_m: FloatArray
 
 
 @dataclass
@@ -116,8 +90,63 @@ class Quantities:
         return self.world.road.routes.goal_m - self.state.station_m
 
     @cached_property
+    def road_steering_rad(self) -> FloatArray:
+        """The steering angle that follows the route."""
+        state, wheelbase_m = self.state, self.world.actuators.wheelbase_m
+        return self.world.road.routes.road_steering_rad(state.station_m, state.speed_mps, wheelbase_m)
+
+    @cached_property
     def lateral_acceleration_mps2(self) -> FloatArray:
         return lateral_acceleration_mps2(self.state, self.world.actuators)
+
+    # --- signals, signs and priority ---------------------------------------------------------------------------
+
+    @cached_property
+    def front_m(self) -> FloatArray:
+        """Station of the front bumper."""
+        return self.state.station_m + 0.5 * self.world.length_m
+
+    @cached_property
+    def next_stop_line(self) -> IntArray:
+        """Row of the next stop line; -1 without one."""
+        lines = self.world.right_of_way.stop_lines
+        return next_stop_lines(self.front_m, lines.player, lines.station_m)
+
+    @cached_property
+    def _passed(self) -> tuple[FloatArray, FloatArray]:
+        state, lines = self.state, tuple(self.world.right_of_way.stop_lines)
+        return passed_stop_lines(self.front_m, self.advanced_m, state.speed_mps, state.signals, state.signal_s, lines)
+
+    @property
+    def passed_red_s(self) -> FloatArray:
+        """Seconds since the signal became red, if the player passed its stop line in this step; else -1."""
+        return self._passed[0]
+
+    @property
+    def passed_stop_sign_mps(self) -> FloatArray:
+        """Speed at which the player passed a stop sign in this step; else -1."""
+        return self._passed[1]
+
+    @cached_property
+    def permitted_mps(self) -> FloatArray:
+        """Speed that the limit, signals, signs and right of way permit."""
+        right_of_way = self.world.right_of_way
+        return permitted_mps(
+            *(self.front_m, self.state.speed_mps, self.speed_limit_mps, self.next_stop_line, self.state.signals),
+            *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),
+        )
+
+    @cached_property
+    def speed_over_permitted(self) -> FloatArray:
+        """Excess over the permitted speed as a share of the limit; negative below it."""
+        return (self.state.speed_mps - self.permitted_mps) / self.speed_limit_mps
+
+    @cached_property
+    def wrong_way(self) -> FloatArray:
+        """1 where the player is among oncoming lanes, else 0."""
+        routes = self.world.road.routes
+        rows = routes.rows(self.state.station_m)
+        return wrong_way(self.lateral_offset_m, rows, routes.own_left_m, routes.own_right_m)
 
     # --- other bodies --------------------------------------------------------------------------------------------
 
@@ -131,7 +160,7 @@ class Quantities:
         """Bodies in route coordinates, each in the nearest frame of the route at `PATH_M`."""
         bodies = self.bodies
         boxes = (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
-        return OnPath(*_on_path(self.state.station_m, self.lateral_offset_m, tuple(self.world.road.routes), *boxes))
+        return OnPath(*on_path(self.state.station_m, self.lateral_offset_m, tuple(self.world.road.routes), *boxes))
 
     @cached_property
     def leader_gap_m(self) -> FloatArray:
@@ -148,13 +177,6 @@ class Quantities:
         """Time headway without the leader's length: gap over own speed; inf without a leader."""
         return self.leader_gap_m / np.maximum(self.state.speed_mps, 0.1)
 
-    # --- conflicts at junctions ---------------------------------------------------------------------------------------
-
-    @cached_property
-    def signals(self) -> IntArray:
-        """[G, L] states (`Signal`) of the links `World.right_of_way.signal_links`."""
-        return np.zeros((len(self.state.step), len(self.world.right_of_way.signal_links)), dtype=np.int8)
-
     @cached_property
     def meetings(self) -> Meetings:
         """Each player's conflict with each body at a junction."""
@@ -164,9 +186,21 @@ class Quantities:
         columns = meetings(
             *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
             (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),
-            *(self.visible, self.signals, tuple(tables.streams)),
+            *(self.visible, state.signals, tuple(tables.streams)),
         )
         return Meetings.of(*columns)
+
+    @cached_property
+    def gap_s(self) -> FloatArray:
+        """Time between the player's passage of a zone of conflict and that of another body, both at constant speed; inf
+        without a zone that the player reaches within `meetings.HORIZON_S`."""
+        return least_gap_s(self.meetings)
+
+    @cached_property
+    def entered_before_s(self) -> FloatArray:
+        """For a player that entered a zone in this step: the least time until a body with priority is there, 0 if it is
+        there already; else inf."""
+        return entered_before_s(self.meetings, self.advanced_m)
 
     # --- surfaces ------------------------------------------------------------------------------------------------
 
@@ -254,27 +288,3 @@ def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
 @compiled
 def _vehicle_clearance_m(cars: Box, boxes: Box, players: BoolArray, bodies: BoolArray) -> FloatArray:
     return distance_to_nearest_box(cars, boxes, _visible(players, bodies), REACH_M)
-
-
-@compiled
-def _on_path(
-    station_m: FloatArray,
-    lateral_offset_m: FloatArray,
-    table: tuple[Any, ...],
-    x_m: FloatArray,
-    y_m: FloatArray,
-    heading_rad: FloatArray,
-    length_m: FloatArray,
-    width_m: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    routes = Routes(*table)
-    shape = (station_m.shape[0], station_m.shape[1], x_m.shape[1])
-    ahead, left, half_length, half_width = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    for g, p in np.ndindex(station_m.shape):
-        station, offset = station_m[g, p], lateral_offset_m[g, p]
-        row = row_at(station, routes.first_row[p], routes.last_row[p])
-        for b in range(x_m.shape[1]):
-            box = (x_m[g, b], y_m[g, b], heading_rad[g, b], length_m[g, b], width_m[g, b])
-            extent = along_route(row, station, offset, p, routes, *box)
-            ahead[g, p, b], left[g, p, b], half_length[g, p, b], half_width[g, p, b] = extent
-    return ahead, left, half_length, half_width

@@ -19,15 +19,17 @@ from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
 from harness.game.initial_state import StartDistribution, StartRange
-from harness.game.quantities import REACH_M, World
+from harness.game.quantities import REACH_M
 from harness.game.road import Road, Routes
 from harness.game.state import ROLES
+from harness.game.world import World
 from harness.traffic import network
 from harness.traffic.departures import check_departures
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType, read_route_file
+from harness.traffic.start_ranges import start_range
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,10 +69,12 @@ class OpenScene:
         human_factors: Sequence[HumanFactors | Sequence[HumanFactors]],
         present_share: Sequence[float],
         shares: Sequence[Sequence[float]] | None = None,
+        along_route_share: float = 0.0,
     ) -> StartDistribution:
         """The distribution of initial states for players with these human factors and probabilities of taking part.
 
-        A player with several drivers has the human factors of each, and the `shares` [P][n] of the games of each.
+        A player with several drivers has the human factors of each, and the `shares` [P][n] of the games of each. In
+        `along_route_share` of the games, players start anywhere along their routes.
         """
         factors_of = [[each] if isinstance(each, HumanFactors) else list(each) for each in human_factors]
         return StartDistribution(
@@ -81,6 +85,8 @@ class OpenScene:
             present_share=present_share,
             steps=self.world.steps,
             step_s=self.world.step_s,
+            routes=self.world.road.routes,
+            along_route_share=along_route_share,
         )
 
 
@@ -119,6 +125,14 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     players = [player for player in opened if player is not None]
     if problems or len(players) < len(ROLES):
         raise UsageError(problems)
+    start_of = partial(start_range, file=document_file, document=document, net=net, ego_route=players[0].route)
+    starts = [
+        collect(problems, partial(start_of, role, route=player.route))
+        for role, player in zip(ROLES, players, strict=True)
+    ]
+    places = tuple(start for start in starts if start is not None)
+    if problems:
+        raise UsageError(problems)
     lines = network.rail_lines(net, area)
     types = [player.vehicle_type for player in players]
     world = World(
@@ -135,7 +149,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         document=document,
         world=world,
         routes=routes,
-        places=tuple(player.place for player in players),
+        places=places,
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
     )
