@@ -6,7 +6,7 @@ player is therefore read again only when it may have come near, at the top speed
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import libsumo
@@ -17,6 +17,7 @@ from harness.errors import SimulationError
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.neighbours import Search, rows_by_game
 from harness.traffic.angles import heading_rad_of
+from harness.traffic.insertion import Insertion, put_beside
 from harness.traffic.route_file import Departure
 from harness.traffic.simulation import Reading
 from harness.traffic.vehicle_reads import DIRECT, read_near, string_record
@@ -67,7 +68,7 @@ class _Table:
 
 
 class BackgroundTraffic:
-    """The background traffic of all games. `insert` adds a vehicle of a game to SUMO under a name."""
+    """The background traffic of all games."""
 
     def __init__(
         self,
@@ -77,14 +78,15 @@ class BackgroundTraffic:
         step_s: float,
         fastest_player_mps: float,
         recorded: bool,
-        insert: Callable[[int, str, Departure], None],
+        insertion: Insertion,
     ) -> None:
         self._prefixes, self._offsets_m, self._step_s = prefixes, offsets_m, step_s
-        self._fastest_player_mps, self._recorded, self._insert = fastest_player_mps, recorded, insert
+        self._fastest_player_mps, self._recorded, self._insertion = fastest_player_mps, recorded, insertion
         self._step = 0
         self._first_step = [0] * len(prefixes)
         self._waiting: dict[int, list[Departure]] = {}  # by game, the next departure last
         self._places: dict[str, tuple[int, int]] = {}  # row and place of each vehicle in SUMO, by its name there
+        self._beside: dict[str, Departure] = {}  # vehicles that are to depart beside the middle of their lane
         self._table = _Table(len(prefixes))
         self._empty_reading = self._reading(np.zeros(0, dtype=np.int64), np.zeros((4, 0)))
 
@@ -93,6 +95,7 @@ class BackgroundTraffic:
         if self._table.count[game]:
             for sumo_name in self._table.sumo_name[game, : self._table.count[game]].tolist():
                 if self._places.pop(sumo_name, None) is not None:
+                    self._beside.pop(sumo_name, None)
                     libsumo.vehicle.remove(sumo_name)
             self._table.clear(game)
         self._first_step[game] = self._step
@@ -114,6 +117,8 @@ class BackgroundTraffic:
             for name in libsumo.simulation.getDepartedIDList():
                 if name in self._places:
                     due[self._places[name]] = self._step
+                    if name in self._beside:
+                        put_beside(name, self._beside.pop(name))
         for game in list(self._waiting):
             self._depart(game)
 
@@ -144,7 +149,7 @@ class BackgroundTraffic:
             departure = waiting.pop()
             sumo_name, vehicle = self._prefixes[game] + departure.name, libsumo.vehicle
             sumo_text = sumo_name.encode()
-            self._insert(game, sumo_name, departure)
+            self._insertion.depart(self._prefixes[game], sumo_name, departure)
             place = self._table.add(
                 game,
                 sumo_name=sumo_name,
@@ -157,6 +162,10 @@ class BackgroundTraffic:
                 max_speed_mps=vehicle.getMaxSpeed(sumo_name),
             )
             self._places[sumo_name] = (game, place)
+            if departure.motion is not None:  # in the traffic already: SUMO does not announce its departure
+                self._table.due[game, place] = self._step + 1
+            elif departure.lateral:
+                self._beside[sumo_name] = departure
         if not waiting:
             del self._waiting[game]
 

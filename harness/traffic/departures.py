@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import pairwise
+from math import inf
 
 from sumolib.net import Net
 from sumolib.net.edge import Edge
@@ -14,11 +15,17 @@ from harness.errors import Problem, UsageError, collect
 from harness.game.state import ROLES
 from harness.traffic import network
 from harness.traffic.route_file import Departure, RouteFile
+from harness.traffic.stops import stop_problems
 from harness.traffic.xml_file import number_of
 
 LANES = ("random", "free", "allowed", "best", "first")
 POSITIONS = ("random", "free", "random_free", "base", "last")
 SPEEDS = ("random", "max", "desired", "speedLimit", "last", "avg")
+ARRIVAL_LANES = ("current", "random", "first")
+ARRIVAL_POSITIONS = ("random", "max", "center")
+ARRIVAL_SPEEDS = ("current",)
+_MOST_PROBLEMS = 20
+_ALL_THE_TIME_S = (0.0, inf)
 
 
 def edges_of(departure: Departure, net: Net, routes: RouteFile) -> list[Edge]:
@@ -34,24 +41,35 @@ def edges_of(departure: Departure, net: Net, routes: RouteFile) -> list[Edge]:
     return [edges[name] for name in departure.edges]
 
 
-def background_departures(routes: RouteFile, players: Iterable[str]) -> list[Departure]:
-    """The departures of all vehicles but the players. A flow is represented by one of its vehicles."""
+def background_departures(
+    routes: RouteFile, players: Iterable[str], window_s: tuple[float, float] = _ALL_THE_TIME_S
+) -> list[Departure]:
+    """The departures of all vehicles but the players in a time of the file, with each type and route they may have.
+
+    A flow is represented by one of its vehicles.
+    """
     players = set(players)
-    vehicles = [each for name, each in routes.vehicles.items() if name not in players]
-    return [*vehicles, *(flow.departure for flow in routes.flows)]
+    within = [each for each in routes.within(*window_s) if each.name not in players]
+    return [variant for each in within for variant in routes.variants(each)]
 
 
-def check_departures(players: set[str], net: Net, routes: RouteFile) -> None:
-    """Raise UsageError for background vehicles that SUMO would refuse during a game."""
+def check_departures(
+    players: set[str], net: Net, routes: RouteFile, window_s: tuple[float, float] = _ALL_THE_TIME_S
+) -> None:
+    """Raise UsageError for background vehicles in a time of the file that SUMO would refuse during a game."""
     problems: list[Problem] = []
-    for departure in background_departures(routes, players):
+    for departure in background_departures(routes, players, window_s):
         where = (str(routes.path), f"vehicle {departure.name}")
         if departure.name in ROLES and players <= routes.vehicles.keys():
             problems.append(Problem(*where, "has the name of a player, but is not the player's vehicle", "rename it"))
         edges = collect(problems, partial(edges_of, departure, net, routes))
         if edges:
             problems += [Problem(*where, *each) for each in _gaps(edges)]
-            problems += _departure_problems(*where, departure, edge=edges[0], routes=routes)
+            problems += _end_problems(*where, departure, first=edges[0], last=edges[-1], routes=routes)
+            kind = routes.types[departure.vehicle_type].vehicle_class
+            problems += stop_problems(*where, departure.stops, edges, kind)
+        if len(problems) >= _MOST_PROBLEMS:
+            break
     if problems:
         raise UsageError(problems)
 
@@ -68,24 +86,40 @@ def _gaps(edges: Sequence[Edge]) -> list[tuple[str, str]]:
     ]
 
 
-def _departure_problems(file: str, key: str, departure: Departure, *, edge: Edge, routes: RouteFile) -> list[Problem]:
-    """The problems of a departure's lane, position and speed on its first edge."""
-    lanes, length = edge.getLaneNumber(), edge.getLength()
-    kind = routes.types.get(departure.vehicle_type)
-    fastest = min(edge.getSpeed(), kind.max_speed_mps if kind else edge.getSpeed())
-    values = (
-        ("departLane", departure.lane, LANES, lambda lane: lane in range(lanes), f"a lane from 0 to {lanes - 1}"),
-        ("departPos", departure.position, POSITIONS, lambda m: abs(m) <= length, f"up to {length:g} m, the edge's end"),
-        ("departSpeed", departure.speed, SPEEDS, lambda mps: 0.0 <= mps <= fastest, f"from 0 to {fastest:g} m/s"),
-    )
+def _end_problems(
+    file: str, key: str, departure: Departure, *, first: Edge, last: Edge, routes: RouteFile
+) -> list[Problem]:
+    """The problems of a departure's lane, position and speed on its first edge, and on arrival on its last edge."""
+    most_mps = routes.types[departure.vehicle_type].max_speed_mps
+    factor = max(departure.speed_factor or 1.0, 1.0)
+    written = (departure.lane, departure.position, departure.speed)
+    checks = [
+        *_checks("depart", first, min(first.getSpeed() * factor, most_mps), written, (LANES, POSITIONS, SPEEDS)),
+        *_checks("arrival", last, most_mps, departure.arrival, (ARRIVAL_LANES, ARRIVAL_POSITIONS, ARRIVAL_SPEEDS)),
+    ]
     return [
         Problem(
             file, f"{key}.{name}", f"{value[:60]!r} is not possible here", f"give {valid}, or {nearest(value, words)}"
         )
-        for name, value, words, fits, valid in values
-        if not _possible(value, words, fits)
+        for name, value, words, fits, valid in checks
+        if value not in words and not fits(number_of(value))
     ]
 
 
-def _possible(value: str, words: Sequence[str], fits: Callable[[float], bool]) -> bool:
-    return value in words or fits(number_of(value))
+_Check = tuple[str, str, Sequence[str], Callable[[float], bool], str]
+
+
+def _checks(
+    prefix: str, edge: Edge, fastest: float, written: Sequence[str], words: Sequence[Sequence[str]]
+) -> list[_Check]:
+    """For lane, position and speed: attribute, value, words, whether a number is possible, and which ones are."""
+    lanes, length = edge.getLaneNumber(), edge.getLength()
+    possible: Sequence[tuple[str, Callable[[float], bool], str]] = (
+        ("Lane", lambda lane: lane in range(lanes), f"a lane from 0 to {lanes - 1}"),
+        ("Pos", lambda m: abs(m) <= length, f"up to {length:g} m, the edge's end"),
+        ("Speed", lambda mps: 0.0 <= mps <= fastest, f"from 0 to {fastest:g} m/s"),
+    )
+    return [
+        (prefix + name, value, several, fits, valid)
+        for (name, fits, valid), value, several in zip(possible, written, words, strict=True)
+    ]

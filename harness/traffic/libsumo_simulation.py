@@ -31,6 +31,7 @@ from harness.game.initial_state import InitialState
 from harness.game.state import ROLES
 from harness.traffic.angles import compass_deg_of, heading_rad_of
 from harness.traffic.background_traffic import BackgroundTraffic
+from harness.traffic.insertion import Insertion
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.signals import Signals
@@ -119,7 +120,7 @@ class LibsumoSimulation:
             _Tile(prefix=tile_prefix(game, self._games), offset_m=float(self._offsets[game]))
             for game in range(self._games)
         ]
-        self._routes: set[str] = set()
+        self._traffic = Insertion()
         self._placed: dict[str, int] = {}  # players placed by the arena, by name in SUMO: index in a flat [G, P]
         self._sumo_driven: dict[str, tuple[int, int]] = {}  # players that SUMO drives: game and player
         self._present = np.zeros((self._games, len(self._taken_over)), dtype=bool)
@@ -132,7 +133,7 @@ class LibsumoSimulation:
             step_s=world.step_s,
             fastest_player_mps=float(world.actuators.max_speed_mps.max()),
             recorded=self._recorded,
-            insert=self._insert,
+            insertion=self._traffic,
         )
 
     def reload(self, seed: int) -> None:
@@ -218,8 +219,8 @@ class LibsumoSimulation:
         tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
         vehicle_type, lane, fastest = self._insertions[player]
         on_lane = lane is not None and not np.isnan(start.position_m[player])
-        self._add(
-            tile,
+        self._traffic.add(
+            tile.prefix,
             name,
             edges=self._scene.edges[player],
             vehicle_type=vehicle_type,
@@ -255,36 +256,6 @@ class LibsumoSimulation:
         legal = float(routes.speed_limit_mps[routes.first_row[player]])
         obeyed = legal * min(1.0, types.getSpeedFactor(vehicle_type))
         return vehicle_type, lane and lane.rsplit("_", 1)[1], float(min(obeyed, types.getMaxSpeed(vehicle_type)))
-
-    def _insert(self, game: int, name: str, departure: Departure) -> None:
-        self._add(
-            self._tiles[game],
-            name,
-            edges=departure.edges,
-            vehicle_type=departure.vehicle_type,
-            lane=departure.lane,
-            position=departure.position,
-            speed=departure.speed,
-        )
-
-    def _add(
-        self,
-        tile: _Tile,
-        name: str,
-        *,
-        edges: Sequence[str],
-        vehicle_type: str,
-        lane: str,
-        position: str,
-        speed: str,
-    ) -> None:
-        route = tile.prefix + "route " + " ".join(edges)
-        if route not in self._routes:
-            libsumo.route.add(route, [tile.prefix + edge for edge in edges])
-            self._routes.add(route)
-        libsumo.vehicle.add(
-            name, route, vehicle_type, depart="now", departLane=lane, departPos=position, departSpeed=speed
-        )
 
     def _read_players(self) -> FloatArray | None:
         """[G, P, 4] x_m, y_m, heading_rad and speed_mps of the players that SUMO drives; None if it drives none."""

@@ -1,42 +1,26 @@
-"""SUMO route files: vehicle types, routes and departures.
+"""The content of a SUMO route file, and the departures that a game draws from it.
 
 The harness inserts every vehicle itself, at its time after the start of a game. All games of an arena therefore have
-the same traffic, independent of earlier resets. The XML parser refuses entities and external references.
+the same traffic, independent of earlier resets. What SUMO would draw when it loads the file is drawn here from the
+game's generator: types and routes of distributions, and the times of random flows.
 """
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cache, partial
+from bisect import bisect_left
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 
-from harness.config.toml_reading import nearest
-from harness.errors import Problem, UsageError, collect
-from harness.game.arrays import FloatArray
-from harness.traffic.schema import Kind, kinds, problems_in
-from harness.traffic.xml_file import number_of, parse_xml
+from harness.traffic.flows import Rate, times_of
+from harness.traffic.stops import Stop
 
-_DEFAULT_TYPE = "DEFAULT_VEHTYPE"
-_FLOW_RATES = ("number", "period", "vehsPerHour", "probability")
-_DEPARTS = ("type", "route", "departLane", "departPos", "departSpeed")
-_NAME = re.compile(r"[^\s|\\'\";,<>&:!?*]{1,200}")
-_LEAST_PERIOD_S = 0.05
-# the range of each number: above the first value, up to the second
-_RANGES = {
-    "length": (0.0, 100.0),
-    "width": (0.0, 10.0),
-    "maxSpeed": (0.0, 200.0),
-    "vehsPerHour": (0.0, 3600.0 / _LEAST_PERIOD_S),
-    "period": (_LEAST_PERIOD_S * 0.999, 1e7),
-    "probability": (-0.001, 1.0),
-}
-_TIMES = (-0.001, 1e7)
-_EMISSIONS = re.compile(r"(HBEFA[234]|Energy)/\w+|zero|default")  # SUMO reads other classes from files
+DEFAULT_TYPE = "DEFAULT_VEHTYPE"
+SHARE = " of the room"
+"""The ending of a drawn place across the lane: a share, from -1 (right) to 1 (left), of the room beside the vehicle."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +33,28 @@ class VehicleType:
     max_speed_mps: float = 55.55
     lane_changes: str = ""
     """The vType's laneChangeModel; empty: SUMO's default."""
+    vehicle_class: str = "passenger"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RouteChoice:
+    """One route of a distribution, with its share."""
+
+    share: float
+    edges: tuple[str, ...]
+    stops: tuple[Stop, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """The motion of a vehicle of the warm-up: its front bumper, heading and speed, in the net's coordinates."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    speed_mps: float
+    length_m: float
+    width_m: float
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,17 +68,36 @@ class Departure:
     lane: str
     position: str
     speed: str
+    arrival: tuple[str, str, str] = ("current", "max", "current")
+    """SUMO's arrivalLane, arrivalPos and arrivalSpeed."""
+    lateral: str = ""
+    """SUMO's departPosLat; empty: the middle of the lane."""
+    speed_factor: float | None = None
+    """None: drawn by SUMO from the type."""
+    stops: tuple[Stop, ...] = ()
+    trip: tuple[str, ...] = ()
+    """The edges of a trip, from first to last, that a route has to be found for."""
+    choices: tuple[RouteChoice, ...] = ()
+    """The routes of a distribution. A departure of a game has one route and no choices."""
+    motion: Motion | None = None
+    """Of a vehicle that drives already when the game begins. `lane` is then the whole id of its lane."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Flow:
-    """A flow of vehicles, by a period or by a probability per second."""
+    """A flow of vehicles."""
 
     departure: Departure
     end_s: float
-    period_s: float | None
-    probability_per_s: float | None
-    number: int | None
+    rate: Rate
+
+
+@dataclass(frozen=True, kw_only=True)
+class Mix:
+    """A distribution of vehicle types."""
+
+    types: tuple[str, ...]
+    shares: tuple[float, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,193 +109,90 @@ class RouteFile:
     vehicles: Mapping[str, Departure]
     flows: tuple[Flow, ...]
     types_xml: str  # a route file with the vehicle types only, for SUMO
+    mixes: Mapping[str, Mix] = field(default_factory=dict)
+    found: Mapping[tuple[str, tuple[str, ...]], tuple[str, ...]] = field(default_factory=dict)
+    """The routes of trips: the edges for each vehicle type and trip."""
 
-    def departures(self, excluded: set[str], until_s: float, generator: np.random.Generator) -> list[Departure]:
-        """The departures in the first `until_s` seconds of a game, by time, without the `excluded` vehicles."""
-        departures = [each for name, each in self.vehicles.items() if name not in excluded]
+    def departures(
+        self,
+        excluded: set[str],
+        until_s: float,
+        generator: np.random.Generator,
+        begin_s: float = 0.0,
+        density: float = 1.0,
+    ) -> list[Departure]:
+        """The departures from `begin_s` to `until_s` of the file, by time, without the `excluded` vehicles.
+
+        Their times count from `begin_s`. `density` is a factor on the rates of flows; a single vehicle departs that
+        many times on average, as with SUMO's option --scale.
+        """
+        due = [each for each in self._listed(begin_s, until_s) if each.name not in excluded]
+        if density != 1.0:
+            due = self._repeated(due, density, generator)
         for flow in self.flows:
-            departures += _expand(flow, until_s, generator)
-        due = (each for each in departures if each.depart_s < until_s)
-        return sorted(due, key=lambda each: (each.depart_s, each.name))
+            times = times_of(flow.rate, flow.departure.depart_s, min(flow.end_s, until_s), begin_s, density, generator)
+            due += [replace(flow.departure, name=f"{flow.departure.name}.{k}", depart_s=time) for k, time in times]
+        drawn = [self._drawn(each, generator, begin_s) for each in due]
+        return sorted(drawn, key=lambda each: (each.depart_s, each.name))
+
+    def within(self, begin_s: float, until_s: float) -> list[Departure]:
+        """The vehicles of this time, as they are written. A flow is represented by one of its vehicles."""
+        flows = [each.departure for each in self.flows if each.departure.depart_s < until_s and each.end_s > begin_s]
+        return [*self._listed(begin_s, until_s), *flows]
+
+    def variants(self, departure: Departure) -> list[Departure]:
+        """A departure with each type and each route that it may have."""
+        mix = self.mixes.get(departure.vehicle_type)
+        typed = [replace(departure, vehicle_type=each) for each in mix.types] if mix else [departure]
+        return [
+            variant
+            for each in typed
+            for variant in ([_on(each, choice) for choice in each.choices] or [self._routed(each)])
+        ]
+
+    @cached_property
+    def _by_time(self) -> tuple[list[float], list[Departure]]:
+        vehicles = sorted(self.vehicles.values(), key=lambda each: each.depart_s)
+        return [each.depart_s for each in vehicles], vehicles
+
+    def _listed(self, begin_s: float, until_s: float) -> list[Departure]:
+        times, vehicles = self._by_time
+        return vehicles[bisect_left(times, begin_s) : bisect_left(times, until_s)]
+
+    def _repeated(self, due: Sequence[Departure], density: float, generator: np.random.Generator) -> list[Departure]:
+        counts = np.floor(density + generator.random(len(due))).astype(int).tolist()
+        return [
+            each if copy == 0 else replace(each, name=f"{each.name}.copy{copy}")
+            for each, count in zip(due, counts, strict=True)
+            for copy in range(count)
+        ]
+
+    def _drawn(self, departure: Departure, generator: np.random.Generator, begin_s: float) -> Departure:
+        """A departure of a game, with one type and one route, and with times from `begin_s`."""
+        if begin_s:
+            stops = tuple(stop.later(-begin_s) for stop in departure.stops)
+            departure = replace(departure, depart_s=departure.depart_s - begin_s, stops=stops)
+        mix = self.mixes.get(departure.vehicle_type)
+        if mix is not None:
+            departure = replace(departure, vehicle_type=mix.types[_index(mix.shares, generator)])
+        if departure.choices:
+            choice = departure.choices[_index([each.share for each in departure.choices], generator)]
+            choice = replace(choice, stops=tuple(stop.later(-begin_s) for stop in choice.stops))
+            departure = _on(departure, choice)
+        if departure.lateral == "random":
+            departure = replace(departure, lateral=f"{generator.uniform(-1.0, 1.0):.3f}{SHARE}")
+        return self._routed(departure)
+
+    def _routed(self, departure: Departure) -> Departure:
+        if not departure.trip or departure.edges:
+            return departure
+        return replace(departure, edges=self.found.get((departure.vehicle_type, departure.trip), ()))
 
 
-def read_route_file(path: Path) -> RouteFile:
-    """Read a `.rou.xml`. Raises UsageError for invalid or unsupported content."""
-    root = parse_xml(path)
-    _check_names(path, root)
-    only_types = ElementTree.Element("routes")
-    only_types.extend(element for element in root if element.tag in ("vType", "vTypeDistribution"))
-    problems: list[Problem] = []
-    types = {_DEFAULT_TYPE: VehicleType(name=_DEFAULT_TYPE)}
-    for element in only_types.iter("vType"):
-        vehicle_type = collect(problems, partial(_vehicle_type, path, element))
-        if vehicle_type is not None:
-            types[vehicle_type.name] = vehicle_type
-    distributions = {_attribute(path, element, "id") for element in root.iter("vTypeDistribution")}
-    routes = {
-        _attribute(path, element, "id"): tuple(element.get("edges", "").split())
-        for element in root
-        if element.tag == "route"
-    }
-    vehicles: dict[str, Departure] = {}
-    flows: dict[str, Flow] = {}
-    for element in root:
-        if element.tag in ("vehicle", "flow"):
-            departure = collect(problems, partial(_departure, path, element, routes, set(types) | distributions))
-            if departure is None:
-                continue
-            if departure.name in vehicles or departure.name in flows:
-                where = f"{element.tag} {departure.name}"
-                problems.append(Problem(str(path), where, "stands twice", "rename one of the two"))
-            elif element.tag == "vehicle":
-                vehicles[departure.name] = departure
-            else:
-                flow = collect(problems, partial(_flow, path, element, departure))
-                if flow is not None:
-                    flows[departure.name] = flow
-    if problems:
-        raise UsageError(problems)
-    types_xml = ElementTree.tostring(only_types, encoding="unicode")
-    return RouteFile(path=path, types=types, vehicles=vehicles, flows=tuple(flows.values()), types_xml=types_xml)
+def _on(departure: Departure, choice: RouteChoice) -> Departure:
+    return replace(departure, edges=choice.edges, stops=choice.stops + departure.stops, choices=())
 
 
-def _check_names(path: Path, root: ElementTree.Element) -> None:
-    """Raise UsageError for unsupported elements and attributes, and for names that SUMO does not allow."""
-    if root.tag != "routes":
-        raise UsageError.of(path, str(root.tag), "is not a SUMO route file: its root is not routes", "name a .rou.xml")
-    problems = list(problems_in(path, root, _supported_kinds(), "routesType"))
-    for element in root.iter():
-        name = element.get("id")
-        if name and not _NAME.fullmatch(name):
-            message = f"{name[:60]!r} can't be a name in SUMO"
-            problems.append(Problem(str(path), f"{element.tag}.id", message, "use letters, digits and _"))
-        if not _EMISSIONS.fullmatch(element.get("emissionClass", "default")):
-            message = f"{element.get('emissionClass')!r} may make SUMO read other files"
-            problems.append(Problem(str(path), f"{element.tag} {name}.emissionClass", message, "leave it out"))
-    if problems:
-        raise UsageError(problems)
-
-
-@cache
-def _supported_kinds() -> Mapping[str, Kind]:
-    """The part of SUMO's schema that the harness uses or passes on to SUMO, without attributes that name files."""
-    file_attributes = ("imgFile", "osgFile")
-    types = {
-        name: Kind(
-            {each: required for each, required in kind.attributes.items() if each not in file_attributes}, kind.children
-        )
-        for name, kind in kinds("routes_file.xsd").items()
-    }
-    children = {"route": "route within"}
-    rates = dict.fromkeys(("begin", "end", *_FLOW_RATES), False)
-    return types | {
-        "routesType": Kind(
-            children={name: name for name in ("vType", "vTypeDistribution", "route", "vehicle", "flow")}
-        ),
-        "vType": types["vTypeType"],
-        "vTypeDistribution": types["vTypeDistributionType"],
-        "route": Kind({"id": True, "edges": True, "color": False}),
-        "route within": Kind({"edges": True}),
-        "vehicle": Kind({"id": True, "depart": False, **dict.fromkeys(_DEPARTS, False)}, children),
-        "flow": Kind({"id": True, **rates, **dict.fromkeys(_DEPARTS, False)}, children),
-    }
-
-
-def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
-    return VehicleType(
-        name=_attribute(path, element, "id"),
-        length_m=_number(path, element, "length", VehicleType.length_m),
-        width_m=_number(path, element, "width", VehicleType.width_m),
-        max_speed_mps=_number(path, element, "maxSpeed", VehicleType.max_speed_mps),
-        lane_changes=element.get("laneChangeModel", ""),
-    )
-
-
-def _departure(
-    path: Path, element: ElementTree.Element, routes: Mapping[str, tuple[str, ...]], types: set[str]
-) -> Departure:
-    name = _attribute(path, element, "id")
-    kind = element.get("type", _DEFAULT_TYPE)
-    if kind not in types:
-        raise UsageError.of(path, f"{element.tag} {name}", f"unknown vehicle type {kind!r}", nearest(kind, types))
-    own_route = element.find("route")
-    if own_route is not None:
-        edges = tuple(own_route.get("edges", "").split())
-    else:
-        route = _attribute(path, element, "route")
-        if route not in routes:
-            raise UsageError.of(path, f"{element.tag} {name}", f"unknown route {route!r}", nearest(route, routes))
-        edges = routes[route]
-    if not edges:
-        raise UsageError.of(path, f"{element.tag} {name}", "its route has no edges", "give the route's edges")
-    return Departure(
-        name=name,
-        vehicle_type=kind,
-        edges=edges,
-        depart_s=_number(path, element, "begin" if element.tag == "flow" else "depart", 0.0),
-        lane=element.get("departLane", "first"),
-        position=element.get("departPos", "base"),
-        speed=element.get("departSpeed", "0"),
-    )
-
-
-def _flow(path: Path, element: ElementTree.Element, departure: Departure) -> Flow:
-    rates = [name for name in _FLOW_RATES if element.get(name) is not None]
-    if not rates or (rates == ["number"] and element.get("end") is None):
-        raise UsageError.of(path, f"flow {departure.name}", "has no rate", f"give one of {', '.join(_FLOW_RATES[1:])}")
-    if len(set(rates) - {"number"}) > 1:
-        raise UsageError.of(path, f"flow {departure.name}", f"has its rate twice: {', '.join(rates)}", "give one")
-    end = _number(path, element, "end", np.inf)
-    if end <= departure.depart_s:
-        raise UsageError.of(path, f"flow {departure.name}.end", "does not lie after its begin", "give a later end")
-    number = int(_number(path, element, "number", 0)) if "number" in rates else None
-    period = None
-    if "vehsPerHour" in rates:
-        period = 3600.0 / _number(path, element, "vehsPerHour", 1.0)
-    elif "period" in rates:
-        period = _number(path, element, "period", 1.0)
-    elif "number" in rates:
-        period = (end - departure.depart_s) / max(number or 1, 1)
-        if period < _LEAST_PERIOD_S:
-            message = f"one vehicle every {period:g} s is more than the capacity of a lane"
-            raise UsageError.of(path, f"flow {departure.name}.number", message, "give a smaller number")
-    probability = _number(path, element, "probability", 0.0) if "probability" in rates else None
-    return Flow(departure=departure, end_s=end, period_s=period, probability_per_s=probability, number=number)
-
-
-def _expand(flow: Flow, until_s: float, generator: np.random.Generator) -> list[Departure]:
-    """The departures of a flow before `until_s`, named as in SUMO: f.0, f.1 and so on."""
-    first, end = flow.departure.depart_s, min(flow.end_s, until_s)
-    if flow.period_s is not None:
-        times: FloatArray = np.arange(first, end, flow.period_s)
-    else:
-        seconds = np.arange(first, end, 1.0)
-        times = seconds[generator.random(len(seconds)) < (flow.probability_per_s or 0.0)]
-    if flow.number is not None:
-        times = times[: flow.number]
-    template = flow.departure
-    return [replace(template, name=f"{template.name}.{k}", depart_s=float(time)) for k, time in enumerate(times)]
-
-
-def _attribute(path: Path, element: ElementTree.Element, name: str) -> str:
-    value = element.get(name)
-    if not value:
-        raise UsageError.of(path, element.tag, f"has no {name!r}", f"give every {element.tag} its {name}")
-    return value
-
-
-def _number(path: Path, element: ElementTree.Element, name: str, default: float) -> float:
-    value = element.get(name)
-    if value is None:
-        return default
-    number = number_of(value)
-    above, most = _RANGES.get(name, _TIMES)
-    if not above < number <= most or (name == "number" and number != int(number)):
-        where = f"{element.tag} {element.get('id', '')}.{name}"
-        raise UsageError.of(
-            path,
-            where,
-            f"{value[:60]!r} is not a number that is possible here",
-            f"give a number of seconds, metres or m/s, up to {most:g}",
-        )
-    return number
+def _index(shares: Sequence[float], generator: np.random.Generator) -> int:
+    upper = np.cumsum(shares)
+    return int(np.searchsorted(upper, generator.random() * upper[-1], side="right"))

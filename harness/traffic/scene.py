@@ -28,7 +28,8 @@ from harness.traffic.departures import check_departures
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
-from harness.traffic.route_file import Departure, RouteFile, VehicleType, read_route_file
+from harness.traffic.route_file import Departure, RouteFile, VehicleType
+from harness.traffic.route_reading import read_route_file
 from harness.traffic.start_ranges import start_range
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from harness.errors import UsageError
-from harness.traffic.route_file import Departure, RouteFile, VehicleType, read_route_file
+from harness.traffic.route_file import Departure, RouteFile, VehicleType
+from harness.traffic.route_reading import read_route_file
 
 Write = Callable[[str], Path]
 
