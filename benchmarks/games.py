@@ -13,7 +13,7 @@ from harness.drivers.policy_file import ACTIONS, Policy
 from harness.environments.arena import Arena, Seat
 from harness.environments.auto_reset import AutoReset
 from harness.game.arrays import FloatArray
-from harness.game.observation import SIZE
+from harness.game.observation_layout import SIZE
 from harness.game.seeding import generator_of
 from harness.traffic.scene import OpenScene, open_scene
 

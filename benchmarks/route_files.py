@@ -54,7 +54,9 @@ def main(arguments: Sequence[str]) -> None:
             count[verdict] += 1
             net = sources.net.name if sources.net else ""
             print(f"| {file.relative_to(folder)} | {net} | {said} | {own or 'loads'} |", flush=True)
-    print(f"\n{sum(count.values())} files: " + ", ".join(f"{each} {verdict}" for verdict, each in sorted(count.items())))
+    print(
+        f"\n{sum(count.values())} files: " + ", ".join(f"{each} {verdict}" for verdict, each in sorted(count.items()))
+    )
 
 
 def _route_files(folder: Path) -> Iterator[Path]:
@@ -110,7 +112,9 @@ def _sumo(file: Path, sources: Sources) -> str:
     additional = ["--additional-files", ",".join(map(str, sources.additional))] if sources.additional else []
     program = Path(sumo.SUMO_HOME) / "bin" / "sumo"
     options = ["--net-file", str(sources.net), "--route-files", str(file), "--begin", sources.begin, *additional]
-    run = subprocess.run([program, *options, "--no-step-log", "--no-warnings", "--end", "100"], capture_output=True, text=True)
+    run = subprocess.run(
+        [program, *options, "--no-step-log", "--no-warnings", "--end", "100"], capture_output=True, text=True
+    )
     return "runs" if run.returncode == 0 else run.stderr.strip().splitlines()[0].replace("|", "/")[:_LONGEST_REASON]
 
 

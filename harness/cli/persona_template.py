@@ -19,7 +19,7 @@ from harness.config.campaign import Campaign
 from harness.config.json_schema import file_of, schema_of, term_in_words, unit_of
 from harness.config.scene import Name
 from harness.errors import UsageError
-from harness.game.payoff import FUZZY_QUANTITIES, TERMS
+from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 
 FOLDER = "personas"
 """The default folder of a new persona."""

@@ -62,6 +62,9 @@ class Training(Document):
     payoff_scale: float = Field(0.1, gt=0.0, le=1000.0)
     """Factor of the payoffs that PPO receives; tables show the payoffs without it. The gradients of actor and critic
     are clipped together: with large payoffs, the errors of the critic would leave little of the step to the actor."""
+    along_route_share: float = Field(0.7, ge=0.0, le=1.0)
+    """Share of the games that start anywhere along the players' routes, at any legal speed, without contact. The other
+    games, and all games of an assessment, start as the scene says."""
     segment_steps: int = Field(131_072, ge=1_024, le=100_000_000)
     """A checkpoint is written, and the learning curve evaluated, each time after this many steps."""
     learner: Literal["compiled", "stable_baselines3"] = "compiled"

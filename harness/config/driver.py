@@ -15,7 +15,7 @@ from harness.config.rule_driver import Rules
 from harness.config.toml_reading import Document, nearest, read_document
 from harness.config.tunable import Adjustable, ParameterName
 from harness.errors import UsageError
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 
 OUTPUTS = ("acceleration_mps2", "steering_rad")
 """The outputs of a driver that uses SI units."""

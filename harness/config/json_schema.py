@@ -20,7 +20,7 @@ from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
-from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS, Term
+from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS, Term
 
 DOCUMENTS: Mapping[str, Any] = {"campaign": Campaign, "persona": Persona, "scene": Scene, "driver": DriverDocument}
 """All kinds of documents that users write, with their types."""

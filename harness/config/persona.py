@@ -22,7 +22,8 @@ from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, neare
 from harness.game.attention import HumanFactors
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.human_limits import ALL_NOTICED, EXACT_SIGHT, FULL_SHARES, NO_DELAY
-from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS, Payoff, Weighted
+from harness.game.payoff import Payoff, Weighted
+from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS
 
 Weight = Annotated[float, Field(ge=0.0, le=1000.0)]
 Input = Annotated[float, Field(ge=-1e6, le=1e6)]
@@ -47,6 +48,16 @@ class Parametrised(Document):
     """The term is 0 from this distance on."""
     within_s: float | None = Field(None, gt=0.0, le=60.0)
     """The term is 0 from this time on."""
+    after_s: float | None = Field(None, ge=0.0, le=600.0)
+    """The term counts from this time on."""
+    from_mps: float | None = Field(None, ge=0.0, le=100.0)
+    """The term counts from this speed on."""
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """The limits that are given, by name."""
+        names = (name for name in type(self).model_fields if name != "weight")
+        return {name: value for name in names if (value := getattr(self, name)) is not None}
 
 
 WeightOrTable = Annotated[
@@ -144,7 +155,7 @@ class Human(Group):
 def _has_limit(value: float | Parametrised, limit: str) -> bool:
     """Whether the value of a term has exactly this limit; an empty name stands for no limit."""
     if isinstance(value, Parametrised):
-        return {name for name in ("within_m", "within_s") if getattr(value, name) is not None} == {limit}
+        return set(value.limits) == {limit}
     return not limit
 
 
@@ -210,7 +221,7 @@ class Persona(Document):
         for group in (self.safety, self.operational, self.human):
             for name, value in group.terms.items():
                 if isinstance(value, Parametrised):
-                    limit = value.within_m or value.within_s
+                    (limit,) = value.limits.values()
                     terms.append(Weighted(name=name, weight=value.weight, parameter=limit))
                 else:
                     terms.append(Weighted(name=name, weight=value))

@@ -16,13 +16,20 @@ def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
     return interval
 
 
+def _positive(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] < 0.0 or not 0.0 < interval[1] <= _DENSEST:
+        raise ValueError(f"the density lies outside 0 to {_DENSEST:g}")
+    return interval
+
+
+_DENSEST = 10.0
 Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
 Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
 class Goal(Document):
-    """The destination of the players."""
+    """The destination of a player."""
 
     edge: str
     """The edge of the goal, an edge of the net."""
@@ -46,27 +53,49 @@ class Actuators(Document):
 
 
 class Player(Document):
-    """A vehicle of the route file that the harness controls, and the ranges of its start in each episode."""
+    """A vehicle of the route file that the harness controls, its goal, and the ranges of its start in each episode."""
 
     vehicle: str
-    """The id of the vehicle in the route file."""
-    lane: str
-    """The lane of the start."""
+    """The id of the vehicle in the route file. It gives the route and the vehicle type."""
+    lane: str | None = None
+    """The lane of the start, with `position_m` or `beside_ego_m`."""
     position_m: Interval | None = None
     """Range of the start of its front bumper, along the lane."""
     beside_ego_m: Interval | None = None
     """Instead of `position_m`: range of the start relative to the start of the ego, ahead (+) or behind (-)."""
+    route_m: Interval | None = None
+    """Instead of a lane: range of the start of its front bumper, along the vehicle's route, over all of its edges."""
+    arrival_after_ego_s: Interval | None = None
+    """Instead of a lane: range of the time from the ego's arrival to its own at the place where their routes meet, if
+    both keep the speed of their start; negative: it arrives before the ego."""
     speed_mps: Interval
     """Range of the speed at the start."""
+    goal: Goal | None = None
+    """Its destination; left out: the goal of the scene."""
     actuators: Actuators = Actuators()
 
     @model_validator(mode="after")
-    def _one_position(self) -> Player:
-        if (self.position_m is None) == (self.beside_ego_m is None):
-            raise ValueError("give either position_m or beside_ego_m")
+    def _one_start(self) -> Player:
+        on_lane = [name for name in ("position_m", "beside_ego_m") if getattr(self, name) is not None]
+        on_route = [name for name in ("route_m", "arrival_after_ego_s") if getattr(self, name) is not None]
+        if len(on_lane) + len(on_route) != 1:
+            raise ValueError("give one of position_m, beside_ego_m, route_m and arrival_after_ego_s")
+        if on_lane and self.lane is None:
+            raise ValueError(f"{on_lane[0]} needs the lane of the start")
+        if on_route and self.lane is not None:
+            raise ValueError(f"{on_route[0]} is along the route: leave out lane")
         if self.speed_mps[0] < 0.0:
             raise ValueError("speed_mps must not be negative")
+        if self.arrival_after_ego_s is not None and self.speed_mps[0] <= 0.0:
+            raise ValueError("arrival_after_ego_s needs speeds above 0")
         return self
+
+
+class Varies(Document):
+    """What differs from game to game: ranges from which each game draws by its seed."""
+
+    traffic_density: Annotated[Interval, AfterValidator(_positive)] | None = None
+    """Range of a factor on the background traffic: on the rates of flows, and on the number of single vehicles."""
 
 
 class Scene(Document):
@@ -86,20 +115,53 @@ class Scene(Document):
     """Coefficient of friction between tyre and road, as a share of g."""
     lane_change_duration_s: float = Field(2.0, ge=0.0, le=10.0)
     """Duration of a lane change of background traffic."""
-    goal: Goal
+    traffic_begin_s: float = Field(0.0, ge=0.0, le=1e7)
+    """Time of the route file at which its traffic begins, as SUMO's option --begin."""
+    warm_up_s: float = Field(0.0, ge=0.0, le=3600.0)
+    """Time for which background traffic has been on the road when a game starts. The game starts at `traffic_begin_s`
+    plus this time of the route file."""
+    varies: Varies = Varies()
+    goal: Goal | None = None
+    """The destination of every player that has none of its own."""
     ego: Player
     non_ego: Player
 
     @model_validator(mode="after")
-    def _ego_leads(self) -> Scene:
-        if self.ego.beside_ego_m is not None:
-            raise ValueError("ego.beside_ego_m: the ego can't start beside itself; give ego.position_m")
+    def _players_fit(self) -> Scene:
+        for name in ("beside_ego_m", "arrival_after_ego_s"):
+            if getattr(self.ego, name) is not None:
+                raise ValueError(f"ego.{name}: the ego can't start relative to itself; give ego.position_m")
+        if self.non_ego.beside_ego_m is not None and self.ego.position_m is None:
+            raise ValueError("non_ego.beside_ego_m needs ego.position_m, along the ego's lane")
+        for role, player in zip(("ego", "non_ego"), self.players, strict=True):
+            if self.goal is None and player.goal is None:
+                raise ValueError(f"{role} has no goal: give [goal] for all players, or [{role}.goal]")
+        if self.goal is not None and all(player.goal is not None for player in self.players):
+            raise ValueError("every player has a goal of its own: leave out [goal]")
         return self
 
     @property
     def players(self) -> tuple[Player, Player]:
         """Ego and non-ego, in the order of the player axis of arrays."""
         return self.ego, self.non_ego
+
+    @property
+    def game_window_s(self) -> tuple[float, float]:
+        """Begin and end of a game, as times of the route file."""
+        begin_s = self.traffic_begin_s + self.warm_up_s
+        return begin_s, begin_s + self.time_limit_s
+
+    @property
+    def traffic_window_s(self) -> tuple[float, float]:
+        """Begin of the warm-up and end of a game, as times of the route file."""
+        return self.traffic_begin_s, self.game_window_s[1]
+
+    def goal_of(self, player: Player) -> tuple[str, Goal]:
+        """A player's goal, and the key of the document that gives it."""
+        if player.goal is None:
+            assert self.goal is not None, "each player has a goal"
+            return "goal", self.goal
+        return ("ego.goal" if player is self.ego else "non_ego.goal"), player.goal
 
 
 SCENE_FILE = "scene.toml"

@@ -9,10 +9,10 @@ import numpy as np
 from harness.game import bicycle
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import Actuators
-from harness.game.observation import LAYOUT, in_units
-from harness.game.quantities import World
+from harness.game.observation_layout import LAYOUT, in_units
+from harness.game.world import World
 
-SPEED = LAYOUT.index("speed_mps")
+SPEED, _ROAD_STEERING = LAYOUT.index("speed_mps"), LAYOUT.index("road_steering_rad")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,8 +39,10 @@ class Car:
     def actions(self, acceleration_mps2: FloatArray, steering_rad: FloatArray, observation: FloatArray) -> FloatArray:
         """Actions [N, 2] that request an acceleration [N] and a steering angle [N] at the speed in `observation`
         [N, SIZE]. A request beyond the car's limits is clipped."""
-        speed = self.physical(observation)[:, SPEED, None]
-        return bicycle.actions(acceleration_mps2[:, None], steering_rad[:, None], speed, self.actuators)[:, 0]
+        seen = self.physical(observation)
+        speed, road_steering = seen[:, SPEED, None], seen[:, _ROAD_STEERING, None]
+        requested = (acceleration_mps2[:, None], steering_rad[:, None])
+        return bicycle.actions(*requested, speed, road_steering, self.actuators)[:, 0]
 
 
 def car_of(world: World, player: int) -> Car:

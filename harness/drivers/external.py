@@ -37,7 +37,7 @@ from harness.drivers.protocol import Driver
 from harness.drivers.rules import RulesDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import DriverError, UsageError
-from harness.game.observation import SIZE
+from harness.game.observation_layout import SIZE
 
 ALLOW_CODE = "--allow-code"
 _RUNS_CODE = {

@@ -21,7 +21,7 @@ from harness.config.toml_reading import nearest
 from harness.drivers.car import Car
 from harness.drivers.process import ProcessDriver
 from harness.errors import Problem, UsageError
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 
 ENTRY_OF = {name.replace("@", "_"): name for name in LAYOUT} | {name: name for name in LAYOUT}
 """Possible names of an FMU's inputs, and the entry of each. Most tools do not allow `@` in a name: `_` replaces it."""

@@ -7,7 +7,7 @@ import numpy as np
 from harness.config.rule_driver import LaneKeeping
 from harness.drivers.perception import OwnMotion
 from harness.game.arrays import FloatArray
-from harness.game.observation import AHEAD_M
+from harness.game.observation_layout import AHEAD_M
 
 
 def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, step_s: float) -> FloatArray:

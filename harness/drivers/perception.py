@@ -1,8 +1,5 @@
-"""Perception of a rule-based driver: the path ahead and the road users on it and beside it, in metres.
-
-An observation gives a road user's position and heading, not its size: each is taken to be as large as the own car.
-An entry at its bound is taken at its worst: a road user that closes at 10 m/s or more is taken to stand.
-"""
+"""Perception of a rule-based driver: the path ahead, the next stop line, and the road users on the path and beside it,
+in metres."""
 
 from __future__ import annotations
 
@@ -12,17 +9,10 @@ import numpy as np
 
 from harness.drivers.car import Car
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.observation import AHEAD_M, LAYOUT, OTHERS, SIZE
+from harness.game.observation_layout import AHEAD_M, ENTRIES, LAYOUT, OTHERS
 
-_SPEED, _OVER, _ACCELERATION, _STEERING = (
-    LAYOUT.index(name) for name in ("speed_mps", "speed_over_limit", "acceleration_mps2", "steering_rad")
-)
-_TURNED = LAYOUT.index("path_turned_rad@0m")
-_LEFT = LAYOUT.index("path_left_m")
-_OTHER = LAYOUT.index("other0_seen")
-_ENTRIES = (SIZE - _OTHER) // OTHERS
-MAX_CLOSING_MPS = 10.0
-"""Bound of the closing speed in an observation."""
+_AT = {name: LAYOUT.index(name) for name in LAYOUT}
+_TURNED, _OTHER = _AT["path_turned_rad@0m"], _AT["other0_seen"]
 
 
 class Encounters(NamedTuple):
@@ -43,6 +33,12 @@ class Encounters(NamedTuple):
     """Towards the path, across it."""
     lengths_m: FloatArray
     """Half the length of the other plus half the length of the own car, along the path."""
+    own_to_conflict_m: FloatArray
+    """From the own front bumper to the place where the other's way crosses or joins the own path; inf without one."""
+    other_to_conflict_s: FloatArray
+    """Time to that place at the other's present speed; inf without one."""
+    has_priority: BoolArray
+    """Whether the other has priority there."""
 
 
 class OwnMotion(NamedTuple):
@@ -50,42 +46,52 @@ class OwnMotion(NamedTuple):
 
     speed_mps: FloatArray
     limit_mps: FloatArray
-    """Speed limit; NaN while the car stands, because the observation gives the speed relative to the limit only."""
+    """Speed limit."""
     acceleration_mps2: FloatArray
     steering_rad: FloatArray
     path_left_m: FloatArray
     path_turned_rad: FloatArray
+    stop_line_m: FloatArray
+    """From the front bumper to the next stop line; very large without one."""
+    stop_sign: BoolArray
+    signal_red: BoolArray
+    signal_yellow: BoolArray
 
 
 def perceive(car: Car, observation: FloatArray) -> tuple[OwnMotion, Encounters]:
     """Own motion and other road users in N games, from observations [N, SIZE]."""
     values = car.physical(observation)
-    speed = values[:, _SPEED]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        limit = np.where(speed > 0.1, speed / (1.0 + values[:, _OVER]), np.nan)
+
+    def entry(name: str) -> FloatArray:
+        return values[:, _AT[name]]
+
     motion = OwnMotion(
-        speed_mps=speed,
-        limit_mps=limit,
-        acceleration_mps2=values[:, _ACCELERATION],
-        steering_rad=values[:, _STEERING],
-        path_left_m=values[:, _LEFT],
+        speed_mps=entry("speed_mps"),
+        limit_mps=entry("speed_limit_mps"),
+        acceleration_mps2=entry("acceleration_mps2"),
+        steering_rad=entry("steering_rad"),
+        path_left_m=entry("path_left_m"),
         path_turned_rad=values[:, _TURNED : _TURNED + len(AHEAD_M)],
+        stop_line_m=entry("stop_line_m"),
+        stop_sign=entry("stop_sign") > 0.5,
+        signal_red=entry("signal_red") > 0.5,
+        signal_yellow=entry("signal_yellow") > 0.5,
     )
-    others = values[:, _OTHER:].reshape(len(values), OTHERS, _ENTRIES)
+    others = values[:, _OTHER:].reshape(len(values), OTHERS, ENTRIES)
     return motion, _encounters(car, motion, others)
 
 
 def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
-    seen, ahead, left, closing, across, sin, cos = np.moveaxis(others, -1, 0)
+    seen, ahead, left, closing, across, sin, cos, length, width, *conflict = np.moveaxis(others, -1, 0)
+    own_m, other_m, _, priority = conflict
     own = motion.speed_mps[:, None]
     forward = own + closing
-    forward = np.where(closing <= -MAX_CLOSING_MPS, np.minimum(forward, 0.0), forward)
     path_left, path_turned = _path_at(motion, ahead)
     along_cos, along_sin = np.cos(path_turned), np.sin(path_turned)
     offset = (left - path_left) * along_cos
     turned_cos, turned_sin = np.abs(cos * along_cos + sin * along_sin), np.abs(sin * along_cos - cos * along_sin)
-    half_length = 0.5 * (car.length_m * turned_cos + car.width_m * turned_sin)
-    half_width = 0.5 * (car.length_m * turned_sin + car.width_m * turned_cos)
+    half_length = 0.5 * (length * turned_cos + width * turned_sin)
+    half_width = 0.5 * (length * turned_sin + width * turned_cos)
     lengths = half_length + 0.5 * car.length_m
     leftwards = across * along_cos - forward * along_sin
     return Encounters(
@@ -97,6 +103,11 @@ def _encounters(car: Car, motion: OwnMotion, others: FloatArray) -> Encounters:
         speed_mps=forward * along_cos + across * along_sin,
         approach_mps=-np.sign(offset) * leftwards,
         lengths_m=lengths,
+        own_to_conflict_m=np.where(priority != 0.0, own_m, np.inf),
+        other_to_conflict_s=np.where(
+            priority != 0.0, np.maximum(other_m, 0.0) / np.maximum(np.hypot(forward, across), 0.1), np.inf
+        ),
+        has_priority=priority > 0.5,
     )
 
 

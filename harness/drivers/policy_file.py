@@ -25,7 +25,7 @@ from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.files import content_of, write_atomically
 from harness.game.arrays import FloatArray
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 
 FORMAT = 1
 _NOT_LEARNED_BY = ("name", "description", "sources")  # keys of a persona

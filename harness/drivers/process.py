@@ -32,7 +32,7 @@ import numpy as np
 from harness.drivers.car import Car
 from harness.errors import DriverError
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 
 PROTOCOL = 2
 _LONGEST_ANSWER_BYTES = 10_000_000

@@ -20,9 +20,6 @@ from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.drivers.reaction import BrakeReaction, ReactionState, react
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 
-UNKNOWN_LIMIT_MPS = 5.0
-"""A driver that starts from standing has not seen the limit: it drives up to this speed until it has."""
-
 
 @dataclass(kw_only=True)
 class _DriverState:
@@ -31,7 +28,6 @@ class _DriverState:
     reacted_s: FloatArray
     calm_s: FloatArray
     braking_mps2: FloatArray
-    limit_mps: FloatArray
     cruising_mps2: FloatArray
     requested_mps2: FloatArray
 
@@ -51,28 +47,26 @@ class RulesDriver:
         self._reaction = _reaction_parameters(rules)
 
     def reset(self, games: IntArray) -> None:
-        """Reset games [N]: no reaction is under way, and the limit is not known."""
-        state, missing = self._state, int(games.max(initial=-1)) + 1 - len(self._state.limit_mps)
+        """Reset games [N]: no reaction is under way."""
+        state, missing = self._state, int(games.max(initial=-1)) + 1 - len(self._state.reacted_s)
         for each in fields(state):
             values = np.pad(getattr(state, each.name), (0, max(missing, 0)))
-            values[games] = UNKNOWN_LIMIT_MPS if each.name == "limit_mps" else 0.0
+            values[games] = 0.0
             setattr(state, each.name, values)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """Actions [N, 2] from observations [N, SIZE]. Decisions are deterministic: `noise` is not used."""
         state, rules, car = self._state, self._rules, self._car
         motion, encounters = perceive(car, observation)
-        limit = np.where(np.isfinite(motion.limit_mps), motion.limit_mps, state.limit_mps[games])
         cruising = cruise_mps2(
             motion,
             encounters,
-            limit_mps=limit,
             before_mps2=state.cruising_mps2[games],
             law=rules.cruise,
             step_s=car.step_s,
         )
         requested = self._react(games, motion, encounters, cruising)
-        state.limit_mps[games], state.cruising_mps2[games], state.requested_mps2[games] = limit, cruising, requested
+        state.cruising_mps2[games], state.requested_mps2[games] = cruising, requested
         wheelbase = float(car.actuators.wheelbase_m[0])
         steering = steering_rad(motion, law=rules.lane_keeping, wheelbase_m=wheelbase, step_s=car.step_s)
         return car.actions(requested, steering, observation)

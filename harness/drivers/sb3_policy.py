@@ -11,7 +11,7 @@ from harness.config.driver import StableBaselines3
 from harness.drivers.policy_file import ACTIONS
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.observation import SIZE
+from harness.game.observation_layout import SIZE
 
 
 class Sb3Driver:

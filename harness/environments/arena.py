@@ -31,11 +31,13 @@ from harness.game.attention import release_controls
 from harness.game.bicycle import move, requests
 from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
-from harness.game.observation import SIZE, observe
+from harness.game.observation import observe
+from harness.game.observation_layout import SIZE
 from harness.game.payoff import Payoff
 from harness.game.quantities import Quantities, terminations
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
 from harness.game.state import Bodies, Outcome, State
+from harness.game.traffic_rules import since_change_s
 from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
@@ -93,7 +95,7 @@ class Arena:
             scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
         )
         players = len(self.seats)
-        self.state = State.empty(games, players)
+        self.state = State.empty(games, players, len(self.world.right_of_way.signal_links))
         self.observation: FloatArray = np.zeros((games, players, SIZE), dtype=np.float32)
         self._member = np.zeros((games, players), dtype=np.int64)
         drivers = [seat.driver for of_player in self.seats for seat in of_player if seat.driver is not None]
@@ -113,7 +115,8 @@ class Arena:
         """Reset games, each to its `InitialState` and with its departures of background traffic, and observe."""
         for game, start in starts.items():
             self._place(game, start)
-            self.simulation.reset(game, start, list((departures or {}).get(game, [])))
+            signals = self.simulation.reset(game, start, list((departures or {}).get(game, [])))
+            self.state.signals[game], self.state.signal_s[game] = signals
             if self.reading is not None:
                 self.reading.present[game] = False
         games = np.array(sorted(starts), dtype=np.int64)
@@ -141,6 +144,9 @@ class Arena:
         move(state, acceleration, steering, drove & self._taken_over, self.world.actuators, self.world.step_s)
         reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         self.reading = reading
+        if reading.signals is not None:
+            state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, self.world.step_s)
+            state.signals = reading.signals
         self._read_sumo_players(reading, drove)
         bodies = self._bodies(state)
         advanced_m, offset_m = self._locate()
@@ -182,7 +188,11 @@ class Arena:
                     )
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)
-        acceleration, steering = requests(chosen, state.speed_mps, self.world.actuators)
+        world = self.world
+        road_steering = world.road.routes.road_steering_rad(
+            state.station_m, state.speed_mps, world.actuators.wheelbase_m
+        )
+        acceleration, steering = requests(chosen, state.speed_mps, road_steering, world.actuators)
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
         state.lapsed = release_controls(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
@@ -262,6 +272,7 @@ class Arena:
         state = self.state
         state.x_m[game], state.y_m[game], state.heading_rad[game] = start.x_m, start.y_m, start.heading_rad
         state.speed_mps[game], state.present[game] = start.speed_mps, start.present
+        state.station_m[game] = start.station_m
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
         state.unseen_behind_m[game], self._member[game] = start.unseen_behind_m, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
@@ -273,10 +284,9 @@ class Arena:
             self._noise[game] = start.noise
 
     def _first_quantities(self, games: IntArray) -> Quantities:
-        """Quantities of games [N] after a reset. The positions along the routes are searched, because none is known."""
+        """Quantities of games [N] after a reset."""
         state, routes = self.state.of(games), self.world.road.routes
-        start = routes.find(state.x_m, state.y_m)
-        state.station_m, offset = routes.locate(state.x_m, state.y_m, start)
+        state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
         self.state.station_m[games] = state.station_m
         return Quantities(
             world=self.world,

@@ -25,7 +25,8 @@ from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
-from harness.game.observation import SIZE, observe
+from harness.game.observation import observe
+from harness.game.observation_layout import SIZE
 from harness.game.seeding import generator_of
 from harness.game.state import ROLES, Outcome
 from harness.traffic.scene import OpenScene, open_scene

@@ -15,7 +15,7 @@ from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution
-from harness.game.observation import SIZE
+from harness.game.observation_layout import SIZE
 from harness.game.state import Outcome
 
 OBSERVATION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (SIZE,), np.float32)

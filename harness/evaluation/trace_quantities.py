@@ -14,9 +14,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.quantities import Quantities, World
+from harness.game.quantities import Quantities
 from harness.game.road import MARGIN_M, SPACING_M, Routes
 from harness.game.state import ROLES, Bodies, State
+from harness.game.world import World
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -45,30 +45,40 @@ def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArra
 
 
 @compiled
-def requests(action: FloatArray, speed_mps: FloatArray, actuators: Actuators) -> tuple[FloatArray, FloatArray]:
+def requests(
+    action: FloatArray, speed_mps: FloatArray, road_steering_rad: FloatArray, actuators: Actuators
+) -> tuple[FloatArray, FloatArray]:
     """The accelerations (m/s^2) and steering angles (rad), [G, P], that actions request of the cars.
 
-    action [G, P, 2] in [-1, 1]: the pedals (-1 full brake, 0 coast, 1 full throttle) and the wheel (-1 and 1: the
-    largest useful angle to the right and left at speeds [G, P]; progressive from the centre).
+    action [G, P, 2] in [-1, 1]: the pedals (-1 full brake, 0 coast, 1 full throttle) and the wheel. A wheel of 0
+    follows the road (road_steering_rad [G, P]); -1 and 1 add the largest useful angle to the right and left at speeds
+    [G, P]; progressive from the centre.
     """
     acceleration, steering = np.empty(speed_mps.shape), steering_range_rad(speed_mps, actuators)
     for g, p in np.ndindex(speed_mps.shape):
         pedals, wheel = _clamped(action[g, p, 0], 1.0), _clamped(action[g, p, 1], 1.0)
         strongest = actuators.max_acceleration_mps2[p] if pedals >= 0.0 else actuators.max_braking_mps2[p]
         acceleration[g, p] = pedals * strongest
-        steering[g, p] *= wheel * (WHEEL_CENTRE + (1.0 - WHEEL_CENTRE) * wheel**2)
+        turned = steering[g, p] * wheel * (WHEEL_CENTRE + (1.0 - WHEEL_CENTRE) * wheel**2)
+        steering[g, p] = _clamped(road_steering_rad[g, p] + turned, actuators.max_steering_rad[p])
     return acceleration, steering
 
 
 def actions(
-    acceleration_mps2: FloatArray, steering_rad: FloatArray, speed_mps: FloatArray, actuators: Actuators
+    acceleration_mps2: FloatArray,
+    steering_rad: FloatArray,
+    speed_mps: FloatArray,
+    road_steering_rad: FloatArray,
+    actuators: Actuators,
 ) -> FloatArray:
     """[..., P, 2] actions in [-1, 1]: the inverse of `requests`.
 
-    acceleration_mps2, steering_rad and speed_mps are [..., P]. Requests beyond the car's limits are clipped.
+    acceleration_mps2, steering_rad, speed_mps and road_steering_rad are [..., P]. Requests beyond the car's limits are
+    clipped.
     """
     strongest = np.where(acceleration_mps2 >= 0.0, actuators.max_acceleration_mps2, actuators.max_braking_mps2)
-    share = np.clip(steering_rad / steering_range_rad(speed_mps, actuators), -1.0, 1.0)
+    turned = np.clip(steering_rad, -actuators.max_steering_rad, actuators.max_steering_rad) - road_steering_rad
+    share = np.clip(turned / steering_range_rad(speed_mps, actuators), -1.0, 1.0)
     # the only real root of the depressed cubic share = wheel (c + (1 - c) wheel^2)
     stretch = np.sqrt(WHEEL_CENTRE / (3.0 * (1.0 - WHEEL_CENTRE)))
     wheel = 2.0 * stretch * np.sinh(np.arcsinh(1.5 * share / (WHEEL_CENTRE * stretch)) / 3.0)

@@ -27,20 +27,55 @@ from harness.game.human_limits import (
     draw_estimation_errors,
     draw_noticed_m,
 )
+from harness.game.road import Routes
+from harness.game.route_starts import draw_along_route
 from harness.game.seeding import between, generator_of, seed_of
 
 _UNLIMITED = (ALL_NOTICED, NO_DELAY, EXACT_SIGHT, FULL_SHARES)
 
 
+@dataclass(frozen=True)
+class OnLine:
+    """A start at positions (m) along the player's own line."""
+
+    position_m: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class BesideEgo:
+    """A start at positions (m) relative to the ego's, ahead (+) or behind (-)."""
+
+    offset_m: tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArrivesAfterEgo:
+    """A start from which the player arrives at a meeting point at a time (s) after the ego, at constant speeds."""
+
+    after_s: tuple[float, float]
+    meeting_m: float  # along the player's line
+    ego_meeting_m: float  # along the ego's line
+
+
 @dataclass(frozen=True, kw_only=True)
 class StartRange:
-    """The range of a player's start: positions of its front bumper along a lane, and speeds."""
+    """The range of a player's start: positions of its front bumper along a line, and speeds."""
 
-    line: FloatArray  # [n, 2] the lane's centre line
-    position_m: tuple[float, float]
-    beside_ego: bool  # whether `position_m` is relative to the ego's position
+    line: FloatArray  # [n, 2] the centre line of a lane, or the line of the player's route
+    place: OnLine | BesideEgo | ArrivesAfterEgo
     speed_mps: tuple[float, float]
     scale: float = 1.0  # metres of the line per metre of the lane: SUMO's lane length may differ from its shape
+
+    def position_m(self, share: float, speed_mps: float, ego_m: float, ego_mps: float) -> float:
+        """The position at a share, from 0 to 1, of the range, for this speed and the ego's position and speed."""
+        match self.place:
+            case OnLine(position_m=bounds):
+                return between(bounds, share)
+            case BesideEgo(offset_m=bounds):
+                return between(bounds, share) + ego_m
+            case ArrivesAfterEgo(after_s=bounds, meeting_m=meeting_m, ego_meeting_m=ego_meeting_m):
+                arrival_s = (ego_meeting_m - ego_m) / ego_mps + between(bounds, share)
+                return meeting_m - speed_mps * arrival_s
 
     def pose(self, position_m: float, length_m: float) -> tuple[float, float, float]:
         """x_m and y_m of the body's centre and heading_rad, for a front bumper at this position along the lane."""
@@ -79,7 +114,8 @@ class InitialState:
     y_m: FloatArray
     heading_rad: FloatArray
     speed_mps: FloatArray
-    position_m: FloatArray  # of the front bumper, along the start lane
+    position_m: FloatArray  # of the front bumper, along the start lane; NaN if the start is not in the scene's range
+    station_m: FloatArray  # along the route, about
     present: BoolArray
     lazy_noise: LazyNoise
     lapses: tuple[Lapses, ...]
@@ -87,6 +123,11 @@ class InitialState:
     limits: tuple[Limits, ...]
     member: tuple[int, ...]  # index of the driver that each player has in this game
     parts: tuple[str | int, ...]  # parts of the seeds
+
+    @property
+    def signal_share(self) -> float:
+        """The place in the cycles of traffic lights at which the game starts, from 0 to 1."""
+        return float(generator_of(*self.parts, "signals").random())
 
     @property
     def noise(self) -> FloatArray:
@@ -104,6 +145,8 @@ class StartDistribution:
     """The distribution of initial states: start ranges [P], lengths [P] and probabilities of taking part [P].
 
     A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
+
+    In `along_route_share` of the games, the players start anywhere along their `routes` instead, up to their goals.
     """
 
     places: Sequence[StartRange]
@@ -113,6 +156,8 @@ class StartDistribution:
     present_share: Sequence[float]
     steps: int
     step_s: float
+    routes: Routes
+    along_route_share: float = 0.0
 
 
 def draw_initial_state(start_distribution: StartDistribution, *parts: str | int) -> InitialState:
@@ -122,8 +167,9 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
     draws = iter(generator.random(4 * len(players)).tolist())  # the same numbers as drawn one by one
     poses: list[tuple[float, ...]] = []
     for place, length in zip(start_distribution.places, start_distribution.length_m.tolist(), strict=True):
-        position = between(place.position_m, next(draws)) + (poses[0][-1] if place.beside_ego else 0.0)
-        speed = between(place.speed_mps, next(draws))
+        share, speed = next(draws), between(place.speed_mps, next(draws))
+        ego_mps, ego_m = poses[0][-2:] if poses else (speed, 0.0)
+        position = place.position_m(share, speed, ego_m, ego_mps)
         poses.append((*place.pose(position, length), speed, position))
     present = [next(draws) < share for share in start_distribution.present_share]
     member = [
@@ -138,12 +184,25 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
         for player in players
     ]
     x, y, heading, speeds, positions = np.array(poses).T
+    stations = positions - 0.5 * start_distribution.length_m
+    if start_distribution.along_route_share:
+        along = draw_along_route(
+            start_distribution.routes,
+            start_distribution.length_m,
+            np.array(present),
+            start_distribution.along_route_share,
+            generator_of(*parts, "along route"),
+        )
+        if along is not None:
+            x, y, heading, speeds, stations = along
+            positions = np.full_like(positions, np.nan)
     return InitialState(
         x_m=x,
         y_m=y,
         heading_rad=heading,
         speed_mps=speeds,
         position_m=positions,
+        station_m=stations,
         present=np.array(present),
         lazy_noise=LazyNoise(generator, (len(players), start_distribution.steps, 2)),
         lapses=tuple(lapses),

@@ -1,13 +1,16 @@
-"""Observations of the players: own motion, the road ahead and the nearest other bodies, in the player's own frame.
+"""Observations of the players: own motion, the road ahead, signs and signals, and the other bodies that matter most.
 
-An observation holds only what a driver can see: no intentions, personas, payoffs or plans. Every entry is scaled to
-[-1, 1]. `LAYOUT` names the entries in order and is stored with every policy.
+An observation is in the player's own frame and holds only what a driver can see: no intentions, personas, payoffs or
+plans. `harness.game.observation_layout` has its entries.
 
 An error of estimated distances scales the distance of other bodies in their true direction. An error of closing speeds
 adds a radial velocity to theirs (`game.human_limits`).
 
 The free width at a distance ahead ends at the nearest surface on either side, rail or vehicle (paper, section 4.3.2:
 the ego "seeks to maintain a large distance between itself and nearby objects").
+
+The other bodies are those that the player may meet first: by the time to the conflict of the two ways, or by their
+distance.
 """
 
 from __future__ import annotations
@@ -16,63 +19,24 @@ from typing import Any
 
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
+from harness.game.meetings import Meetings
+from harness.game.observation_layout import AHEAD_M, BEHIND, COMPRESSED, ENTRIES, LAYOUT, OTHERS, SCALE, SIZE
 from harness.game.quantities import Quantities
+from harness.game.right_of_way import Control, Signal, StopLines
 from harness.game.road import Routes, lane_at, row_at
-from harness.game.route_coordinates import PATH_M, half_extents_m, place_along_route, row_ahead
-
-_BEHIND = int(np.searchsorted(PATH_M, 0.0))  # number of entries of PATH_M behind the player
-AHEAD_M = PATH_M[_BEHIND:]
-OTHERS = 3  # number of other bodies in an observation
+from harness.game.route_coordinates import half_extents_m, place_along_route, row_ahead
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
-# divisors of the entries
-_SPEED_MPS, _ACCELERATION_MPS2, _SIDE_M, _FAR_M = 30.0, 10.0, 8.0, 100.0
-_AHEAD_M, _CLOSING_MPS, _CROSSING_MPS = 50.0, 10.0, 5.0
-_OTHER = ("seen", "ahead_m", "left_m", "ahead_mps", "left_mps", "turned_sin", "turned_cos")
-_ENTRIES = len(_OTHER)
-
-LAYOUT: tuple[str, ...] = (
-    "speed_mps",
-    "speed_over_limit",
-    "acceleration_mps2",
-    "steering_rad",
-    "lane_end_m",
-    "goal_m",
-    *(f"path_turned_rad@{d:g}m" for d in AHEAD_M),
-    "path_left_m",
-    *(f"free_left_m@{d:g}m" for d in AHEAD_M),
-    *(f"free_right_m@{d:g}m" for d in AHEAD_M),
-    *(f"other{k}_{name}" for k in range(OTHERS) for name in _OTHER),
-)
-SIZE = len(LAYOUT)
 _COUNT = len(AHEAD_M)
-_TURNED = 6  # first entry of each kind
-_LEFT = _TURNED + _COUNT + 1
-_RIGHT = _LEFT + _COUNT
-_FIRST_OTHER = _RIGHT + _COUNT
-OF_OTHERS = np.array([name.startswith("other") for name in LAYOUT])
+_PATH_LEFT, _STOP_LINE, _LEADER = (LAYOUT.index(name) for name in ("path_left_m", "stop_line_m", "leader_gap_m"))
+_TURNED, _LEFT, _RIGHT = (LAYOUT.index(f"{name}@0m") for name in ("path_turned_rad", "free_left_m", "free_right_m"))
+_FIRST_OTHER = LAYOUT.index("other0_seen")
 
-_SCALES = np.array(
-    [
-        *(_SPEED_MPS, 1.0, _ACCELERATION_MPS2, 1.0, _FAR_M, 2.0 * _FAR_M),
-        *(0.5,) * _COUNT,  # radians
-        *(_SIDE_M,) * (1 + 2 * _COUNT),
-        *(1.0, _AHEAD_M, _SIDE_M, _CLOSING_MPS, _CROSSING_MPS, 1.0, 1.0) * OTHERS,
-    ]
-)
-_LOCK = LAYOUT.index("steering_rad")
-
-
-def in_units(observation: FloatArray, max_steering_rad: float) -> FloatArray:
-    """[..., SIZE] float64: observations [..., SIZE] in the units named in `LAYOUT`.
-
-    An entry at its bound stands for all values beyond it: a goal at 200 m may be farther away.
-    """
-    values = np.asarray(observation, dtype=np.float64) * _SCALES
-    values[..., _LOCK] *= max_steering_rad
-    return values
+SEEN_M = 120.0  # bodies farther away are not in an observation
+_NEARNESS_MPS = 10.0  # a body at a distance matters like a conflict in the time to cover it at this speed
+_LEAST_MPS = 3.0  # a slower body may start to move
 
 
 def observe(q: Quantities) -> FloatArray:
@@ -80,10 +44,13 @@ def observe(q: Quantities) -> FloatArray:
     state, bodies, actuators = q.state, q.bodies, q.world.actuators
     return _observe(
         *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
-        *(state.station_m, q.lateral_offset_m, state.present),
+        *(state.station_m, q.lateral_offset_m, state.present, q.road_steering_rad),
         (state.unseen_behind_m, state.sight_m, state.distance_error, state.closing_error_per_s),
         *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
-        *(bodies.present, actuators.max_steering_rad, tuple(q.world.road.routes)),
+        bodies.present,
+        *(actuators.max_steering_rad, q.world.length_m, q.world.width_m, state.signal_s),
+        *(q.next_stop_line, state.signals),
+        (tuple(q.world.road.routes), tuple(q.world.right_of_way.stop_lines), tuple(q.meetings)),
     )
 
 
@@ -98,6 +65,7 @@ def _observe(
     station_m: FloatArray,
     offset_m: FloatArray,
     present: BoolArray,
+    road_steering_rad: FloatArray,
     sight: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     body_x_m: FloatArray,
     body_y_m: FloatArray,
@@ -107,43 +75,54 @@ def _observe(
     body_width_m: FloatArray,
     body_present: BoolArray,
     max_steering_rad: FloatArray,
-    table: tuple[Any, ...],
+    length_m: FloatArray,
+    width_m: FloatArray,
+    signal_s: FloatArray,
+    next_stop_line: IntArray,
+    signals: IntArray,
+    tables: tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]],
 ) -> FloatArray:
     """One compiled pass: for the few games of a reset, several calls would cost more than their work."""
-    routes = Routes(*table)
+    routes, stop_lines, meetings = Routes(*tables[0]), StopLines(*tables[1]), Meetings(*tables[2])
     unseen_behind_m, sight_m, distance_error, closing_error_per_s = sight
     observation = np.zeros((*present.shape, SIZE), dtype=np.float32)
     view = np.empty(SIZE)
     bodies = body_present.shape[1]
-    seen, distance_m = np.empty(bodies, dtype=np.bool_), np.empty(bodies)
+    seen, urgency_s = np.empty(bodies, dtype=np.bool_), np.empty(bodies)
     ahead_m, left_m = np.empty(bodies), np.empty(bodies)
     for g, p in np.ndindex(present.shape):
         if present[g, p]:
             first, last = routes.first_row[p], routes.last_row[p]
-            station, offset, heading = station_m[g, p], offset_m[g, p], heading_rad[g, p]
+            station, offset, heading, speed = station_m[g, p], offset_m[g, p], heading_rad[g, p], speed_mps[g, p]
             row = row_at(station, first, last)
             _, lane_end = lane_at(row, offset, routes.lane_offset_m, routes.lane_end_m)
             view[:] = 0.0
-            view[0] = speed_mps[g, p] / _SPEED_MPS
-            view[1] = speed_mps[g, p] / routes.speed_limit_mps[row] - 1.0
-            view[2] = acceleration_mps2[g, p] / _ACCELERATION_MPS2
-            view[3] = steering_rad[g, p] / max_steering_rad[p]
-            view[4] = np.maximum(lane_end - station, 0.0) / _FAR_M
-            view[5] = (routes.goal_m[p] - station) / (2.0 * _FAR_M)
-            view[_LEFT - 1] = -offset / _SIDE_M
+            view[0], view[1] = speed, routes.speed_limit_mps[row]
+            view[2] = speed / routes.speed_limit_mps[row] - 1.0
+            view[3] = acceleration_mps2[g, p]
+            view[4] = steering_rad[g, p] / max_steering_rad[p]
+            view[5] = road_steering_rad[g, p] / max_steering_rad[p]
+            view[6] = np.maximum(lane_end - station, 0.0)
+            view[7] = routes.goal_m[p] - station
+            view[8], view[9] = routes.own_left_m[row] - offset, routes.own_right_m[row] - offset
+            view[_PATH_LEFT] = -offset
             for k in range(_COUNT):
-                ahead = row_ahead(row, _BEHIND + k, first, last)
+                ahead = row_ahead(row, BEHIND + k, first, last)
                 turned = routes.heading_rad[ahead] - heading
-                view[_TURNED + k] = 2.0 * ((turned + np.pi) % (2.0 * np.pi) - np.pi)
+                view[_TURNED + k] = (turned + np.pi) % (2.0 * np.pi) - np.pi
                 view[_LEFT + k] = routes.left_edge_m[ahead] - offset
                 view[_RIGHT + k] = routes.right_edge_m[ahead] - offset
+            front_m = station + 0.5 * length_m[p]
+            _see_stop_line(view, next_stop_line[g, p], front_m, stop_lines, signals[g], signal_s[g])
+            leader_m, leader_mps = np.inf, 0.0
             cosine, sine = np.cos(heading), np.sin(heading)
             for b in range(bodies):
                 dx, dy = body_x_m[g, b] - x_m[g, p], body_y_m[g, b] - y_m[g, p]
                 ahead_m[b], left_m[b] = dx * cosine + dy * sine, dy * cosine - dx * sine
-                distance_m[b] = np.hypot(dx, dy)
-                in_view = ahead_m[b] >= unseen_behind_m[g, p] and distance_m[b] <= sight_m[g, p]
+                distance = np.hypot(dx, dy)
+                in_view = ahead_m[b] >= unseen_behind_m[g, p] and distance <= min(sight_m[g, p], SEEN_M)
                 seen[b] = body_present[g, b] and b != p and in_view
+                urgency_s[b] = distance / _NEARNESS_MPS
                 if seen[b]:
                     error = distance_error[g, p]
                     seen_at = (body_x_m[g, b] + error * dx, body_y_m[g, b] + error * dy)
@@ -152,30 +131,67 @@ def _observe(
                     extent = 0.5 * (length + width)  # at least the half extents, which take longer to compute
                     if along + extent > _EDGES[0] and along - extent < _EDGES[-1]:
                         turned = body_heading_rad[g, b] - routes.heading_rad[frame]
-                        _narrow(view, along, beside, *half_extents_m(turned, length, width))
-            for k in range(_COUNT):
-                view[_LEFT + k] /= _SIDE_M
-                view[_RIGHT + k] /= _SIDE_M
-            last_seen, last_m = -1, -1.0  # the body of the previous entry
-            for k in range(OTHERS):  # nearest first; missing bodies stay zeros
-                nearest = _next_nearest(seen, distance_m, last_seen, last_m)
-                if nearest < 0:
+                        half_length, half_width = half_extents_m(turned, length, width)
+                        _narrow(view, along, beside, half_length, half_width)
+                        gap = along - half_length - 0.5 * length_m[p]
+                        if along > 0.0 and gap < leader_m and abs(beside) < half_width + 0.5 * width_m[p]:
+                            closing = closing_error_per_s[g, p] * along
+                            leader_m, leader_mps = gap, body_speed_mps[g, b] * np.cos(turned) - speed + closing
+                    if meetings.conflict[g, p, b] >= 0:
+                        own_s = max(meetings.own_m[g, p, b], 0.0) / max(speed, _LEAST_MPS)
+                        other_s = max(meetings.other_m[g, p, b], 0.0) / max(body_speed_mps[g, b], _LEAST_MPS)
+                        urgency_s[b] = min(urgency_s[b], max(own_s, other_s))
+            view[_LEADER], view[_LEADER + 1] = max(leader_m, 0.0), leader_mps
+            last_seen, last_s = -1, -1.0  # the body of the previous entry
+            for k in range(OTHERS):  # the most urgent first; missing bodies stay zeros
+                b = _next_urgent(seen, urgency_s, last_seen, last_s)
+                if b < 0:
                     break
-                last_seen, last_m = nearest, distance_m[nearest]
-                turned, speed = body_heading_rad[g, nearest] - heading, body_speed_mps[g, nearest]
-                entry = view[_FIRST_OTHER + k * _ENTRIES :]
-                entry[0] = 1.0
+                last_seen, last_s = b, urgency_s[b]
                 error, closing = distance_error[g, p], closing_error_per_s[g, p]
-                ahead, left = ahead_m[nearest], left_m[nearest]
-                entry[1] = (ahead + error * ahead) / _AHEAD_M
-                entry[2] = (left + error * left) / _SIDE_M
-                entry[3] = (speed * np.cos(turned) - speed_mps[g, p] + closing * ahead) / _CLOSING_MPS
-                entry[4] = (speed * np.sin(turned) + closing * left) / _CROSSING_MPS
-                entry[5] = np.sin(turned)
-                entry[6] = np.cos(turned)
+                turned = body_heading_rad[g, b] - heading
+                entry = view[_FIRST_OTHER + k * ENTRIES :]
+                entry[0] = 1.0
+                entry[1], entry[2] = (1.0 + error) * ahead_m[b], (1.0 + error) * left_m[b]
+                entry[3] = body_speed_mps[g, b] * np.cos(turned) - speed + closing * ahead_m[b]
+                entry[4] = body_speed_mps[g, b] * np.sin(turned) + closing * left_m[b]
+                entry[5], entry[6] = np.sin(turned), np.cos(turned)
+                entry[7], entry[8] = body_length_m[g, b], body_width_m[g, b]
+                if meetings.conflict[g, p, b] >= 0:
+                    other = (1.0 + error) * meetings.other_m[g, p, b]
+                    entry[9], entry[10] = meetings.own_m[g, p, b], other
+                    own_s = max(meetings.own_m[g, p, b], 0.0) / max(speed, 0.1)
+                    entry[11] = max(other, 0.0) / max(body_speed_mps[g, b], 0.1) - own_s
+                    entry[12] = 1.0 if meetings.must_yield[g, p, b] else -1.0
             for k in range(SIZE):
-                observation[g, p, k] = min(max(view[k], -1.0), 1.0)
+                observation[g, p, k] = _scaled(view[k], SCALE[k], COMPRESSED[k])
     return observation
+
+
+@compiled
+def _scaled(value: float, scale: float, compressed: bool) -> float:
+    if compressed:
+        return value / (abs(value) + scale) if abs(value) < np.inf else np.sign(value)
+    return min(max(value / scale, -1.0), 1.0)
+
+
+@compiled
+def _see_stop_line(
+    view: FloatArray, line: int, front_m: float, stop_lines: StopLines, signals: IntArray, signal_s: FloatArray
+) -> None:
+    """Write the entries of the next stop line; -1 for none."""
+    view[_STOP_LINE] = np.inf
+    if line < 0:
+        return
+    view[_STOP_LINE] = stop_lines.station_m[line] - front_m
+    control, link = stop_lines.control[line], stop_lines.link[line]
+    view[_STOP_LINE + 1] = 1.0 if control == Control.GIVE_WAY else 0.0
+    view[_STOP_LINE + 2] = 1.0 if control in (Control.STOP, Control.ALL_WAY_STOP) else 0.0
+    if link >= 0:
+        view[_STOP_LINE + 3] = 1.0 if signals[link] in (Signal.GREEN, Signal.GREEN_YIELDING) else 0.0
+        view[_STOP_LINE + 4] = 1.0 if signals[link] == Signal.YELLOW else 0.0
+        view[_STOP_LINE + 5] = 1.0 if signals[link] == Signal.RED else 0.0
+        view[_STOP_LINE + 6] = signal_s[link]
 
 
 @compiled
@@ -191,11 +207,11 @@ def _narrow(view: FloatArray, ahead_m: float, left_m: float, half_length_m: floa
 
 
 @compiled
-def _next_nearest(seen: BoolArray, distance_m: FloatArray, last: int, last_m: float) -> int:
-    """The nearest body after the last one, by distance and then by index; -1 if there is none."""
-    nearest, nearest_m = -1, _FAR_M
+def _next_urgent(seen: BoolArray, urgency_s: FloatArray, last: int, last_s: float) -> int:
+    """The most urgent body after the last one, by urgency and then by index; -1 if there is none."""
+    found, found_s = -1, np.inf
     for b in range(len(seen)):
-        distance = distance_m[b]
-        if seen[b] and distance < nearest_m and (distance > last_m or (distance == last_m and b > last)):
-            nearest, nearest_m = b, distance
-    return nearest
+        urgency = urgency_s[b]
+        if seen[b] and urgency < found_s and (urgency > last_s or (urgency == last_s and b > last)):
+            found, found_s = b, urgency
+    return found

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
 from functools import cached_property
 from operator import attrgetter
 from typing import Any
@@ -22,154 +21,8 @@ from numpy.typing import NDArray
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction
 from harness.game.jit import compiled
+from harness.game.payoff_terms import TERMS, Form
 from harness.game.quantities import Quantities
-from harness.game.state import Outcome
-
-GROUPS = ("safety", "operational", "human")
-FUZZY_QUANTITIES: Mapping[str, str] = {
-    "speed_over_limit": "speed over the limit, as a share of it; negative below",
-    "speed_mps": "speed",
-    "time_gap_s": "time gap to the vehicle ahead",
-    "clearance_m": "distance to the nearest surface, rail or vehicle",
-    "lane_offset_m": "distance from the centre of the nearest lane",
-    "lane_end_m": "distance until the lane the car is in ends; infinite if it goes on",
-    "goal_m": "distance to the goal, along the route",
-}
-"""The quantities that a fuzzy term can use, with their descriptions."""
-NEARNESS = ("time_gap_s", "clearance_m")  # the fuzzy quantities that are 0 at contact
-
-
-class Form(IntEnum):
-    """The function that a term applies to its quantity."""
-
-    BELOW = 0  # 0 at the parameter and above, linear to -1 at zero
-    OVER = 1  # minus the positive part
-    UNDER = 2  # the negative part
-    LESS = 3  # minus the quantity
-    LESS_SQUARED = 4  # minus the square, in units of 10 m/s2
-    PER_100 = 5  # a hundredth of the quantity
-    GAINED = 6  # 1 if equal to the parameter
-    LOST = 7  # -1 if equal to the parameter
-    ALWAYS = 8  # -1
-
-
-@dataclass(frozen=True, kw_only=True)
-class Term:
-    """A named term of equation 1.
-
-    `quantity` is the name of its quantity [G, P] in `Quantities`. `per_second` terms are rates and are multiplied by
-    the step length. The other terms are events and count in the step in which they occur.
-    """
-
-    group: str
-    meaning: str
-    quantity: str
-    form: Form
-    per_second: bool = False
-    parameter: str = ""
-    """The name of the form's parameter, if a persona sets it: a limit in the quantity's unit."""
-    outcome: Outcome = Outcome.RUNNING
-    """The form's parameter, if it is an outcome."""
-
-
-def _outcome_term(*, group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
-    return Term(group=group, meaning=meaning, quantity="state.outcome", form=form, outcome=outcome)
-
-
-TERMS: Mapping[str, Term] = {
-    "collision": _outcome_term(
-        group="safety", meaning="touching a vehicle or person, once", form=Form.LOST, outcome=Outcome.COLLISION
-    ),
-    "rail": _outcome_term(
-        group="safety", meaning="touching the edge of the road, once", form=Form.LOST, outcome=Outcome.RAIL
-    ),
-    "clearance": Term(
-        group="safety",
-        meaning="nearness to the nearest surface, rail or vehicle",
-        quantity="clearance_m",
-        form=Form.BELOW,
-        per_second=True,
-        parameter="within_m",
-    ),
-    "vehicle_clearance": Term(
-        group="safety",
-        meaning="nearness to the nearest vehicle",
-        quantity="vehicle_clearance_m",
-        form=Form.BELOW,
-        per_second=True,
-        parameter="within_m",
-    ),
-    "time_gap": Term(
-        group="safety",
-        meaning="following closer than a time gap",
-        quantity="time_gap_s",
-        form=Form.BELOW,
-        per_second=True,
-        parameter="within_s",
-    ),
-    "time_to_collision": Term(
-        group="safety",
-        meaning="being on a course to contact sooner than this",
-        quantity="time_to_collision_s",
-        form=Form.BELOW,
-        per_second=True,
-        parameter="within_s",
-    ),
-    "speed_over_limit": Term(
-        group="safety",
-        meaning="speed over the limit, as a share of it",
-        quantity="speed_over_limit",
-        form=Form.OVER,
-        per_second=True,
-    ),
-    "goal": _outcome_term(
-        group="operational", meaning="reaching the goal, once", form=Form.GAINED, outcome=Outcome.GOAL
-    ),
-    "timeout": _outcome_term(
-        group="operational", meaning="not reaching the goal in time, once", form=Form.LOST, outcome=Outcome.TIMEOUT
-    ),
-    "progress": Term(
-        group="operational",
-        meaning="way along the route, per 100 m",
-        quantity="advanced_m",
-        form=Form.PER_100,
-    ),
-    "speed_under_limit": Term(
-        group="operational",
-        meaning="speed under the limit, as a share of it",
-        quantity="speed_over_limit",
-        form=Form.UNDER,
-        per_second=True,
-    ),
-    "lane_offset": Term(
-        group="operational",
-        meaning="distance from the nearest lane's centre, m",
-        quantity="lane_offset_m",
-        form=Form.LESS,
-        per_second=True,
-    ),
-    "acceleration": Term(
-        group="operational",
-        meaning="squared acceleration or braking, as a share of 10 m/s2",
-        quantity="state.acceleration_mps2",
-        form=Form.LESS_SQUARED,
-        per_second=True,
-    ),
-    "lateral_acceleration": Term(
-        group="operational",
-        meaning="squared lateral acceleration, as a share of 10 m/s2",
-        quantity="lateral_acceleration_mps2",
-        form=Form.LESS_SQUARED,
-        per_second=True,
-    ),
-    "time_pressure": Term(
-        group="human",
-        meaning="every second on the way",
-        quantity="state.speed_mps",
-        form=Form.ALWAYS,
-        per_second=True,
-    ),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -279,4 +132,6 @@ def _unweighted(value: float, form: int, parameter: float) -> float:
         return 1.0 if value == parameter else 0.0
     if form == Form.LOST:
         return -1.0 if value == parameter else -0.0
+    if form == Form.FROM:
+        return -1.0 if value >= parameter else -0.0
     return -1.0

@@ -12,32 +12,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.bicycle import Actuators, lateral_acceleration_mps2
+from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
-from harness.game.road import Along, Road, Routes, row_at
+from harness.game.meetings import Meetings, meetings
+from harness.game.road import Along, Routes, row_at
 from harness.game.route_coordinates import PATH_M, along_route, row_ahead
 from harness.game.state import Bodies, Outcome, State
+from harness.game.traffic_rules import next_stop_lines, passed_stop_lines, permitted_mps, wrong_way
+from harness.game.world import World
 
 SIGHT_M = 60.0  # a body farther ahead than this is not a leader
 REACH_M = 10.0  # largest clearance that is computed
-
-
-@dataclass(frozen=True, kw_only=True)
-class World:
-    """The constants of a game: road, cars, step length, time limit. Sizes are [P]."""
-
-    road: Road
-    actuators: Actuators
-    length_m: FloatArray
-    width_m: FloatArray
-    step_s: float
-    time_limit_s: float
-
-    @property
-    def steps(self) -> int:
-        """Steps until the time limit."""
-        return round(self.time_limit_s / self.step_s)
 
 
 class Path(NamedTuple):
@@ -113,8 +99,63 @@ class Quantities:
         return self.world.road.routes.goal_m - self.state.station_m
 
     @cached_property
+    def road_steering_rad(self) -> FloatArray:
+        """The steering angle that follows the route."""
+        state, wheelbase_m = self.state, self.world.actuators.wheelbase_m
+        return self.world.road.routes.road_steering_rad(state.station_m, state.speed_mps, wheelbase_m)
+
+    @cached_property
     def lateral_acceleration_mps2(self) -> FloatArray:
         return lateral_acceleration_mps2(self.state, self.world.actuators)
+
+    # --- signals, signs and priority ---------------------------------------------------------------------------
+
+    @cached_property
+    def front_m(self) -> FloatArray:
+        """Station of the front bumper."""
+        return self.state.station_m + 0.5 * self.world.length_m
+
+    @cached_property
+    def next_stop_line(self) -> IntArray:
+        """Row of the next stop line; -1 without one."""
+        lines = self.world.right_of_way.stop_lines
+        return next_stop_lines(self.front_m, lines.player, lines.station_m)
+
+    @cached_property
+    def _passed(self) -> tuple[FloatArray, FloatArray]:
+        state, lines = self.state, tuple(self.world.right_of_way.stop_lines)
+        return passed_stop_lines(self.front_m, self.advanced_m, state.speed_mps, state.signals, state.signal_s, lines)
+
+    @property
+    def passed_red_s(self) -> FloatArray:
+        """Seconds since the signal became red, if the player passed its stop line in this step; else -1."""
+        return self._passed[0]
+
+    @property
+    def passed_stop_sign_mps(self) -> FloatArray:
+        """Speed at which the player passed a stop sign in this step; else -1."""
+        return self._passed[1]
+
+    @cached_property
+    def permitted_mps(self) -> FloatArray:
+        """Speed that the limit, signals, signs and right of way permit."""
+        right_of_way = self.world.right_of_way
+        return permitted_mps(
+            *(self.front_m, self.state.speed_mps, self.speed_limit_mps, self.next_stop_line, self.state.signals),
+            *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),
+        )
+
+    @cached_property
+    def speed_over_permitted(self) -> FloatArray:
+        """Excess over the permitted speed as a share of the limit; negative below it."""
+        return (self.state.speed_mps - self.permitted_mps) / self.speed_limit_mps
+
+    @cached_property
+    def wrong_way(self) -> FloatArray:
+        """1 where the player is among oncoming lanes, else 0."""
+        routes = self.world.road.routes
+        rows = routes.rows(self.state.station_m)
+        return wrong_way(self.lateral_offset_m, rows, routes.own_left_m, routes.own_right_m)
 
     # --- other bodies --------------------------------------------------------------------------------------------
 
@@ -144,6 +185,18 @@ class Quantities:
     def time_gap_s(self) -> FloatArray:
         """Time headway without the leader's length: gap over own speed; inf without a leader."""
         return self.leader_gap_m / np.maximum(self.state.speed_mps, 0.1)
+
+    @cached_property
+    def meetings(self) -> Meetings:
+        """Each player's conflict with each body at a junction."""
+        state, bodies, tables = self.state, self.bodies, self.world.right_of_way
+        return Meetings(
+            *meetings(
+                *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
+                (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),
+                *(self.visible, state.signals, tuple(tables.conflicts), tuple(tables.streams)),
+            )
+        )
 
     # --- surfaces ------------------------------------------------------------------------------------------------
 

@@ -9,13 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.geometry import Box, distance_to_nearest_segment
 from harness.game.jit import compiled
+from harness.game.rails import Rails
 
 SPACING_M = 0.5  # between stations of a route
 MARGIN_M = 100.0  # straight extension of a route's table before its start and beyond its end
-_CELL_M = 20.0
-_FAR_AWAY_M = 1e6
+_BEND_M = 4.0  # a driver steers by the mean curvature of this length: the lines of a net have corners
+_TIGHTEST = 1.0  # product of curvature and wheelbase: beyond the lock of any car
+PREVIEW_S = 0.2  # time ahead of the bend for which a driver steers; the steering rack needs some of it
 _LEAST_STRETCH = 0.25  # bound for points near or beyond a curve's centre, where the nearest station is not unique
 
 
@@ -32,6 +33,8 @@ class Route:
     heading_rad: FloatArray
     left_edge_m: FloatArray
     right_edge_m: FloatArray
+    own_left_m: FloatArray  # offset of the left mark between own and oncoming lanes; inf without oncoming lanes there
+    own_right_m: FloatArray  # the same on the right side, where traffic keeps to the left; -inf without
     speed_limit_mps: FloatArray
     lane_offset_m: FloatArray  # [N, L] of the lane's centre
     lane_end_m: FloatArray  # [N, L] station where the lane stops leading along this route; inf if it never does
@@ -59,8 +62,11 @@ class Routes(NamedTuple):
     cos: FloatArray
     sin: FloatArray
     curvature_per_m: FloatArray
+    bend_per_m: FloatArray  # curvature, smoothed over `_BEND_M`
     left_edge_m: FloatArray
     right_edge_m: FloatArray
+    own_left_m: FloatArray
+    own_right_m: FloatArray
     speed_limit_mps: FloatArray
     lane_offset_m: FloatArray
     lane_end_m: FloatArray
@@ -88,6 +94,7 @@ class Routes(NamedTuple):
             cos=np.cos(columns["heading_rad"]),
             sin=np.sin(columns["heading_rad"]),
             curvature_per_m=np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
+            bend_per_m=np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
             first_row=first,
             last_row=first + rows - 1,
             goal_m=np.array([route.goal_m for route in routes]),
@@ -102,34 +109,17 @@ class Routes(NamedTuple):
         lines = (self.x_m, self.y_m, self.cos, self.sin, self.curvature_per_m)
         return _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
 
+    def road_steering_rad(self, station_m: FloatArray, speed_mps: FloatArray, wheelbase_m: FloatArray) -> FloatArray:
+        """[G, P] steering angle (rad) with which cars follow the routes at stations and speeds [G, P].
+
+        The angle is that of the bend `PREVIEW_S` ahead, for wheelbases [P].
+        """
+        return _road_steering_rad(station_m, speed_mps, wheelbase_m, self.bend_per_m, self.first_row, self.last_row)
+
     def along(self, station_m: FloatArray, offset_m: FloatArray) -> Along:
         """The routes' properties at stations and lateral offsets [G, P]."""
         lanes = (self.lane_offset_m, self.lane_end_m)
         return Along(*_along(station_m, offset_m, self.speed_limit_mps, *lanes, self.first_row, self.last_row))
-
-    def find(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
-        """[G, P] stations in the table nearest to points [G, P], by a search of the whole route."""
-        return _find(x_m, y_m, self.x_m, self.y_m, self.first_row, self.last_row)
-
-
-@compiled
-def _find(
-    x_m: FloatArray,
-    y_m: FloatArray,
-    line_x_m: FloatArray,
-    line_y_m: FloatArray,
-    first_row: IntArray,
-    last_row: IntArray,
-) -> FloatArray:
-    stations = np.empty(x_m.shape)
-    for g, p in np.ndindex(x_m.shape):
-        nearest, nearest2 = first_row[p], np.inf
-        for row in range(first_row[p], last_row[p] + 1):
-            distance2 = (line_x_m[row] - x_m[g, p]) ** 2 + (line_y_m[row] - y_m[g, p]) ** 2
-            if distance2 < nearest2:
-                nearest, nearest2 = row, distance2
-        stations[g, p] = (nearest - first_row[p]) * SPACING_M - MARGIN_M
-    return stations
 
 
 @compiled
@@ -145,6 +135,29 @@ def row_at(station_m: float, first_row: int, last_row: int) -> int:
     """The row of a route nearest to a station; the first row for NaN."""
     rows = (station_m + MARGIN_M) / SPACING_M
     return first_row + int(min(np.rint(rows), last_row - first_row)) if rows > 0.0 else first_row
+
+
+@compiled
+def _road_steering_rad(
+    station_m: FloatArray,
+    speed_mps: FloatArray,
+    wheelbase_m: FloatArray,
+    bend_per_m: FloatArray,
+    first_row: IntArray,
+    last_row: IntArray,
+) -> FloatArray:
+    steering = np.empty(station_m.shape)
+    for g, p in np.ndindex(station_m.shape):
+        row = row_at(station_m[g, p] + PREVIEW_S * speed_mps[g, p], first_row[p], last_row[p])
+        steering[g, p] = steering_of_bend_rad(bend_per_m[row], wheelbase_m[p])
+    return steering
+
+
+@compiled
+def steering_of_bend_rad(bend_per_m: float, wheelbase_m: float) -> float:
+    """The steering angle (rad) with which a car drives a bend: the inverse of `bicycle.curvature_per_m`."""
+    turn = min(max(bend_per_m * wheelbase_m, -_TIGHTEST), _TIGHTEST)
+    return np.arctan(turn / np.sqrt(1.0 - 0.25 * turn**2))
 
 
 @compiled
@@ -211,65 +224,14 @@ def _curvature_per_m(heading_rad: FloatArray) -> FloatArray:
     return np.gradient(np.unwrap(heading_rad), SPACING_M)
 
 
-@dataclass(frozen=True, kw_only=True)
-class Rails:
-    """The edges of the drivable area as line segments, with a grid for spatial look-up."""
-
-    segments: FloatArray  # [S, 2, 2]; the last one is far away and pads the cells
-    origin_m: FloatArray  # [2]
-    cells: IntArray  # [X, Y, K] rows of `segments` within reach of each cell
-
-    @classmethod
-    def of(cls, segments: FloatArray, reach_m: float) -> Rails:
-        """Rails from segments [S, 2, 2]; `near` finds all segments within `reach_m` of a point."""
-        segments = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
-        padded = np.concatenate((segments, np.full((1, 2, 2), _FAR_AWAY_M)))
-        if not len(segments):
-            return cls(segments=padded, origin_m=np.zeros(2), cells=np.zeros((1, 1, 1), dtype=np.int64))
-        low = segments.min((0, 1)) - reach_m
-        counts = ((segments.max((0, 1)) + reach_m - low) // _CELL_M).astype(int) + 1
-        rows_of: dict[tuple[int, ...], list[int]] = {}
-        first = ((segments.min(1) - reach_m - low) // _CELL_M).astype(int)
-        last = ((segments.max(1) + reach_m - low) // _CELL_M).astype(int) + 1
-        for row, (begin, end) in enumerate(zip(first, last, strict=True)):
-            for cell in np.ndindex(*(end - begin)):
-                rows_of.setdefault((begin[0] + cell[0], begin[1] + cell[1]), []).append(row)
-        cells = np.full((*counts, max(map(len, rows_of.values()))), len(segments), dtype=np.int64)
-        for place, rows in rows_of.items():
-            cells[place][: len(rows)] = rows
-        return cls(segments=padded, origin_m=low, cells=cells)
-
-    def near(self, x_m: FloatArray, y_m: FloatArray) -> IntArray:
-        """[G, P, K] rows of `segments` within reach of points [G, P]."""
-        return _cells_at(x_m, y_m, self.origin_m, self.cells)
-
-    def distance_m(self, cars: Box, limit_m: float) -> FloatArray:
-        """[G, P] distance (m) of cars (places [G, P], sizes [P]) to the nearest rail, at most `limit_m`.
-
-        `limit_m` must be within the reach of the rails.
-        """
-        return _distance_m(cars, self.segments, self.origin_m, self.cells, limit_m)
-
-
-@compiled
-def _distance_m(cars: Box, segments: FloatArray, origin_m: FloatArray, cells: IntArray, limit_m: float) -> FloatArray:
-    return distance_to_nearest_segment(cars, segments, _cells_at(cars.x_m, cars.y_m, origin_m, cells), limit_m)
-
-
-@compiled
-def _cells_at(x_m: FloatArray, y_m: FloatArray, origin_m: FloatArray, cells: IntArray) -> IntArray:
-    rows = np.empty((*x_m.shape, cells.shape[2]), dtype=cells.dtype)
-    for g, p in np.ndindex(x_m.shape):
-        column = _cell(x_m[g, p] - origin_m[0], cells.shape[0])
-        line = _cell(y_m[g, p] - origin_m[1], cells.shape[1])
-        rows[g, p] = cells[column, line]
-    return rows
-
-
-@compiled
-def _cell(place_m: float, cells: int) -> int:
-    """The cell at a place, clamped to the grid; the first cell for NaN."""
-    return int(min(place_m / _CELL_M, cells - 1.0)) if place_m > 0.0 else 0
+def _bend_per_m(heading_rad: FloatArray) -> FloatArray:
+    """[N] mean curvature of a route's line around each station, left positive."""
+    turned = np.unwrap(heading_rad)
+    rows = np.arange(len(turned))
+    reach = round(0.5 * _BEND_M / SPACING_M)
+    before, after = np.maximum(rows - reach, 0), np.minimum(rows + reach, len(turned) - 1)
+    bend: FloatArray = (turned[after] - turned[before]) / ((after - before) * SPACING_M)
+    return bend
 
 
 @dataclass(frozen=True)

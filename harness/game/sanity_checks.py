@@ -25,7 +25,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 from harness.game.quantities import Quantities
 from harness.game.state import ROLES, State
 

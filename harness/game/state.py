@@ -56,9 +56,11 @@ class State:
     distance_error: FloatArray  # error of estimated distances, as a share: + is farther than true
     closing_error_per_s: FloatArray  # error of closing speeds, per distance: + is moving away
     step: IntArray  # [G]
+    signals: IntArray  # [G, L] int8, states of signal links (`right_of_way.Signal`)
+    signal_s: FloatArray  # [G, L] seconds since they changed
 
     @classmethod
-    def empty(cls, games: int, players: int) -> State:
+    def empty(cls, games: int, players: int, signals: int = 0) -> State:
         """A state of zeros without human factors, in which no player is present."""
         shape = (games, players)
         return cls(
@@ -77,6 +79,8 @@ class State:
             distance_error=np.zeros(shape),
             closing_error_per_s=np.zeros(shape),
             step=np.zeros(games, dtype=np.int64),
+            signals=np.zeros((games, signals), dtype=np.int8),
+            signal_s=np.zeros((games, signals)),
         )
 
     @property

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 from sumolib.net import Net
 
+from harness.config.scene import Goal
 from harness.game.arrays import FloatArray
 from harness.traffic.network import car_lanes, drivable_area, lane_line
 from harness.traffic.scene import OpenScene
@@ -30,15 +31,20 @@ def lane_marks(net: Net) -> list[FloatArray]:
     return marks
 
 
-def goal_line(scene: OpenScene, net: Net) -> list[FloatArray]:
-    """The line [2, 2] across the lanes at the goal."""
+def goal_lines(scene: OpenScene, net: Net) -> list[FloatArray]:
+    """The lines [2, 2] across the lanes at the players' goals, one for each goal."""
+    goals = {scene.document.goal_of(player)[1] for player in scene.document.players}
+    return [_goal_line(goal, net) for goal in sorted(goals, key=lambda goal: (goal.edge, goal.position_m))]
+
+
+def _goal_line(goal: Goal, net: Net) -> FloatArray:
     ends = []
-    for lane in car_lanes(net.getEdge(scene.document.goal.edge)):
+    for lane in car_lanes(net.getEdge(goal.edge)):
         line = shapely.LineString(lane_line(lane))
-        place = min(scene.document.goal.position_m / lane.getLength(), 1.0) * line.length
+        place = min(goal.position_m / lane.getLength(), 1.0) * line.length
         here, before = (np.array(line.interpolate(each).coords[0]) for each in (place, max(place - 0.5, 0.0)))
         after = np.array(line.interpolate(place + 0.5).coords[0])
         along = (after - before) / max(float(np.hypot(*(after - before))), 1e-9)
         across = 0.5 * lane.getWidth() * np.array([-along[1], along[0]])
         ends += [here - across, here + across]
-    return [np.array([ends[0], ends[-1]])]
+    return np.array([ends[0], ends[-1]])

@@ -26,7 +26,7 @@ import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
 
 from harness.errors import SimulationError
-from harness.game.arrays import FloatArray
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.game.state import ROLES
 from harness.traffic.angles import compass_deg_of, heading_rad_of
@@ -34,6 +34,7 @@ from harness.traffic.background_traffic import BackgroundTraffic
 from harness.traffic.insertion import Insertion
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
+from harness.traffic.signals import Signals
 from harness.traffic.simulation import Reading
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
@@ -125,6 +126,7 @@ class LibsumoSimulation:
         self._present = np.zeros((self._games, len(self._taken_over)), dtype=bool)
         self._insertions = [self._insertion(player) for player in range(len(self._taken_over))]
         world = self._scene.world
+        self._signals = Signals([tile.prefix for tile in self._tiles], world.right_of_way.signal_links)
         self._background = BackgroundTraffic(
             prefixes=[tile.prefix for tile in self._tiles],
             offsets_m=self._offsets,
@@ -138,8 +140,11 @@ class LibsumoSimulation:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._load([*self._options, "--seed", str(seed)], libsumo.load)
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
-        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> tuple[IntArray, FloatArray]:
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times.
+
+        The arguments and the result are those of `Simulation.reset`.
+        """
         tile = self._tiles[game]
         with self._sumo_call(f"reset game {game}"):
             taking_part = {player for player, present in enumerate(start.present.tolist()) if present}
@@ -149,6 +154,7 @@ class LibsumoSimulation:
             for player in sorted(taking_part - staying):
                 self._add_player(game, player, start)
             self._background.reset(game, departures)
+            return self._signals.reset(game, start.signal_share if self._signals else 0.0)
 
     def halt(self, game: int, player: int) -> None:
         """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
@@ -188,7 +194,9 @@ class LibsumoSimulation:
                 x_m = np.where(np.isnan(players[..., 0]), x_m, players[..., 0])
                 y_m = np.where(np.isnan(players[..., 1]), y_m, players[..., 1])
             reading = self._background.read(x_m, y_m, self._present)
-            return replace(reading, players=players) if players is not None else reading
+            if players is None and not self._signals:
+                return reading
+            return replace(reading, players=players, signals=self._signals.read() if self._signals else None)
 
     def close(self) -> None:
         """Release libsumo. A second call has no effect."""
@@ -210,13 +218,14 @@ class LibsumoSimulation:
     def _add_player(self, game: int, player: int, start: InitialState) -> None:
         tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
         vehicle_type, lane, fastest = self._insertions[player]
+        on_lane = lane is not None and not np.isnan(start.position_m[player])
         self._traffic.add(
             tile.prefix,
             name,
             edges=self._scene.edges[player],
             vehicle_type=vehicle_type,
-            lane=lane,
-            position=str(start.position_m[player]),
+            lane=str(lane) if on_lane else "best",
+            position=str(start.position_m[player]) if on_lane else "base",
             speed=str(min(speed, fastest)),
         )
         tile.inside.add(player)
@@ -234,18 +243,19 @@ class LibsumoSimulation:
         heading = float(start.heading_rad[player])
         x = float(start.x_m[player] + ahead * np.cos(heading))
         y = float(start.y_m[player] + ahead * np.sin(heading) + tile.offset_m)
+        options = self._move_options if self._taken_over[player] else _ON_ITS_ROUTE
         # moveToXY puts the vehicle in the traffic at once; without it, the vehicle would wait for free space
-        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), *self._move_options)
+        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), *options)
 
-    def _insertion(self, player: int) -> tuple[str, str, float]:
-        """A player's vehicle type, its start lane, and the largest speed at which SUMO inserts it: the speed limit for
-        its type."""
+    def _insertion(self, player: int) -> tuple[str, str | None, float]:
+        """A player's vehicle type, its start lane (None: its start is along its route), and the largest speed at which
+        SUMO inserts it: the speed limit for its type."""
         routes, types = self._scene.world.road.routes, libsumo.vehicletype
         vehicle_type = self._scene.vehicle(player).vehicle_type
-        lane = self._scene.document.players[player].lane.rsplit("_", 1)[1]
+        lane = self._scene.document.players[player].lane
         legal = float(routes.speed_limit_mps[routes.first_row[player]])
         obeyed = legal * min(1.0, types.getSpeedFactor(vehicle_type))
-        return vehicle_type, lane, float(min(obeyed, types.getMaxSpeed(vehicle_type)))
+        return vehicle_type, lane and lane.rsplit("_", 1)[1], float(min(obeyed, types.getMaxSpeed(vehicle_type)))
 
     def _read_players(self) -> FloatArray | None:
         """[G, P, 4] x_m, y_m, heading_rad and speed_mps of the players that SUMO drives; None if it drives none."""

@@ -21,7 +21,7 @@ from sumolib.net.lane import Lane
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.road import Rails
+from harness.game.rails import Rails
 
 _SEAM_M = 0.05  # gaps up to twice this between lanes and junctions are closed
 _OPENING_M = 0.3  # reach of an opening along the outline

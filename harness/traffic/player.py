@@ -1,11 +1,10 @@
-"""A player of a scene: its start range, its route and its vehicle type, checked against net, routes and goal."""
+"""A player of a scene: its route and its vehicle type, checked against net, routes and goal."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.edge import Edge
@@ -14,7 +13,6 @@ from sumolib.net.lane import Lane
 from harness.config.scene import Player, Scene
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
-from harness.game.initial_state import StartRange
 from harness.game.road import Route
 from harness.traffic import network
 from harness.traffic.departures import edges_of
@@ -28,7 +26,6 @@ _LONGEST_ROUTE_M = 50_000.0
 class OpenPlayer:
     """A player of an open scene."""
 
-    place: StartRange
     route: Route
     edges: tuple[str, ...]  # the route, from the start edge on
     vehicle_type: VehicleType
@@ -43,34 +40,44 @@ def open_player(
     """
     player: Player = getattr(document, role)
     problems: list[Problem] = []
-    lane = collect(problems, lambda: network.find_lane(net, file, f"{role}.lane", player.lane))
-    goal = collect(problems, lambda: _goal(file, document, net))
+    lane = player.lane and collect(problems, lambda: network.find_lane(net, file, f"{role}.lane", str(player.lane)))
+    goal = collect(problems, lambda: _goal(file, document, player, net))
     vehicle = collect(problems, lambda: _vehicle(file, role, player, routes))
     edges = collect(problems, lambda: edges_of(vehicle, net, routes)) if vehicle else None
-    place = collect(problems, lambda: _place(role, file=file, document=document, lane=lane, net=net)) if lane else None
-    if lane is None or goal is None or vehicle is None or edges is None or place is None:
+    if problems or goal is None or vehicle is None or edges is None:
         raise UsageError(problems)
-    if lane.getEdge() not in edges:
-        message = f"{player.lane!r} is not on the route of vehicle {vehicle.name!r}"
-        raise UsageError.of(file, f"{role}.lane", message, "choose a lane of one of its edges")
-    route_edges = edges[edges.index(lane.getEdge()) :]
+    first = 0
+    if isinstance(lane, Lane):
+        if lane.getEdge() not in edges:
+            message = f"{player.lane!r} is not on the route of vehicle {vehicle.name!r}"
+            raise UsageError.of(file, f"{role}.lane", message, "choose a lane of one of its edges")
+        first = edges.index(lane.getEdge())
+    route_edges = edges[first:]
+    if goal not in route_edges:
+        key, each = document.goal_of(player)
+        message = f"edge {each.edge!r} is not on the route of vehicle {vehicle.name!r}, after its start"
+        names = ", ".join(edge.getID() for edge in route_edges[-3:])
+        raise UsageError.of(
+            file, f"{key}.edge", message, f"choose one of its edges (it ends with {names}), or give [{role}.goal]"
+        )
     length_m = sum(each.getLength() for each in route_edges)
     key = f"vehicle {vehicle.name}"
     if length_m > _LONGEST_ROUTE_M:
         message = f"its route is {length_m / 1e3:,.0f} km long, up to {_LONGEST_ROUTE_M / 1e3:g} km are possible"
         raise UsageError.of(routes.path, key, message, "remove edges from the route")
+    goal_position_m = document.goal_of(player)[1].position_m
     try:
-        route = route_table(net, area, route_edges, goal=goal, goal_position_m=document.goal.position_m)
+        route = route_table(net, area, route_edges, goal=goal, goal_position_m=goal_position_m)
     except ValueError as error:
         raise UsageError.of(routes.path, key, f"its route {error}", "correct the route's edges") from None
     vehicle_type = routes.types[vehicle.vehicle_type]
-    _check_room_beyond_goal(file, document, route, vehicle_type)
-    return OpenPlayer(
-        place=place, route=route, edges=tuple(edge.getID() for edge in route_edges), vehicle_type=vehicle_type
-    )
+    _check_room_beyond_goal(file, document, player, route, vehicle_type)
+    return OpenPlayer(route=route, edges=tuple(edge.getID() for edge in route_edges), vehicle_type=vehicle_type)
 
 
-def _check_room_beyond_goal(file: Path, document: Scene, route: Route, vehicle_type: VehicleType) -> None:
+def _check_room_beyond_goal(
+    file: Path, document: Scene, player: Player, route: Route, vehicle_type: VehicleType
+) -> None:
     """Raise UsageError if the goal is too near to the end of the route.
 
     SUMO removes a vehicle when its front bumper reaches the end of its route. The body's centre reaches the goal
@@ -79,19 +86,21 @@ def _check_room_beyond_goal(file: Path, document: Scene, route: Route, vehicle_t
     needed_m = 0.5 * vehicle_type.length_m + vehicle_type.max_speed_mps * document.step_length_s
     room_m = route.length_m - route.goal_m
     if room_m < needed_m:
-        latest_m = max(document.goal.position_m - (needed_m - room_m), 0.0)
+        key, goal = document.goal_of(player)
+        latest_m = max(goal.position_m - (needed_m - room_m), 0.0)
         message = f"leaves {room_m:.1f} m of route behind the goal, {needed_m:.1f} m are needed"
         raise UsageError.of(
-            file, "goal.position_m", message, f"choose {latest_m:.1f} or less, or add an edge to the route"
+            file, f"{key}.position_m", message, f"choose {latest_m:.1f} or less, or add an edge to the route"
         )
 
 
-def _goal(file: Path, document: Scene, net: Net) -> Edge:
-    goal = network.find_edge(net, file, "goal.edge", document.goal.edge)
-    if document.goal.position_m > goal.getLength():
-        message = f"lies beyond the edge's end at {goal.getLength():g} m"
-        raise UsageError.of(file, "goal.position_m", message, "choose a smaller one")
-    return goal
+def _goal(file: Path, document: Scene, player: Player, net: Net) -> Edge:
+    key, goal = document.goal_of(player)
+    edge = network.find_edge(net, file, f"{key}.edge", goal.edge)
+    if goal.position_m > edge.getLength():
+        message = f"lies beyond the edge's end at {edge.getLength():g} m"
+        raise UsageError.of(file, f"{key}.position_m", message, "choose a smaller one")
+    return edge
 
 
 def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Departure:
@@ -103,45 +112,11 @@ def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Depart
     if vehicle.vehicle_type not in routes.types:
         message = "a player's type can't be a distribution"
         raise UsageError.of(routes.path, f"vehicle {vehicle.name}.type", message, "name one vType")
+    if vehicle.choices:
+        message = "a player's route can't be drawn from a distribution"
+        raise UsageError.of(routes.path, f"vehicle {vehicle.name}", message, "give it one route")
     fastest_mps = routes.types[vehicle.vehicle_type].max_speed_mps
     if player.speed_mps[1] > fastest_mps:
         message = f"reaches {player.speed_mps[1]:g} m/s, more than the vehicle's maxSpeed"
         raise UsageError.of(file, f"{role}.speed_mps", message, f"keep it to {fastest_mps:g} m/s")
     return vehicle
-
-
-def _place(role: str, *, file: Path, document: Scene, lane: Lane, net: Net) -> StartRange:
-    player: Player = getattr(document, role)
-    if player.beside_ego_m is None:
-        reach, name = player.position_m, "position_m"
-    else:
-        beside_ego = _beside_ego(role, file=file, document=document, lane=lane, net=net)
-        reach, name = beside_ego, "beside_ego_m"
-    assert reach is not None, "the document has one of the two"
-    key, text = f"{role}.{name}", f"reaches from {reach[0]:g} to {reach[1]:g} m,"
-    if reach[0] < 0.0 or reach[1] > lane.getLength():
-        message = f"{text} off lane {lane.getID()!r} of {lane.getLength():g} m"
-        raise UsageError.of(file, key, message, f"keep it between 0 and {lane.getLength():g} m")
-    goal = document.goal
-    if lane.getEdge().getID() == goal.edge and reach[1] >= goal.position_m:
-        message = f"{text} and the goal is at {goal.position_m:g} m"
-        raise UsageError.of(file, key, message, "start before the goal")
-    line = network.lane_line(lane)
-    return StartRange(
-        line=line,
-        position_m=player.beside_ego_m or reach,
-        beside_ego=player.beside_ego_m is not None,
-        speed_mps=player.speed_mps,
-        scale=float(np.hypot(*np.diff(line, axis=0).T).sum()) / lane.getLength(),
-    )
-
-
-def _beside_ego(role: str, *, file: Path, document: Scene, lane: Lane, net: Net) -> tuple[float, float]:
-    """The range of positions along its lane of a player that starts beside the ego."""
-    ego_lane = network.find_lane(net, file, "ego.lane", document.ego.lane)
-    if ego_lane.getEdge() is not lane.getEdge():
-        message = "needs both to start on the same edge"
-        raise UsageError.of(file, f"{role}.beside_ego_m", message, "give position_m instead")
-    beside_ego_m, ego_m = getattr(document, role).beside_ego_m, document.ego.position_m
-    assert ego_m is not None, "the document says that the ego has one"
-    return ego_m[0] + beside_ego_m[0], ego_m[1] + beside_ego_m[1]

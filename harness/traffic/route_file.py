@@ -130,9 +130,7 @@ class RouteFile:
         if density != 1.0:
             due = self._repeated(due, density, generator)
         for flow in self.flows:
-            times = times_of(
-                flow.rate, flow.departure.depart_s, min(flow.end_s, until_s), begin_s, density, generator
-            )
+            times = times_of(flow.rate, flow.departure.depart_s, min(flow.end_s, until_s), begin_s, density, generator)
             due += [replace(flow.departure, name=f"{flow.departure.name}.{k}", depart_s=time) for k, time in times]
         drawn = [self._drawn(each, generator, begin_s) for each in due]
         return sorted(drawn, key=lambda each: (each.depart_s, each.name))
@@ -161,9 +159,7 @@ class RouteFile:
         times, vehicles = self._by_time
         return vehicles[bisect_left(times, begin_s) : bisect_left(times, until_s)]
 
-    def _repeated(
-        self, due: Sequence[Departure], density: float, generator: np.random.Generator
-    ) -> list[Departure]:
+    def _repeated(self, due: Sequence[Departure], density: float, generator: np.random.Generator) -> list[Departure]:
         counts = np.floor(density + generator.random(len(due))).astype(int).tolist()
         return [
             each if copy == 0 else replace(each, name=f"{each.name}.copy{copy}")

@@ -109,9 +109,7 @@ def _departure(path: Path, element: ElementTree.Element, named: NamedRoutes, typ
     return replace(departure, choices=choices)
 
 
-def _choices(
-    path: Path, where: str, element: ElementTree.Element, named: NamedRoutes
-) -> tuple[RouteChoice, ...]:
+def _choices(path: Path, where: str, element: ElementTree.Element, named: NamedRoutes) -> tuple[RouteChoice, ...]:
     """The routes that a vehicle has or chooses from; none for a trip."""
     own, several, name = element.find("route"), element.find("routeDistribution"), element.get("route")
     if own is not None:
@@ -145,9 +143,7 @@ def _trip(path: Path, where: str, element: ElementTree.Element, departure: Depar
 def _cut(path: Path, where: str, element: ElementTree.Element, choice: RouteChoice) -> RouteChoice:
     """The part of a route from departEdge to arrivalEdge."""
     most = len(choice.edges) - 1
-    first, last = (
-        number_in(path, where, element, name, -0.001, most) for name in ("departEdge", "arrivalEdge")
-    )
+    first, last = (number_in(path, where, element, name, -0.001, most) for name in ("departEdge", "arrivalEdge"))
     if first is None and last is None:
         return choice
     return replace(choice, edges=choice.edges[int(first or 0) : int(most if last is None else last) + 1])

@@ -25,7 +25,16 @@ _DRAWN_ONLY = ("imgFile", "osgFile", "emissionClass")
 _RECORDERS = r"(battery|elechybrid|emissions|fcd|tripinfo|vehroute)"
 _RECORDED_ONLY = re.compile(rf"has\.{_RECORDERS}\.device|device\.{_RECORDERS}\..*")
 _NO_EFFECT = {
-    "vehicle": ("color", "line", "personNumber", "containerNumber", "parkingBadges", "arrivalPosLat", "fromTaz", "toTaz"),
+    "vehicle": (
+        "color",
+        "line",
+        "personNumber",
+        "containerNumber",
+        "parkingBadges",
+        "arrivalPosLat",
+        "fromTaz",
+        "toTaz",
+    ),
     "stop": ("arrival", "actType", "tripId", "line", "started", "ended", "actualArrival", "depart", "priority"),
     "busStop": ("name", "lines", "personCapacity", "parkingLength", "color", "angle", "friendlyPos"),
     "route": ("color", "cost", "savings", "probability", "routeLength"),
@@ -40,7 +49,7 @@ _NO_CAUSE: Reason = ("nothing arrives that the stop could wait for", "give a dur
 _REFUSED: Mapping[str, Reason] = {
     **dict.fromkeys(("person", "personFlow"), _NO_PEOPLE),
     **dict.fromkeys(("container", "containerFlow"), _NO_CONTAINERS),
-    "include": ("other files are not read", "copy their content into this file"),
+    "include": ("is not understood here: other files are not read", "copy their content into this file"),
 }
 _REFUSED_OF_VEHICLES: Mapping[str, Reason] = dict.fromkeys(
     (f"{end}{kind}" for end in ("from", "to", "via") for kind in ("Junction", "Junctions", "XY", "LonLat")), _NOT_EDGES
@@ -95,10 +104,11 @@ def _refused(path: Path, root: ElementTree.Element) -> Iterator[Problem]:
     found: Counter[tuple[str, str, str]] = Counter()
     for element in root.iter():
         if element.tag in _REFUSED:
-            found[element.tag, *_REFUSED[element.tag]] += 1
-        for name, reason in _reasons_of(element).items():
+            message, remedy = _REFUSED[element.tag]
+            found[element.tag, message, remedy] += 1
+        for name, (message, remedy) in _reasons_of(element).items():
             if element.get(name) is not None:
-                found[f"{element.tag}.{name}", *reason] += 1
+                found[f"{element.tag}.{name}", message, remedy] += 1
         for name, only in _ONLY.items():
             if element.tag in VEHICLES and element.get(name, only[0]) not in only:
                 message = f"{element.get(name, '')[:60]!r} is not supported"
@@ -129,13 +139,16 @@ def _supported_kinds() -> Mapping[str, Kind]:
     rates = dict.fromkeys(("begin", "end", *FLOW_RATES), False)
     unused = ("arrival", "routeLength")
     top = (*VEHICLES, "vType", "vTypeDistribution", "route", "routeDistribution", "interval", "busStop")
-    return types | {
+    return {
+        **types,
         "root": Kind(children={name: name for name in top}),
         "vType": types["vTypeType"],
-        "vTypeDistribution": Kind({each: need for each, need in mix.attributes.items()}, mix.children),
+        "vTypeDistribution": Kind({"id": True, "vTypes": False, "probabilities": False}, mix.children),
         "route": Kind({"id": True, "edges": True, **route}, {"stop": "stop", "param": "param"}),
         "route within": Kind({"id": False, "edges": True, **route}, {"stop": "stop", "param": "param"}),
-        "route listed": Kind({"id": False, "refId": False, "edges": False, **route}, {"stop": "stop", "param": "param"}),
+        "route listed": Kind(
+            {"id": False, "refId": False, "edges": False, **route}, {"stop": "stop", "param": "param"}
+        ),
         "routeDistribution": Kind(
             {"id": True, "last": False, "routes": False, "probabilities": False}, {"route": "route listed"}
         ),
@@ -146,7 +159,13 @@ def _supported_kinds() -> Mapping[str, Kind]:
         "interval": Kind({"begin": True, "end": True, "id": False}, {"flow": "flow"}),
         "stop": Kind(dict.fromkeys((*STOP_ATTRIBUTES, *_NO_EFFECT["stop"]), False), {"param": "param"}),
         "busStop": Kind(
-            {"id": True, "lane": True, "startPos": False, "endPos": False, **dict.fromkeys(_NO_EFFECT["busStop"], False)},
+            {
+                "id": True,
+                "lane": True,
+                "startPos": False,
+                "endPos": False,
+                **dict.fromkeys(_NO_EFFECT["busStop"], False),
+            },
             {"param": "param", "access": "access"},
         ),
         "access": Kind(dict.fromkeys(("lane", "pos", "length", "friendlyPos"), False)),

@@ -20,6 +20,7 @@ from sumolib.net.lane import Lane
 from harness.game.arrays import FloatArray
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic.network import car_lanes, lane_line
+from harness.traffic.oncoming_lanes import own_side
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
@@ -33,6 +34,36 @@ class _Piece:
     lanes: list[tuple[FloatArray, Lane]]  # lines [m, 2] side by side, with the lane that each belongs to
     edge: int  # index of the route's edge with these lanes
     speed_mps: float
+    is_junction: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class JunctionOnRoute:
+    """The junction between two edges of a route."""
+
+    link: Connection  # that the route's line follows
+    links: list[Connection]  # all that cars may take from the one edge to the other
+    begin_m: float  # stations of the route's line
+    end_m: float
+
+
+def junctions_on_route(net: Net, edges: Sequence[Edge]) -> list[JunctionOnRoute]:
+    """The junctions of a route along connected edges, in order, with the stations of its table."""
+    starts = _join([piece.line for piece in _pieces(net, edges)])[1].tolist()
+    return [
+        JunctionOnRoute(
+            link=link,
+            links=_car_links(edges[k], edges[k + 1]),
+            begin_m=starts[2 * k + 1],
+            end_m=starts[2 * k + 2],
+        )
+        for k, link in enumerate(_links(edges))
+    ]
+
+
+def line_over_junction(net: Net, link: Connection) -> FloatArray:
+    """[n, 2] line of a link over its junction."""
+    return _over_junction(net, link)[0]
 
 
 def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Edge, goal_position_m: float) -> Route:
@@ -59,6 +90,9 @@ def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Ed
             offsets[rows, column] = _offsets(points[rows], headings[rows], lane_points)
             lane_ends[rows, column] = ends[piece.edge][lane.getID()]
     left, right = _road_edges(area, points, headings)
+    widths = np.array([max((lane.getWidth() for _, lane in piece.lanes), default=0.0) for piece in pieces])[piece_at]
+    on_edge = ~np.array([piece.is_junction for piece in pieces])[piece_at]
+    own_left, own_right = own_side(net, points, headings, offsets_m=offsets, width_m=widths, on_edge=on_edge)
     inside = (stations >= 0.0) & (stations <= line.length)
     row = 2 * list(edges).index(goal)
     return Route(
@@ -67,6 +101,8 @@ def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Ed
         heading_rad=headings,
         left_edge_m=_extend(left, inside),
         right_edge_m=_extend(right, inside),
+        own_left_m=_extend(own_left, inside),
+        own_right_m=_extend(own_right, inside),
         speed_limit_mps=np.array([pieces[k].speed_mps for k in piece_at]),
         lane_offset_m=offsets,
         lane_end_m=lane_ends,
@@ -93,7 +129,7 @@ def _pieces(net: Net, edges: Sequence[Edge]) -> list[_Piece]:
         if k < len(links):
             line, speed = _over_junction(net, links[k])
             lanes = [(_over_junction(net, link)[0], link.getToLane()) for link in _car_links(edge, edges[k + 1])]
-            pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed))
+            pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed, is_junction=True))
     return pieces
 
 

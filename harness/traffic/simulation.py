@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from harness.game.arrays import BoolArray, FloatArray
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.traffic.route_file import Departure
 
@@ -32,6 +32,8 @@ class Reading:
     present: BoolArray
     players: FloatArray | None = None
     """[G, P, 4] x_m, y_m, heading_rad, speed_mps; NaN for players that the harness drives, None if it drives all."""
+    signals: IntArray | None = None
+    """[G, L] int8 states of the signal links of the scene's right of way; None if it has none."""
 
 
 class Simulation(Protocol):
@@ -40,8 +42,13 @@ class Simulation(Protocol):
     def reload(self, seed: int) -> None:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
-        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> tuple[IntArray, FloatArray]:
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times.
+
+        Traffic lights are set to their place in the cycle. Returns the states of the signal links [L], and the seconds
+        since they changed [L].
+        """
+        ...
 
     def halt(self, game: int, player: int) -> None:
         """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""

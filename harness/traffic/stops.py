@@ -98,7 +98,9 @@ def placed(stop: Stop, net: Net, vehicle_class: str) -> Stop:
     return replace(stop, lane=index, start_m=max(start, 0.0) if stop.start_m is None else start, end_m=end)
 
 
-def stop_problems(file: str, key: str, stops: Sequence[Stop], edges: Sequence[Edge], vehicle_class: str) -> list[Problem]:
+def stop_problems(
+    file: str, key: str, stops: Sequence[Stop], edges: Sequence[Edge], vehicle_class: str
+) -> list[Problem]:
     """The problems of placed stops with the route of their vehicle: SUMO would refuse them during a game."""
     names = [edge.getID() for edge in edges]
     problems, reached = [], (0, 0.0)

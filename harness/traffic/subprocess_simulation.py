@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from harness.errors import SimulationError
-from harness.game.arrays import FloatArray
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
@@ -53,9 +53,13 @@ class SubprocessSimulation:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._call("reload", seed)
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> None:
-        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
-        self._call("reset", game, start, departures)
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> tuple[IntArray, FloatArray]:
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times.
+
+        The result is that of `Simulation.reset`.
+        """
+        signals: tuple[IntArray, FloatArray] = self._call("reset", game, start, departures)
+        return signals
 
     def halt(self, game: int, player: int) -> None:
         """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""

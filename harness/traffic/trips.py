@@ -96,7 +96,9 @@ def _find(
     for trip in trips:
         vehicle_class, _, places = query = queries[trip.vehicle_type, trip.trip]
         if query not in answers:
-            message = f"no route for a {vehicle_class} leads from {' over '.join(map(repr, places[:-1]))} to {places[-1]!r}"
+            message = (
+                f"no route for a {vehicle_class} leads from {' over '.join(map(repr, places[:-1]))} to {places[-1]!r}"
+            )
             problems.append(Problem(str(routes.path), f"trip {trip.name}", message, "correct its edges or its type"))
     if problems:
         raise UsageError(sorted(set(problems))[:MOST_PROBLEMS])
@@ -140,7 +142,9 @@ def _run_duarouter(net_file: Path, route_path: Path, queries: Sequence[_Query]) 
         run = _run(options, folder, PATIENCE_S + PATIENCE_S_PER_BYTE * net_file.stat().st_size)
         if run is None or run.returncode or not found.exists():
             said = run.stderr.strip()[-300:] if run else "no answer in time"
-            raise UsageError.of(route_path, "trip", f"SUMO's duarouter failed: {said}", "write the routes into the file")
+            raise UsageError.of(
+                route_path, "trip", f"SUMO's duarouter failed: {said}", "write the routes into the file"
+            )
         edges: list[list[str]] = [[] for _ in queries]
         for vehicle in parse_xml(found).iter("vehicle"):
             route = vehicle.find("route")

@@ -34,7 +34,9 @@ def number_in(
         return None
     number = number_of(value)
     if not above < number <= most:
-        raise UsageError.of(path, f"{where}.{name}", f"{value[:60]!r} is not a number that is possible here", _hint(most))
+        raise UsageError.of(
+            path, f"{where}.{name}", f"{value[:60]!r} is not a number that is possible here", _hint(most)
+        )
     return number
 
 

@@ -26,7 +26,7 @@ from harness.environments.arena import Arena, Seat
 from harness.environments.vector_env import ArenaVecEnv
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution
-from harness.game.observation import OF_OTHERS
+from harness.game.observation_layout import OF_OTHERS
 from harness.game.seeding import seed_of
 from harness.traffic.scene import OpenScene
 from harness.training.callbacks import CurveRecorder, DeviationBound
@@ -137,7 +137,7 @@ def _start_distribution(spec: TrainingSpec, steps: int) -> StartDistribution:
     human_factors[spec.learner], shares[spec.learner] = [own_factors], [1.0]
     if steps < _attentive_steps(spec):
         human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
-    return spec.scene.start_distribution(human_factors, present, shares)
+    return spec.scene.start_distribution(human_factors, present, shares, spec.settings.along_route_share)
 
 
 def _opponent(spec: TrainingSpec) -> Mixture | None:

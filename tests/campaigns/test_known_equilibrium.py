@@ -43,7 +43,7 @@ from harness.evaluation.tables import EPISODE_COLUMNS, typed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
-from harness.game.observation import LAYOUT, SIZE
+from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.state import EGO, ROLES
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.ppo import TrainingSpec, train

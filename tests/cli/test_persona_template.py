@@ -19,7 +19,7 @@ from harness.config.json_schema import schema_of
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
-from harness.game.payoff import FUZZY_QUANTITIES, TERMS
+from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
 from harness.training.ppo import TrainingSpec, train

@@ -18,7 +18,7 @@ from harness.cli.schema_files import write_schemas
 from harness.config.campaign import Training
 from harness.config.json_schema import DIALECT, DOCUMENTS, UNITS, file_of, schema_of, schema_text
 from harness.errors import UsageError
-from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS
+from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS
 from tests.support.repository import REPOSITORY
 
 if sys.version_info >= (3, 11):

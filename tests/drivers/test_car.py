@@ -10,7 +10,8 @@ import pytest
 
 from harness.drivers.car import Car, car_of
 from harness.game.bicycle import requests
-from harness.game.observation import LAYOUT, SIZE, observe
+from harness.game.observation import observe
+from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
 

@@ -22,7 +22,7 @@ from harness.config.toml_reading import tomllib
 from harness.drivers.external import ALLOW_CODE
 from harness.drivers.policy_file import write_policy
 from harness.errors import UsageError
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 from tests.support.external_drivers import document, find, problems
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY

@@ -17,7 +17,7 @@ from harness.drivers.car import Car, car_of
 from harness.drivers.fmu import fmu_driver, wiring
 from harness.environments.rollout import Arm, assess
 from harness.errors import DriverError, UsageError
-from harness.game.observation import LAYOUT, SIZE
+from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.external_drivers import fmu_example

@@ -16,7 +16,7 @@ from safetensors.numpy import save
 from harness.drivers.policy_file import Policy, read_policy, write_policy
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.observation import SIZE
+from harness.game.observation_layout import SIZE
 from tests.support.policies import some_policy
 
 

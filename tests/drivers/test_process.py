@@ -20,7 +20,7 @@ from harness.drivers.car import Car, car_of
 from harness.drivers.process import ProcessDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import DriverError
-from harness.game.observation import LAYOUT, SIZE
+from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.processes import driver, is_running, started

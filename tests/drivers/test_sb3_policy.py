@@ -22,7 +22,7 @@ from harness.drivers.external import find_driver
 from harness.drivers.sb3_policy import Sb3Driver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
-from harness.game.observation import SIZE
+from harness.game.observation_layout import SIZE
 from harness.traffic.scene import OpenScene
 from tests.support.tiny import CAREFUL
 

@@ -16,7 +16,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat, Step
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
-from harness.game.observation import LAYOUT, SIZE
+from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.payoff import Payoff
 from harness.game.state import Outcome
 from harness.traffic.route_file import Departure

@@ -16,7 +16,7 @@ from harness.environments.arena import Arena
 from harness.environments.conformance import check_conformance
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 from harness.traffic.scene import OpenScene
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness

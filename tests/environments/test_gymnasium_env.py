@@ -25,7 +25,7 @@ from harness.config.persona import Persona
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.sumo import SumoDriver
 from harness.game.attention import HumanFactors
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene
 from harness.traffic.subprocess_simulation import SubprocessSimulation

@@ -27,9 +27,11 @@ from harness.game.human_limits import (
     draw_noticed_m,
 )
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.game.observation import LAYOUT, observe
-from harness.game.quantities import Quantities, World
+from harness.game.observation import observe
+from harness.game.observation_layout import LAYOUT
+from harness.game.quantities import Quantities
 from harness.game.state import State
+from harness.game.world import World
 from harness.traffic.scene import OpenScene
 from tests.support.scenes import build_scene, drawn
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.game.attention import Attention, HumanFactors
-from harness.game.initial_state import InitialState, StartDistribution, StartRange, draw_initial_state
+from harness.game.initial_state import InitialState, OnLine, StartDistribution, StartRange, draw_initial_state
 from harness.game.seeding import generator_of, seed_of
 from harness.traffic.scene import OpenScene
 
@@ -93,7 +93,7 @@ def test_start__has_noise_and_lapses_for_every_step(start_distribution: StartDis
 
 
 def place(line: list[tuple[float, float]], scale: float = 1.0) -> StartRange:
-    return StartRange(line=np.array(line), position_m=(0.0, 1.0), beside_ego=False, speed_mps=(0.0, 1.0), scale=scale)
+    return StartRange(line=np.array(line), place=OnLine((0.0, 1.0)), speed_mps=(0.0, 1.0), scale=scale)
 
 
 @pytest.mark.parametrize(

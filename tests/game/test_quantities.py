@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from harness.game.quantities import REACH_M, Quantities, World
-from harness.game.road import MARGIN_M, SPACING_M, Rails, Road, Route, Routes
+from harness.game.quantities import REACH_M, Quantities
+from harness.game.rails import Rails
+from harness.game.road import MARGIN_M, SPACING_M, Road, Route, Routes
 from harness.game.state import Outcome
+from harness.game.world import World
 from harness.traffic.scene import OpenScene
 
 Moment = Callable[..., Quantities]

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.game.arrays import FloatArray
-from harness.game.road import MARGIN_M, SPACING_M, Rails, Route, Routes
+from harness.game.rails import Rails
+from harness.game.road import MARGIN_M, SPACING_M, Route, Routes
 
 
 def route(x: FloatArray, y: FloatArray, heading: FloatArray, length: float, lanes: int = 1) -> Route:

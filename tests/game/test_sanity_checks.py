@@ -31,8 +31,10 @@ from harness.errors import StageFailed, UsageError
 from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
-from harness.game.observation import LAYOUT, observe
-from harness.game.payoff import FUZZY_QUANTITIES, GROUPS, TERMS, Payoff, Weighted
+from harness.game.observation import observe
+from harness.game.observation_layout import LAYOUT
+from harness.game.payoff import Payoff, Weighted
+from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS
 from harness.game.quantities import Quantities
 from harness.game.sanity_checks import ImpossibleNumber, check_observation, check_step, slack_m
 from harness.game.state import EGO, NON_EGO, ROLES, Bodies, Outcome, State

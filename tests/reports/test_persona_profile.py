@@ -15,7 +15,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
 from harness.game.attention import Attention, draw_lapses
-from harness.game.payoff import GROUPS, TERMS
+from harness.game.payoff_terms import GROUPS, TERMS
 from harness.reports.persona.drives import DRIFT_SPEED_MPS, drift_m, free_share, lapsed_share, lapses_per_minute
 from harness.reports.persona.page import render_profile, write_profile
 from harness.reports.persona.plotting import area, axis, curve, stretches, ticks

@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.drivers.policy_file import Policy
 from harness.game.arrays import FloatArray
-from harness.game.observation import SIZE
+from harness.game.observation_layout import SIZE
 
 
 def some_policy(seed: int = 0, hidden: int = 5) -> Policy:

@@ -21,7 +21,8 @@ from sumolib.net.edge import Edge
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.geometry import Box
-from harness.game.road import MARGIN_M, SPACING_M, Rails, Route
+from harness.game.rails import Rails
+from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic import network
 from harness.traffic.route_table import route_table
 from harness.traffic.scene import OpenScene, open_scene

@@ -22,8 +22,8 @@ from harness.drivers.policy_file import write_policy
 from harness.drivers.sumo import SumoDriver
 from harness.environments.vector_env import ArenaVecEnv
 from harness.game.initial_state import StartDistribution
-from harness.game.observation import OF_OTHERS, SIZE
-from harness.game.payoff import TERMS
+from harness.game.observation_layout import OF_OTHERS, SIZE
+from harness.game.payoff_terms import TERMS
 from harness.game.quantities import Quantities
 from harness.game.state import EGO, NON_EGO
 from harness.traffic.scene import OpenScene

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from harness.drivers.car import Car
-from harness.game.observation import LAYOUT
+from harness.game.observation_layout import LAYOUT
 
 SPEED, TURNED, LEFT = (LAYOUT.index(name) for name in ("speed_mps", "path_turned_rad@5m", "path_left_m"))
 

@@ -27,7 +27,7 @@ from harness.config.toml_reading import Document
 from harness.drivers.policy_file import policy_files, read_card
 from harness.errors import UsageError
 from harness.files import write_atomically
-from harness.game.payoff import GROUPS, TERMS
+from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.state import NON_EGO, ROLES
 from harness.reports.numbers import interval, number, percent
 

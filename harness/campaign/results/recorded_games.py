@@ -127,5 +127,5 @@ def scene_drawing(scene: OpenScene) -> SceneDrawing:
         surfaces=drawing.surfaces(net),
         lane_marks=drawing.lane_marks(net),
         rails=scene.rail_lines,
-        goal=drawing.goal_line(scene, net),
+        goal=drawing.goal_lines(scene, net),
     )

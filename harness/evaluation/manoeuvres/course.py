@@ -12,9 +12,10 @@ import pandas as pd
 from harness.evaluation.manoeuvres.thresholds import SAME_WITHIN_S
 from harness.evaluation.trace_quantities import drove_in, quantities_of
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.quantities import Quantities, World
+from harness.game.quantities import Quantities
 from harness.game.route_coordinates import PATH_M
 from harness.game.state import EGO, ROLES, Bodies
+from harness.game.world import World
 
 _HERE = int(np.flatnonzero(PATH_M == 0.0)[0])
 _NEARBY_M = 10.0  # of road, behind and ahead

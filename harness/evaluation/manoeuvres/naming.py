@@ -11,8 +11,8 @@ import pandas as pd
 
 from harness.evaluation.manoeuvres.course import Course
 from harness.evaluation.manoeuvres.rules import RULES, Span
-from harness.game.quantities import World
 from harness.game.state import ROLES
+from harness.game.world import World
 
 NAMES = tuple(RULES)
 

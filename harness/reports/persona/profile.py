@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from harness.config.persona import Persona
-from harness.game.payoff import GROUPS
+from harness.game.payoff_terms import GROUPS
 from harness.reports.persona.drives import (
     DRIFT_SPEED_MPS,
     DRIVE_S,

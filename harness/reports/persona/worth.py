@@ -12,7 +12,8 @@ import numpy as np
 from harness.config.json_schema import unit_of
 from harness.config.persona import Persona
 from harness.game.arrays import FloatArray
-from harness.game.payoff import FUZZY_QUANTITIES, TERMS, Payoff, Weighted
+from harness.game.payoff import Payoff, Weighted
+from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 from harness.game.state import Outcome
 
 EXAMPLES: Mapping[str, tuple[str, str, float]] = {

@@ -1,0 +1,62 @@
+"""Starts anywhere along the players' routes, for training.
+
+A scene's starts are a few seconds from its conflict, and a learner that fails early sees little of the rest of its
+route. With starts along the whole route, every part of it is practised from the first game on.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.road import Routes
+
+_BEFORE_GOAL_M = 10.0
+_APART_M = 6.0  # between the bumpers of two players, in any direction
+_ATTEMPTS = 20
+_OFFSET_SD_M, _TURNED_SD_RAD = 0.2, 0.03  # from the centre of the lane, and from its direction
+
+
+def draw_along_route(
+    routes: Routes, length_m: FloatArray, present: BoolArray, share: float, generator: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """x_m, y_m, heading_rad, speed_mps and station_m [P] of the centres of players of `length_m` [P].
+
+    None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P]. A lane and
+    a station are drawn uniformly, the speed uniformly from 0 to the speed limit.
+    """
+    if generator.random() >= share:
+        return None
+    for _ in range(_ATTEMPTS):
+        starts = np.array([_draw(routes, player, length_m[player], generator) for player in range(len(length_m))]).T
+        if _apart(starts[0], starts[1], length_m, present):
+            x_m, y_m, heading_rad, speed_mps, station_m = starts
+            return x_m, y_m, heading_rad, speed_mps, station_m
+    return None
+
+
+def _draw(
+    routes: Routes, player: int, length_m: float, generator: np.random.Generator
+) -> tuple[float, float, float, float, float]:
+    last_m = max(routes.goal_m[player] - _BEFORE_GOAL_M, 0.5 * length_m)
+    station_m = generator.uniform(0.5 * length_m, last_m)
+    row = int(routes.rows(np.full((1, len(routes.goal_m)), station_m))[0, player])
+    lanes_m = routes.lane_offset_m[row]
+    lanes_m = lanes_m[np.isfinite(lanes_m)]
+    lane_m = float(generator.choice(lanes_m)) if len(lanes_m) else 0.0
+    offset_m = lane_m + generator.normal(0.0, _OFFSET_SD_M)
+    heading_rad = routes.heading_rad[row]
+    x_m = routes.x_m[row] - offset_m * np.sin(heading_rad)
+    y_m = routes.y_m[row] + offset_m * np.cos(heading_rad)
+    turned_rad = generator.normal(0.0, _TURNED_SD_RAD)
+    return x_m, y_m, heading_rad + turned_rad, generator.uniform(0.0, routes.speed_limit_mps[row]), station_m
+
+
+def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: BoolArray) -> bool:
+    """Whether all players that are present are at least `_APART_M` from one another."""
+    for one in range(len(x_m)):
+        for other in range(one):
+            least_m = 0.5 * (length_m[one] + length_m[other]) + _APART_M
+            if present[one] and present[other] and np.hypot(x_m[one] - x_m[other], y_m[one] - y_m[other]) < least_m:
+                return False
+    return True

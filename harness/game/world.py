@@ -1,0 +1,28 @@
+"""The constants of a game."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from harness.game.arrays import FloatArray
+from harness.game.bicycle import Actuators
+from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
+from harness.game.road import Road
+
+
+@dataclass(frozen=True, kw_only=True)
+class World:
+    """The constants of a game: road, right of way, cars, step length, time limit. Sizes are [P]."""
+
+    road: Road
+    actuators: Actuators
+    length_m: FloatArray
+    width_m: FloatArray
+    step_s: float
+    time_limit_s: float
+    right_of_way: RightOfWay = NO_JUNCTIONS
+
+    @property
+    def steps(self) -> int:
+        """Steps until the time limit."""
+        return round(self.time_limit_s / self.step_s)
