@@ -36,6 +36,8 @@ def gaps_table(found: pd.DataFrame) -> str:
     for row in found.sort_values(["persona", "round", "role", "seed"], kind="stable").to_dict("records"):
         player = "ego" if row["role"] == "ego" else row["non_ego"]
         interval = f"{row['gap']:+.2f} ({row['ci_low']:+.2f} to {row['ci_high']:+.2f})"
+        if pd.isna(row["p_holm"]):  # there is no test
+            interval = f"{row['gap']:+.2f}"
         fails = f"{row['ego_failure_rate']:.0%} → {row['ego_failure_rate_best_response']:.0%}"
         cells = (
             f"`{row['ego']}` against `{row['non_ego']}`: {player}",
@@ -43,7 +45,7 @@ def gaps_table(found: pd.DataFrame) -> str:
             f"{row['payoff']:.2f} → {row['payoff_best_response']:.2f}",
             interval,
             f"{row['gap_share']:+.1%}",
-            f"{row['p_holm']:.2g}",
+            "–" if pd.isna(row["p_holm"]) else f"{row['p_holm']:.2g}",
             fails,
         )
         lines.append("| " + " | ".join(map(str, cells)) + " |")

@@ -18,7 +18,7 @@ from harness.cli.workers import Ray, started_on
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from harness.campaign.results.kept_results import RunResult, ShownVerdict
+    from harness.campaign.results.kept_results import RunResult
 
 MACHINE_ERRORS = (
     errno.ENOSPC,
@@ -115,7 +115,7 @@ def campaign(
     except KeyboardInterrupt as interrupt:
         console.print(wording.INTERRUPTED)
         raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
-    _show(outcome.verdicts, folder.path, console)
+    _show(outcome, folder.path, console)
     _exit_if_failed(outcome, console)
 
 
@@ -150,7 +150,7 @@ def report(run: RunPath) -> None:
     folder.manifest()
     with folder.held():
         outcome = write_results(folder, console)
-    _show(outcome.verdicts, run, console)
+    _show(outcome, run, console)
 
 
 @app.command()
@@ -217,9 +217,11 @@ def _handle_termination_signals() -> None:
             signal.signal(getattr(signal, name), terminate)
 
 
-def _show(verdicts: Iterable[ShownVerdict], run: Path, console: Console) -> None:
+def _show(outcome: RunResult, run: Path, console: Console) -> None:
     styles = {"harm": "red", "mended": "green", "open": "yellow"}
-    for verdict in verdicts:
+    for training in outcome.did_not_learn:
+        console.print(wording.did_not_learn(training), style="bold yellow", highlight=False, markup=False)
+    for verdict in outcome.verdicts:
         label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
         console.print(label, style=f"bold {styles[verdict.tone]}", highlight=False, markup=False)
         for sentence in (verdict.sentence, verdict.speed):

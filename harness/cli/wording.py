@@ -69,6 +69,10 @@ def report_written(run: Path) -> str:
     return f"Report: {run / 'report.html'}"
 
 
+def did_not_learn(training: str) -> str:
+    return f"Did not learn: {training}"
+
+
 def failed_stages(names: Sequence[str]) -> str:
     return f"Not finished: {', '.join(names)}"
 

@@ -178,6 +178,16 @@ class Assessment(Document):
     """A difference is called real if its p-value, after Holm's correction, is below this."""
 
 
+class Competence(Document):
+    """What a player has to achieve without the other player before its results count. A question about players of which
+    one achieves less is not answered, and a training that made such a player is reported as `did not learn`."""
+
+    ego_goal_share: float = Field(0.97, ge=0.0, le=1.0)
+    """Least share of its games alone in which an ego reaches its goal. 0: not asked of egos."""
+    non_ego_goal_share: float = Field(0.8, ge=0.0, le=1.0)
+    """Least share of its games alone in which a non-ego reaches its goal. 0: not asked of non-egos."""
+
+
 class Campaign(Document):
     """A campaign: one document, run by one command into one run folder."""
 
@@ -202,6 +212,7 @@ class Campaign(Document):
     rounds: Rounds = Rounds()
     best_response: BestResponse | None = None
     crossplay: CrossPlay | None = None
+    competence: Competence = Competence()
     assessment: Assessment = Assessment()
 
     @field_validator("seeds")

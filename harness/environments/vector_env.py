@@ -29,6 +29,8 @@ class Finished:
     payoff: float
     steps: int
     outcome: Outcome
+    alone: bool = False
+    """Whether no other player took part."""
 
 
 class ArenaVecEnv(VecEnv):
@@ -107,7 +109,15 @@ class ArenaVecEnv(VecEnv):
     def _finish(self, game: int) -> None:
         state = self.arena.state
         outcome = Outcome(int(state.outcome[game, self._learner]))
-        self._finished.append(Finished(payoff=float(self._payoff[game]), steps=int(state.step[game]), outcome=outcome))
+        took_part = state.present[game] | (state.outcome[game] != Outcome.RUNNING)  # a player at its goal has left
+        self._finished.append(
+            Finished(
+                payoff=float(self._payoff[game]),
+                steps=int(state.step[game]),
+                outcome=outcome,
+                alone=int(took_part.sum()) == 1,
+            )
+        )
         self._payoff[game] = 0.0
 
     # --- methods of VecEnv without a meaning for an arena ----------------------------------------------

@@ -17,6 +17,9 @@ one-tailed in the direction of H1 like the t-test (of the pairs in which exactly
 in more than half? Binomial with p = 1/2; 1 when there are no such pairs); and Holm's correction over all
 t-tests of the table, which is that of the whole campaign.
 
+A question whose players were not shown to drive the scene alone (`competence.gate`) is not answered: its rows have
+pairs and a mean difference, which describe the games, and no test. They are not in Holm's family.
+
 `rejects_h0` is the paper's criterion, the uncorrected p-value. The verdict is stricter: see `Verdict`.
 """
 
@@ -31,6 +34,7 @@ import numpy.typing as npt
 import pandas as pd
 from scipy import stats
 
+from harness.evaluation.competence import Gate, gate
 from harness.evaluation.research_questions import Question, ResearchQuestion, Verdict
 
 Floats = npt.NDArray[np.float64]
@@ -52,8 +56,10 @@ COMPARISON_COLUMNS = {
     "mcnemar_p": "float64",
     "rejects_h0": "bool",
     "verdict": "object",
+    "reason": "object",
 }
-"""Columns of `comparisons.csv` in order, each with its pandas dtype."""
+"""Columns of `comparisons.csv` in order, each with its pandas dtype. `reason`: why a question is not answered for
+want of competence; else empty."""
 
 CONFIDENCE = 0.95
 """The confidence of every interval in the tables; it does not depend on the campaign's significance."""
@@ -85,14 +91,20 @@ def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance:
     Games are paired by seed and episode. A pair is left out, and counted in `pairs_left_out`, when either
     game errored, has an empty value, or is missing. A value that can't be computed is NaN. Where all
     differences are equal, or there are fewer than two pairs, there is no test: t, p-values, interval and effect
-    size are NaN, the row is not in Holm's family, and `rejects_h0` is false.
+    size are NaN, the row is not in Holm's family, and `rejects_h0` is false. The same holds for a question whose
+    players miss a bound of `Question.alone`.
 
     Raises ValueError when significance is not in (0, 1), or when an arm has two games for one episode.
     """
     if not 0 < significance < 1:
         raise ValueError(f"significance must be between 0 and 1, not {significance}")
     games = games_by_arm(episodes)
-    rows = [_row(question, metric, games) for question in questions for metric in METRICS]
+    rows = [
+        _row(question, metric, games, closed)
+        for question in questions
+        for closed in [gate(question.alone, question.seed, games)]
+        for metric in METRICS
+    ]
     table = pd.DataFrame(rows, columns=list(COMPARISON_COLUMNS))
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
     table["rejects_h0"] = table["p_value"].astype("float64") < significance
@@ -123,7 +135,9 @@ def mean_interval(values: Floats) -> tuple[float, float]:
     return float(mean - half_width), float(mean + half_width)
 
 
-def _row(question: Question, metric: Metric, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
+def _row(
+    question: Question, metric: Metric, games: Mapping[Any, pd.DataFrame], closed: Gate | None
+) -> dict[str, object]:
     baseline, treatment, left_out = pairs_of(
         games, question.seed, question.baseline, question.treatment, [metric.column]
     )
@@ -136,9 +150,11 @@ def _row(question: Question, metric: Metric, games: Mapping[Any, pd.DataFrame]) 
         "metric": metric.name,
         "pairs": len(low),
         "pairs_left_out": left_out,
+        "verdict": closed.verdict.value if closed is not None else "",
+        "reason": closed.reason if closed is not None else "",
     }
-    row |= paired_t_test(low, high)
-    if metric.name == "failure" and len(low) >= 2:
+    row |= paired_t_test(low, high, closed)
+    if closed is None and metric.name == "failure" and len(low) >= 2:
         row["mcnemar_p"] = _mcnemar(low, high)
     return row
 
@@ -179,14 +195,17 @@ def measured_values(rows: pd.DataFrame | None, columns: Sequence[str]) -> pd.Dat
     )
 
 
-def paired_t_test(low: Floats, high: Floats) -> dict[str, float]:
-    """H1: the mean of `high - low`, [N] each, is > 0. The result has the table's columns that exist for these pairs."""
+def paired_t_test(low: Floats, high: Floats, closed: Gate | None = None) -> dict[str, float]:
+    """H1: the mean of `high - low`, [N] each, is > 0. The result has the table's columns that exist for these pairs.
+
+    Behind a closed gate there is no test: only the mean difference, which describes the games.
+    """
     differences = high - low
     if len(differences) == 0:
         return {}
     largest = float(np.abs([low, high]).max())
     mean = float(differences.mean())
-    if len(differences) < 2 or _all_equal(differences, largest):
+    if closed is not None or len(differences) < 2 or _all_equal(differences, largest):
         return {"mean_difference": 0.0 if abs(mean) <= ROUNDING * largest else mean}
     ci_low, ci_high = mean_interval(differences)
     test = stats.ttest_rel(high, low, alternative="greater")
@@ -213,7 +232,9 @@ def _mcnemar(low: Floats, high: Floats) -> float:
 
 
 def verdict_of(row: Mapping[Any, Any], significance: float) -> Verdict:
-    """The verdict of a row, from its pairs, p-values and mean difference."""
+    """The verdict of a row, from its pairs, p-values and mean difference; the one that it has behind a closed gate."""
+    if row["verdict"]:
+        return Verdict(row["verdict"])
     if row["pairs"] < 2:
         return Verdict.NOT_ENOUGH_PAIRS
     if np.isnan(row["p_value"]):

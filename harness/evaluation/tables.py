@@ -99,8 +99,10 @@ TRAINING_COLUMNS = {
     "failure_rate": "float64",
     "games": "int64",
     "mean_duration_s": "float64",
+    "stopped": "object",
 }
-"""Columns of `training.csv`."""
+"""Columns of `training.csv`. `stopped` is filled in the last row of a training: `converged`, `budget` or
+`did not learn`."""
 
 MANOEUVRE_COLUMNS = {
     "arm": "object",

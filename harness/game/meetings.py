@@ -12,9 +12,14 @@ from harness.game.right_of_way import CELL_M, Conflicts, Signal, Streams
 
 STANDING_MPS = 0.1  # a body that is not faster does not arrive
 _MOST_TURNED = float(np.cos(np.pi / 4.0))  # a body drives in a stream if its heading is within 45 degrees
-
-
-_OFF = int(Signal.OFF)  # a plain integer: compiled code can't convert a member
+_BEGIN_M, _END_M, _STOP_M, _RIGHT_M, _LEFT_M, _FROM_M, _UNTIL_M, _ZONE_M, _LENGTH_M = (
+    Conflicts._fields.index(f"{name}_m")
+    for name in ("begin", "end", "stop", "right", "left", "from", "until", "zone", "length")
+)
+_YIELDS, _FIRST_COME, _OWN_LINK, _OTHER_LINK = (
+    Conflicts._fields.index(name) for name in ("yields", "first_come", "own_link", "other_link")
+)
+_OFF, _GREEN, _RED = int(Signal.OFF), int(Signal.GREEN), int(Signal.RED)
 
 
 class Meetings(NamedTuple):
@@ -29,8 +34,19 @@ class Meetings(NamedTuple):
     other_m: FloatArray
     own_s: FloatArray
     other_s: FloatArray
-    must_yield: BoolArray  # the player, to the body
     gap_s: FloatArray  # time between the two passages; 0 if both would be in the zone at the same time
+    must_yield: BoolArray  # the player, to the body
+
+    @classmethod
+    def none(cls, shape: tuple[int, ...]) -> Meetings:
+        """No conflict with any of the bodies, [G, P, B]."""
+        return cls.of(np.full(shape, -1), np.full((5, *shape), np.inf), np.zeros(shape, dtype=bool))
+
+    @classmethod
+    def of(cls, conflict: IntArray, numbers: FloatArray, must_yield: BoolArray) -> Meetings:
+        """The record of the columns that `meetings` returns."""
+        own_m, other_m, own_s, other_s, gap_s = numbers
+        return cls(conflict, own_m, other_m, own_s, other_s, gap_s, must_yield)
 
 
 @compiled
@@ -42,22 +58,19 @@ def meetings(
     bodies: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
     visible: BoolArray,
     signals: IntArray,
-    conflict_table: tuple[Any, ...],
-    stream_table: tuple[Any, ...],
-) -> tuple[IntArray, FloatArray, FloatArray, FloatArray, FloatArray, BoolArray, FloatArray]:
-    """The columns of `Meetings`.
+    table: tuple[Any, ...],
+) -> tuple[IntArray, FloatArray, BoolArray]:
+    """The columns of `Meetings`: the conflict, the numbers [5, G, P, B] in their order, and the duty to yield.
 
     Players are given by station, lateral offset and speed [G, P] and length [P], bodies by x, y, heading, speed and
     length [G, B], and which body each player regards by `visible` [G, P, B]. `signals` [G, L] are the states of links.
     """
-    conflicts, streams = Conflicts(*conflict_table), Streams(*stream_table)
+    streams = Streams(*table)
+    conflicts = streams.conflicts
     x_m, y_m, heading_rad, body_speed_mps, body_length_m = bodies
     shape = visible.shape
     row, must_yield = np.full(shape, -1), np.zeros(shape, dtype=np.bool_)
-    own_m, other_m, gap_s = np.full(shape, np.inf), np.full(shape, np.inf), np.full(shape, np.inf)
-    own_s, other_s = np.full(shape, np.inf), np.full(shape, np.inf)
-    if len(conflicts.player) == 0:
-        return row, own_m, other_m, own_s, other_s, must_yield, gap_s
+    numbers = np.full((5, *shape), np.inf)
     along_m = np.empty(streams.first_conflict.shape[1])
     in_streams = np.empty(len(along_m), dtype=np.int64)
     for g in range(shape[0]):
@@ -69,24 +82,24 @@ def meetings(
                     continue
                 if count < 0:
                     count = _streams_at(x_m[g, b], y_m[g, b], heading_rad[g, b], streams, in_streams, along_m)
-                found, other = _first_conflict(
-                    p, station_m[g, p] - 0.5 * length_m[p], offset_m[g, p], half_m, in_streams[:count], along_m,
-                    conflicts, streams,
-                )  # fmt: skip
-                if found >= 0:
-                    front_m = station_m[g, p] + 0.5 * length_m[p]
-                    row[g, p, b], other_m[g, p, b] = found, other
-                    own_m[g, p, b] = conflicts.begin_m[found] - front_m
-                    own_end_m = conflicts.end_m[found] - front_m + length_m[p]
-                    other_end_m = other + conflicts.length_m[found] + 2.0 * half_m
-                    own = _passage_s(own_m[g, p, b], own_end_m, speed_mps[g, p])
-                    others = _passage_s(other, other_end_m, body_speed_mps[g, b])
-                    own_s[g, p, b], other_s[g, p, b] = own[0], others[0]
-                    gap_s[g, p, b] = _gap_s(own, others)
-                    must_yield[g, p, b] = _must_yield(
-                        found, front_m, conflicts.zone_m[found] - other, own[0], others[0], signals[g], conflicts
-                    )
-    return row, own_m, other_m, own_s, other_s, must_yield, gap_s
+                rear_m, places = station_m[g, p] - 0.5 * length_m[p], in_streams[:count]
+                found, other_m = _first_conflict(p, rear_m, offset_m[g, p], half_m, places, along_m, streams)
+                if found < 0:
+                    continue
+                front_m = station_m[g, p] + 0.5 * length_m[p]
+                own_m = conflicts[found, _BEGIN_M] - front_m
+                own_end_m = conflicts[found, _END_M] - front_m + length_m[p]
+                other_end_m = other_m + conflicts[found, _LENGTH_M] + 2.0 * half_m
+                own = _passage_s(own_m, own_end_m, speed_mps[g, p])
+                other = _passage_s(other_m, other_end_m, body_speed_mps[g, b])
+                other_along_m = conflicts[found, _ZONE_M] - other_m
+                row[g, p, b] = found
+                for k, number in enumerate((own_m, other_m, own[0], other[0], _gap_s(own, other))):
+                    numbers[k, g, p, b] = number
+                must_yield[g, p, b] = _must_yield(
+                    found, front_m, other_along_m, own[0], other[0], signals[g], conflicts
+                )
+    return row, numbers, must_yield
 
 
 @compiled
@@ -101,18 +114,18 @@ def _streams_at(
     count, nearest2 = 0, np.inf
     cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
     for place in range(streams.first[column, line], streams.first[column, line + 1]):
-        k = streams.samples[place]
-        dx, dy = x_m - streams.x_m[k], y_m - streams.y_m[k]
-        u, v = dx * streams.cos[k] + dy * streams.sin[k], dy * streams.cos[k] - dx * streams.sin[k]
-        if abs(v) > streams.half_width_m[k] or abs(u) > streams.half_spacing_m[k]:
-            continue
-        if streams.cos[k] * cosine + streams.sin[k] * sine < _MOST_TURNED:
+        k = streams.rows[place]
+        sample = streams.samples[k]
+        at_x, at_y, along_x, along_y = sample[0], sample[1], sample[2], sample[3]
+        dx, dy = x_m - at_x, y_m - at_y
+        u, v = dx * along_x + dy * along_y, dy * along_x - dx * along_y
+        if abs(v) > sample[4] or abs(u) > sample[5] or along_x * cosine + along_y * sine < _MOST_TURNED:
             continue
         again = count > 0 and in_streams[count - 1] == streams.stream[k]
         if not again or u * u + v * v < nearest2:
             count += 0 if again else 1
             in_streams[count - 1], nearest2 = streams.stream[k], u * u + v * v
-            along_m[streams.stream[k]] = streams.along_m[k] + u
+            along_m[streams.stream[k]] = sample[6] + u
     return count
 
 
@@ -124,24 +137,24 @@ def _first_conflict(
     half_m: float,
     in_streams: IntArray,
     along_m: FloatArray,
-    conflicts: Conflicts,
     streams: Streams,
 ) -> tuple[int, float]:
     """The player's first conflict with a body in these streams that neither has passed, and the distance of the body's
     front to the zone; -1 without one. `rear_m` is the station of the player's rear, `half_m` half the body's length."""
+    conflicts = streams.conflicts
     found, begin_m, other_m = -1, np.inf, np.inf
     for s in in_streams:
         for c in range(streams.first_conflict[player, s], streams.last_conflict[player, s]):
-            if rear_m > conflicts.end_m[c] or conflicts.begin_m[c] >= begin_m:
+            if rear_m > conflicts[c, _END_M] or conflicts[c, _BEGIN_M] >= begin_m:
                 continue
-            if not conflicts.right_m[c] <= offset_m <= conflicts.left_m[c]:
+            if not conflicts[c, _RIGHT_M] <= offset_m <= conflicts[c, _LEFT_M]:
                 continue
             place = along_m[s]
-            if not conflicts.from_m[c] <= place <= conflicts.until_m[c]:
+            if not conflicts[c, _FROM_M] <= place <= conflicts[c, _UNTIL_M]:
                 continue
-            if place - half_m > conflicts.zone_m[c] + conflicts.length_m[c]:
+            if place - half_m > conflicts[c, _ZONE_M] + conflicts[c, _LENGTH_M]:
                 continue
-            found, begin_m, other_m = c, conflicts.begin_m[c], conflicts.zone_m[c] - place - half_m
+            found, begin_m, other_m = c, conflicts[c, _BEGIN_M], conflicts[c, _ZONE_M] - place - half_m
     return found, other_m
 
 
@@ -169,7 +182,7 @@ def _must_yield(
     own_s: float,
     other_s: float,
     signals: IntArray,
-    conflicts: Conflicts,
+    conflicts: FloatArray,
 ) -> bool:
     """Whether the player must yield in conflict `c`.
 
@@ -177,14 +190,14 @@ def _must_yield(
     none over a stream that is not, and a player on 'G' yields to no stream. Otherwise the signs of the junction decide.
     """
     own, other = _OFF, _OFF
-    if conflicts.own_link[c] >= 0 and front_m <= conflicts.stop_m[c] and len(signals):
-        own = signals[conflicts.own_link[c]]
-    if conflicts.other_link[c] >= 0 and other_along_m <= 0.0 and len(signals):
-        other = signals[conflicts.other_link[c]]
-    if other == Signal.RED or own == Signal.GREEN:
+    if conflicts[c, _OWN_LINK] >= 0 and front_m <= conflicts[c, _STOP_M] and len(signals):
+        own = signals[int(conflicts[c, _OWN_LINK])]
+    if conflicts[c, _OTHER_LINK] >= 0 and other_along_m <= 0.0 and len(signals):
+        other = signals[int(conflicts[c, _OTHER_LINK])]
+    if other == _RED or own == _GREEN:
         return False
-    if own == Signal.RED:
+    if own == _RED:
         return True
-    if conflicts.first_come[c]:
+    if conflicts[c, _FIRST_COME] > 0.0:
         return other_s < own_s
-    return conflicts.yields[c]
+    return conflicts[c, _YIELDS] > 0.0

@@ -101,8 +101,8 @@ TERMS: Mapping[str, Term] = {
     ),
     "speed_over_limit": Term(
         group="safety",
-        meaning="speed over the limit, as a share of it",
-        quantity="speed_over_limit",
+        meaning="speed over the limit, or over what a signal, a sign or priority permits, as a share of the limit",
+        quantity="speed_over_permitted",
         form=Form.OVER,
         per_second=True,
     ),

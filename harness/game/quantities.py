@@ -190,13 +190,14 @@ class Quantities:
     def meetings(self) -> Meetings:
         """Each player's conflict with each body at a junction."""
         state, bodies, tables = self.state, self.bodies, self.world.right_of_way
-        return Meetings(
-            *meetings(
-                *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
-                (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),
-                *(self.visible, state.signals, tuple(tables.conflicts), tuple(tables.streams)),
-            )
+        if not len(tables.conflicts.player):
+            return Meetings.none(self.visible.shape)
+        columns = meetings(
+            *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
+            (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),
+            *(self.visible, state.signals, tuple(tables.streams)),
         )
+        return Meetings.of(*columns)
 
     # --- surfaces ------------------------------------------------------------------------------------------------
 

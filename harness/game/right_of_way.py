@@ -74,39 +74,42 @@ class Conflicts(NamedTuple):
         return cls(*(_column(name, [row[name] for row in ordered]) for name in cls._fields))
 
 
-class Streams(NamedTuple):
-    """Streams, as samples [N] of their centre lines with a grid for look-up, and as an index of their conflicts.
+SAMPLE = ("x_m", "y_m", "cos", "sin", "half_width_m", "half_spacing_m", "along_m")
+"""The columns of a stream's samples: point and direction of its centre line, half its width, half the length of stream
+that the sample stands for, and the place along the stream."""
 
-    The samples of cell (x, y) are the rows `samples[first[x, y]:first[x, y + 1]]`, sorted by stream.
+
+class Streams(NamedTuple):
+    """Streams, as samples [N] of their centre lines with a grid for look-up, and their conflicts, for compiled loops.
+
+    The samples of cell (x, y) are `samples[rows[first[x, y]:first[x, y + 1]]]`, sorted by stream.
     """
 
-    x_m: FloatArray
-    y_m: FloatArray
-    cos: FloatArray
-    sin: FloatArray
-    half_width_m: FloatArray
-    half_spacing_m: FloatArray  # the sample stands for this length of the stream before and after it
-    along_m: FloatArray  # from the stream's stop line
-    stream: IntArray
+    samples: FloatArray  # [N, 7] with the columns of `SAMPLE`
+    stream: IntArray  # [N]
     origin_m: FloatArray  # [2]
     first: IntArray  # [X, Y + 1]
-    samples: IntArray
-    first_conflict: IntArray  # [P, S] rows of `Conflicts` of a player with a stream: from
-    last_conflict: IntArray  # [P, S] and before
+    rows: IntArray
+    first_conflict: IntArray  # [P, S] the player's conflicts with a stream: the first row of `conflicts`
+    last_conflict: IntArray  # [P, S] and the row after the last one
+    conflicts: FloatArray  # [C, 16] the columns of `Conflicts` in one array
 
     @classmethod
     def of(cls, samples: FloatArray, stream: IntArray, conflicts: Conflicts, players: int) -> Streams:
-        """The table of samples [N, 7], the columns x_m to along_m, of streams [N]."""
-        columns = dict(zip(cls._fields, samples.T, strict=False))
+        """The table of samples [N, 7] of streams [N]."""
         count = int(stream.max(initial=-1)) + 1
         keys = conflicts.player * count + conflicts.stream
         wanted = np.arange(players * count).reshape(players, count)
+        origin_m, first, rows = _grid(samples, stream)
         return cls(
-            **columns,
+            samples=np.ascontiguousarray(samples),
             stream=stream,
-            **_grid(columns, stream),
+            origin_m=origin_m,
+            first=first,
+            rows=rows,
             first_conflict=np.searchsorted(keys, wanted, side="left"),
             last_conflict=np.searchsorted(keys, wanted, side="right"),
+            conflicts=np.stack(conflicts, axis=1, dtype=np.float64),
         )
 
 
@@ -133,6 +136,8 @@ class RightOfWay(NamedTuple):
     stop_lines: StopLines
     signal_links: tuple[tuple[str, int], ...]
     """The links of traffic lights that matter, (id, index): the columns of the table of signals."""
+    stream_lanes: tuple[tuple[str, str], ...] = ()
+    """The lanes before and behind the junction of each stream."""
 
 
 def _column(name: str, values: list[Any]) -> Any:
@@ -140,28 +145,26 @@ def _column(name: str, values: list[Any]) -> Any:
     return np.array(values, dtype=_DTYPES.get(name, np.float64))
 
 
-def _grid(columns: dict[str, FloatArray], stream: IntArray) -> dict[str, Any]:
+def _grid(samples: FloatArray, stream: IntArray) -> tuple[FloatArray, IntArray, IntArray]:
     """The grid of samples: each sample is in every cell that touches the box around the length it stands for."""
     if not len(stream):
-        none = np.zeros(0, dtype=np.int64)
-        return {"origin_m": np.zeros(2), "first": np.zeros((1, 2), dtype=np.int64), "samples": none}
-    points = np.stack((columns["x_m"], columns["y_m"]), axis=1)
-    reach_m = np.hypot(columns["half_width_m"], columns["half_spacing_m"])[:, None]
+        return np.zeros(2), np.zeros((1, 2), dtype=np.int64), np.zeros(0, dtype=np.int64)
+    points, reach_m = samples[:, :2], np.hypot(samples[:, 4], samples[:, 5])[:, None]
     origin_m = (points - reach_m).min(0)
     low = ((points - reach_m - origin_m) // CELL_M).astype(np.int64)
     high = ((points + reach_m - origin_m) // CELL_M).astype(np.int64) + 1
     across, up = high.max(0)
     pairs = [
         (x * up + y, row)
-        for row in np.lexsort((columns["along_m"], stream)).tolist()
+        for row in np.lexsort((samples[:, 6], stream)).tolist()
         for x in range(low[row, 0], high[row, 0])
         for y in range(low[row, 1], high[row, 1])
     ]
     cell, sample = np.array(pairs, dtype=np.int64).T
     order = np.argsort(cell, kind="stable")
     bounds = np.searchsorted(cell[order], np.arange(across * up + 1))
-    rows = np.arange(across)[:, None] * up + np.arange(up + 1)
-    return {"origin_m": origin_m, "first": bounds[rows], "samples": sample[order]}
+    first = bounds[np.arange(across)[:, None] * up + np.arange(up + 1)]
+    return origin_m, first, sample[order]
 
 
 _NO_CONFLICTS = Conflicts.of([])

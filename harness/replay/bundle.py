@@ -24,6 +24,7 @@ from harness.replay.floating_car_data import shown_at, write_recording, write_xm
 from harness.replay.gui_settings import WINDOW_PX, Viewport, choose_view, view_settings
 from harness.replay.lanes import Lanes
 from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
+from harness.traffic.xml_file import xml_bytes
 
 _RING_RADIUS_M = 4.0
 
@@ -57,7 +58,7 @@ def write_replay(
     shutil.rmtree(partial, ignore_errors=True)
     partial.mkdir()
     try:
-        shutil.copyfile(net_file, partial / "scene.net.xml")
+        (partial / "scene.net.xml").write_bytes(xml_bytes(net_file))
         write_xml(
             _scenery(types=types, rails=rails, touches=touches, view=view, title=title), partial / "scene.add.xml"
         )

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import defusedxml.ElementTree as SafeXml
 import numpy as np
 import shapely
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.traffic.xml_file import parse_xml
 
 _NOT_FOR_VEHICLES = {"crossing", "walkingarea"}
 
@@ -26,15 +26,15 @@ class Lanes:
 
     @classmethod
     def read(cls, net_file: Path) -> Lanes:
-        root = SafeXml.parse(net_file).getroot()
+        root = parse_xml(net_file)
         ids, shapes, lengths = [], [], []
         for edge in root.iter("edge"):
             if edge.get("function") not in _NOT_FOR_VEHICLES:
                 for lane in edge.iter("lane"):
                     ids.append(str(lane.get("id")))
-                    points = [[float(c) for c in point.split(",")[:2]] for point in lane.get("shape").split()]
+                    points = [[float(c) for c in point.split(",")[:2]] for point in lane.get("shape", "").split()]
                     shapes.append(np.array(points))
-                    lengths.append(float(lane.get("length")))
+                    lengths.append(float(lane.get("length", "nan")))
         row = {name: number for number, name in enumerate(ids)}
         onward = np.arange(len(ids))
         for connection in root.iter("connection"):

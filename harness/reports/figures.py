@@ -81,7 +81,8 @@ class Curve:
     payoffs: Sequence[float]
     failure_rates: Sequence[float]
     stopped_at: float | None
-    stopped_early: bool
+    stopped: str
+    """The reason, as the manifest has it."""
 
 
 def rate_figure(columns: Sequence[Column], name: str, alternative: str) -> Markup:
@@ -140,7 +141,7 @@ def learning_figure(curves: Sequence[Curve], series: str, name: str, alternative
             payoff.legend(frameon=False, fontsize=8)
         elif curves[0].stopped_at is not None:
             payoff.annotate(
-                stopped_at(curves[0].stopped_at, curves[0].stopped_early), (curves[0].stopped_at, 1), (0, 3),
+                stopped_at(curves[0].stopped_at, curves[0].stopped), (curves[0].stopped_at, 1), (0, 3),
                 xycoords=("data", "axes fraction"), textcoords="offset points", ha="right", fontsize=9,
             )  # fmt: skip
         payoff.set_ylabel("mean payoff")

@@ -24,7 +24,7 @@ from harness.reports.game_wording import (
 )
 from harness.reports.heatmaps import MatrixView, views
 from harness.reports.numbers import MISSING, interval, number, p_number, percent
-from harness.reports.wording import Answer, Conclusion, Row
+from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, Row, as_sentence
 
 _CELL_BYTES, _REST_BYTES = 60, 50_000
 
@@ -65,6 +65,8 @@ class NewPersona:
 class GameSection:
     """The contents of the section on the game."""
 
+    cautions: Sequence[tuple[int, str]]
+    """Seed and sentence: which strategies were not shown to drive the scene."""
     verdicts: Sequence[tuple[str, Conclusion]]
     others: Sequence[tuple[str, str, Answer]]
     """Persona, name and answer of each pair that is not of the last round."""
@@ -89,6 +91,7 @@ def game_section(findings: GameFindings | None) -> GameSection | None:
     frames = {name: typed(getattr(findings, name)) for name in CAPTIONS}
     gaps = frames["gaps"]
     return GameSection(
+        cautions=[(seed, as_sentence(reason)) for seed, reason in findings.cautions],
         verdicts=gap_verdicts(gaps),
         others=other_pairs(gaps),
         gaps=[_gap(row) for name in dict.fromkeys(gaps["persona"]) for row in _last(gaps[gaps["persona"] == name])],
@@ -114,7 +117,7 @@ def _gap(row: Row) -> Gap:
         payoff=number(row["payoff"], 2),
         best=number(row["payoff_best_response"], 2),
         gap=gap,
-        share=percent(row["gap_share"]) if not row["gap"] <= 0 else NONE_FOUND,
+        share=NONE_FOUND if row["gap"] <= 0 and not row["reason"] else percent(row["gap_share"]),
         p_holm=p_number(row["p_holm"]),
         failures=_rate(row, "ego_failure_rate"),
         failures_best=_rate(row, "ego_failure_rate_best_response"),
@@ -138,6 +141,7 @@ def _new_personas(generalisation: pd.DataFrame) -> list[NewPersona]:
 def _new_persona(ego: str, trained_against: str, non_ego: str, rows: pd.DataFrame) -> NewPersona:
     """One row of the table; `rows` are the seeds that were played."""
     significant = int((rows["verdict"] == Verdict.SIGNIFICANT.value).sum())
+    answered = int((rows["reason"] == "").sum())
     rate, naive_rate = rows["failure_rate"].mean(), rows["naive_failure_rate"].mean()
     one_seed = rows.iloc[0] if len(rows) == 1 else None
     span = ""
@@ -157,5 +161,5 @@ def _new_persona(ego: str, trained_against: str, non_ego: str, rows: pd.DataFram
         naive_rate=percent(naive_rate),
         share=percent(rate / naive_rate) if naive_rate else MISSING,
         difference=fewer_failures(rows["fewer_failures"].mean(), *ends),
-        significant=f"{significant} of {len(rows)}",
+        significant=f"{significant} of {answered}" if answered else NOT_ANSWERED,
     )

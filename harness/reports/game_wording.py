@@ -14,7 +14,7 @@ import pandas as pd
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, trimmed
-from harness.reports.wording import Answer, Conclusion, Row, Tone, left_out
+from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, Row, Tone, as_sentence, left_out
 
 QUESTION = "Equilibrium"
 NO, NEAR, OPEN = "no", "not refuted", "not decided"
@@ -53,7 +53,8 @@ def gap_verdicts(gaps: pd.DataFrame) -> list[tuple[str, Conclusion]]:
     for persona in dict.fromkeys(gaps["persona"]):
         last = last_pairs(gaps[gaps["persona"] == persona])
         answers = [pair_answer(rows) for rows in last]
-        responders = [row for rows in last for row in rows if row["role"] == "non_ego" and row["pairs"]]
+        shown = [row for rows in last for row in rows if not row["reason"]]
+        responders = [row for row in shown if row["role"] == "non_ego" and row["pairs"]]
         verdicts.append((str(persona), _headline(str(persona), answers, responders)))
     return verdicts
 
@@ -90,6 +91,10 @@ def pair_answer(rows: Sequence[Row]) -> Answer:
     """Whether a pair is an equilibrium as far as was found, and how a best-responding persona affects the ego."""
     by_role = {row["role"]: row for row in rows}
     ego, non_ego = by_role.get("ego"), by_role.get("non_ego")
+    if reason := rows[0]["reason"]:  # the same of both sides
+        return Answer(
+            seed=rows[0]["seed"], yes=False, label=NOT_ANSWERED, tone="open", sentence=as_sentence(reason), speed=""
+        )
     label = _label([GapVerdict(row["verdict"]) for row in rows], both=ego is not None and non_ego is not None)
     sentence = f"{_both_sides(str(rows[0]['persona']), ego, non_ego)}: {MEANINGS[label]}."
     harmful = non_ego is not None and non_ego["failure_difference_low"] > 0
@@ -192,16 +197,17 @@ def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]
         NO: f"the ego or the {persona} driver could still gain by a change of strategy alone (after Holm's correction)",
         NEAR: "no gain that is distinguishable from 0 was found for either side",
         OPEN: "it is not decided",
+        NOT_ANSWERED: "it is not answered",
     }
     counts = {label: sum(answer.label == label for answer in answers) for label in findings}
     sentence = "; ".join(
         f"in {count} of {several} {unit} {findings[label]}" for label, count in counts.items() if count
     )
-    headline = next((label for label in (NO, NEAR) if counts[label]), OPEN)
+    headline = next((label for label in (NO, NEAR, OPEN) if counts[label]), NOT_ANSWERED)
     tone: Tone = "harm" if "harm" in [answer.tone for answer in answers] else "open"
     return Conclusion(
         question=QUESTION,
-        label=OPEN if headline == OPEN else f"{headline} in {counts[headline]} of {several} {unit}",
+        label=headline if headline in (OPEN, NOT_ANSWERED) else f"{headline} in {counts[headline]} of {several} {unit}",
         tone=tone,
         sentence=f"{sentence[0].upper()}{sentence[1:]}.",
         speed=_induced_in_several(persona, responders, unit),

@@ -46,7 +46,7 @@ def _stage(stage: str, place: int, tables: RunTables, rows: pd.DataFrame) -> Lea
                 payoffs=windows["mean_payoff"].tolist(),
                 failure_rates=windows["failure_rate"].tolist(),
                 stopped_at=entry.get("steps"),
-                stopped_early=entry.get("stopped") == "converged",
+                stopped=str(entry.get("stopped") or ""),
             )
         )
         if entry.get("steps") is not None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports import page_wording
 from harness.reports.cards import Card, card
@@ -85,6 +86,11 @@ def _troubles(tables: RunTables) -> dict[str, Any]:
     errored = tables.episodes[unplayed(tables.episodes)]
     return {
         "unfinished": unfinished(tables.stages),
+        "not_learned": [
+            (name, page_wording.stopped(each))
+            for name, each in tables.stages.items()
+            if each.get("stopped") == DID_NOT_LEARN
+        ],
         "mixed": mixed_versions(tables.stages),
         "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
         "errors": len(errored),

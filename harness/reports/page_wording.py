@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,
@@ -187,12 +188,17 @@ def _alternative(columns: Mapping[str, Sequence[str]]) -> str:
 def stopped(stage: Mapping[str, Any]) -> str:
     """Why a training stopped."""
     reason = stage.get("stopped")
-    return {"converged": "early: converged", "budget": "budget used", None: MISSING}.get(reason, str(reason))
+    text = {"converged": "early: converged", "budget": "budget used", None: MISSING}.get(reason, str(reason))
+    if reason == DID_NOT_LEARN and stage.get("played"):
+        asked = f"at least {percent(stage['goal_share_asked'])}"
+        text += f": goal in {stage['goals']} of {stage['played']} games alone, {asked} asked"
+    return text
 
 
-def stopped_at(steps: float, early: bool) -> str:
+def stopped_at(steps: float, reason: str) -> str:
     """Where a learning curve ends."""
-    return f"{'stopped early' if early else 'budget used'}: {steps_text(steps)}"
+    end = {"converged": "stopped early", "budget": "budget used"}.get(reason, reason)
+    return f"{end}: {steps_text(steps)}"
 
 
 def stop(stage: Mapping[str, Any], seed: int, several: bool) -> str:

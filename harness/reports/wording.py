@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from harness.evaluation.research_questions import Verdict
+from harness.evaluation.research_questions import INCOMPETENT, Verdict
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, p_text, trimmed
 from harness.reports.treatment import ARMS, RETRAINED, Change
 
@@ -31,8 +31,10 @@ LABELS = {
     Verdict.NO_DIFFERENCE: "no difference",
     Verdict.ALL_EQUAL: "no t statistic",
     Verdict.NOT_ENOUGH_PAIRS: NOT_ANSWERED,
+    **{verdict: verdict.value for verdict in INCOMPETENT},
 }
 NO_ROUND_2 = "Round 2 was not played: this ego has nothing to train or to tune."
+NO_SEED_ANSWERS = "It is not answered in any training seed."
 NOT_COMPARED = "Not compared."
 FAILURES_NOT_COMPARED = "The failures were not compared."
 BEFORE_HOLM_ONLY = "without correction, but not after Holm's correction"
@@ -51,6 +53,11 @@ class Answer:
     sentence: str
     speed: str
     """The answer of average speed to the same question; empty when there is no such row."""
+
+    @property
+    def answered(self) -> bool:
+        """Whether the question could be asked of the games at all."""
+        return not self.label.startswith(NOT_ANSWERED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,11 +118,17 @@ def _of_seeds(question: str, persona: str, answers: Sequence[Answer], change: Ch
         "RQ2": f"{change.doing} makes the ego fail significantly less often against the {persona} driver",
     }[question]
     label = f"yes in {yes} of {seeds} seeds" if yes else f"not shown in any of {seeds} seeds"
+    sentence = f"In {yes} of {seeds} training seeds {finding} (after Holm's correction)."
+    if unanswered := [answer.label for answer in answers if not answer.answered]:
+        if len(unanswered) == seeds:
+            label, sentence = unanswered[0] if len(set(unanswered)) == 1 else NOT_ANSWERED, NO_SEED_ANSWERS
+        else:
+            sentence += f" In {len(unanswered)} of {seeds} it is not answered."
     return Conclusion(
         question=question,
-        label=NOT_ANSWERED if all(answer.label == NOT_ANSWERED for answer in answers) else label,
+        label=label,
         tone=TONE_OF_YES[question] if yes == seeds or (yes and question == "RQ1") else "open",
-        sentence=f"In {yes} of {seeds} training seeds {finding} (after Holm's correction).",
+        sentence=sentence,
         speed="",
         per_seed=answers,
     )
@@ -139,6 +152,10 @@ def _answer(
         sentence = arms_not_played(unplayed) if unplayed else FAILURES_NOT_COMPARED
         return Answer(seed=seed, yes=False, label=NOT_ANSWERED, tone="open", sentence=sentence, speed="")
     verdict = Verdict(failure["verdict"])
+    if verdict in INCOMPETENT:
+        return Answer(
+            seed=seed, yes=False, label=LABELS[verdict], tone="open", sentence=as_sentence(failure["reason"]), speed=""
+        )
     sentence = _failure_sentence(question, persona, verdict, failure, before, after, change)
     if verdict is Verdict.ALL_EQUAL and significance is not None:
         sentence += _beside_significance(failure["mcnemar_p"], significance)
@@ -163,6 +180,11 @@ def arms_not_played(arms: Sequence[str]) -> str:
     if len(arms) == 1:
         return f"The arm {arms[0]} was not played."
     return f"The arms {' and '.join(arms)} were not played."
+
+
+def as_sentence(reason: str) -> str:
+    """A reason for want of competence as a sentence."""
+    return f"{reason[:1].upper()}{reason[1:]}."
 
 
 def _beside_significance(p: float, significance: float) -> str:

@@ -6,13 +6,14 @@ outline, without the openings where roads enter and leave the scene, is the rail
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 import shapely
 import sumolib
 from shapely.geometry.base import BaseGeometry
+from shapely.ops import substring
 from sumolib.net import Net
 from sumolib.net.connection import Connection
 from sumolib.net.edge import Edge
@@ -22,11 +23,17 @@ from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.rails import Rails
+from harness.traffic import surface
+from harness.traffic.surface import Part
 
-_SEAM_M = 0.05  # gaps up to twice this between lanes and junctions are closed
 _OPENING_M = 0.3  # reach of an opening along the outline
-_SMOOTH_M = 0.01
-_CAR, _SHOULDER = "passenger", "emergency"  # a paved shoulder is a lane for emergency vehicles
+_BEYOND_M = 10.0  # of the lanes before and after a junction that a car follows
+_CAR = "passenger"
+_MOTOR = (  # vehicle classes on roads; a paved shoulder is a lane for emergency vehicles
+    *("passenger", "emergency", "private", "authority", "army", "vip", "hov", "taxi", "bus", "coach", "delivery"),
+    *("truck", "trailer", "motorcycle", "moped", "evehicle"),
+)
+_BACK = -0.9  # cosine of the angle between the directions of two opposite edges
 _TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
 
 
@@ -37,7 +44,10 @@ def read_net(path: Path) -> Net:
     except Exception as error:  # sumolib does not document its errors
         raise UsageError.of(path, "", f"is not a SUMO net: {error!r}", "build it with netconvert or netedit") from error
     if not any(car_lanes(edge) for edge in net.getEdges(withInternal=False)):
-        raise UsageError.of(path, "", "has no lane that cars may use", "build it with netconvert or netedit")
+        lanes = [lane for edge in net.getEdges(withInternal=False) for lane in edge.getLanes()]
+        classes = sorted({each for lane in lanes for each in lane.getPermissions()})
+        message = f"has no lane that cars may use: its lanes are for {', '.join(classes) or 'no vehicle'}"
+        raise UsageError.of(path, "", message, f"allow vehicle class {_CAR!r} on the lanes of the road")
     return net
 
 
@@ -46,9 +56,17 @@ def car_lanes(edge: Edge) -> list[Lane]:
     return [lane for lane in edge.getLanes() if lane.allows(_CAR)]
 
 
-def _paved_lanes(edge: Edge) -> list[Lane]:
-    """The edge's lanes that a car can physically use: hard shoulders count, pavements do not."""
-    return [lane for lane in edge.getLanes() if lane.allows(_CAR) or lane.allows(_SHOULDER)]
+def paved_lanes(edge: Edge) -> list[Lane]:
+    """The edge's lanes that a car can physically use: those of motor vehicles, hard shoulders, and painted bicycle lanes
+    beside them. Pavements and lanes beyond a pavement are none."""
+    lanes = edge.getLanes()
+    paved = {k for k, lane in enumerate(lanes) if any(lane.allows(each) for each in _MOTOR)}
+    for order in (range(len(lanes)), range(len(lanes) - 1, -1, -1)):
+        beside = False
+        for k in order:
+            beside = k in paved or (beside and lanes[k].allows("bicycle") and not lanes[k].allows("pedestrian"))
+            paved |= {k} if beside else set()
+    return [lanes[k] for k in sorted(paved)]
 
 
 def lane_line(lane: Lane) -> FloatArray:
@@ -56,20 +74,105 @@ def lane_line(lane: Lane) -> FloatArray:
     return np.array([point[:2] for point in lane.getShape()], dtype=float)
 
 
-def drivable_area(net: Net) -> BaseGeometry:
-    """The area that cars can drive on, with hard shoulders, in network coordinates."""
+def drivable_area(net: Net, own: Collection[Edge] = ()) -> BaseGeometry:
+    """The area that cars can drive on, with hard shoulders, in network coordinates.
+
+    Where roads lie over one another, the area is flat: it has the level of the edges `own`, and roads of other levels
+    are cut off beside them. Without `own`, and where two of them lie over one another, the levels are one area.
+    """
     outside = _turnarounds_outside(net)
-    parts = [
-        shapely.LineString(lane_line(lane)).buffer(lane.getWidth() / 2.0, cap_style="flat", join_style="mitre")
+    parts = [*_lane_parts(net, set(own), outside), *_junction_parts(net, set(own))]
+    level = surface.own_level(parts)
+    is_cut = any(part is not kept for part, kept in zip(parts, level, strict=True))
+    area = surface.without_slits(surface.joined([part.shape for part in level if not part.shape.is_empty]))
+    paths = [line for edge, line in _followed_lines(net) if not is_cut or edge in own]
+    return surface.with_swept_paths(area, paths)
+
+
+def _lane_parts(net: Net, own: Collection[Edge], outside: Collection[str]) -> Iterator[Part]:
+    """The parts of lanes, and of connections that have no lane inside their junction."""
+    nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
+    for edge in net.getEdges(withInternal=True):
+        is_own = edge in own or (edge.isSpecial() and edge.getFromNode() in nodes)
+        for lane in paved_lanes(edge):
+            line = lane_line(lane)
+            if lane.getID() not in outside and np.ptp(line, axis=0).any():
+                shape = surface.lane_shape(line, lane.getWidth())
+                yield Part(shape=shape, line=np.array(lane.getShape3D(), dtype=float), own=is_own)
+            for link in lane.getOutgoing():
+                if not link.getViaLaneID() and not edge.isSpecial() and _is_for_cars(link):
+                    curve = surface.curve_between(line[-2:], lane_line(link.getToLane())[:2])
+                    if np.ptp(curve, axis=0).any():
+                        width_m = min(lane.getWidth(), link.getToLane().getWidth())
+                        height = np.full((len(curve), 1), lane.getShape3D()[-1][2])
+                        shape = surface.lane_shape(curve, width_m)
+                        yield Part(shape=shape, line=np.hstack((curve, height)), own=is_own)
+
+
+def _junction_parts(net: Net, own: Collection[Edge]) -> Iterator[Part]:
+    """The areas of junctions without the pavements inside them."""
+    nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
+    pavements = [
+        shapely.Polygon(lane_line(edge.getLane(0))).buffer(0)
         for edge in net.getEdges(withInternal=True)
-        for lane in _paved_lanes(edge)
-        if lane.getID() not in outside and np.ptp(lane_line(lane), axis=0).any()
+        if edge.getFunction() == "walkingarea" and len(edge.getLane(0).getShape()) > 2
     ]
+    tree = shapely.STRtree(pavements)
     for node in net.getNodes():
         if len(node.getShape()) > 2:
-            parts.append(shapely.Polygon([point[:2] for point in node.getShape()]).buffer(0))
-    grown = shapely.union_all([part.buffer(_SEAM_M, join_style="mitre") for part in parts])
-    return grown.buffer(-_SEAM_M, join_style="mitre").simplify(_SMOOTH_M)
+            shape = shapely.Polygon([point[:2] for point in node.getShape()]).buffer(0)
+            inside = [pavements[k] for k in tree.query(shape, predicate="intersects")]
+            if inside:
+                shape = shape.difference(shapely.union_all(inside))
+            line = np.array(node.getShape3D(), dtype=float)
+            yield Part(shape=shape, line=line, own=node in nodes)
+
+
+def _followed_lines(net: Net) -> Iterator[tuple[Edge, FloatArray]]:
+    """The lines [n, 2] that cars follow: each lane, and each connection with parts of the lanes before and after it.
+
+    Turnarounds are left out: no car can follow their arcs, which are about as wide as a lane.
+    """
+    for edge in net.getEdges(withInternal=False):
+        for lane in car_lanes(edge):
+            yield edge, lane_line(lane)
+            for link in lane.getOutgoing():
+                if _is_for_cars(link):
+                    before, after = _stretch(net, lane, ahead=False), _stretch(net, link.getToLane(), ahead=True)
+                    yield edge, np.concatenate((before, *connection_lines(net, link), after))
+
+
+def _stretch(net: Net, lane: Lane, *, ahead: bool) -> FloatArray:
+    """[n, 2] line of some metres from the lane's start on, or up to its end, over several lanes if it is short."""
+    lines, length_m = [lane_line(lane)], lane.getLength()
+    while length_m < _BEYOND_M:
+        links = [link for link in (lane.getOutgoing() if ahead else _incoming(lane)) if _is_for_cars(link)]
+        if not links:
+            break
+        lane = links[0].getToLane() if ahead else links[0].getFromLane()
+        more = connection_lines(net, links[0])
+        lines = [*lines, *more, lane_line(lane)] if ahead else [lane_line(lane), *more, *lines]
+        length_m += max(lane.getLength(), 1.0)
+    line = shapely.LineString(np.concatenate(lines))
+    reach_m = min(_BEYOND_M, line.length)
+    part = substring(line, 0.0, reach_m) if ahead else substring(line, line.length - reach_m, line.length)
+    return shapely.get_coordinates(part)
+
+
+def _incoming(lane: Lane) -> list[Connection]:
+    """The connections from other edges to a lane."""
+    incoming = lane.getEdge().getIncoming().items()
+    return [link for edge, links in incoming if not edge.isSpecial() for link in links if link.getToLane() is lane]
+
+
+def connection_lines(net: Net, link: Connection) -> list[FloatArray]:
+    """The lines [n, 2] of a connection inside its junction. A curve replaces the lane that a net may not have there."""
+    lines, via = [], link.getViaLaneID()
+    while via:
+        inner = net.getLane(via)
+        lines.append(lane_line(inner))
+        via = next((each.getViaLaneID() for each in inner.getOutgoing() if each.getViaLaneID()), "")
+    return lines or [surface.curve_between(lane_line(link.getFromLane())[-2:], lane_line(link.getToLane())[:2])]
 
 
 def rail_lines(net: Net, area: BaseGeometry) -> list[FloatArray]:
@@ -79,7 +182,7 @@ def rail_lines(net: Net, area: BaseGeometry) -> list[FloatArray]:
         for edge in net.getEdges(withInternal=False)
         for at_end in (False, True)
         if _is_fringe(edge, at_end)
-        for lane in _paved_lanes(edge)
+        for lane in paved_lanes(edge)
     ]
     outline = area.boundary
     rails = shapely.difference(outline, shapely.union_all(openings)) if openings else outline
@@ -117,10 +220,14 @@ def _is_fringe(edge: Edge, at_end: bool) -> bool:
 
 
 def _is_opposite(edge: Edge, other: Edge) -> bool:
-    """Whether the other edge leads from the edge's end back to its start, through turnarounds only."""
-    if other.getToNode() is not edge.getFromNode():
+    """Whether the other edge leads back from the edge's end, and is connected to it through turnarounds only."""
+    if any(link.getDirection() not in _TURNAROUNDS for link in edge.getConnections(other)):
         return False
-    return all(link.getDirection() in _TURNAROUNDS for link in edge.getConnections(other))
+    if other.getToNode() is edge.getFromNode():
+        return True
+    arriving, leaving = lane_line(edge.getLane(0)), lane_line(other.getLane(0))
+    into, out = arriving[-1] - arriving[-2], leaving[1] - leaving[0]
+    return float(into @ out) < _BACK * float(np.hypot(*into) * np.hypot(*out))
 
 
 def _turnarounds_outside(net: Net) -> set[str]:
@@ -141,3 +248,9 @@ def _cross_section(lane: Lane, at_end: bool) -> FloatArray:
     along = (end - inner) / max(float(np.linalg.norm(end - inner)), 1e-9)
     across = 0.5 * lane.getWidth() * np.array([-along[1], along[0]])
     return np.stack((end - across, end + across))
+
+
+def _is_for_cars(link: Connection) -> bool:
+    """Whether cars may use a connection that is no turnaround."""
+    lanes = (link.getFromLane(), link.getToLane())
+    return link.getDirection() not in _TURNAROUNDS and all(lane.allows(_CAR) for lane in lanes)

@@ -72,6 +72,7 @@ class _Builder:
             streams=Streams.of(*samples, conflicts, players=len(junctions)),
             stop_lines=StopLines.of(lines),
             signal_links=tuple(self._columns),
+            stream_lanes=tuple((link.getFromLane().getID(), link.getToLane().getID()) for link in self._numbers),
         )
 
     def _stream(self, link: Connection) -> Stream:

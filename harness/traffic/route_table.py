@@ -21,9 +21,11 @@ from harness.game.arrays import FloatArray
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic.network import car_lanes, lane_line
 from harness.traffic.oncoming_lanes import own_side
+from harness.traffic.surface import curve_between
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
+_FEW_POINTS, _AT_ONCE = 400, 100  # of an area that is cut as a whole; stations otherwise
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -185,21 +187,7 @@ def _over_junction(net: Net, link: Connection) -> tuple[FloatArray, float]:
         via = next((each.getViaLaneID() for each in links if each.getViaLaneID()), "")
     if inner:
         return _join([lane_line(lane) for lane in inner])[0], inner[0].getSpeed()
-    return _curve(before[-2:], after[:2]), link.getToLane().getSpeed()
-
-
-def _curve(before: FloatArray, after: FloatArray) -> FloatArray:
-    """[9, 2] cubic Bezier curve that continues one segment [2, 2] and joins another one."""
-    start, end = before[1], after[0]
-    reach = 0.4 * float(np.linalg.norm(end - start))
-    out = start + reach * _unit(before[1] - before[0])
-    into = end - reach * _unit(after[1] - after[0])
-    t = np.linspace(0.0, 1.0, 9)[:, None]
-    return (1 - t) ** 3 * start + 3 * (1 - t) ** 2 * t * out + 3 * (1 - t) * t**2 * into + t**3 * end
-
-
-def _unit(vector: FloatArray) -> FloatArray:
-    return vector / max(float(np.linalg.norm(vector)), 1e-9)
+    return curve_between(before[-2:], after[:2]), link.getToLane().getSpeed()
 
 
 def _length(line: FloatArray) -> float:
@@ -247,7 +235,7 @@ def _lane_ends(edges: Sequence[Edge], end_of_edge_m: Sequence[float]) -> list[di
 
 def _offsets(points: FloatArray, headings: FloatArray, lane_points: FloatArray) -> FloatArray:
     """[N] lateral offsets of a line [n, 2] from points [N, 2] with headings [N], left positive."""
-    line = shapely.LineString(lane_points)
+    line = shapely.LineString(lane_points if len(lane_points) > 1 else np.repeat(lane_points, 2, axis=0))
     nearest = shapely.line_interpolate_point(line, shapely.line_locate_point(line, shapely.points(points)))
     dx, dy = (shapely.get_coordinates(nearest) - points).T
     return dy * np.cos(headings) - dx * np.sin(headings)
@@ -255,6 +243,18 @@ def _offsets(points: FloatArray, headings: FloatArray, lane_points: FloatArray) 
 
 def _road_edges(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
     """[N] lateral offsets of the drivable area's left (positive) and right (negative) edges from each point."""
+    if shapely.get_num_coordinates(area) <= _FEW_POINTS:
+        return _edges_of(area, points, headings)
+    sides = []
+    for first in range(0, len(points), _AT_ONCE):  # a ray is slow to cut with a large area
+        rows = slice(first, first + _AT_ONCE)
+        low, high = points[rows].min(0) - _FAR_SIDE_M - 1.0, points[rows].max(0) + _FAR_SIDE_M + 1.0
+        sides.append(_edges_of(shapely.intersection(area, shapely.box(*low, *high)), points[rows], headings[rows]))
+    left, right = zip(*sides, strict=True)
+    return np.concatenate(left), np.concatenate(right)
+
+
+def _edges_of(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
     shapely.prepare(area)
     left = np.stack((-np.sin(headings), np.cos(headings)), axis=1)
     sides = []

@@ -73,7 +73,7 @@ class Piece(NamedTuple):
     @classmethod
     def ending_at(cls, along_m: float, line: FloatArray, width_m: float) -> Piece:
         """A part by its end."""
-        return cls(along_m - shapely.LineString(line).length, line, width_m)
+        return cls(along_m - _joined([line]).length, line, width_m)
 
 
 class Stream:
@@ -115,7 +115,7 @@ class Stream:
 
 
 def _joined(lines: Sequence[FloatArray]) -> shapely.LineString:
-    """The line through all points, each once."""
+    """The line through all points, each once. Lanes inside a junction may be a single point: their length is 0."""
     points = np.concatenate(lines)
     apart = np.hypot(*np.diff(points, axis=0).T) > 0.0
     return shapely.LineString(points[np.concatenate(([True], apart))] if apart.any() else points[[0, 0]])
@@ -123,7 +123,7 @@ def _joined(lines: Sequence[FloatArray]) -> shapely.LineString:
 
 def _samples(piece: Piece) -> FloatArray:
     """[N, 7] samples of the last `_BACK_M` before the stop line and of everything behind it."""
-    line = shapely.LineString(piece.line)
+    line = _joined([piece.line])
     skipped_m = max(-_BACK_M - piece.begin_m, 0.0)
     length_m = line.length - skipped_m
     if length_m <= 0.0:

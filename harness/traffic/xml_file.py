@@ -1,9 +1,13 @@
-"""Reading SUMO's XML files: UTF-8, without entities, document types and schemas other than SUMO's."""
+"""Reading SUMO's XML files: UTF-8, without entities, document types and schemas other than SUMO's.
+
+A file whose name ends with `.gz` is compressed with gzip.
+"""
 
 from __future__ import annotations
 
 import math
 import re
+import zlib
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,7 +21,8 @@ from harness.files import content_of
 _MOST_BYTES = 200_000_000
 _REMEDY = "open it in netedit and save it again"
 _ENCODING = re.compile(r"""^<\?xml[^>]*?encoding\s*=\s*["']([^"']*)["']""")
-_SCHEMA = re.compile(r"https?://((www\.)?sumo-sim\.org|sumo\.dlr\.de)/xsd/\w+\.xsd")
+_SCHEMA = re.compile(r"https?://((www\.)?sumo-sim\.org|sumo\.dlr\.de|sumo\.(sf|sourceforge)\.net)/xsd/\w+\.xsd")
+_GZIP = 16 + zlib.MAX_WBITS  # zlib's code for gzip's header
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 _XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
 
@@ -25,9 +30,9 @@ _XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
 def parse_xml(path: Path) -> ElementTree.Element:
     """The root of an XML file. Raises UsageError if the file is missing, malformed or has entities."""
     try:
-        content = content_of(path, _MOST_BYTES)
+        content = xml_bytes(path)
     except FileNotFoundError:
-        siblings = [each.name for each in path.parent.glob("*.xml")] or ["(no XML file in the folder)"]
+        siblings = [each.name for each in path.parent.glob("*.xml*")] or ["(no XML file in the folder)"]
         raise UsageError.of(path, "", "there is no such file", nearest(path.name, siblings)) from None
     except OSError as error:
         raise UsageError.of(path, "", f"is not readable XML: {error.strerror}", _REMEDY) from None
@@ -47,6 +52,31 @@ def parse_xml(path: Path) -> ElementTree.Element:
         raise UsageError.of(path, "", f"is not readable XML: {error}", _REMEDY) from None
     _check_schema_names(path, root)
     return root
+
+
+def xml_bytes(path: Path) -> bytes:
+    """The content of a file, unpacked if its name ends with `.gz`: sumolib goes by the name, too.
+
+    Raises OSError for anything but a plain file of limited size, UsageError for one that is not valid gzip.
+    """
+    content = content_of(path, _MOST_BYTES)
+    if path.suffix != ".gz":
+        return content
+    parts: list[bytes] = []
+    while content:  # SUMO writes files of several gzip members
+        unpacking = zlib.decompressobj(_GZIP)
+        room = _MOST_BYTES - sum(map(len, parts))
+        try:
+            parts.append(unpacking.decompress(content, room + 1))
+        except zlib.error as error:
+            raise UsageError.of(path, "", f"is not a gzip file: {error}", "compress it again, or remove .gz") from None
+        if len(parts[-1]) > room:
+            message = f"holds more than {_MOST_BYTES / 1e6:,.0f} MB"
+            raise UsageError.of(path, "", message, "cut out the part that the scene needs")
+        if not unpacking.eof:
+            raise UsageError.of(path, "", "is cut off: its gzip data has no end", "compress it again")
+        content = unpacking.unused_data
+    return b"".join(parts)
 
 
 def _check_schema_names(path: Path, root: ElementTree.Element) -> None:

@@ -46,6 +46,10 @@ class Progress:
     segment_payoffs: list[float]
     """Mean payoff of each segment; -inf if no game ended in it."""
     curve: list[CurvePoint]
+    alone_games: list[int]
+    """Games of each segment without another player."""
+    alone_failures: list[int]
+    """Those of them that did not end at the goal."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,17 +121,24 @@ def _progress(text: str) -> Progress:
     stored = json.loads(text)
     curve = [CurvePoint(**window) for window in stored["curve"]]
     progress = Progress(
-        segments=stored["segments"], steps=stored["steps"], segment_payoffs=stored["segment_payoffs"], curve=curve
+        segments=stored["segments"],
+        steps=stored["steps"],
+        segment_payoffs=stored["segment_payoffs"],
+        curve=curve,
+        alone_games=stored["alone_games"],
+        alone_failures=stored["alone_failures"],
     )
     counts = [progress.segments, progress.steps, *(count for each in curve for count in (each.steps, each.games))]
+    counts += [*progress.alone_games, *progress.alone_failures]
     numbers = [
         *progress.segment_payoffs,
         *(number for each in curve for number in (each.mean_payoff, each.failure_rate, each.mean_duration_s)),
     ]
     if not all(type(each) is int and each >= 0 for each in counts) or not all(type(each) is float for each in numbers):
         raise ValueError("a count or a number of the progress has another type")
-    if not isinstance(progress.segment_payoffs, list) or len(progress.segment_payoffs) != progress.segments:
-        raise ValueError("the progress does not have a list with a mean payoff for each segment")
+    for series in (progress.segment_payoffs, progress.alone_games, progress.alone_failures):
+        if not isinstance(series, list) or len(series) != progress.segments:
+            raise ValueError("the progress does not have a list with an entry for each segment")
     return progress
 
 

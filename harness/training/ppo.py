@@ -28,11 +28,12 @@ from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution
 from harness.game.observation_layout import OF_OTHERS
 from harness.game.seeding import seed_of
+from harness.game.state import Outcome
 from harness.traffic.scene import OpenScene
 from harness.training.callbacks import CurveRecorder, DeviationBound
 from harness.training.checkpoint import Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
-from harness.training.early_stopping import has_converged
+from harness.training.early_stopping import has_converged, still_fails
 
 _GAE_LAMBDA = 0.95
 _ALGORITHMS: dict[str, type[PPO]] = {"compiled": CompiledPPO, "stable_baselines3": PPO}
@@ -91,7 +92,7 @@ def train(
     environment = _environment(spec)
     try:
         model = _learner(spec, environment, tensorboard)
-        new = Progress(segments=0, steps=0, segment_payoffs=[], curve=[])
+        new = Progress(segments=0, steps=0, segment_payoffs=[], curve=[], alone_games=[], alone_failures=[])
         progress = read_checkpoint(model, key, checkpoint) or new
         while (stopped := _stop_reason(spec, progress)) is None:
             on_start(progress.segments)
@@ -107,7 +108,8 @@ def _stop_reason(spec: TrainingSpec, progress: Progress) -> str | None:
     training's checkpoint stops as well."""
     settings = spec.settings
     attentive = ceil(_attentive_steps(spec) / settings.segment_steps)
-    if settings.early_convergence and has_converged(progress.segment_payoffs[attentive:]):
+    fails = still_fails(progress.alone_games, progress.alone_failures)
+    if settings.early_convergence and not fails and has_converged(progress.segment_payoffs[attentive:]):
         return "converged"
     return "budget" if progress.steps >= settings.steps else None
 
@@ -226,10 +228,13 @@ def _segment(
         if not torch.isfinite(value).all():
             raise FloatingPointError(f"parameter {name} is not finite after {model.num_timesteps} steps")
     payoffs = [game.payoff for game in curve.games]
+    alone = [game.outcome is not Outcome.GOAL for game in curve.games if game.alone]
     mean = float(np.mean(payoffs)) if payoffs else float("-inf")
     return Progress(
         segments=progress.segments + 1,
         steps=model.num_timesteps,
         segment_payoffs=[*progress.segment_payoffs, mean],
         curve=curve.windows,
+        alone_games=[*progress.alone_games, len(alone)],
+        alone_failures=[*progress.alone_failures, sum(alone)],
     )

@@ -182,7 +182,7 @@ def test_write_csv__truth_values_are_true_and_false(tmp_path):
     write_csv(
         compare([Question(question="RQ1", persona="x", seed=1, baseline="a", treatment="b")], episodes, 0.01), path
     )
-    assert path.read_text().splitlines()[1] == "RQ1,x,1,failure,2,0,0.0,,,,,,,1.0,false,no difference"
+    assert path.read_text().splitlines()[1] == "RQ1,x,1,failure,2,0,0.0,,,,,,,1.0,false,no difference,"
 
 
 def test_write_csv__puts_columns_in_the_order_of_the_table(tmp_path):

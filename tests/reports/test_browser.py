@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.support.chromium import launched, opener
+from tests.support.incompetent import cannot_drive
 from tests.support.pages import CONTRAST, campaign, recordings, rendered, with_errors
 
 
@@ -68,6 +69,20 @@ def test_report__long_names_and_messages_do_not_widen_it(opened, tmp_path):
     arguments["manifest"]["stages"]["naive-seed1"] |= {"status": "failed", "message": "x" * 300}
     page = opened(write(tmp_path, arguments), width=400)
     assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
+@pytest.mark.parametrize("width", [400, 1280])
+def test_report__a_person_that_cannot_drive_is_on_the_first_screen(width, opened, tmp_path):
+    page = opened(write(tmp_path, cannot_drive(campaign(personas=["speedy"]))), width=width)
+    banner = page.locator("#not_learned")
+    assert banner.is_visible()
+    assert banner.bounding_box()["y"] < 900
+    assert banner.evaluate(CONTRAST) >= 4.5
+    assert page.get_by_text("RQ1: not answered: the person can't drive this scene").is_visible()
+    banner.get_by_role("link", name="learning curves").click()
+    assert page.evaluate("location.hash") == "#learning"
+    assert page.get_by_text("did not learn: goal in 0 of 60 games alone").last.is_visible()
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

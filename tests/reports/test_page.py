@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from harness.evaluation.research_questions import Verdict
+from harness.evaluation.research_questions import INCOMPETENT, Verdict
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import write_csv
 from harness.replay.selection import choose_games, replay_name, worst_first
@@ -17,6 +17,7 @@ from harness.reports.wording import (
     BEFORE_HOLM_ONLY,
     NO_DIFFERENCE,
     NO_ROUND_2,
+    NO_SEED_ANSWERS,
     NO_T_STATISTIC,
     arms_not_played,
     effect,
@@ -24,7 +25,16 @@ from harness.reports.wording import (
     too_few,
     verdicts,
 )
-from tests.support.pages import Page, blank_figures, campaign, recomputed, recordings, rendered, with_errors
+from tests.support.pages import (
+    Page,
+    blank_figures,
+    campaign,
+    cannot_drive,
+    recomputed,
+    recordings,
+    rendered,
+    with_errors,
+)
 
 
 @pytest.fixture(scope="module")
@@ -224,7 +234,7 @@ def test_words__failures_alone_are_stated(page):
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_words__only_significant_is_a_yes(verdict, question, small):
     row = {"question": question, "seed": 1, "verdict": verdict.value, "pairs": 60, "pairs_left_out": 0}
-    row |= {"p_value": 0.004, "p_holm": 0.02, "mcnemar_p": 0.004}
+    row |= {"p_value": 0.004, "p_holm": 0.02, "mcnemar_p": 0.004, "reason": "the speedy driver can't drive this scene"}
     rows = [row | {"metric": metric} for metric in ("failure", "mean_speed")]
     arms = {(arm["arm"], arm["seed"]): arm for arm in small["summary"].to_dict("records")}
     answer = verdicts(question, "speedy", seeds=[1], rows=rows, arms=arms, significance=0.01)
@@ -232,6 +242,10 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
     assert (answer.label == "yes") == yes
     assert (answer.tone != "open") == yes
     assert answer.sentence.endswith(".")
+    if verdict in INCOMPETENT:  # no number of the games is an answer
+        assert (answer.label, answer.tone, answer.speed) == (verdict.value, "open", "")
+        assert answer.sentence == "The speedy driver can't drive this scene."
+        return
     assert answer.speed.endswith(".")
     for text in (answer.sentence, answer.speed):
         if verdict in (Verdict.NO_DIFFERENCE, Verdict.ALL_EQUAL, Verdict.NOT_ENOUGH_PAIRS):
@@ -251,6 +265,38 @@ def test_words__one_seed_of_several_is_enough_for_harm_but_not_for_mended():
         answer = verdicts(question, "speedy", seeds=[1, 2], rows=rows, arms=arms, significance=0.01)
         assert answer.label == "yes in 1 of 2 seeds"
         assert answer.tone == tone
+
+
+def test_words__a_person_that_cannot_drive_leaves_both_questions_unanswered():
+    arguments = cannot_drive(campaign(personas=["speedy"]), [1])
+    for label, sentence in verdict_texts(arguments):
+        assert label.endswith(": not answered: the person can't drive this scene")
+        assert sentence == (
+            "The speedy driver can't drive this scene: alone it reaches its goal in 0 of 60 games (0 %), below 80 %."
+        )
+    text = text_of(arguments).replace("\N{NO-BREAK SPACE}", " ")
+    assert "1 training did not learn to drive this scene." in text
+    stopped = "did not learn: goal in 0 of 60 games alone, at least 80 % asked"
+    assert f"speedy-seed1: {stopped}" in text
+    (stage,) = [row for row in Page(without_curves(arguments)).tables["stages"] if row[0]["text"] == "speedy-seed1"]
+    assert stopped in [cell["text"].replace("\N{NO-BREAK SPACE}", " ") for cell in stage]
+    assert not any("significantly" in sentence for _, sentence in verdict_texts(arguments))
+
+
+def test_words__seeds_that_are_not_answered_are_counted():
+    arguments = cannot_drive(campaign(personas=["speedy"], seeds=(1, 2)), [2])
+    rq1, _ = verdict_texts(arguments)
+    assert rq1[0] == "RQ1: yes in 1 of 2 seeds"
+    assert rq1[1].endswith("In 1 of 2 it is not answered.")
+    assert "Seed 2: not answered: the person can't drive this scene. The speedy driver can't drive" in text_of(
+        arguments
+    )
+
+
+def test_words__a_question_without_an_answer_in_any_seed_has_no_count():
+    rq1, rq2 = verdict_texts(cannot_drive(campaign(personas=["speedy"], seeds=(1, 2)), [1, 2]))
+    assert rq1 == ("RQ1: not answered: the person can't drive this scene", NO_SEED_ANSWERS)
+    assert rq2[0].startswith("RQ2: not answered")
 
 
 def test_p_values__are_never_rounded_to_0_or_1():

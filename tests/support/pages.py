@@ -13,6 +13,8 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
+from harness.campaign.plan.competence import alone_bounds
+from harness.config.campaign import Campaign
 from harness.evaluation.comparison import compare
 from harness.evaluation.research_questions import Question, ResearchQuestion
 from harness.evaluation.strategies import (
@@ -34,6 +36,7 @@ from harness.reports.page import render_page
 from harness.reports.player_data import RecordedGame, SceneDrawing
 from harness.reports.run_tables import RunTables
 from tests.support.recorded import SCENE, manoeuvres, recorded
+from tests.support.tiny import UNGATED
 
 GAMES = 60
 FAILING = {"alone": 0.0, "sumo": 0.03, "naive": 0.3, "retrained": 0.03}
@@ -171,6 +174,7 @@ def _windows(stage: str, seed: int, random: np.random.Generator) -> Iterator[dic
             "failure_rate": min(1, math.exp(-window / 2) + abs(random.normal(0, 0.01))),
             "games": 900,
             "mean_duration_s": 11.5,
+            "stopped": "converged" if window == 9 else "",
         }
 
 
@@ -271,8 +275,9 @@ CONTRAST = """element => {
 """WCAG's contrast ratio of an element's text with the first ground behind it that is not transparent."""
 
 
-def recomputed(arguments: dict[str, Any]) -> dict[str, Any]:
-    """The campaign with tables that fit its changed episodes."""
+def recomputed(arguments: dict[str, Any], competence: Mapping[str, float] = UNGATED) -> dict[str, Any]:
+    """The campaign with tables that fit its changed episodes; `competence` is its table of that name."""
+    asked = Campaign.model_validate({"name": "a", "scene": "b", "personas": ["x.toml"], "competence": competence})
     old = arguments["comparisons"]
     questions = [
         Question(
@@ -281,6 +286,7 @@ def recomputed(arguments: dict[str, Any]) -> dict[str, Any]:
             seed=row["seed"],
             baseline="naive_alone" if row["question"] == "RQ1" else f"naive_vs_{row['persona']}",
             treatment=f"{'naive' if row['question'] == 'RQ1' else 'retrained'}_vs_{row['persona']}",
+            alone=alone_bounds(asked, against_persona(NaiveEgo(), row["persona"])),
         )
         for row in old[old["metric"] == "failure"].to_dict("records")
     ]

@@ -34,6 +34,8 @@ TRAINING: dict[str, Any] = {
     "epochs": 2,
     "network": [8],
 }
+UNGATED: dict[str, Any] = {"ego_goal_share": 0.0, "non_ego_goal_share": 0.0}
+"""Bounds that every player meets: tiny trainings learn nothing, and most tests are about what comes after them."""
 PERSONA = """\
 name = "{name}"
 description = "Somebody who wants to get there."
@@ -69,6 +71,7 @@ def write_campaign(folder: Path, **changes: Any) -> Path:
         "ego": {"persona": str(CAREFUL)},
         "training": TRAINING,
         "assessment": {"episodes": 4},
+        "competence": UNGATED,
     }
     document |= changes
     folder.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,15 @@ import math
 import numpy as np
 import pytest
 
-from harness.training.early_stopping import LATEST, LEAST, RULE, TOLERANCE, has_converged
+from harness.training.early_stopping import (
+    LATEST,
+    LEAST,
+    MOST_FAILURES,
+    RULE,
+    TOLERANCE,
+    has_converged,
+    still_fails,
+)
 
 
 def test_has_converged__a_flat_curve_has() -> None:
@@ -63,3 +71,33 @@ def test_has_converged__segments_without_a_finished_game_do_not_count() -> None:
 def test_rule__names_windows_and_tolerance() -> None:
     assert f"latest {LATEST} segments" in RULE
     assert "1%" in RULE
+
+
+# --- a flat curve of a player that can't drive ------------------------------------------------------------------------
+
+
+def test_still_fails__a_player_that_fails_in_nearly_all_games_has_not_converged() -> None:
+    """A roundabout's ego that failed in every game had a flat curve, and counted as converged."""
+    assert still_fails([100] * LEAST, [100] * LEAST)
+    assert not still_fails([100] * LEAST, [6] * LEAST)
+
+
+def test_still_fails__by_the_share_of_the_latest_segments() -> None:
+    games = [1, 1, 1, *[10] * LATEST]
+    at_the_bound = round(MOST_FAILURES * 10)
+    assert not still_fails(games, [1, 1, 1, *[at_the_bound] * LATEST])
+    assert still_fails(games, [0, 0, 0, *[at_the_bound] * (LATEST - 1), at_the_bound + 1])
+
+
+def test_still_fails__segments_count_by_their_games() -> None:
+    assert not still_fails([2, 100], [2, 10])
+
+
+def test_still_fails__without_games_alone_nothing_can_be_said() -> None:
+    assert not still_fails([], [])
+    assert not still_fails([0] * LEAST, [0] * LEAST)
+    assert not still_fails([5, *[0] * LATEST], [5, *[0] * LATEST])
+
+
+def test_rule__names_the_bound() -> None:
+    assert f"more than {MOST_FAILURES:.0%} of the games without another player fail" in RULE

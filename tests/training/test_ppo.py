@@ -105,6 +105,7 @@ def test_train__a_continued_converged_training_stays_converged(
     alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(harness.training.ppo, "has_converged", lambda payoffs: len(payoffs) >= 2)
+    monkeypatch.setattr(harness.training.ppo, "still_fails", lambda games, failures: False)
     converged = in_one_go(alone, tmp_path)
     assert (converged.stopped, converged.progress.steps) == ("converged", 2048)
     assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), converged, tmp_path)
@@ -203,7 +204,9 @@ def test_train__starts_from_the_initial_policy(
     monkeypatch.setattr(
         harness.training.ppo,
         "_segment",
-        lambda *_, **__: Progress(segments=1, steps=10**9, segment_payoffs=[0.0], curve=[]),
+        lambda *_, **__: Progress(
+            segments=1, steps=10**9, segment_payoffs=[0.0], curve=[], alone_games=[0], alone_failures=[0]
+        ),
     )
     warm = in_one_go(replace(alone, initial=trained.policy), tmp_path)
     for name, tensor in trained.policy.tensors.items():
@@ -234,9 +237,12 @@ def test_train__alone_share_is_the_share_of_games_without_opponent(
 
     monkeypatch.setattr(harness.environments.vector_env.Arena, "reset", recording)
     spec = replace(alone, opponent=SumoDriver(), alone_share=share)
-    in_one_go(spec, tmp_path)
+    progress = in_one_go(spec, tmp_path).progress
     assert len(present) > 60
-    assert 1.0 - np.mean(present) == pytest.approx(share, abs=0.15 if 0.0 < share < 1.0 else 0.0)
+    tolerance = 0.15 if 0.0 < share < 1.0 else 0.0
+    assert 1.0 - np.mean(present) == pytest.approx(share, abs=tolerance)
+    ended = sum(window.games for window in progress.curve)
+    assert sum(progress.alone_games) / ended == pytest.approx(share, abs=tolerance)
 
 
 @pytest.mark.parametrize(("share", "lapsing"), [(0.0, [True] * 3), (0.5, [False, False, True])])
@@ -344,6 +350,17 @@ def test_checkpoint__is_a_safetensors_file(alone: TrainingSpec, tmp_path: Path) 
     header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])  # safetensors: a JSON header, numbers
     assert header["__metadata__"]["key"] == "key"
     assert any(name.startswith("optimizer/") for name in header)
+
+
+def test_train__a_flat_curve_of_failures_is_not_convergence(
+    alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(harness.training.ppo, "has_converged", lambda payoffs: len(payoffs) >= 1)
+    trained = in_one_go(alone, tmp_path)
+    assert (trained.stopped, trained.progress.steps) == ("budget", 3072)
+    games, failures = trained.progress.alone_games, trained.progress.alone_failures
+    assert sum(games) == sum(window.games for window in trained.progress.curve)  # it is alone in all of them
+    assert sum(failures) > 0.5 * sum(games)
 
 
 @pytest.mark.slow

@@ -70,6 +70,7 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
         inputs["choice_episodes"] = document.best_response.choice_episodes
     if stage.gates:
         inputs["significance"] = document.assessment.significance
+        inputs["competence"] = document.competence.model_dump(mode="json")
     return inputs
 
 

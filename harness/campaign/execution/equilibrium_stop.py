@@ -1,4 +1,7 @@
-"""Whether an approximate equilibrium is reached: no player's best response gains anything distinguishable from 0."""
+"""Whether an approximate equilibrium is reached: no player's best response gains anything distinguishable from 0.
+
+A pair of which a player can't drive the scene alone is in none: that no training found anything better shows nothing.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,7 @@ def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, sign
     from harness.evaluation.tables import read_csv
 
     episodes = pd.concat([read_csv(folder.work(each) / "episodes.csv") for each in gate.stages], ignore_index=True)
-    pair, *responses = (str(name) for name in episodes["arm"].unique())
+    pair, *responses = (str(name) for name in episodes["arm"].unique()[:3])
     roles: tuple[Role, Role] = ("ego", "non_ego")
     asked = [
         Response(
@@ -31,6 +34,7 @@ def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, sign
             response_arm=arm,
             ego="",
             non_ego="",
+            alone=gate.bounds,
         )
         for role, arm in zip(roles, responses, strict=True)
     ]

@@ -80,6 +80,10 @@ class StageProgress:
         if line:
             self.bars.console.print(line, highlight=False, soft_wrap=True, markup=False)
 
+    def tell(self, stage: str, what: str, message: str) -> None:
+        """Say what has turned out about a stage that is done."""
+        self.bars.console.print(f"{what}: {stage}: {message}", highlight=False, soft_wrap=True, markup=False)
+
     def _show_progress(self, event: Event) -> None:
         """Move a stage's bar; it starts again where another kind of work starts."""
         row, unit = self._rows[event.stage], event.message or self._units[event.stage]

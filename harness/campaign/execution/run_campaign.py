@@ -16,9 +16,11 @@ from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.results.kept_results import RunResult, kept_result
+from harness.campaign.storage.learned import Entries, did_not_learn, judged, recorded_goals
 from harness.campaign.storage.manifest import FINISHED
 from harness.campaign.storage.run_folder import FORMAT, RunFolder
 from harness.campaign.storage.versions import versions, versions_of_numbers
+from harness.evaluation.competence import DID_NOT_LEARN
 from harness.reports.provenance import mixed_versions, warn
 
 CHECKING = "checking what is finished"
@@ -49,8 +51,12 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: Start
             with StageProgress(stages, len(finished), console) as progress:
 
                 def emit(event: Event) -> None:
+                    incapable = did_not_learn(manifest.content["stages"])
                     manifest.note(event)
                     progress.show(event)
+                    for training, shortfall in did_not_learn(manifest.content["stages"]).items():
+                        if training not in incapable:
+                            progress.tell(training, DID_NOT_LEARN, shortfall)
 
                 workers = start_workers(run_context_of(campaign, folder, keys), len(stages) - len(finished))
                 run_stages(stages, finished, workers, emit)
@@ -65,7 +71,8 @@ class _ManifestKeeper:
     def __init__(
         self, campaign: OpenCampaign, folder: RunFolder, stages: Sequence[Stage], keys: Mapping[str, str]
     ) -> None:
-        self._folder = folder
+        self._folder, self._campaign, self._plan = folder, campaign.document, stages
+        self._stages: Entries = {stage.id: _entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages}
         self._manifest: dict[str, Any] = {
             "format": FORMAT,
             "name": campaign.document.name,
@@ -78,9 +85,8 @@ class _ManifestKeeper:
             "seeds": list(campaign.document.seeds),
             "hashes": dict(campaign.hashes),
             "versions": versions(),
-            "stages": {stage.id: _entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages},
         }
-        self._folder.write_manifest(self._manifest)
+        self._write()
 
     @property
     def content(self) -> Mapping[str, Any]:
@@ -98,7 +104,7 @@ class _ManifestKeeper:
 
     def note(self, event: Event) -> None:
         """Write down what happened to a stage."""
-        entry = self._manifest["stages"][event.stage]
+        entry = self._stages[event.stage]
         match event.kind:
             case "done":
                 entry.update({"message": "", **event.info}, status=_status(event.info))
@@ -108,6 +114,12 @@ class _ManifestKeeper:
                 entry.update(status="pending", message=event.message)
             case _:
                 return
+        self._write()
+
+    def _write(self) -> None:
+        """Write the manifest with the judgement of each training, which depends on the arm that assesses its player."""
+        goals = recorded_goals(self._stages)
+        self._manifest["stages"] = judged(self._stages, self._campaign, self._plan, goals)
         self._folder.write_manifest(self._manifest)
 
 

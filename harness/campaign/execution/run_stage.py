@@ -140,7 +140,8 @@ def _train(stage: TrainingStage, run: StageRun) -> Made:
     make_folder(folder.policy(stage.id))
     write_policy(trained.policy, folder.policy(stage.id))
     curve = pd.DataFrame([asdict(point) for point in trained.progress.curve])
-    curve = curve.assign(stage=stage.name, persona=stage.persona, seed=stage.seed)
+    ends = [*[""] * (len(curve) - 1), trained.stopped][: len(curve)]
+    curve = curve.assign(stage=stage.name, persona=stage.persona, seed=stage.seed, stopped=ends)
     table = folder.work(stage.id) / "training.csv"
     write_csv(typed(curve.reindex(columns=list(TRAINING_COLUMNS))), table)
     info = {
@@ -230,7 +231,19 @@ def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
     join_segments(segments, *files)
     episodes = segments[-1].episodes.stop
-    return {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}, files
+    facts = {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}
+    return facts | _goals_alone(stage, work / EPISODES), files
+
+
+def _goals_alone(stage: AssessmentStage, episodes: Path) -> dict[str, int]:
+    """How often the player of an arm reached its goal, if it drives alone: whether its training succeeded."""
+    if None not in stage.drivers:
+        return {}
+    from harness.evaluation.competence import goals_alone
+    from harness.evaluation.tables import read_csv
+
+    found = goals_alone(read_csv(episodes), "ego" if stage.ego is not None else "non_ego")
+    return {"goals": found.goals, "played": found.games}
 
 
 def _versions_since(checkpoint: Path, also: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, str]]:

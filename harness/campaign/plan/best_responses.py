@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from harness.campaign.plan.competence import alone_bounds
 from harness.campaign.plan.planned_drivers import BestOf, Trained, TrainedBefore, persona_of
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage, stage_id
 from harness.config.campaign import Campaign
@@ -21,10 +22,12 @@ def plan_best_responses(campaign: Campaign, pair: AssessmentStage) -> list[Stage
     return [stage for learner in (EGO, NON_EGO) for stage in _plan_response(campaign, pair, learner)]
 
 
-def gate_of(pair: AssessmentStage) -> EquilibriumGate:
-    """The gate behind which there is nothing to do when neither player of a pair gains anything."""
+def gate_of(campaign: Campaign, pair: AssessmentStage) -> EquilibriumGate:
+    """The gate behind which there is nothing to do when neither player of a pair gains anything, and both can drive."""
     ego, non_ego = (stage_id(_response_arm(pair, learner).name, pair.seed) for learner in (EGO, NON_EGO))
-    return EquilibriumGate(pair=pair.id, ego_response=ego, non_ego_response=non_ego)
+    bounds = tuple(each for each in alone_bounds(campaign, pair.arm) if each.goal_share > 0)
+    alone = tuple(stage_id(each.arm, pair.seed) for each in bounds)
+    return EquilibriumGate(pair=pair.id, ego_response=ego, non_ego_response=non_ego, alone=alone, bounds=bounds)
 
 
 def _response_arm(pair: AssessmentStage, learner: int) -> Arm:

@@ -89,7 +89,7 @@ def persona_rounds(campaign: Campaign, persona: str, seed: int, tunable: bool = 
         if campaign.stops_early and round_ % 2 == 0 and round_ < last:
             pair = pairing(egos[-1], non_egos[-1], seed)
             stages += plan_best_responses(campaign, pair)
-            gates = (*gates, gate_of(pair))
+            gates = (*gates, gate_of(campaign, pair))
     return PersonaRounds(egos=tuple(egos), non_egos=tuple(non_egos), stages=tuple(stages))
 
 

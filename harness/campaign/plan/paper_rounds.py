@@ -15,11 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from harness.campaign.plan.competence import alone_bounds
 from harness.campaign.plan.planned_drivers import PlannedDriver
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
 from harness.campaign.plan.strategy_drivers import driver_of, ego_learns, learned_driver, population_driver
 from harness.config.campaign import Campaign
-from harness.evaluation.research_questions import Question
+from harness.evaluation.research_questions import Question, ResearchQuestion
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
@@ -151,23 +152,21 @@ def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False
     for name in [*personas, *(each.name for each in campaign.population)]:
         non_ego = PersonaNonEgo(persona=name)
         naive_alone, naive = Arm(ego=NaiveEgo()), Arm(ego=NaiveEgo(), non_ego=non_ego)
-        round_2: RetrainedEgo | ReconfiguredEgo | None = None
+        pairs: list[tuple[ResearchQuestion, Arm, Arm]] = [("RQ1", naive_alone, naive)]
         if ego_learns(campaign):
-            round_2 = RetrainedEgo(against=name)
+            pairs.append(("RQ2", naive, Arm(ego=RetrainedEgo(against=name), non_ego=non_ego)))
         elif tunable:
-            round_2 = ReconfiguredEgo(against=name)
-        for seed in campaign.seeds:
-            asked.append(
-                Question(question="RQ1", persona=name, seed=seed, baseline=naive_alone.name, treatment=naive.name)
+            pairs.append(("RQ2", naive, Arm(ego=ReconfiguredEgo(against=name), non_ego=non_ego)))
+        asked += [
+            Question(
+                question=question,
+                persona=name,
+                seed=seed,
+                baseline=baseline.name,
+                treatment=treatment.name,
+                alone=alone_bounds(campaign, baseline, treatment),
             )
-            if round_2 is not None:
-                asked.append(
-                    Question(
-                        question="RQ2",
-                        persona=name,
-                        seed=seed,
-                        baseline=naive.name,
-                        treatment=Arm(ego=round_2, non_ego=non_ego).name,
-                    )
-                )
+            for seed in campaign.seeds
+            for question, baseline, treatment in pairs
+        ]
     return asked

@@ -15,6 +15,7 @@ from harness.campaign.plan.planned_drivers import (
     policies_before,
     stages_before,
 )
+from harness.evaluation.research_questions import AloneBound
 from harness.evaluation.strategies import Arm, BestResponse, ReconfiguredEgo, Strategy, player_of, strategy_name
 
 
@@ -26,11 +27,15 @@ class EquilibriumGate:
     pair: str
     ego_response: str
     non_ego_response: str
+    alone: tuple[str, ...] = ()
+    """The assessments that show whether the players of the pair can drive the scene alone."""
+    bounds: tuple[AloneBound, ...] = ()
+    """What the players have to achieve in these: a pair that can't drive is in no equilibrium."""
 
     @property
-    def stages(self) -> tuple[str, str, str]:
-        """The ids of the three stages."""
-        return self.pair, self.ego_response, self.non_ego_response
+    def stages(self) -> tuple[str, ...]:
+        """The ids of these stages."""
+        return self.pair, self.ego_response, self.non_ego_response, *self.alone
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -49,6 +49,8 @@ class RunResult(Document):
     """One for each persona and question."""
     failed_stages: tuple[Line, ...]
     error_games: int = Field(ge=0)
+    did_not_learn: tuple[Line, ...] = ()
+    """The trainings that made no player that can drive the scene, each with its share of goals and the bound."""
 
 
 def kept_result(folder: RunFolder, manifest: Mapping[str, Any]) -> RunResult | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from harness.campaign.plan.competence import alone_bounds
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
 from harness.config.campaign import Campaign
@@ -44,15 +45,22 @@ def matchups_of(
     stages = plan(campaign, personas, tunable)
     arms = [each for each in stages if isinstance(each, AssessmentStage) and each.id in done]
     return Matchups(
-        pairings=[_pairing(arm) for arm in arms if arm.is_pair],
-        responses=_responses(arms),
+        pairings=[_pairing(campaign, arm) for arm in arms if arm.is_pair],
+        responses=_responses(campaign, arms),
         training_personas=_training_personas(campaign, arms),
     )
 
 
-def _pairing(stage: AssessmentStage) -> Pairing:
+def _pairing(campaign: Campaign, stage: AssessmentStage) -> Pairing:
     ego, non_ego = _names(stage.arm)
-    return Pairing(arm=stage.name, seed=stage.seed, ego=ego, non_ego=non_ego, persona=stage.persona)
+    return Pairing(
+        arm=stage.name,
+        seed=stage.seed,
+        ego=ego,
+        non_ego=non_ego,
+        persona=stage.persona,
+        alone=alone_bounds(campaign, stage.arm),
+    )
 
 
 def _names(arm: Arm) -> tuple[str, str]:
@@ -61,7 +69,7 @@ def _names(arm: Arm) -> tuple[str, str]:
     return strategy_name(arm.ego), strategy_name(arm.non_ego)
 
 
-def _responses(stages: Sequence[AssessmentStage]) -> list[Response]:
+def _responses(campaign: Campaign, stages: Sequence[AssessmentStage]) -> list[Response]:
     """The arms in which a best response replaces a player, of pairs that are done too."""
     done = {(stage.arm, stage.seed) for stage in stages}
     found = []
@@ -82,6 +90,7 @@ def _responses(stages: Sequence[AssessmentStage]) -> list[Response]:
                 response_arm=stage.name,
                 ego=ego,
                 non_ego=non_ego,
+                alone=alone_bounds(campaign, arm.pair),
             )
         )
     return found

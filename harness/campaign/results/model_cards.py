@@ -26,10 +26,12 @@ from harness.config.persona import Parametrised, Persona
 from harness.config.toml_reading import Document
 from harness.drivers.policy_file import policy_files, read_card
 from harness.errors import UsageError
+from harness.evaluation.competence import DID_NOT_LEARN
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.state import NON_EGO, ROLES
 from harness.reports.numbers import interval, number, percent
+from harness.reports.page_wording import stopped
 
 CARD = "README.md"
 _PROGRAMS = ("python", "eclipse-sumo", "torch", "stable-baselines3", "numpy")
@@ -101,6 +103,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
         campaign=manifest["name"],
         version=versions["harness"],
         quick=manifest.get("quick"),
+        not_learned=stopped(entry) if entry["stopped"] == DID_NOT_LEARN else "",
         facts=list(_facts(entry, manifest, policy, persona)),
         persona=persona,
         alpha=" + ".join(f"{getattr(persona, group).weight:g} × {group}" for group in GROUPS),
@@ -147,6 +150,7 @@ def _facts(
         yield "games without the other player", percent(how.alone_share)
     yield "initial policy", f"`{policy['began_from']}`" if policy["began_from"] else "none"
     reason = {"converged": "stopped by convergence", "budget": "the whole budget"}.get(entry["stopped"], "")
+    reason = stopped(entry) if entry["stopped"] == DID_NOT_LEARN else reason
     yield "trained for", f"{entry['steps']:,} of at most {entry['budget_steps']:,} steps: {reason}"
     if entry.get("rule"):
         yield "convergence", entry["rule"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,18 +14,20 @@ from rich.progress import track
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
+from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
 from harness.campaign.results.kept_results import RunResult, ShownVerdict, keep_result
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
+from harness.campaign.storage.learned import did_not_learn, judged
 from harness.campaign.storage.manifest import FINISHED, is_tuned
 from harness.campaign.storage.manoeuvre_table import manoeuvres_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
-from harness.evaluation.comparison import compare
+from harness.evaluation.comparison import compare, games_by_arm
+from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import find
 from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.research_questions import Question
@@ -55,21 +57,24 @@ from harness.traffic.scene import OpenScene, open_scene
 
 def write_results(folder: RunFolder, console: Console) -> RunResult:
     """Write tables, replays and report of the finished stages, from the run folder alone."""
-    manifest = folder.manifest()
-    folder.check_whole(manifest)
-    done = {name: entry for name, entry in manifest["stages"].items() if entry["status"] == "done"}
+    written = folder.manifest()
+    folder.check_whole(written)
+    campaign = _campaign(written)
+    stages = plan(campaign, written["personas"], is_tuned(written))
+    done = {name: entry for name, entry in written["stages"].items() if entry["status"] == "done"}
     episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
+    entries = judged(written["stages"], campaign, stages, _goals(stages, episodes))
+    manifest = {**written, "stages": entries}
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
+    training = _with_ends(training, entries)
     reconfiguration = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
     summary = summarise(episodes)
-    campaign = _campaign(manifest)
-    stages = plan(campaign, manifest["personas"], is_tuned(manifest))
     arms = {stage.name: stage.arm for stage in stages if isinstance(stage, AssessmentStage)}
     asked = _questions(campaign, manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
     game = _game(campaign, manifest, episodes)
-    tables |= vars(game) if game is not None else {}
+    tables |= game.tables if game is not None else {}
     populations = by_who_drove(campaign, episodes)
     tables |= {"populations": populations} if campaign.population else {}
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
@@ -110,14 +115,32 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         verdicts=tuple(_shown(persona, verdict) for persona, verdict in verdicts),
         failed_stages=failed,
         error_games=int((episodes["error"] != "").sum()),
+        did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(entries).items()),
     )
-    keep_result(folder, manifest, result)
+    keep_result(folder, written, result)
     return result
 
 
 def _shown(persona: str, verdict: Conclusion) -> ShownVerdict:
     told = {name: getattr(verdict, name) for name in ("question", "label", "tone", "sentence", "speed")}
     return ShownVerdict(persona=persona, **told)
+
+
+def _goals(stages: Iterable[Stage], episodes: pd.DataFrame) -> dict[str, Goals]:
+    """How often the player of each arm without another player reached its goal, by the arm's stage."""
+    games = games_by_arm(episodes)
+    alone = [each for each in stages if isinstance(each, AssessmentStage) and None in each.drivers]
+    return {
+        each.id: goals_alone(games.get((each.name, each.seed)), "ego" if each.ego is not None else "non_ego")
+        for each in alone
+    }
+
+
+def _with_ends(training: pd.DataFrame, entries: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """The learning curves, with the judgement of the manifest in the last row of each training."""
+    last = training.drop_duplicates(["stage", "seed"], keep="last")
+    ends = [entries[stage_id(str(row.stage), row.seed)].get("stopped") for row in last.itertuples()]
+    return training.assign(stopped=pd.Series(ends, index=last.index, dtype=object).reindex(training.index).fillna(""))
 
 
 def _questions(campaign: Campaign, manifest: Mapping[str, Any]) -> list[Question]:

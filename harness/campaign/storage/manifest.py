@@ -43,6 +43,13 @@ class StageEntry(_Record):
     trials_unplayed: Count | None = None
     chosen_trial: Count | None = None
     settled: Text | None = None
+    goals: Count | None = None
+    """Of an arm in which a player drives alone, and of the training that made the player: games that it ended at its
+    goal."""
+    played: Count | None = None
+    """The games of that arm that could be played."""
+    goal_share_asked: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    """Of a training: the least share of these games for its player to have learned."""
 
 
 class Manifest(_Record):

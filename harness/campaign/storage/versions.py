@@ -10,7 +10,7 @@ _PACKAGES = (
     *("harness", "eclipse-sumo", "libsumo", "sumolib", "numpy", "scipy", "numba", "pandas", "torch"),
     *("stable-baselines3", "gymnasium", "pyarrow", "safetensors"),
 )
-NUMBERS_FORMAT = 2  # raised when the same inputs give other numbers, so that finished stages are carried out again
+NUMBERS_FORMAT = 3  # raised when the same inputs give other numbers, so that finished stages are carried out again
 _OF_NUMBERS = ("python", "platform", "harness", "libsumo", "numpy", "numba", "torch", "stable-baselines3")
 
 

@@ -16,7 +16,15 @@ import numpy.typing as npt
 import pandas as pd
 from scipy import stats
 
-from harness.evaluation.comparison import CONFIDENCE, games_by_arm, holm, mean_interval, paired_t_test, pairs_of
+from harness.evaluation.comparison import (
+    CONFIDENCE,
+    games_by_arm,
+    holm,
+    mean_interval,
+    paired_t_test,
+    pairs_of,
+)
+from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.columns import GAP_COLUMNS
 from harness.evaluation.game_theory.records import Response
 
@@ -41,6 +49,8 @@ class GapVerdict(str, Enum):
     ALL_EQUAL = "no t statistic: all differences equal"
     """The best response earned more by the same number in every game."""
     NOT_ENOUGH_PAIRS = "not enough pairs"
+    NOT_ANSWERED = "not answered: the pair was not shown to drive this scene"
+    """A player of the pair misses a bound of `Response.alone`, so there is no test."""
 
 
 NOTHING_TO_GAIN = frozenset({GapVerdict.NOT_DISTINGUISHABLE, GapVerdict.NONE_FOUND, GapVerdict.NO_DIFFERENCE})
@@ -53,6 +63,7 @@ def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: fl
     `episodes` has the columns of episodes.csv. A pair is left out, and counted, when either game errored, is missing,
     or lacks the payoff or the ego's outcome. A value that can't be computed is NaN; where all differences are equal
     there is no test, as in `harness.evaluation.comparison`. Holm's correction is over all gaps of this table.
+    There is no test either where a player of the pair misses a bound of `Response.alone`.
 
     Raises ValueError when significance is not in (0, 1), or when an arm has two games for one episode.
     """
@@ -86,7 +97,9 @@ def wilson(failures: float, games: int) -> tuple[float, float]:
 def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
     columns = [PAYOFF[response.role], "ego_failed"]
     pair, best, left_out = pairs_of(games, response.seed, response.pair_arm, response.response_arm, columns)
+    closed = gate(response.alone, response.seed, games)
     row: dict[str, object] = {
+        "reason": closed.reason if closed is not None else "",
         "seed": response.seed,
         "persona": response.persona,
         "round": response.round,
@@ -99,7 +112,7 @@ def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, obj
     if not len(pair):
         return row
     payoff = float(pair[:, 0].mean())
-    test = paired_t_test(pair[:, 0], best[:, 0])
+    test = paired_t_test(pair[:, 0], best[:, 0], closed)
     row |= {"payoff": payoff, "payoff_best_response": float(best[:, 0].mean()), "gap": test["mean_difference"]}
     row |= {name: test[name] for name in ("ci_low", "ci_high", "p_value") if name in test}
     if payoff != 0:
@@ -114,6 +127,8 @@ def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, obj
 
 
 def _verdict(row: Mapping[Any, Any], significance: float) -> GapVerdict:
+    if row["reason"]:
+        return GapVerdict.NOT_ANSWERED
     if row["pairs"] < 2:
         return GapVerdict.NOT_ENOUGH_PAIRS
     if np.isnan(row["p_value"]) and row["gap"] == 0:

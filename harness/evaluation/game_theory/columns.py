@@ -29,6 +29,7 @@ GAP_COLUMNS = {
     "failure_difference_low": "float64",  # 95 % t interval
     "failure_difference_high": "float64",
     "verdict": "object",  # harness.evaluation.game_theory.best_response_gap.GapVerdict
+    "reason": "object",  # why there is no verdict for want of competence; else empty
 }
 """Columns of `gaps.csv`: a row for each best response."""
 
@@ -89,7 +90,8 @@ GENERALISATION_COLUMNS = {
     "fewer_failures_high": "float64",
     "p_value": "float64",  # paired t-test, one-tailed: it fails less than the naive ego
     "p_holm": "float64",  # over the table
-    "verdict": "object",  # harness.evaluation.comparison.Verdict
+    "verdict": "object",  # harness.evaluation.research_questions.Verdict
+    "reason": "object",  # why there is no verdict for want of competence; else empty
 }
 """Columns of `generalisation.csv`: a row for each retrained ego and non-ego of a persona it was not trained against."""
 

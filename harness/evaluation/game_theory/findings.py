@@ -6,6 +6,8 @@ from collections.abc import Collection, Mapping, Sequence
 
 import pandas as pd
 
+from harness.evaluation.comparison import games_by_arm
+from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.best_response_gap import gaps
 from harness.evaluation.game_theory.crossplay import crossplay
 from harness.evaluation.game_theory.empirical_game import equilibria
@@ -33,4 +35,13 @@ def find(
         crossplay=cells,
         equilibria=equilibria(cells),
         generalisation=generalisation(trained_against, pairings, episodes, significance),
+        cautions=_cautions(pairings, episodes),
     )
+
+
+def _cautions(pairings: Sequence[Pairing], episodes: pd.DataFrame) -> list[tuple[int, str]]:
+    """Seed and reason of each strategy of the cross-play that misses its bound alone."""
+    games = games_by_arm(episodes)
+    bounds = dict.fromkeys((each.seed, bound) for each in pairings for bound in each.alone)
+    closed = [(seed, gate([bound], seed, games)) for seed, bound in bounds]
+    return [(seed, each.reason) for seed, each in closed if each is not None]

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparison import games_by_arm, holm, paired_t_test, pairs_of, verdict_of
+from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.best_response_gap import wilson
 from harness.evaluation.game_theory.columns import GENERALISATION_COLUMNS
 from harness.evaluation.game_theory.records import Pairing
@@ -26,14 +27,15 @@ def generalisation(
     pairings, with `GENERALISATION_COLUMNS`. The baseline is the naive ego against the same non-ego.
 
     `trained_against` names for each retrained ego the personas it was trained against; the naive ego is not in it.
-    `episodes` has the columns of episodes.csv. Pairs and tests are those of `harness.evaluation.comparison`.
+    `episodes` has the columns of episodes.csv. Pairs and tests are those of `harness.evaluation.comparison`; where a
+    player, or the naive ego, misses a bound of `Pairing.alone`, there is no test.
 
     Raises ValueError when significance is not in (0, 1), or an arm has two games for one episode.
     """
     if not 0 < significance < 1:
         raise ValueError(f"significance must be between 0 and 1, not {significance}")
     pairings, games = list(pairings), games_by_arm(episodes)
-    naive = {(each.seed, each.non_ego): each.arm for each in pairings if each.ego == NAIVE}
+    naive = {(each.seed, each.non_ego): each for each in pairings if each.ego == NAIVE}
     rows = [
         _row(pairing, trained_against[pairing.ego], naive.get((pairing.seed, pairing.non_ego)), games)
         for pairing in pairings
@@ -47,9 +49,11 @@ def generalisation(
 
 
 def _row(
-    pairing: Pairing, trained_against: Collection[str], naive_arm: str | None, games: Mapping[Any, pd.DataFrame]
+    pairing: Pairing, trained_against: Collection[str], baseline: Pairing | None, games: Mapping[Any, pd.DataFrame]
 ) -> dict[str, object]:
-    naive, ego, left_out = pairs_of(games, pairing.seed, naive_arm or "", pairing.arm, ["ego_failed"])
+    arm, bounds = (baseline.arm, baseline.alone) if baseline is not None else ("", ())
+    closed = gate((*bounds, *pairing.alone), pairing.seed, games)
+    naive, ego, left_out = pairs_of(games, pairing.seed, arm, pairing.arm, ["ego_failed"])
     was, now = naive[:, 0], ego[:, 0]
     row: dict[str, object] = {
         "seed": pairing.seed,
@@ -59,6 +63,8 @@ def _row(
         "non_ego": pairing.non_ego,
         "pairs": len(now),
         "pairs_left_out": left_out,
+        "verdict": closed.verdict.value if closed is not None else "",
+        "reason": closed.reason if closed is not None else "",
     }
     if not len(now):
         return row
@@ -67,7 +73,7 @@ def _row(
     row |= {"naive_failure_rate": was.mean()}
     if was.sum():
         row["share_of_naive"] = now.sum() / was.sum()
-    test = paired_t_test(now, was)
+    test = paired_t_test(now, was, closed)
     names = {"mean_difference": "", "ci_low": "_low", "ci_high": "_high"}
     row |= {f"fewer_failures{end}": test[name] for name, end in names.items() if name in test}
     return row | ({"p_value": test["p_value"]} if "p_value" in test else {})

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import pandas as pd
+
+from harness.evaluation.game_theory.columns import GAME_TABLES
+from harness.evaluation.research_questions import AloneBound
 
 Role = Literal["ego", "non_ego"]
 
@@ -20,6 +24,8 @@ class Pairing:
     non_ego: str
     persona: str
     """Of the non-ego; "" for SUMO's own driver, which has no payoff and is in no empirical game."""
+    alone: tuple[AloneBound, ...] = ()
+    """What its players have to achieve alone; otherwise there is no verdict on them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,6 +41,8 @@ class Response:
     response_arm: str
     ego: str
     non_ego: str
+    alone: tuple[AloneBound, ...] = ()
+    """What the players of the pair have to achieve alone; otherwise there is no verdict on them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,3 +53,10 @@ class GameFindings:
     crossplay: pd.DataFrame
     equilibria: pd.DataFrame
     generalisation: pd.DataFrame
+    cautions: Sequence[tuple[int, str]] = ()
+    """Seed and reason: the strategies of the cross-play that were not shown to drive the scene alone."""
+
+    @property
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """The tables by their names in the run folder."""
+        return {name: getattr(self, name) for name in GAME_TABLES}

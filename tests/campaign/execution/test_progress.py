@@ -13,6 +13,7 @@ from harness.campaign.execution.progress import STARTING, StageProgress
 from harness.campaign.execution.stage_events import Event
 from harness.campaign.plan.plan import plan
 from harness.config.campaign import Campaign
+from harness.evaluation.competence import DID_NOT_LEARN, Goals
 
 STAGES = plan(Campaign.model_validate({"name": "a", "scene": "b", "personas": ["speedy.toml"]}), ["speedy"])
 NAIVE = STAGES[0].id
@@ -68,3 +69,12 @@ def test_preparations__are_the_log_of_what_is_prepared(caplog: pytest.LogCapture
         log.info("loading")
     log.info("after the block")
     assert told == [("merging 3 copies", 1, 3), ("loading", 0, 0)]
+
+
+def test_tell__a_training_that_did_not_learn_is_named_with_its_share_of_goals() -> None:
+    console = Console(file=io.StringIO(), width=80)
+    with StageProgress(STAGES, 0, console) as progress:
+        progress.tell(NAIVE, DID_NOT_LEARN, Goals(goals=3, games=100).below(0.97))
+    assert console.file.getvalue() == (  # type: ignore[attr-defined]
+        "did not learn: naive-seed1: alone it reaches its goal in 3 of 100 games (3 %), below 97 %\n"
+    )

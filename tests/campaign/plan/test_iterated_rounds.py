@@ -223,6 +223,16 @@ def test_plan__an_exchange_may_end_after_each_answer_of_the_ego(tmp_path: Path, 
     )
 
 
+def test_plan__a_pair_ends_the_rounds_only_if_its_players_were_assessed_alone(tmp_path: Path, anna: list[str]) -> None:
+    changes = {"rounds": {"count": 6}, "best_response": RESPONSE, "competence": {}}
+    stages, _ = planned(tmp_path, personas=anna, **changes)
+    first, second = training(stages, "anna_round5").gates
+    assert first.alone == ("retrained_alone_anna-seed1", "anna_alone-seed1")
+    assert second.alone == ("retrained_anna_round4_alone-seed1", "anna_round3_alone-seed1")
+    assert [bound.goal_share for bound in first.bounds] == [0.97, 0.8]
+    assert set(first.alone) <= set(training(stages, "anna_round3").needs)
+
+
 def test_plan__rounds_are_played_to_the_end_where_that_is_asked(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 6, "stop_early": False}, best_response=RESPONSE)
     assert not any(stage.gates for stage in stages.values())

@@ -14,6 +14,7 @@ from harness.campaign.results.model_cards import model_card, write_model_cards
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
+from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.tables import SUMMARY_COLUMNS, read_csv, typed
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, learned_run, sumo_run
@@ -185,6 +186,17 @@ def test_card__marks_a_quick_run_and_has_no_timings() -> None:
     slower = json.loads(json.dumps(MANIFEST))
     slower["stages"]["naive-seed1"]["seconds"] = 999.0
     assert model_card("naive-seed1", slower, SUMMARY, POLICY) == model_card("naive-seed1", MANIFEST, SUMMARY, POLICY)
+
+
+def test_card__of_a_policy_that_did_not_learn_says_so_first() -> None:
+    manifest = json.loads(json.dumps(MANIFEST))
+    judgement = {"stopped": DID_NOT_LEARN, "goals": 3, "played": 100, "goal_share_asked": 0.97}
+    manifest["stages"]["naive-seed1"] |= judgement
+    card = model_card("naive-seed1", manifest, SUMMARY, POLICY).replace("\N{NO-BREAK SPACE}", " ")
+    stopped = "did not learn: goal in 3 of 100 games alone, at least 97 % asked"
+    assert f"**It {stopped}. Not for use.**" in card.partition("| player |")[0]
+    assert f"| trained for | 1,703,936 of at most 3,000,000 steps: {stopped} |" in card.splitlines()
+    assert "convergence |" not in card
 
 
 # --- of real runs -----------------------------------------------------------------------------------------------------

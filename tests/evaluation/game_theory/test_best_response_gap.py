@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy import stats
 from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps, nothing_to_gain
 from harness.evaluation.game_theory.columns import GAP_COLUMNS
 from harness.evaluation.game_theory.records import Response
+from harness.evaluation.research_questions import AloneBound
 from tests.support.game_tables import arm, table
 
 EGO = Response(
@@ -185,3 +187,35 @@ def test_nothing_to_gain__not_without_a_response_or_a_measurement_of_each_side()
     assert not nothing_to_gain(both[both["role"] == "ego"])
     assert not nothing_to_gain(both[:0])
     assert not nothing_to_gain(gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01))
+
+
+# --- pairs that were not shown to drive ------------------------------------------------------
+
+
+ALONE = (AloneBound(player="ego", words="the retrained ego", arm="retrained_alone_speedy", goal_share=0.97),)
+
+
+@pytest.mark.parametrize("gain", [5.0, -5.0])
+def test_gap__of_a_pair_that_cannot_drive_is_no_answer(gain):
+    """Neither "could gain" nor "nothing better was found": no training of such a pair shows anything."""
+    payoffs = np.linspace(9, 11, 40)
+    pair = arm("pair", ego_failed=[0] * 40)
+    best = arm("best_ego", ego_failed=[0] * 40, ego_payoff=payoffs + gain)
+    alone = arm("retrained_alone_speedy", ego_failed=[0] * 38 + [1] * 2)
+    row = one(replace(EGO, alone=ALONE), pair, best, alone)
+    assert row["verdict"] == GapVerdict.NOT_ANSWERED.value
+    assert row["reason"] == (
+        "the retrained ego can't drive this scene: alone it reaches its goal in 38 of 40 games (95 %), below 97 %"
+    )
+    assert row["gap"] == pytest.approx(gain)
+    assert all(math.isnan(row[name]) for name in ("ci_low", "ci_high", "p_value", "p_holm"))
+    assert not nothing_to_gain(gaps([replace(EGO, alone=ALONE), NON_EGO], table(pair, best, alone), 0.01))
+
+
+def test_gap__of_a_pair_that_can_drive_is_what_it_was():
+    pair = arm("pair", ego_failed=[0] * 4, ego_payoff=[10, 12, 8, 10])
+    best = arm("best_ego", ego_failed=[0] * 4, ego_payoff=[11, 15, 10, 12])
+    alone = arm("retrained_alone_speedy", ego_failed=[0] * 4)
+    row = one(replace(EGO, alone=ALONE), pair, best, alone)
+    assert (row["verdict"], row["reason"], row["gap"]) == (GapVerdict.DISTINGUISHABLE.value, "", 2)
+    assert row["p_holm"] == one(EGO, pair, best)["p_holm"]

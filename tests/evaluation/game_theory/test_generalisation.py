@@ -1,13 +1,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from harness.evaluation.game_theory.findings import find
 from harness.evaluation.game_theory.generalisation import generalisation
 from harness.evaluation.game_theory.records import Pairing
-from harness.evaluation.research_questions import Verdict
+from harness.evaluation.research_questions import AloneBound, Verdict
 from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
 from tests.support.game_tables import TRAINED_AGAINST, a_campaign, arm, findings, table
 
@@ -91,3 +92,23 @@ def test_find__gives_every_table():
     found = find(pairings, responses, TRAINED_AGAINST, episodes, 0.01)
     assert (len(found.gaps), len(found.crossplay), len(found.generalisation)) == (8, 32, 6)
     assert set(found.equilibria["game"]) == {"speedy", "distracted", "all"}
+
+
+@pytest.mark.parametrize("incapable", ["naive", "retrained_speedy"])
+def test_generalisation__an_ego_that_cannot_drive_is_compared_with_none(incapable):
+    bounds = {
+        name: (AloneBound(player="ego", words=f"the ego {name}", arm=f"{name}_alone", goal_share=0.97),)
+        for name in ("naive", "retrained_speedy")
+    }
+    alone = [arm(f"{name}_alone", ego_failed=[int(name == incapable)] * 20) for name in bounds]
+    played = [
+        arm("naive_vs_distracted", ego_failed=[1] * 18 + [0] * 2),
+        arm("retrained_vs_distracted", ego_failed=[0] * 20),
+    ]
+    pairings = [replace(each, alone=bounds[each.ego]) for each in (NAIVE, RETRAINED)]
+    found = find(pairings, [], {"retrained_speedy": ("speedy",)}, table(*alone, *played), 0.01)
+    (row,) = found.generalisation.to_dict("records")
+    assert row["verdict"] == Verdict.EGO_CANNOT_DRIVE.value
+    assert math.isnan(row["p_value"])
+    assert (row["pairs"], row["fewer_failures"]) == (20, 0.9)  # what happened in the games stays
+    assert found.cautions == [(1, row["reason"])]

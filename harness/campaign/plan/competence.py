@@ -1,0 +1,84 @@
+"""The arms in which the players of a campaign drive alone, and what they have to achieve there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from harness.campaign.plan.stages import TrainingStage
+from harness.config.campaign import Campaign
+from harness.evaluation.research_questions import AloneBound
+from harness.evaluation.strategies import (
+    Arm,
+    BestResponse,
+    EgoStrategy,
+    NaiveEgo,
+    NonEgoStrategy,
+    OtherEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    Strategy,
+    SumoNonEgo,
+    strategy_name,
+)
+
+
+def alone_bounds(campaign: Campaign, *arms: Arm) -> tuple[AloneBound, ...]:
+    """What the players of these arms have to achieve alone, each once.
+
+    A population stands for its members. SUMO's own driver as non-ego and the further egos of a cross-play have no arm
+    alone, and nothing is asked of them. A best response is a change of a player's strategy: its arm asks what the pair
+    asks.
+    """
+    found = [
+        bound
+        for arm in arms
+        for strategy in (arm.ego, arm.non_ego)
+        if strategy is not None
+        for bound in _bounds(campaign, strategy)
+    ]
+    return tuple(dict.fromkeys(found))
+
+
+def bound_of(campaign: Campaign, stage: TrainingStage) -> AloneBound | None:
+    """What the player that a training makes has to achieve alone; None for a best response.
+
+    A best response is trained in games with its opponent only. It is the answer to one opponent, and not a driver for
+    the empty road.
+    """
+    if isinstance(stage.strategy, BestResponse):
+        return None
+    (bound,) = _bounds(campaign, stage.strategy)
+    return bound
+
+
+def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
+    asked = campaign.competence
+    match strategy:
+        case SumoNonEgo() | OtherEgo() | BestResponse():
+            return
+        case PersonaNonEgo(persona=persona):
+            members = {each.name: list(each.shares) for each in campaign.population}
+            non_egos = [PersonaNonEgo(persona=each) for each in members[persona]] if persona in members else [strategy]
+            for non_ego in non_egos:
+                arm, share = Arm(non_ego=non_ego).name, asked.non_ego_goal_share
+                yield AloneBound(player="non_ego", words=_non_ego_in_words(non_ego), arm=arm, goal_share=share)
+        case _:
+            arm, share = Arm(ego=strategy).name, asked.ego_goal_share
+            yield AloneBound(player="ego", words=_ego_in_words(strategy), arm=arm, goal_share=share)
+
+
+def _non_ego_in_words(strategy: NonEgoStrategy) -> str:
+    return f"the {strategy_name(strategy)} driver"
+
+
+def _ego_in_words(strategy: EgoStrategy) -> str:
+    match strategy:
+        case NaiveEgo():
+            return "the naive ego"
+        case RetrainedEgo(round=2):
+            return "the retrained ego"
+        case ReconfiguredEgo():
+            return "the reconfigured ego"
+        case _:
+            return f"the ego {strategy_name(strategy)}"

@@ -1,0 +1,44 @@
+"""Rounds end early only where a pair that can drive is an approximate equilibrium."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from harness.campaign.execution.equilibrium_stop import equilibrium_before
+from harness.campaign.plan.stages import EquilibriumGate, TrainingStage
+from harness.campaign.storage.run_folder import RunFolder
+from harness.evaluation.research_questions import AloneBound
+from harness.evaluation.strategies import PersonaNonEgo
+from harness.evaluation.tables import write_csv
+from harness.files import make_folder
+from tests.support.game_tables import arm
+
+BOUND = AloneBound(player="ego", words="the retrained ego", arm="retrained_alone_anna", goal_share=0.97)
+GATE = EquilibriumGate(
+    pair="retrained_vs_anna-seed1",
+    ego_response="retrained_vs_anna_ego_response-seed1",
+    non_ego_response="retrained_vs_anna_non_ego_response-seed1",
+    alone=("retrained_alone_anna-seed1",),
+    bounds=(BOUND,),
+)
+ROUND_3 = TrainingStage(
+    seed=1,
+    persona="anna",
+    strategy=PersonaNonEgo(persona="anna", round=3),
+    opponent=None,
+    initial=None,
+    alone_share=0.0,
+    gates=(GATE,),
+)
+
+
+@pytest.mark.parametrize(("failures", "ends"), [(0, True), (4, False)])
+def test_equilibrium__of_a_pair_that_cannot_drive_is_none(failures: int, ends: bool, tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path)
+    for stage in GATE.stages:  # no best response earns anything more
+        failed = [1] * failures + [0] * (20 - failures) if stage in GATE.alone else [0] * 20
+        make_folder(folder.work(stage))
+        write_csv(arm(stage.removesuffix("-seed1"), ego_failed=failed), folder.work(stage) / "episodes.csv")
+    assert equilibrium_before(ROUND_3, folder, 0.01) == (GATE if ends else None)

@@ -1,0 +1,177 @@
+"""The competence gate: a verdict counts only if its players reach their goals alone."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+
+from harness.evaluation.comparison import compare, games_by_arm
+from harness.evaluation.competence import Goals, gate, goals_alone
+from harness.evaluation.research_questions import INCOMPETENT, AloneBound, Question, Verdict
+
+EGO = AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.97)
+PERSON = AloneBound(player="non_ego", words="the speedy driver", arm="speedy_alone", goal_share=0.8)
+RQ1 = Question(
+    question="RQ1",
+    persona="speedy",
+    seed=1,
+    baseline="naive_alone",
+    treatment="naive_vs_speedy",
+    alone=(EGO, PERSON),
+)
+WRECK = {"goal": 0, "rail": 1, "error": None, "": None}
+
+
+def arm(name: str, *, ego: list[str] | None = None, non_ego: list[str] | None = None) -> pd.DataFrame:
+    """Games of an arm by the outcomes of its players; a player of None does not take part."""
+    count = len(ego or non_ego or [])
+    outcomes = {"ego": ego or [""] * count, "non_ego": non_ego or [""] * count}
+    either = zip(*outcomes.values(), strict=True)
+    return pd.DataFrame(
+        {
+            "arm": name,
+            "seed": 1,
+            "episode": range(count),
+            "ego_outcome": outcomes["ego"],
+            "ego_failed": pd.array([WRECK[each] for each in outcomes["ego"]], dtype="Int64"),
+            "ego_mean_speed_mps": [12.0 + 0.1 * place for place in range(count)],
+            "non_ego_outcome": outcomes["non_ego"],
+            "error": ["it died" if "error" in pair else "" for pair in either],
+        }
+    )
+
+
+def goals(reached: int, of: int) -> list[str]:
+    return ["goal"] * reached + ["rail"] * (of - reached)
+
+
+def table(ego: int, person: int, of: int = 100) -> pd.DataFrame:
+    """RQ1's games: each player's goals alone, and a person against which the ego always fails."""
+    return pd.concat(
+        [
+            arm("naive_alone", ego=goals(ego, of)),
+            arm("speedy_alone", non_ego=goals(person, of)),
+            arm("naive_vs_speedy", ego=goals(1, of), non_ego=goals(0, of)),
+        ],
+        ignore_index=True,
+    )
+
+
+def compared(episodes: pd.DataFrame, *questions: Question) -> list[dict[str, object]]:
+    return compare(questions or [RQ1], episodes, 0.01).to_dict("records")  # type: ignore[return-value]
+
+
+# --- the share of goals -----------------------------------------------------------------------------------------------
+
+
+def test_goals__are_counted_over_the_games_that_could_be_played() -> None:
+    games = arm("speedy_alone", non_ego=["goal", "rail", "error", "goal"])
+    assert goals_alone(games, "non_ego") == Goals(goals=2, games=3)
+    assert goals_alone(games, "ego") == Goals(goals=0, games=0)  # it does not take part
+    assert goals_alone(None, "ego") == Goals(goals=0, games=0)
+
+
+@pytest.mark.parametrize(("reached", "enough"), [(97, True), (96, False), (100, True), (0, False)])
+def test_goals__suffice_from_the_bound_on(reached: int, enough: bool) -> None:
+    assert Goals(goals=reached, games=100).suffice(0.97) == enough
+
+
+def test_goals__none_of_no_games_suffice() -> None:
+    assert not Goals(goals=0, games=0).suffice(0.97)
+
+
+def test_goals__a_share_below_its_bound_is_never_shown_as_the_bound() -> None:
+    text = Goals(goals=969_999, games=1_000_000).below(0.97)
+    assert text == "alone it reaches its goal in 969999 of 1000000 games (96.9 %), below 97 %"
+
+
+# --- the gate ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("ego", "person", "verdict"),
+    [
+        (97, 80, None),
+        (96, 80, Verdict.EGO_CANNOT_DRIVE),
+        (97, 79, Verdict.NON_EGO_CANNOT_DRIVE),
+        (0, 0, Verdict.NEITHER_CAN_DRIVE),
+    ],
+)
+def test_gate__names_who_cannot_drive(ego: int, person: int, verdict: Verdict | None) -> None:
+    closed = gate(RQ1.alone, 1, games_by_arm(table(ego, person)))
+    assert (closed.verdict if closed is not None else None) == verdict
+
+
+def test_gate__the_reason_has_the_player_its_share_and_the_bound() -> None:
+    closed = gate(RQ1.alone, 1, games_by_arm(table(100, 3)))
+    assert closed is not None
+    assert closed.verdict.value == "not answered: the person can't drive this scene"
+    assert closed.reason == (
+        "the speedy driver can't drive this scene: alone it reaches its goal in 3 of 100 games (3 %), below 80 %"
+    )
+
+
+def test_gate__players_that_were_not_played_alone_are_not_taken_on_trust() -> None:
+    episodes = table(100, 100)
+    closed = gate(RQ1.alone, 1, games_by_arm(episodes[episodes["arm"] != "speedy_alone"]))
+    assert closed is not None
+    assert closed.verdict is Verdict.NOT_PLAYED_ALONE
+    assert "no game of the arm speedy_alone could be played" in closed.reason
+
+
+def test_gate__a_bound_of_0_asks_nothing() -> None:
+    free = [AloneBound(player="ego", words="the naive ego", arm="naive_alone", goal_share=0.0)]
+    assert gate(free, 1, {}) is None
+    assert gate([], 1, {}) is None
+
+
+def test_gate__is_asked_for_each_seed() -> None:
+    good, bad = table(100, 100), table(100, 0).assign(seed=2)
+    games = games_by_arm(pd.concat([good, bad], ignore_index=True))
+    assert gate(RQ1.alone, 1, games) is None
+    assert gate(RQ1.alone, 2, games) is not None
+
+
+# --- comparisons ------------------------------------------------------------------------------------------------------
+
+
+def test_compare__the_failures_of_a_person_that_cannot_drive_are_no_answer() -> None:
+    """A person that never makes its turn and wrecks itself in front of the ego gave "30 of 30, p < 0.0001"."""
+    answered, _ = compared(table(100, 100, of=30))
+    assert (answered["verdict"], answered["reason"]) == ("significant", "")
+    for row in compared(table(30, 0, of=30)):
+        assert row["verdict"] == Verdict.NON_EGO_CANNOT_DRIVE.value
+        assert row["reason"]
+        assert not row["rejects_h0"]
+        assert (row["pairs"], row["pairs_left_out"]) == (30, 0)
+        for name in ("t", "p_value", "p_holm", "ci_low", "ci_high", "effect_size", "mcnemar_p"):
+            assert pd.isna(row[name]), name  # type: ignore[call-overload]
+    failure, _ = compared(table(30, 0, of=30))
+    assert failure["mean_difference"] == 29 / 30  # what happened in the games stays
+
+
+def test_compare__unanswered_questions_are_not_in_holms_family() -> None:
+    mild = arm("naive_vs_bert", ego=["rail"] * 5 + ["goal"] * 25, non_ego=["goal"] * 30)
+    alone = arm("bert_alone", non_ego=["goal"] * 30)
+    asked = Question(
+        question="RQ1",
+        persona="bert",
+        seed=1,
+        baseline="naive_alone",
+        treatment="naive_vs_bert",
+        alone=(EGO, AloneBound(player="non_ego", words="the bert driver", arm="bert_alone", goal_share=0.8)),
+    )
+    episodes = pd.concat([table(30, 0, of=30), mild, alone], ignore_index=True)
+    with_it = [row for row in compared(episodes, RQ1, asked) if row["persona"] == "bert"]
+    pd.testing.assert_frame_equal(pd.DataFrame(with_it), pd.DataFrame(compared(episodes, asked)))
+    assert with_it[0]["p_holm"] == with_it[0]["p_value"]  # the only test of the family
+
+
+def test_compare__no_unanswered_question_is_ever_significant() -> None:
+    for ego in (0, 50, 96, 97, 100):
+        for person in (0, 79, 80, 100):
+            failure, speed = compared(table(ego, person))
+            answered = ego >= 97 and person >= 80
+            assert (Verdict(failure["verdict"]) in INCOMPETENT) == (not answered)
+            assert (Verdict(speed["verdict"]) in INCOMPETENT) == (not answered)
+            assert answered == (failure["reason"] == "")

@@ -1,0 +1,225 @@
+"""Conflicts of players with bodies by hand: a stream from the south crosses the merge road at x = 100 m.
+
+The players drive east on the line y = -1.6, so their stations are their x. The stream is 3.2 m wide and has its stop
+line at y = -10: the place of a body along it is y + 10. The zone is 98.5 to 101.5 m on the route and 7 to 10 m along
+the stream. Cars are 4.6 m long.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.game.meetings import Meetings
+from harness.game.quantities import Quantities, World
+from harness.game.right_of_way import Conflicts, RightOfWay, Signal, StopLines, Streams
+from harness.traffic.scene import OpenScene
+
+Moment = Callable[..., Quantities]
+NORTH = np.pi / 2.0
+CROSSING: Mapping[str, Any] = {
+    "player": 0,
+    "stream": 0,
+    "begin_m": 98.5,
+    "end_m": 101.5,
+    "crossing": True,
+    "yields": True,
+    "first_come": False,
+    "stop_m": 90.0,
+    "right_m": -np.inf,
+    "left_m": np.inf,
+    "own_link": 0,
+    "other_link": 1,
+    "from_m": -np.inf,
+    "until_m": np.inf,
+    "zone_m": 7.0,
+    "length_m": 3.0,
+}
+
+
+def with_conflicts(world: World, *rows: Mapping[str, Any]) -> World:
+    """A world with conflicts with stream 0, which comes from the south. Stream 1 is 30 m to the east of it."""
+    y_m = np.arange(-120.0, 20.0, 4.0)
+    samples = np.array([(x, y, 0.0, 1.0, 1.6, 2.0, y + 10.0) for x in (100.0, 130.0) for y in y_m])
+    conflicts = Conflicts.of(rows)
+    streams = Streams.of(samples, np.repeat([0, 1], len(y_m)), conflicts, players=2)
+    tables = RightOfWay(conflicts, streams, StopLines.of([]), (("light", 0), ("light", 1)))
+    return replace(world, right_of_way=tables)
+
+
+@pytest.fixture(scope="module")
+def world(merge: OpenScene) -> World:
+    return with_conflicts(merge.world, CROSSING)
+
+
+def ego(x_m: float, speed_mps: float = 10.0, y_m: float = -1.6) -> dict[str, float]:
+    return {"x_m": x_m, "y_m": y_m, "speed_mps": speed_mps}
+
+
+def northbound(y_m: float, speed_mps: float = 10.0, x_m: float = 100.0, **more: float) -> dict[str, float]:
+    return {"x_m": x_m, "y_m": y_m, "heading_rad": NORTH, "speed_mps": speed_mps, **more}
+
+
+FAR = ego(20.0, y_m=-4.8)
+
+
+def meeting(q: Quantities, body: int = 2, player: int = 0) -> Meetings:
+    """What one player meets in one body."""
+    return Meetings(*(column[0, player, body] for column in q.meetings))
+
+
+def test_meetings__distances_are_those_of_the_front_bumpers_to_the_zone(moment: Moment, world: World) -> None:
+    met = meeting(moment(world, [ego(70.0), FAR], [northbound(-40.0)]))
+    assert met.conflict == 0
+    assert met.own_m == pytest.approx(98.5 - 72.3)
+    assert met.other_m == pytest.approx(7.0 - (-40.0 + 10.0 + 2.3))
+
+
+def test_meetings__times_at_constant_speed_and_the_gap_between_the_passages(moment: Moment, world: World) -> None:
+    met = meeting(moment(world, [ego(70.0, speed_mps=20.0), FAR], [northbound(-40.0, speed_mps=5.0)]))
+    assert met.own_s == pytest.approx(26.2 / 20.0)
+    assert met.other_s == pytest.approx(34.7 / 5.0)
+    own_leaves_s = (101.5 - 67.7) / 20.0  # when its rear bumper is out of the zone
+    assert met.gap_s == pytest.approx(34.7 / 5.0 - own_leaves_s)
+
+
+def test_meetings__the_gap_is_that_of_the_player_behind_the_body_as_well(moment: Moment, world: World) -> None:
+    met = meeting(moment(world, [ego(50.0), FAR], [northbound(-10.0)]))
+    other_leaves_s = (10.0 - (-2.3)) / 10.0
+    assert met.gap_s == pytest.approx((98.5 - 52.3) / 10.0 - other_leaves_s)
+
+
+def test_meetings__both_in_the_zone_at_once_is_no_gap(moment: Moment, world: World) -> None:
+    assert meeting(moment(world, [ego(70.0), FAR], [northbound(-30.0)])).gap_s == 0.0
+
+
+def test_meetings__a_body_that_stands_before_the_zone_does_not_arrive(moment: Moment, world: World) -> None:
+    met = meeting(moment(world, [ego(70.0), FAR], [northbound(-20.0, speed_mps=0.0)]))
+    assert (met.other_s, met.gap_s) == (np.inf, np.inf)
+    assert met.conflict == 0
+
+
+def test_meetings__a_body_that_stands_in_the_zone_does_not_leave_it(moment: Moment, world: World) -> None:
+    met = meeting(moment(world, [ego(70.0), FAR], [northbound(-1.6, speed_mps=0.0)]))
+    assert met.other_m < 0.0
+    assert (met.other_s, met.gap_s) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("meaning", "body"),
+    [
+        ("beside the stream", northbound(-40.0, x_m=101.7)),
+        ("turned by more than 45 degrees", northbound(-40.0, heading_rad=0.25 * np.pi - 0.01)),
+        ("in the opposite direction", northbound(-40.0, heading_rad=-NORTH)),
+        ("in another stream, without a conflict", northbound(-40.0, x_m=130.0)),
+        ("beyond the zone", northbound(3.0)),
+        ("off the map", northbound(-4000.0)),
+        ("not present", northbound(-40.0, present=False)),
+    ],
+)
+def test_meetings__no_conflict_with_a_body(moment: Moment, world: World, meaning: str, body: dict[str, float]) -> None:
+    met = meeting(moment(world, [ego(70.0), FAR], [body]))
+    assert met.conflict == -1, meaning
+    assert (met.own_m, met.other_m, met.own_s, met.other_s, met.gap_s) == (np.inf,) * 5
+    assert not met.must_yield
+
+
+def test_meetings__a_body_conflicts_until_its_rear_has_left_the_zone(moment: Moment, world: World) -> None:
+    # the zone ends at y = 0: the rear leaves it when the centre is at 2.3 m
+    assert meeting(moment(world, [ego(70.0), FAR], [northbound(2.2)])).conflict == 0
+    assert meeting(moment(world, [ego(70.0), FAR], [northbound(2.4)])).conflict == -1
+
+
+def test_meetings__a_player_conflicts_until_its_rear_has_left_the_zone(moment: Moment, world: World) -> None:
+    assert meeting(moment(world, [ego(103.7), FAR], [northbound(-40.0)])).conflict == 0
+    assert meeting(moment(world, [ego(103.9), FAR], [northbound(-40.0)])).conflict == -1
+
+
+def test_meetings__only_the_player_with_the_conflict_has_it(moment: Moment, world: World) -> None:
+    q = moment(world, [ego(70.0), ego(60.0)], [northbound(-40.0)])
+    assert q.meetings.conflict[0].tolist() == [[-1, -1, 0], [-1, -1, -1]]
+
+
+def test_meetings__players_meet_each_other(moment: Moment, merge: OpenScene) -> None:
+    world = with_conflicts(merge.world, CROSSING)
+    q = moment(world, [ego(70.0), {**northbound(-40.0)}])
+    assert q.meetings.conflict[0].tolist() == [[-1, 0], [-1, -1]]
+
+
+def test_meetings__the_first_conflict_on_the_way_counts(moment: Moment, merge: OpenScene) -> None:
+    early = {**CROSSING, "begin_m": 95.0, "end_m": 97.0, "zone_m": 4.0}
+    world = with_conflicts(merge.world, CROSSING, early)
+    met = meeting(moment(world, [ego(70.0), FAR], [northbound(-40.0)]))
+    assert (met.conflict, met.own_m) == (0, pytest.approx(95.0 - 72.3))
+    met = meeting(moment(world, [ego(100.0), FAR], [northbound(-40.0)]))
+    assert met.conflict == 1, "the first zone is passed"
+
+
+def test_meetings__only_in_the_lane_that_the_stream_conflicts_with(moment: Moment, merge: OpenScene) -> None:
+    world = with_conflicts(merge.world, {**CROSSING, "right_m": -np.inf, "left_m": -1.6})
+    assert meeting(moment(world, [ego(70.0), FAR], [northbound(-40.0)])).conflict == -1
+    assert meeting(moment(world, [ego(70.0, y_m=-4.8), FAR], [northbound(-40.0)])).conflict == 0
+
+
+def test_meetings__a_body_on_the_players_own_way_is_a_leader_and_no_conflict(moment: Moment, merge: OpenScene) -> None:
+    world = with_conflicts(merge.world, {**CROSSING, "from_m": -50.0, "until_m": 8.0})
+    for y_m, conflict in ((-61.0, -1), (-59.0, 0), (-2.5, 0), (-1.5, -1)):
+        assert meeting(moment(world, [ego(70.0), FAR], [northbound(y_m)])).conflict == conflict
+
+
+def test_meetings__without_conflicts_there_are_none(moment: Moment, merge: OpenScene) -> None:
+    q = moment(merge.world, [ego(70.0), FAR], [northbound(-40.0)])
+    assert (q.meetings.conflict == -1).all()
+    assert np.isinf(q.meetings.gap_s).all()
+
+
+# --- who must yield --------------------------------------------------------------------------------------------------
+
+
+def must_yield(moment: Moment, world: World, own: int, other: int, x_m: float = 70.0, y_m: float = -40.0) -> bool:
+    q = moment(world, [ego(x_m), FAR], [northbound(y_m)])
+    q.signals = np.array([[own, other]], dtype=np.int8)
+    return bool(meeting(q).must_yield)
+
+
+@pytest.mark.parametrize("yields", [True, False])
+def test_must_yield__by_the_signs_without_signals(moment: Moment, merge: OpenScene, yields: bool) -> None:
+    unsigned = {**CROSSING, "yields": yields, "own_link": -1, "other_link": -1}
+    assert must_yield(moment, with_conflicts(merge.world, unsigned), Signal.RED, Signal.RED) == yields
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "expected"),
+    [
+        (Signal.OFF, Signal.OFF, True),
+        (Signal.GREEN, Signal.RED, False),
+        (Signal.GREEN, Signal.GREEN_YIELDING, False),
+        (Signal.GREEN_YIELDING, Signal.GREEN, True),
+        (Signal.GREEN_YIELDING, Signal.RED, False),
+        (Signal.YELLOW, Signal.RED, False),
+        (Signal.RED, Signal.GREEN, True),
+        (Signal.RED, Signal.YELLOW, True),
+        (Signal.RED, Signal.RED, False),
+    ],
+)
+def test_must_yield__by_signals(moment: Moment, world: World, own: Signal, other: Signal, expected: bool) -> None:
+    assert must_yield(moment, world, own, other) == expected
+
+
+def test_must_yield__a_signal_does_not_count_for_a_side_that_has_passed_it(moment: Moment, merge: OpenScene) -> None:
+    major = with_conflicts(merge.world, {**CROSSING, "yields": False})
+    assert must_yield(moment, major, Signal.RED, Signal.GREEN)
+    assert not must_yield(moment, major, Signal.RED, Signal.GREEN, x_m=91.0)
+    minor = with_conflicts(merge.world, CROSSING)
+    assert not must_yield(moment, minor, Signal.YELLOW, Signal.RED, y_m=-13.0)
+    assert must_yield(moment, minor, Signal.YELLOW, Signal.RED, y_m=-12.0), "its front is at y = -9.7"
+
+
+def test_must_yield__to_the_first_that_comes_at_an_all_way_stop(moment: Moment, merge: OpenScene) -> None:
+    world = with_conflicts(merge.world, {**CROSSING, "first_come": True})
+    assert must_yield(moment, world, Signal.OFF, Signal.OFF, x_m=70.0, y_m=-20.0)
+    assert not must_yield(moment, world, Signal.OFF, Signal.OFF, x_m=70.0, y_m=-40.0)
