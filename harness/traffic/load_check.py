@@ -13,6 +13,7 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,6 +21,7 @@ import sumo
 
 from harness.errors import Problem, UsageError
 from harness.traffic.departures import background_departures
+from harness.traffic.route_writing import vehicle_element
 from harness.traffic.scene import OpenScene
 
 PATIENCE_S, PATIENCE_S_PER_BYTE = 15.0, 2e-6  # time limit of a program: a constant, and a part per byte of the net
@@ -64,16 +66,12 @@ def check_loads(scene: OpenScene) -> None:
 
 def _write_vehicles(scene: OpenScene, file: Path) -> int:
     """Write one background vehicle of each kind, one after another. Returns the end time in s. Raises OSError."""
-    kinds = {
-        (each.vehicle_type, each.edges, each.lane, each.position, each.speed): each
-        for each in background_departures(scene.routes, (player.vehicle for player in scene.document.players))
-    }
+    players = {player.vehicle for player in scene.document.players}
+    departures = background_departures(scene.routes, players, scene.document.traffic_window_s)
+    kinds = {replace(each, name="", depart_s=0.0, stops=()): each for each in departures}
     root = ElementTree.Element("routes")
     for k, each in enumerate(kinds.values()):
-        start = {"departLane": each.lane, "departPos": each.position, "departSpeed": each.speed}
-        identity = {"id": each.name, "type": each.vehicle_type, "depart": str(_INTERVAL_S * k)}
-        vehicle = ElementTree.SubElement(root, "vehicle", identity | start)
-        ElementTree.SubElement(vehicle, "route", edges=" ".join(each.edges))
+        root.append(vehicle_element(each, name=each.name, depart_s=_INTERVAL_S * k))
     if not kinds:
         ElementTree.SubElement(root, "vType", id="harness_unused")  # the schema forbids an empty document
     ElementTree.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)
