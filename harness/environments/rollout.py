@@ -193,10 +193,10 @@ class _Trace:
 
     def _add(self, *cells: Any) -> None:
         step = int(self._arena.state.step[0])
-        row = (self._episode, step, step * self._arm.scene.world.step_s, *cells)
+        row = (self._episode, step, step * self._arm.scene.world.step_s, *cells, self._arena.signal_texts[0])
         for name, cell in zip(TRACE_COLUMNS, row, strict=True):
             self.columns[name].append(cell)
 
 
 _MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad")
-TRACE_COLUMNS = ("episode", "step", "time_s", "player", "vehicle_type", *_MOTION, "lapsed", "outcome")
+TRACE_COLUMNS = ("episode", "step", "time_s", "player", "vehicle_type", *_MOTION, "lapsed", "outcome", "signals")

@@ -11,6 +11,7 @@ from harness.game.jit import compiled
 from harness.game.right_of_way import CELL_M, Conflicts, Signal, Streams
 
 STANDING_MPS = 0.1  # a body that is not faster does not arrive
+HORIZON_S = 5.0  # a zone that a player reaches later is not in its way yet: from 50 km/h it can stop in comfort
 _MOST_TURNED = float(np.cos(np.pi / 4.0))  # a body drives in a stream if its heading is within 45 degrees
 _BEGIN_M, _END_M, _STOP_M, _RIGHT_M, _LEFT_M, _FROM_M, _UNTIL_M, _ZONE_M, _LENGTH_M = (
     Conflicts._fields.index(f"{name}_m")
@@ -19,6 +20,7 @@ _BEGIN_M, _END_M, _STOP_M, _RIGHT_M, _LEFT_M, _FROM_M, _UNTIL_M, _ZONE_M, _LENGT
 _YIELDS, _FIRST_COME, _OWN_LINK, _OTHER_LINK = (
     Conflicts._fields.index(name) for name in ("yields", "first_come", "own_link", "other_link")
 )
+# plain integers: compiled code can't convert a member
 _OFF, _GREEN, _RED = int(Signal.OFF), int(Signal.GREEN), int(Signal.RED)
 
 
@@ -47,6 +49,18 @@ class Meetings(NamedTuple):
         """The record of the columns that `meetings` returns."""
         own_m, other_m, own_s, other_s, gap_s = numbers
         return cls(conflict, own_m, other_m, own_s, other_s, gap_s, must_yield)
+
+
+def least_gap_s(met: Meetings) -> FloatArray:
+    """[G, P] the least `gap_s` of zones that the player reaches within `HORIZON_S`; inf without one."""
+    return np.where(met.own_s < HORIZON_S, met.gap_s, np.inf).min(-1, initial=np.inf)
+
+
+def entered_before_s(met: Meetings, advanced_m: FloatArray) -> FloatArray:
+    """[G, P] the least `other_s` of the bodies with priority whose zone the player's front entered in this step, in
+    which it advanced by `advanced_m` [G, P]; inf without one."""
+    enters = (met.own_m <= 0.0) & (met.own_m + advanced_m[..., None] > 0.0)
+    return np.where(enters & met.must_yield, met.other_s, np.inf).min(-1, initial=np.inf)
 
 
 @compiled
@@ -187,7 +201,8 @@ def _must_yield(
     """Whether the player must yield in conflict `c`.
 
     A signal counts for a side that has not passed its stop line: a stream on red has no priority, a player on red has
-    none over a stream that is not, and a player on 'G' yields to no stream. Otherwise the signs of the junction decide.
+    none over a stream that is not, a player on 'G' yields to no stream, and any other player at these lights yields to
+    a stream on 'G'. Otherwise the signs of the junction decide.
     """
     own, other = _OFF, _OFF
     if conflicts[c, _OWN_LINK] >= 0 and front_m <= conflicts[c, _STOP_M] and len(signals):
@@ -196,8 +211,8 @@ def _must_yield(
         other = signals[int(conflicts[c, _OTHER_LINK])]
     if other == _RED or own == _GREEN:
         return False
-    if own == _RED:
+    if own == _RED or (other == _GREEN and conflicts[c, _OWN_LINK] >= 0):
         return True
     if conflicts[c, _FIRST_COME] > 0.0:
-        return other_s < own_s
+        return other_s <= own_s
     return conflicts[c, _YIELDS] > 0.0
