@@ -37,6 +37,7 @@ from harness.traffic.scene import OpenScene
 from harness.traffic.signals import Signals
 from harness.traffic.simulation import Reading, SignalsAtReset
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
+from harness.traffic.warm_up import clear_of_players
 
 # Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
 # exactly, on the road or off it. Its bit 1 limits the search to lanes of the car's route.
@@ -150,7 +151,7 @@ class LibsumoSimulation:
                 self._remove_vehicle(game, player)
             for player in sorted(taking_part - staying):
                 self._add_player(game, player, start)
-            self._background.reset(game, departures)
+            self._background.reset(game, clear_of_players(departures, start, self._scene.world.length_m))
             return self._signals.reset(game, start.signal_share if self._signals else 0.0)
 
     def halt(self, game: int, player: int) -> None:

@@ -19,7 +19,8 @@ from xml.etree import ElementTree
 
 import sumo
 
-from harness.errors import Problem, UsageError
+from harness.config.scene import scene_file
+from harness.errors import Problem, SimulationError, UsageError
 from harness.traffic.departures import background_departures
 from harness.traffic.route_writing import vehicle_element
 from harness.traffic.scene import OpenScene
@@ -62,6 +63,17 @@ def check_loads(scene: OpenScene) -> None:
     if complaint:
         about_net = not (str(types) in complaint or str(vehicles) in complaint or _ABOUT_VEHICLES.search(complaint))
         raise UsageError([_problem(complaint, net if about_net else routes, about_net)])
+    if scene.document.warm_up_s and scene.has_background_traffic:
+        _check_warm_up(scene)
+
+
+def _check_warm_up(scene: OpenScene) -> None:
+    """Make the warm-up, or find it in the cache. Raises UsageError if SUMO fails in it."""
+    try:
+        _ = scene.warm_up
+    except SimulationError as error:
+        remedy = "correct the route file as SUMO's message says, or choose a shorter warm-up"
+        raise UsageError.of(scene_file(scene.folder), "warm_up_s", str(error), remedy) from None
 
 
 def _write_vehicles(scene: OpenScene, file: Path) -> int:

@@ -33,6 +33,7 @@ from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_reading import read_route_file
 from harness.traffic.start_ranges import start_range
 from harness.traffic.trips import with_routes
+from harness.traffic.warm_up import Snapshot, snapshots
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +59,11 @@ class OpenScene:
         players = {player.vehicle for player in self.document.players}
         return bool(self.routes.flows) or bool(set(self.routes.vehicles) - players)
 
+    @cached_property
+    def warm_up(self) -> tuple[Snapshot, ...]:
+        """The background traffic with which games begin. Raises SimulationError if SUMO fails."""
+        return snapshots(self.document, self.routes, self.net_file)
+
     def vehicle(self, player: int) -> Departure:
         """A player's vehicle in the route file."""
         return self.routes.vehicles[self.document.players[player].vehicle]
@@ -68,7 +74,11 @@ class OpenScene:
         begin_s, end_s = self.document.game_window_s
         varied = self.document.varies.traffic_density
         density = 1.0 if varied is None else between(varied, generator.random())
-        return self.routes.departures(players, end_s, generator, begin_s, density)
+        on_road: tuple[Departure, ...] = ()
+        if self.document.warm_up_s and self.has_background_traffic:
+            snapshot = self.warm_up[generator.integers(len(self.warm_up))]
+            density, on_road = snapshot.density, snapshot.vehicles
+        return [*on_road, *self.routes.departures(players, end_s, generator, begin_s, density)]
 
     def start_distribution(
         self,
