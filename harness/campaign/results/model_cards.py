@@ -201,7 +201,7 @@ def _terms(persona: Persona) -> Iterator[_Term]:
             term, weight, limit = TERMS[name], given, ""
             if isinstance(given, Parametrised):
                 weight = given.weight
-                limit = f", within {given.within_s:g} s" if given.within_m is None else f", within {given.within_m:g} m"
+                limit = "".join(f", {_in_words(name, value)}" for name, value in given.limits.items())
             counts = "per second" if term.per_second else "per event"
             yield _Term(group=group, name=name, weight=f"{weight:g}", counts=counts, meaning=term.meaning + limit)
     for each in persona.human.fuzzy:
@@ -216,6 +216,12 @@ def _terms(persona: Persona) -> Iterator[_Term]:
             counts="per second",
             meaning=f"fuzzy, of `{each.quantity}`: {sets}",
         )
+
+
+def _in_words(limit: str, value: float) -> str:
+    """A limit of a term in words: within_s 3.0 is "within 3 s"."""
+    word, unit = limit.split("_")
+    return f"{word} {value:g} {unit.replace('mps', 'm/s')}"
 
 
 _HEADINGS = {
