@@ -175,6 +175,8 @@ def _series_of(
         leader_gap_m=series(lambda step: step.quantities.leader_gap_m),
         time_to_collision_s=series(lambda step: step.quantities.time_to_collision_s),
         payoff=series(lambda step: step.payoff),
+        passed_red_s=series(lambda step: step.quantities.passed_red_s),
+        wrong_way=series(lambda step: step.quantities.wrong_way),
         encounters=encounters,
     )
 
@@ -218,10 +220,10 @@ class _Trace:
 
     def _add(self, *cells: Any) -> None:
         step = int(self._arena.state.step[0])
-        row = (self._episode, step, step * self._arm.scene.world.step_s, *cells)
+        row = (self._episode, step, step * self._arm.scene.world.step_s, *cells, self._arena.signal_texts[0])
         for name, cell in zip(TRACE_COLUMNS, row, strict=True):
             self.columns[name].append(cell)
 
 
 _MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad")
-TRACE_COLUMNS = ("episode", "step", "time_s", "player", "vehicle_type", *_MOTION, "lapsed", "outcome")
+TRACE_COLUMNS = ("episode", "step", "time_s", "player", "vehicle_type", *_MOTION, "lapsed", "outcome", "signals")

@@ -155,7 +155,7 @@ def test_departures__are_sorted_by_time_without_the_players(write: Write) -> Non
         ('<flow id="f" route="through" number="3"/>', "flow f: has no rate"),
         ('<flow id="f" route="through" begin="5" end="4" number="3"/>', "flow f.end: does not lie after its begin"),
         ('<vehicle id="v" route="through"/><vehicle id="v" route="through"/>', "vehicle v: stands twice"),
-        ('<trip id="t" from="a" to="b"/>', "trip: is not understood here (valid: flow, route, vType"),
+        ('<trips id="t" from="a" to="b"/>', "trips: is not understood here (did you mean 'trip'?)"),
     ],
 )
 def test_mistake__is_named_with_its_place_and_remedy(write: Write, content: str, expected: str) -> None:

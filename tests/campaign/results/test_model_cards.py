@@ -196,7 +196,7 @@ def test_card__of_a_policy_that_did_not_learn_says_so_first() -> None:
     stopped = "did not learn: goal in 3 of 100 games alone, at least 97 % asked"
     assert f"**It {stopped}. Not for use.**" in card.partition("| player |")[0]
     assert f"| trained for | 1,703,936 of at most 3,000,000 steps: {stopped} |" in card.splitlines()
-    assert "convergence |" not in card
+    assert "stopped by convergence" not in card
 
 
 # --- of real runs -----------------------------------------------------------------------------------------------------
