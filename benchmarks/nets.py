@@ -113,8 +113,12 @@ def described(each: Surveyed) -> str:
     if each.refused:
         return f"{each.file.name}: refused: {each.refused}"
     outcome = f"TRACEBACK {each.crashed};" if each.crashed else "opened"
-    line = f"{each.file.name}: {outcome} in {each.seconds:.2f} s, {each.edges} edges, {len(each.phantom)} phantom rails on "
-    return line + f"{each.paths} lanes and connections" + (f": {', '.join(each.phantom[:3])}" if each.phantom else "")
+    line = (
+        f"{each.file.name}: {outcome} in {each.seconds:.2f} s, {each.edges} edges, {len(each.phantom)} phantom rails "
+    )
+    return (
+        line + f"on {each.paths} lanes and connections" + (f": {', '.join(each.phantom[:3])}" if each.phantom else "")
+    )
 
 
 def summary(found: Iterable[Surveyed]) -> str:

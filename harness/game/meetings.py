@@ -95,7 +95,7 @@ def meetings(
                 if not visible[g, p, b]:
                     continue
                 if count < 0:
-                    count = _streams_at(x_m[g, b], y_m[g, b], heading_rad[g, b], streams, in_streams, along_m)
+                    count = streams_at(x_m[g, b], y_m[g, b], heading_rad[g, b], streams, in_streams, along_m)
                 rear_m, places = station_m[g, p] - 0.5 * length_m[p], in_streams[:count]
                 found, other_m = _first_conflict(p, rear_m, offset_m[g, p], half_m, places, along_m, streams)
                 if found < 0:
@@ -117,7 +117,7 @@ def meetings(
 
 
 @compiled
-def _streams_at(
+def streams_at(
     x_m: float, y_m: float, heading_rad: float, streams: Streams, in_streams: IntArray, along_m: FloatArray
 ) -> int:
     """The number of streams in which a body drives; written to `in_streams` in order, and its place to `along_m`."""
@@ -198,21 +198,26 @@ def _must_yield(
     signals: IntArray,
     conflicts: FloatArray,
 ) -> bool:
-    """Whether the player must yield in conflict `c`.
-
-    A signal counts for a side that has not passed its stop line: a stream on red has no priority, a player on red has
-    none over a stream that is not, a player on 'G' yields to no stream, and any other player at these lights yields to
-    a stream on 'G'. Otherwise the signs of the junction decide.
-    """
+    """Whether the player must yield in conflict `c`. A signal counts for a side that has not passed its stop line."""
     own, other = _OFF, _OFF
     if conflicts[c, _OWN_LINK] >= 0 and front_m <= conflicts[c, _STOP_M] and len(signals):
         own = signals[int(conflicts[c, _OWN_LINK])]
     if conflicts[c, _OTHER_LINK] >= 0 and other_along_m <= 0.0 and len(signals):
         other = signals[int(conflicts[c, _OTHER_LINK])]
+    return has_duty(c, own, other, other_s <= own_s, conflicts)
+
+
+@compiled
+def has_duty(c: int, own: int, other: int, other_first: bool, conflicts: FloatArray) -> bool:
+    """Whether the player must yield in conflict `c` of a table [C, 16], given the signals of both sides.
+
+    A stream on red has no priority, a player on red has none over a stream that is not, a player on 'G' yields to no
+    stream, and any other player at these lights yields to a stream on 'G'. Otherwise the signs of the junction decide.
+    """
     if other == _RED or own == _GREEN:
         return False
     if own == _RED or (other == _GREEN and conflicts[c, _OWN_LINK] >= 0):
         return True
     if conflicts[c, _FIRST_COME] > 0.0:
-        return other_s <= own_s
+        return other_first
     return conflicts[c, _YIELDS] > 0.0

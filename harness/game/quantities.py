@@ -129,10 +129,11 @@ class Quantities:
 
     @cached_property
     def permitted_mps(self) -> FloatArray:
-        """Speed that the limit, signals, signs and right of way permit."""
-        right_of_way = self.world.right_of_way
+        """Speed that the limits, signals, signs and right of way permit."""
+        right_of_way, routes = self.world.right_of_way, self.world.road.routes
+        approach_mps = routes.approach_mps[routes.rows(self.state.station_m)]
         return permitted_mps(
-            *(self.front_m, self.state.speed_mps, self.speed_limit_mps, self.next_stop_line, self.state.signals),
+            *(self.front_m, self.state.speed_mps, approach_mps, self.next_stop_line, self.state.signals),
             *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),
         )
 

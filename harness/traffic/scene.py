@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import ConfigDict
 from sumolib.net import Net
+from sumolib.net.edge import Edge
 
 from harness.config.scene import PlainFile, Scene, scene_file
 from harness.config.toml_reading import Document, nearest, read_document
@@ -25,7 +26,7 @@ from harness.game.seeding import between
 from harness.game.state import ROLES
 from harness.game.world import World
 from harness.traffic import network
-from harness.traffic.departures import check_departures
+from harness.traffic.departures import check_departures, edges_of
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
@@ -136,7 +137,8 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     routes = collect(problems, partial(_with_routes, routes, net_file, net, document))
     if routes is None:
         raise UsageError(problems)
-    area = network.drivable_area(net)
+    own = _edges_of_players(document, net, routes)
+    area = network.drivable_area(net, own)
     open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
     opened = [collect(problems, partial(open_one, role)) for role in ROLES]
     vehicles = {player.vehicle for player in document.players}
@@ -152,7 +154,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     places = tuple(start for start in starts if start is not None)
     if problems:
         raise UsageError(problems)
-    lines = network.rail_lines(net, area)
+    lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
     world = World(
         road=Road(network.rails(lines, REACH_M + 10.0), Routes.of([player.route for player in players])),
@@ -172,6 +174,12 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
     )
+
+
+def _edges_of_players(document: Scene, net: Net, routes: RouteFile) -> list[Edge]:
+    """The edges of the players' routes; those of invalid routes are left out."""
+    vehicles = [routes.vehicles[player.vehicle] for player in document.players if player.vehicle in routes.vehicles]
+    return [edge for each in vehicles for edge in collect([], partial(edges_of, each, net, routes)) or []]
 
 
 def _with_ego_type(routes: RouteFile, document: Scene | None, ego_type: str | None) -> RouteFile:
