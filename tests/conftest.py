@@ -20,6 +20,7 @@ from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 from tests.support.shared import shared_folder
 from tests.support.slow import slow_tests
+from tests.support.stations import nearest_station_m
 
 
 def pytest_configure() -> None:
@@ -117,7 +118,7 @@ def moment() -> Callable[..., Quantities]:
             column("present", state.present[0]),
         )
         routes, where = world.road.routes, (state.x_m, state.y_m)
-        state.station_m, offset = routes.locate(*where, routes.find(*where))
+        state.station_m, offset = routes.locate(*where, nearest_station_m(routes, *where))
         return Quantities(world, state, bodies, np.zeros((1, len(players))), offset)
 
     return make

@@ -16,6 +16,13 @@ def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
     return interval
 
 
+def _positive(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] < 0.0 or not 0.0 < interval[1] <= _DENSEST:
+        raise ValueError(f"the density lies outside 0 to {_DENSEST:g}")
+    return interval
+
+
+_DENSEST = 10.0
 Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
 Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
@@ -84,6 +91,13 @@ class Player(Document):
         return self
 
 
+class Varies(Document):
+    """What differs from game to game: ranges from which each game draws by its seed."""
+
+    traffic_density: Annotated[Interval, AfterValidator(_positive)] | None = None
+    """Range of a factor on the background traffic: on the rates of flows, and on the number of single vehicles."""
+
+
 class Scene(Document):
     """The road, the players on it, and how a game starts and ends."""
 
@@ -101,6 +115,12 @@ class Scene(Document):
     """Coefficient of friction between tyre and road, as a share of g."""
     lane_change_duration_s: float = Field(2.0, ge=0.0, le=10.0)
     """Duration of a lane change of background traffic."""
+    traffic_begin_s: float = Field(0.0, ge=0.0, le=1e7)
+    """Time of the route file at which its traffic begins, as SUMO's option --begin."""
+    warm_up_s: float = Field(0.0, ge=0.0, le=3600.0)
+    """Time for which background traffic has been on the road when a game starts. The game starts at `traffic_begin_s`
+    plus this time of the route file."""
+    varies: Varies = Varies()
     goal: Goal | None = None
     """The destination of every player that has none of its own."""
     ego: Player
@@ -124,6 +144,17 @@ class Scene(Document):
     def players(self) -> tuple[Player, Player]:
         """Ego and non-ego, in the order of the player axis of arrays."""
         return self.ego, self.non_ego
+
+    @property
+    def game_window_s(self) -> tuple[float, float]:
+        """Begin and end of a game, as times of the route file."""
+        begin_s = self.traffic_begin_s + self.warm_up_s
+        return begin_s, begin_s + self.time_limit_s
+
+    @property
+    def traffic_window_s(self) -> tuple[float, float]:
+        """Begin of the warm-up and end of a game, as times of the route file."""
+        return self.traffic_begin_s, self.game_window_s[1]
 
     def goal_of(self, player: Player) -> tuple[str, Goal]:
         """A player's goal, and the key of the document that gives it."""

@@ -106,6 +106,8 @@ class Arena:
         self._limits = PlayersLimits(games, players, self.world.steps)
         self._all_games = np.arange(games)
         self.reading: Reading | None = None
+        self.signal_texts = [""] * games
+        """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
         self._players_length = np.tile(self.world.length_m, (games, 1))
         self._players_width = np.tile(self.world.width_m, (games, 1))
 
@@ -116,7 +118,8 @@ class Arena:
         for game, start in starts.items():
             self._place(game, start)
             signals = self.simulation.reset(game, start, list((departures or {}).get(game, [])))
-            self.state.signals[game], self.state.signal_s[game] = signals
+            self.state.signals[game], self.state.signal_s[game] = signals.states, signals.since_s
+            self.signal_texts[game] = signals.text
             if self.reading is not None:
                 self.reading.present[game] = False
         games = np.array(sorted(starts), dtype=np.int64)
@@ -147,6 +150,7 @@ class Arena:
         if reading.signals is not None:
             state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, self.world.step_s)
             state.signals = reading.signals
+            self.signal_texts = list(reading.signal_texts or self.signal_texts)
         self._read_sumo_players(reading, drove)
         bodies = self._bodies(state)
         advanced_m, offset_m = self._locate()

@@ -12,12 +12,15 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import pandas as pd
 
 from harness.config.persona import Persona
 from harness.drivers.mixture import Player, mixture_of
 from harness.environments.arena import Arena, Seat, Step
+from harness.evaluation.encounters import Encounter, encounters_of
 from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
-from harness.game.arrays import BoolArray, FloatArray
+from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.game.state import EGO, NON_EGO, ROLES, Outcome
@@ -109,6 +112,7 @@ def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode
     arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
     trace = _Trace(arm, arena, episode)
     trace.add_players(arena.state.present[0])
+    signals = arena.state.signals.copy()
     steps: list[Step] = []
     while arena.state.running.any():
         present = arena.state.present[0].copy()
@@ -116,23 +120,43 @@ def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode
         steps.append(step)
         trace.add_players(present, step)
         trace.add_background()
-    return Game(record=_record(arm, arena, episode, steps), trace=trace.columns)
+    encounters = _encounters(arm, trace.columns, np.concatenate([signals, *_signals_of(steps)]))
+    return Game(record=_record(arm, arena, episode, steps, encounters), trace=trace.columns)
 
 
-def _record(arm: Arm, arena: Arena, episode: int, steps: Sequence[Step]) -> dict[str, Any]:
+def _signals_of(steps: Sequence[Step]) -> list[IntArray]:
+    return [step.quantities.state.signals for step in steps]
+
+
+def _encounters(arm: Arm, trace: Mapping[str, Sequence[Any]], signals: IntArray) -> tuple[tuple[Encounter, ...], ...]:
+    """The encounters at junctions of each player in one game; `signals` [T, L] are the states of signal links."""
+    world = arm.scene.world
+    if not len(world.right_of_way.conflicts.player):
+        return ((),) * len(ROLES)
+    frame = pd.DataFrame(trace)
+    types_m = {name: (kind.length_m, kind.width_m) for name, kind in arm.scene.routes.types.items()}
+    quantities, drove = quantities_of(frame, world, sizes_by_name(frame, types_m), signals), drove_in(frame)
+    return tuple(tuple(encounters_of(quantities, player, drove[:, player])) for player in range(len(ROLES)))
+
+
+def _record(
+    arm: Arm, arena: Arena, episode: int, steps: Sequence[Step], encounters: Sequence[tuple[Encounter, ...]]
+) -> dict[str, Any]:
     outcomes = [Outcome(int(outcome)) for outcome in arena.state.outcome[0]]
     record: dict[str, Any] = {"episode": episode, "duration_s": len(steps) * arm.scene.world.step_s, "error": ""}
     for player, metrics in ((EGO, OF_EGO), (NON_EGO, OF_NON_EGO)):
         takes_part = arm.drivers[player] is not None
         record[f"{ROLES[player]}_outcome"] = outcomes[player].word if takes_part else ""
-        series = _series_of(arm, steps, player, outcomes[player]) if takes_part else None
+        series = _series_of(arm, steps, player, outcomes[player], encounters[player]) if takes_part else None
         for name, metric in metrics.items():
             record[name] = metric(series) if series is not None else None
     record["ego_failed"] = int(outcomes[EGO] is not Outcome.GOAL) if arm.drivers[EGO] is not None else None
     return record
 
 
-def _series_of(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -> PlayerSeries:
+def _series_of(
+    arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome, encounters: tuple[Encounter, ...]
+) -> PlayerSeries:
     driver = arm.drivers[player]
     steers = driver is not None and driver.takes_over  # SUMO's cars change lanes without a steering angle
     drove = [step for step in steps if step.drove[0, player]]
@@ -151,6 +175,9 @@ def _series_of(arm: Arm, steps: Sequence[Step], player: int, outcome: Outcome) -
         leader_gap_m=series(lambda step: step.quantities.leader_gap_m),
         time_to_collision_s=series(lambda step: step.quantities.time_to_collision_s),
         payoff=series(lambda step: step.payoff),
+        passed_red_s=series(lambda step: step.quantities.passed_red_s),
+        wrong_way=series(lambda step: step.quantities.wrong_way),
+        encounters=encounters,
     )
 
 
@@ -193,10 +220,10 @@ class _Trace:
 
     def _add(self, *cells: Any) -> None:
         step = int(self._arena.state.step[0])
-        row = (self._episode, step, step * self._arm.scene.world.step_s, *cells)
+        row = (self._episode, step, step * self._arm.scene.world.step_s, *cells, self._arena.signal_texts[0])
         for name, cell in zip(TRACE_COLUMNS, row, strict=True):
             self.columns[name].append(cell)
 
 
 _MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad")
-TRACE_COLUMNS = ("episode", "step", "time_s", "player", "vehicle_type", *_MOTION, "lapsed", "outcome")
+TRACE_COLUMNS = ("episode", "step", "time_s", "player", "vehicle_type", *_MOTION, "lapsed", "outcome", "signals")

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.evaluation.encounters import Encounter
 from harness.game.arrays import FloatArray
 from harness.game.state import Outcome
 
@@ -26,6 +27,11 @@ class PlayerSeries:
     leader_gap_m: FloatArray
     time_to_collision_s: FloatArray
     payoff: FloatArray
+    passed_red_s: FloatArray
+    """Where the player passed a stop line on red: seconds since the signal became red; else -1."""
+    wrong_way: FloatArray
+    """1 while the player was among oncoming lanes, else 0."""
+    encounters: tuple[Encounter, ...] = ()
 
 
 def _finite(values: FloatArray, statistic: Callable[[FloatArray], float]) -> float | None:
@@ -68,16 +74,58 @@ def payoff(drive: PlayerSeries) -> float | None:
     return float(drive.payoff.sum())
 
 
-OF_EGO: Mapping[str, Callable[[PlayerSeries], float | None]] = {
+def red_lights(drive: PlayerSeries) -> float:
+    """Number of stop lines that the player passed on red."""
+    return float(np.count_nonzero(drive.passed_red_s >= 0.0))
+
+
+def latest_red_s(drive: PlayerSeries) -> float | None:
+    """Longest time since the onset of red at which the player passed a stop line."""
+    return _finite(np.where(drive.passed_red_s >= 0.0, drive.passed_red_s, np.nan), np.max)
+
+
+def wrong_way_s(drive: PlayerSeries) -> float:
+    """Time among oncoming lanes."""
+    return float(drive.wrong_way.sum()) * drive.step_s
+
+
+def min_pet_s(drive: PlayerSeries) -> float | None:
+    """Least post-encroachment time (PET) of the player and another road user in a zone of conflict of a junction."""
+    return _finite(np.array([each.post_encroachment_s for each in drive.encounters]), np.min)
+
+
+def pet_priority(drive: PlayerSeries) -> str | None:
+    """`other` if the player had to yield in the passage of least PET, else `ego`."""
+    found = [each for each in drive.encounters if np.isfinite(each.post_encroachment_s)]
+    if not found:
+        return None
+    return "other" if min(found, key=lambda each: each.post_encroachment_s).must_yield else "ego"
+
+
+def accepted_gap_s(drive: PlayerSeries) -> float | None:
+    """Least gap that the player accepted: the time that a road user with priority would have needed to the zone of
+    conflict, at constant speed, when the player entered it; 0 if it was inside."""
+    return _finite(np.array([each.gap_s for each in drive.encounters if each.must_yield]), np.min)
+
+
+OF_EGO: Mapping[str, Callable[[PlayerSeries], float | str | None]] = {
     "ego_mean_speed_mps": mean_speed_mps,
     "ego_trailing_distance_m": trailing_distance_m,
     "ego_min_ttc_s": min_ttc_s,
     "ego_max_deceleration_mps2": max_deceleration_mps2,
     "ego_max_lateral_acceleration_mps2": max_lateral_acceleration_mps2,
     "ego_time_to_goal_s": time_to_goal_s,
+    "ego_red_lights": red_lights,
+    "ego_wrong_way_s": wrong_way_s,
+    "ego_min_pet_s": min_pet_s,
+    "ego_pet_priority": pet_priority,
+    "ego_accepted_gap_s": accepted_gap_s,
     "ego_payoff": payoff,
 }
 OF_NON_EGO: Mapping[str, Callable[[PlayerSeries], float | None]] = {
     "non_ego_mean_speed_mps": mean_speed_mps,
+    "non_ego_red_lights": red_lights,
+    "non_ego_latest_red_s": latest_red_s,
+    "non_ego_wrong_way_s": wrong_way_s,
     "non_ego_payoff": payoff,
 }

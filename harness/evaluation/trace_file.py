@@ -40,6 +40,7 @@ SCHEMA = pa.schema(
         ),
         ("lapsed", pa.bool_()),
         ("outcome", _TEXT),
+        ("signals", _TEXT),
     ]
 )
 
@@ -171,7 +172,7 @@ def _frame(table: pa.Table) -> pd.DataFrame:
 
 
 def _with_strings(frame: pd.DataFrame) -> pd.DataFrame:
-    for name in ("player", "vehicle_type", "outcome"):
+    for name in ("player", "vehicle_type", "outcome", "signals"):
         frame[name] = frame[name].astype(str)
     return frame
 

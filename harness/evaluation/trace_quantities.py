@@ -38,9 +38,24 @@ def series_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[flo
     )
 
 
-def quantities_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]]) -> Quantities:
+def sizes_by_name(trace: pd.DataFrame, types_m: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Length and width of each road user in a trace, by its name, given those of vehicle types; by default SUMO's."""
+    kinds = trace.drop_duplicates("player")
+    return {
+        str(name): types_m.get(str(kind), _USUAL_SIZE_M)
+        for name, kind in zip(kinds["player"], kinds["vehicle_type"], strict=True)
+    }
+
+
+def quantities_of(
+    trace: pd.DataFrame,
+    world: World,
+    sizes_m: Mapping[str, tuple[float, float]],
+    signals: IntArray | None = None,
+) -> Quantities:
     """The quantities of every step of one game. They do not depend on the previous step (advanced_m is 0).
 
+    `signals` [T, L] are the states of signal links; by default they are off.
     The position along the route is located separately in each step: on a route that crosses itself, a player on the
     crossing may be located on the other branch.
     """
@@ -49,7 +64,9 @@ def quantities_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple
     present = _filled(places, np.ones(len(trace), dtype=bool))
     motion = {name: _filled(places, trace[name].to_numpy()) for name in _MOTION}
     sizes = np.array([sizes_m.get(name, (0.0, 0.0)) for name in names])
-    state = State.empty(len(present), players)
+    state = State.empty(len(present), players, len(world.right_of_way.signal_links))
+    if signals is not None:
+        state.signals = signals[: len(present)]
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "lapsed"):
         setattr(state, name, motion[name][:, :players].copy())
     state.present = present[:, :players].copy()
@@ -75,6 +92,7 @@ def drove_in(trace: pd.DataFrame) -> BoolArray:
     return there & np.concatenate((np.ones((1, len(ROLES)), dtype=bool), running[:-1]))
 
 
+_USUAL_SIZE_M = (5.0, 1.8)  # of SUMO's default vehicle type
 _MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "lapsed")
 _Places = tuple[tuple[int, int], BoolArray, IntArray, IntArray]
 

@@ -11,6 +11,7 @@ from harness.game.jit import compiled
 from harness.game.right_of_way import CELL_M, Conflicts, Signal, Streams
 
 STANDING_MPS = 0.1  # a body that is not faster does not arrive
+HORIZON_S = 5.0  # a zone that a player reaches later is not in its way yet: from 50 km/h it can stop in comfort
 _MOST_TURNED = float(np.cos(np.pi / 4.0))  # a body drives in a stream if its heading is within 45 degrees
 _BEGIN_M, _END_M, _STOP_M, _RIGHT_M, _LEFT_M, _FROM_M, _UNTIL_M, _ZONE_M, _LENGTH_M = (
     Conflicts._fields.index(f"{name}_m")
@@ -19,6 +20,8 @@ _BEGIN_M, _END_M, _STOP_M, _RIGHT_M, _LEFT_M, _FROM_M, _UNTIL_M, _ZONE_M, _LENGT
 _YIELDS, _FIRST_COME, _OWN_LINK, _OTHER_LINK = (
     Conflicts._fields.index(name) for name in ("yields", "first_come", "own_link", "other_link")
 )
+_BESIDE_M = 0.8
+# plain integers: compiled code can't convert a member
 _OFF, _GREEN, _RED = int(Signal.OFF), int(Signal.GREEN), int(Signal.RED)
 
 
@@ -47,6 +50,18 @@ class Meetings(NamedTuple):
         """The record of the columns that `meetings` returns."""
         own_m, other_m, own_s, other_s, gap_s = numbers
         return cls(conflict, own_m, other_m, own_s, other_s, gap_s, must_yield)
+
+
+def least_gap_s(met: Meetings) -> FloatArray:
+    """[G, P] the least `gap_s` of zones that the player reaches within `HORIZON_S`; inf without one."""
+    return np.where(met.own_s < HORIZON_S, met.gap_s, np.inf).min(-1, initial=np.inf)
+
+
+def entered_before_s(met: Meetings, advanced_m: FloatArray) -> FloatArray:
+    """[G, P] the least `other_s` of the bodies with priority whose zone the player's front entered in this step, in
+    which it advanced by `advanced_m` [G, P]; inf without one."""
+    enters = (met.own_m <= 0.0) & (met.own_m + advanced_m[..., None] > 0.0)
+    return np.where(enters & met.must_yield, met.other_s, np.inf).min(-1, initial=np.inf)
 
 
 @compiled
@@ -81,7 +96,7 @@ def meetings(
                 if not visible[g, p, b]:
                     continue
                 if count < 0:
-                    count = _streams_at(x_m[g, b], y_m[g, b], heading_rad[g, b], streams, in_streams, along_m)
+                    count = streams_at(x_m[g, b], y_m[g, b], heading_rad[g, b], streams, in_streams, along_m)
                 rear_m, places = station_m[g, p] - 0.5 * length_m[p], in_streams[:count]
                 found, other_m = _first_conflict(p, rear_m, offset_m[g, p], half_m, places, along_m, streams)
                 if found < 0:
@@ -103,16 +118,21 @@ def meetings(
 
 
 @compiled
-def _streams_at(
+def streams_at(
     x_m: float, y_m: float, heading_rad: float, streams: Streams, in_streams: IntArray, along_m: FloatArray
 ) -> int:
-    """The number of streams in which a body drives; written to `in_streams` in order, and its place to `along_m`."""
+    """The number of streams in which a body drives; written to `in_streams` in order, and its place to `along_m`.
+
+    Streams that are farther beside the body than another one by more than `_BESIDE_M` are left out: inside a junction,
+    it is on its way to leave them, or has only come near to their end.
+    """
     column = int((x_m - streams.origin_m[0]) // CELL_M)
     line = int((y_m - streams.origin_m[1]) // CELL_M)
     if column < 0 or line < 0 or column >= streams.first.shape[0] or line >= streams.first.shape[1] - 1:
         return 0
-    count, nearest2 = 0, np.inf
+    count, nearest2, least_m = 0, np.inf, np.inf
     cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
+    beside_m = np.empty(len(in_streams))
     for place in range(streams.first[column, line], streams.first[column, line + 1]):
         k = streams.rows[place]
         sample = streams.samples[k]
@@ -126,7 +146,14 @@ def _streams_at(
             count += 0 if again else 1
             in_streams[count - 1], nearest2 = streams.stream[k], u * u + v * v
             along_m[streams.stream[k]] = sample[6] + u
-    return count
+            beside_m[count - 1] = abs(v)
+            least_m = min(least_m, abs(v))
+    near = 0
+    for k in range(count):
+        if beside_m[k] <= least_m + _BESIDE_M:
+            in_streams[near] = in_streams[k]
+            near += 1
+    return near
 
 
 @compiled
@@ -184,20 +211,26 @@ def _must_yield(
     signals: IntArray,
     conflicts: FloatArray,
 ) -> bool:
-    """Whether the player must yield in conflict `c`.
-
-    A signal counts for a side that has not passed its stop line: a stream on red has no priority, a player on red has
-    none over a stream that is not, and a player on 'G' yields to no stream. Otherwise the signs of the junction decide.
-    """
+    """Whether the player must yield in conflict `c`. A signal counts for a side that has not passed its stop line."""
     own, other = _OFF, _OFF
     if conflicts[c, _OWN_LINK] >= 0 and front_m <= conflicts[c, _STOP_M] and len(signals):
         own = signals[int(conflicts[c, _OWN_LINK])]
     if conflicts[c, _OTHER_LINK] >= 0 and other_along_m <= 0.0 and len(signals):
         other = signals[int(conflicts[c, _OTHER_LINK])]
+    return has_duty(c, own, other, other_s <= own_s, conflicts)
+
+
+@compiled
+def has_duty(c: int, own: int, other: int, other_first: bool, conflicts: FloatArray) -> bool:
+    """Whether the player must yield in conflict `c` of a table [C, 16], given the signals of both sides.
+
+    A stream on red has no priority, a player on red has none over a stream that is not, a player on 'G' yields to no
+    stream, and any other player at these lights yields to a stream on 'G'. Otherwise the signs of the junction decide.
+    """
     if other == _RED or own == _GREEN:
         return False
-    if own == _RED:
+    if own == _RED or (other == _GREEN and conflicts[c, _OWN_LINK] >= 0):
         return True
     if conflicts[c, _FIRST_COME] > 0.0:
-        return other_s < own_s
+        return other_first
     return conflicts[c, _YIELDS] > 0.0

@@ -13,13 +13,14 @@ FUZZY_QUANTITIES: Mapping[str, str] = {
     "speed_over_limit": "speed over the limit, as a share of it; negative below",
     "speed_mps": "speed",
     "time_gap_s": "time gap to the vehicle ahead",
+    "gap_s": "time between the passages of the car and of another vehicle where their ways meet; infinite without one",
     "clearance_m": "distance to the nearest surface, rail or vehicle",
     "lane_offset_m": "distance from the centre of the nearest lane",
     "lane_end_m": "distance until the lane the car is in ends; infinite if it goes on",
     "goal_m": "distance to the goal, along the route",
 }
 """The quantities that a fuzzy term can use, with their descriptions."""
-NEARNESS = ("time_gap_s", "clearance_m")  # the fuzzy quantities that are 0 at contact
+NEARNESS = ("time_gap_s", "gap_s", "clearance_m")  # the fuzzy quantities that are 0 at contact
 
 
 class Form(IntEnum):
@@ -126,6 +127,21 @@ TERMS: Mapping[str, Term] = {
         quantity="wrong_way",
         form=Form.LESS,
         per_second=True,
+    ),
+    "yield": Term(
+        group="safety",
+        meaning="entering the way of a vehicle with priority that is there sooner than this, once",
+        quantity="entered_before_s",
+        form=Form.BELOW,
+        parameter="within_s",
+    ),
+    "gap": Term(
+        group="safety",
+        meaning="passing a crossing or a merge closer in time to another vehicle than this",
+        quantity="gap_s",
+        form=Form.BELOW,
+        per_second=True,
+        parameter="within_s",
     ),
     "goal": _outcome_term(
         group="operational", meaning="reaching the goal, once", form=Form.GAINED, outcome=Outcome.GOAL

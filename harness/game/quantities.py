@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,9 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
-from harness.game.meetings import Meetings, meetings
-from harness.game.road import Along, Routes, row_at
-from harness.game.route_coordinates import PATH_M, along_route, row_ahead
+from harness.game.meetings import Meetings, entered_before_s, least_gap_s, meetings
+from harness.game.road import Along
+from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
 from harness.game.state import Bodies, Outcome, State
 from harness.game.traffic_rules import next_stop_lines, passed_stop_lines, permitted_mps, wrong_way
 from harness.game.world import World
@@ -32,15 +32,6 @@ class Path(NamedTuple):
     heading_rad: FloatArray
     left_edge_m: FloatArray
     right_edge_m: FloatArray
-
-
-class OnPath(NamedTuple):
-    """Bodies in route coordinates, [G, P, B]: centres relative to the player's centre, and half extents."""
-
-    ahead_m: FloatArray
-    left_m: FloatArray
-    half_length_m: FloatArray
-    half_width_m: FloatArray
 
 
 @dataclass
@@ -138,10 +129,11 @@ class Quantities:
 
     @cached_property
     def permitted_mps(self) -> FloatArray:
-        """Speed that the limit, signals, signs and right of way permit."""
-        right_of_way = self.world.right_of_way
+        """Speed that the limits, signals, signs and right of way permit."""
+        right_of_way, routes = self.world.right_of_way, self.world.road.routes
+        approach_mps = routes.approach_mps[routes.rows(self.state.station_m)]
         return permitted_mps(
-            *(self.front_m, self.state.speed_mps, self.speed_limit_mps, self.next_stop_line, self.state.signals),
+            *(self.front_m, self.state.speed_mps, approach_mps, self.next_stop_line, self.state.signals),
             *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),
         )
 
@@ -169,7 +161,7 @@ class Quantities:
         """Bodies in route coordinates, each in the nearest frame of the route at `PATH_M`."""
         bodies = self.bodies
         boxes = (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
-        return OnPath(*_on_path(self.state.station_m, self.lateral_offset_m, tuple(self.world.road.routes), *boxes))
+        return OnPath(*on_path(self.state.station_m, self.lateral_offset_m, tuple(self.world.road.routes), *boxes))
 
     @cached_property
     def leader_gap_m(self) -> FloatArray:
@@ -198,6 +190,18 @@ class Quantities:
             *(self.visible, state.signals, tuple(tables.streams)),
         )
         return Meetings.of(*columns)
+
+    @cached_property
+    def gap_s(self) -> FloatArray:
+        """Time between the player's passage of a zone of conflict and that of another body, both at constant speed; inf
+        without a zone that the player reaches within `meetings.HORIZON_S`."""
+        return least_gap_s(self.meetings)
+
+    @cached_property
+    def entered_before_s(self) -> FloatArray:
+        """For a player that entered a zone in this step: the least time until a body with priority is there, 0 if it is
+        there already; else inf."""
+        return entered_before_s(self.meetings, self.advanced_m)
 
     # --- surfaces ------------------------------------------------------------------------------------------------
 
@@ -285,27 +289,3 @@ def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
 @compiled
 def _vehicle_clearance_m(cars: Box, boxes: Box, players: BoolArray, bodies: BoolArray) -> FloatArray:
     return distance_to_nearest_box(cars, boxes, _visible(players, bodies), REACH_M)
-
-
-@compiled
-def _on_path(
-    station_m: FloatArray,
-    lateral_offset_m: FloatArray,
-    table: tuple[Any, ...],
-    x_m: FloatArray,
-    y_m: FloatArray,
-    heading_rad: FloatArray,
-    length_m: FloatArray,
-    width_m: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    routes = Routes(*table)
-    shape = (station_m.shape[0], station_m.shape[1], x_m.shape[1])
-    ahead, left, half_length, half_width = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
-    for g, p in np.ndindex(station_m.shape):
-        station, offset = station_m[g, p], lateral_offset_m[g, p]
-        row = row_at(station, routes.first_row[p], routes.last_row[p])
-        for b in range(x_m.shape[1]):
-            box = (x_m[g, b], y_m[g, b], heading_rad[g, b], length_m[g, b], width_m[g, b])
-            extent = along_route(row, station, offset, p, routes, *box)
-            ahead[g, p, b], left[g, p, b], half_length[g, p, b], half_width[g, p, b] = extent
-    return ahead, left, half_length, half_width

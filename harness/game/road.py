@@ -17,6 +17,7 @@ MARGIN_M = 100.0  # straight extension of a route's table before its start and b
 _BEND_M = 4.0  # a driver steers by the mean curvature of this length: the lines of a net have corners
 _TIGHTEST = 1.0  # product of curvature and wheelbase: beyond the lock of any car
 PREVIEW_S = 0.2  # time ahead of the bend for which a driver steers; the steering rack needs some of it
+COMFORTABLE_MPS2 = 2.0  # braking before a curve or a stop that was seen in time
 _LEAST_STRETCH = 0.25  # bound for points near or beyond a curve's centre, where the nearest station is not unique
 
 
@@ -68,6 +69,7 @@ class Routes(NamedTuple):
     own_left_m: FloatArray
     own_right_m: FloatArray
     speed_limit_mps: FloatArray
+    approach_mps: FloatArray  # speed at which comfortable braking keeps to the limits ahead
     lane_offset_m: FloatArray
     lane_end_m: FloatArray
     first_row: IntArray  # [P]
@@ -94,6 +96,7 @@ class Routes(NamedTuple):
             cos=np.cos(columns["heading_rad"]),
             sin=np.sin(columns["heading_rad"]),
             curvature_per_m=np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
+            approach_mps=np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
             bend_per_m=np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
             first_row=first,
             last_row=first + rows - 1,
@@ -232,6 +235,14 @@ def _bend_per_m(heading_rad: FloatArray) -> FloatArray:
     before, after = np.maximum(rows - reach, 0), np.minimum(rows + reach, len(turned) - 1)
     bend: FloatArray = (turned[after] - turned[before]) / ((after - before) * SPACING_M)
     return bend
+
+
+def _approach_mps(speed_limit_mps: FloatArray) -> FloatArray:
+    """[N] greatest speed at each station from which braking at `COMFORTABLE_MPS2` keeps to the limits ahead."""
+    gained2 = 2.0 * COMFORTABLE_MPS2 * SPACING_M * np.arange(len(speed_limit_mps))
+    reach2 = np.minimum.accumulate((speed_limit_mps**2 + gained2)[::-1])[::-1] - gained2
+    approach: FloatArray = np.sqrt(np.maximum(reach2, 0.0))
+    return approach
 
 
 @dataclass(frozen=True)

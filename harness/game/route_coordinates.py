@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
 
+from harness.game.arrays import FloatArray
 from harness.game.jit import compiled
-from harness.game.road import MARGIN_M, SPACING_M, Routes
+from harness.game.road import MARGIN_M, SPACING_M, Routes, row_at
 
 # distances ahead of a player at which its route is sampled
 PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])
 _PATH_ROWS = np.rint(PATH_M / SPACING_M).astype(np.int64)
+
+
+class OnPath(NamedTuple):
+    """Bodies in route coordinates, [G, P, B]: centres relative to the player's centre, and half extents."""
+
+    ahead_m: FloatArray
+    left_m: FloatArray
+    half_length_m: FloatArray
+    half_width_m: FloatArray
 
 
 @compiled
@@ -62,3 +74,28 @@ def half_extents_m(turned_rad: float, length_m: float, width_m: float) -> tuple[
     """Half the extents, along and across, of a body at an angle. Neither exceeds half of length plus width."""
     along, across = abs(np.cos(turned_rad)), abs(np.sin(turned_rad))
     return 0.5 * (length_m * along + width_m * across), 0.5 * (length_m * across + width_m * along)
+
+
+@compiled
+def on_path(
+    station_m: FloatArray,
+    lateral_offset_m: FloatArray,
+    table: tuple[Any, ...],
+    x_m: FloatArray,
+    y_m: FloatArray,
+    heading_rad: FloatArray,
+    length_m: FloatArray,
+    width_m: FloatArray,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """The columns of `OnPath`, of players [G, P] and bodies [G, B]; `table` are the routes."""
+    routes = Routes(*table)
+    shape = (station_m.shape[0], station_m.shape[1], x_m.shape[1])
+    ahead, left, half_length, half_width = np.empty(shape), np.empty(shape), np.empty(shape), np.empty(shape)
+    for g, p in np.ndindex(station_m.shape):
+        station, offset = station_m[g, p], lateral_offset_m[g, p]
+        row = row_at(station, routes.first_row[p], routes.last_row[p])
+        for b in range(x_m.shape[1]):
+            box = (x_m[g, b], y_m[g, b], heading_rad[g, b], length_m[g, b], width_m[g, b])
+            extent = along_route(row, station, offset, p, routes, *box)
+            ahead[g, p, b], left[g, p, b], half_length[g, p, b], half_width[g, p, b] = extent
+    return ahead, left, half_length, half_width

@@ -13,8 +13,8 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.meetings import Meetings
 from harness.game.right_of_way import Conflicts, Control, Signal, StopLines
+from harness.game.road import COMFORTABLE_MPS2
 
-COMFORTABLE_MPS2 = 2.0  # braking for a stop that was seen in time
 AMBER_MPS2 = 3.0  # yellow means stop, unless it takes more braking than this (ITE: 10 ft/s2)
 YIELDS_WITHIN_S = 4.0  # a body with priority that arrives sooner is waited for
 ROLLING_MPS = 0.5  # speed at a stop sign that the rules take for a stop
@@ -61,17 +61,17 @@ def passed_stop_lines(
 def permitted_mps(
     front_m: FloatArray,
     speed_mps: FloatArray,
-    limit_mps: FloatArray,
+    approach_mps: FloatArray,
     next_line: IntArray,
     signals: IntArray,
     table: tuple[Any, ...],
     conflict_table: tuple[Any, ...],
     meeting_table: tuple[Any, ...],
 ) -> FloatArray:
-    """The speed (m/s) that limit, signals, signs and right of way permit: that of comfortable braking to a stop line
-    where one has to stop or to wait."""
+    """The speed (m/s) that limits, signals, signs and right of way permit: that of comfortable braking to a lower limit
+    ahead, and to a stop line where one has to stop or to wait."""
     lines, conflicts, meetings = StopLines(*table), Conflicts(*conflict_table), Meetings(*meeting_table)
-    permitted = limit_mps.copy()
+    permitted = approach_mps.copy()
     for g, p in np.ndindex(front_m.shape):
         line = next_line[g, p]
         if line >= 0:

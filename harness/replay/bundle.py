@@ -2,7 +2,7 @@
 
 scene.sumocfg      the configuration, which names the files below
 scene.net.xml      the scene's net, copied
-scene.add.xml      vehicle types in the colours of the game, rails, the place of contact
+scene.add.xml      vehicle types in the colours of the game, traffic lights, rails, the place of contact
 episode.fcd.xml    every pose of every vehicle
 view.xml           zoom, speed, and the halts at contacts and at the end
 """
@@ -23,6 +23,7 @@ from harness.replay.contact import Contact, contacts
 from harness.replay.floating_car_data import shown_at, write_recording, write_xml
 from harness.replay.gui_settings import WINDOW_PX, Viewport, choose_view, view_settings
 from harness.replay.lanes import Lanes
+from harness.replay.signals import programmes
 from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
 from harness.traffic.xml_file import xml_bytes
 
@@ -59,9 +60,9 @@ def write_replay(
     partial.mkdir()
     try:
         (partial / "scene.net.xml").write_bytes(xml_bytes(net_file))
-        write_xml(
-            _scenery(types=types, rails=rails, touches=touches, view=view, title=title), partial / "scene.add.xml"
-        )
+        scenery = _scenery(types=types, rails=rails, touches=touches, view=view, title=title)
+        scenery.extend(programmes(trace, step_length_s))
+        write_xml(scenery, partial / "scene.add.xml")
         write_recording(
             trace=trace,
             types=types,

@@ -172,6 +172,7 @@ def _replays(tables: RunTables, embedded: Container[str]) -> dict[str, Any]:
 def _method(tables: RunTables, found: Results) -> dict[str, Any]:
     return {
         "significance": found.significance,
+        "asked_alone": page_wording.asked_alone(tables.manifest),
         "rules": sorted({stage["rule"] for stage in tables.stages.values() if stage.get("rule")}),
         "glossary": page_wording.glossary(list(dict.fromkeys(tables.summary["arm"])), tables.arms),
         "versions": tables.manifest.get("versions", {}),

@@ -67,6 +67,18 @@ def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> l
     return [(label, value) for label, value in found if value]
 
 
+def asked_alone(manifest: Mapping[str, Any]) -> str:
+    """What the campaign asks of players alone; empty if nothing."""
+    asked = manifest.get("campaign", {}).get("competence", {})
+    names = {"ego_goal_share": "an ego", "non_ego_goal_share": "a non-ego"}
+    bounds = [f"{percent(asked[key])} of {player}" for key, player in names.items() if asked.get(key)]
+    if not bounds:
+        return ""
+    return (
+        f"A question is answered only if its players reach their goals alone in a share of games: {', '.join(bounds)}."
+    )
+
+
 def rounds(stages: Iterable[Mapping[str, Any]]) -> str:
     """The rounds of an ego that is not trained."""
     if any(stage.get("kind") == "reconfiguration" for stage in stages):

@@ -26,7 +26,7 @@ import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
 
 from harness.errors import SimulationError
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
 from harness.game.state import ROLES
 from harness.traffic.angles import compass_deg_of, heading_rad_of
@@ -35,8 +35,9 @@ from harness.traffic.insertion import Insertion
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.signals import Signals
-from harness.traffic.simulation import Reading
+from harness.traffic.simulation import Reading, SignalsAtReset
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
+from harness.traffic.warm_up import clear_of_players
 
 # Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
 # exactly, on the road or off it. Its bit 1 limits the search to lanes of the car's route.
@@ -140,11 +141,8 @@ class LibsumoSimulation:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._load([*self._options, "--seed", str(seed)], libsumo.load)
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> tuple[IntArray, FloatArray]:
-        """Clear a game's tile and place its players at their start. Background vehicles depart at their times.
-
-        The arguments and the result are those of `Simulation.reset`.
-        """
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> SignalsAtReset:
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
         tile = self._tiles[game]
         with self._sumo_call(f"reset game {game}"):
             taking_part = {player for player, present in enumerate(start.present.tolist()) if present}
@@ -153,7 +151,7 @@ class LibsumoSimulation:
                 self._remove_vehicle(game, player)
             for player in sorted(taking_part - staying):
                 self._add_player(game, player, start)
-            self._background.reset(game, departures)
+            self._background.reset(game, clear_of_players(departures, start, self._scene.world.length_m))
             return self._signals.reset(game, start.signal_share if self._signals else 0.0)
 
     def halt(self, game: int, player: int) -> None:
@@ -196,7 +194,10 @@ class LibsumoSimulation:
             reading = self._background.read(x_m, y_m, self._present)
             if players is None and not self._signals:
                 return reading
-            return replace(reading, players=players, signals=self._signals.read() if self._signals else None)
+            if not self._signals:
+                return replace(reading, players=players)
+            texts = self._signals.texts() if self._recorded else None
+            return replace(reading, players=players, signals=self._signals.read(), signal_texts=texts)
 
     def close(self) -> None:
         """Release libsumo. A second call has no effect."""

@@ -13,13 +13,16 @@ import signal
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
 import sumo
 
-from harness.errors import Problem, UsageError
+from harness.config.scene import scene_file
+from harness.errors import Problem, SimulationError, UsageError
 from harness.traffic.departures import background_departures
+from harness.traffic.route_writing import vehicle_element
 from harness.traffic.scene import OpenScene
 
 PATIENCE_S, PATIENCE_S_PER_BYTE = 15.0, 2e-6  # time limit of a program: a constant, and a part per byte of the net
@@ -60,20 +63,27 @@ def check_loads(scene: OpenScene) -> None:
     if complaint:
         about_net = not (str(types) in complaint or str(vehicles) in complaint or _ABOUT_VEHICLES.search(complaint))
         raise UsageError([_problem(complaint, net if about_net else routes, about_net)])
+    if scene.document.warm_up_s and scene.has_background_traffic:
+        _check_warm_up(scene)
+
+
+def _check_warm_up(scene: OpenScene) -> None:
+    """Make the warm-up, or find it in the cache. Raises UsageError if SUMO fails in it."""
+    try:
+        _ = scene.warm_up
+    except SimulationError as error:
+        remedy = "correct the route file as SUMO's message says, or choose a shorter warm-up"
+        raise UsageError.of(scene_file(scene.folder), "warm_up_s", str(error), remedy) from None
 
 
 def _write_vehicles(scene: OpenScene, file: Path) -> int:
     """Write one background vehicle of each kind, one after another. Returns the end time in s. Raises OSError."""
-    kinds = {
-        (each.vehicle_type, each.edges, each.lane, each.position, each.speed): each
-        for each in background_departures(scene.routes, (player.vehicle for player in scene.document.players))
-    }
+    players = {player.vehicle for player in scene.document.players}
+    departures = background_departures(scene.routes, players, scene.document.traffic_window_s)
+    kinds = {replace(each, name="", depart_s=0.0, stops=()): each for each in departures}
     root = ElementTree.Element("routes")
     for k, each in enumerate(kinds.values()):
-        start = {"departLane": each.lane, "departPos": each.position, "departSpeed": each.speed}
-        identity = {"id": each.name, "type": each.vehicle_type, "depart": str(_INTERVAL_S * k)}
-        vehicle = ElementTree.SubElement(root, "vehicle", identity | start)
-        ElementTree.SubElement(vehicle, "route", edges=" ".join(each.edges))
+        root.append(vehicle_element(each, name=each.name, depart_s=_INTERVAL_S * k))
     if not kinds:
         ElementTree.SubElement(root, "vType", id="harness_unused")  # the schema forbids an empty document
     ElementTree.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)

@@ -112,6 +112,9 @@ def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Depart
     if vehicle.vehicle_type not in routes.types:
         message = "a player's type can't be a distribution"
         raise UsageError.of(routes.path, f"vehicle {vehicle.name}.type", message, "name one vType")
+    if vehicle.choices:
+        message = "a player's route can't be drawn from a distribution"
+        raise UsageError.of(routes.path, f"vehicle {vehicle.name}", message, "give it one route")
     fastest_mps = routes.types[vehicle.vehicle_type].max_speed_mps
     if player.speed_mps[1] > fastest_mps:
         message = f"reaches {player.speed_mps[1]:g} m/s, more than the vehicle's maxSpeed"

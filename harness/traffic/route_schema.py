@@ -49,7 +49,7 @@ _NO_CAUSE: Reason = ("nothing arrives that the stop could wait for", "give a dur
 _REFUSED: Mapping[str, Reason] = {
     **dict.fromkeys(("person", "personFlow"), _NO_PEOPLE),
     **dict.fromkeys(("container", "containerFlow"), _NO_CONTAINERS),
-    "include": ("other files are not read", "copy their content into this file"),
+    "include": ("is not understood here: other files are not read", "copy their content into this file"),
 }
 _REFUSED_OF_VEHICLES: Mapping[str, Reason] = dict.fromkeys(
     (f"{end}{kind}" for end in ("from", "to", "via") for kind in ("Junction", "Junctions", "XY", "LonLat")), _NOT_EDGES
@@ -104,10 +104,11 @@ def _refused(path: Path, root: ElementTree.Element) -> Iterator[Problem]:
     found: Counter[tuple[str, str, str]] = Counter()
     for element in root.iter():
         if element.tag in _REFUSED:
-            found[element.tag, *_REFUSED[element.tag]] += 1
-        for name, reason in _reasons_of(element).items():
+            message, remedy = _REFUSED[element.tag]
+            found[element.tag, message, remedy] += 1
+        for name, (message, remedy) in _reasons_of(element).items():
             if element.get(name) is not None:
-                found[f"{element.tag}.{name}", *reason] += 1
+                found[f"{element.tag}.{name}", message, remedy] += 1
         for name, only in _ONLY.items():
             if element.tag in VEHICLES and element.get(name, only[0]) not in only:
                 message = f"{element.get(name, '')[:60]!r} is not supported"
@@ -138,10 +139,11 @@ def _supported_kinds() -> Mapping[str, Kind]:
     rates = dict.fromkeys(("begin", "end", *FLOW_RATES), False)
     unused = ("arrival", "routeLength")
     top = (*VEHICLES, "vType", "vTypeDistribution", "route", "routeDistribution", "interval", "busStop")
-    return types | {
+    return {
+        **types,
         "root": Kind(children={name: name for name in top}),
         "vType": types["vTypeType"],
-        "vTypeDistribution": Kind({each: need for each, need in mix.attributes.items()}, mix.children),
+        "vTypeDistribution": Kind({"id": True, "vTypes": False, "probabilities": False}, mix.children),
         "route": Kind({"id": True, "edges": True, **route}, {"stop": "stop", "param": "param"}),
         "route within": Kind({"id": False, "edges": True, **route}, {"stop": "stop", "param": "param"}),
         "route listed": Kind(

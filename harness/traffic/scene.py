@@ -22,6 +22,7 @@ from harness.game.bicycle import Actuators
 from harness.game.initial_state import StartDistribution, StartRange
 from harness.game.quantities import REACH_M
 from harness.game.road import Road, Routes
+from harness.game.seeding import between
 from harness.game.state import ROLES
 from harness.game.world import World
 from harness.traffic import network
@@ -32,6 +33,8 @@ from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_reading import read_route_file
 from harness.traffic.start_ranges import start_range
+from harness.traffic.trips import with_routes
+from harness.traffic.warm_up import Snapshot, snapshots
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,14 +60,26 @@ class OpenScene:
         players = {player.vehicle for player in self.document.players}
         return bool(self.routes.flows) or bool(set(self.routes.vehicles) - players)
 
+    @cached_property
+    def warm_up(self) -> tuple[Snapshot, ...]:
+        """The background traffic with which games begin. Raises SimulationError if SUMO fails."""
+        return snapshots(self.document, self.routes, self.net_file)
+
     def vehicle(self, player: int) -> Departure:
         """A player's vehicle in the route file."""
         return self.routes.vehicles[self.document.players[player].vehicle]
 
     def departures(self, generator: np.random.Generator) -> list[Departure]:
-        """The background vehicles that depart during a game. Flows with a probability are drawn from the generator."""
+        """The background vehicles that depart during a game. What is random about them is drawn from the generator."""
         players = {player.vehicle for player in self.document.players}
-        return self.routes.departures(players, self.document.time_limit_s, generator)
+        begin_s, end_s = self.document.game_window_s
+        varied = self.document.varies.traffic_density
+        density = 1.0 if varied is None else between(varied, generator.random())
+        on_road: tuple[Departure, ...] = ()
+        if self.document.warm_up_s and self.has_background_traffic:
+            snapshot = self.warm_up[generator.integers(len(self.warm_up))]
+            density, on_road = snapshot.density, snapshot.vehicles
+        return [*on_road, *self.routes.departures(players, end_s, generator, begin_s, density)]
 
     def start_distribution(
         self,
@@ -119,12 +134,15 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     routes = collect(problems, lambda: _checked_routes(route_path, folder, document, ego_type))
     if document is None or net is None or routes is None:
         raise UsageError(problems)
+    routes = collect(problems, partial(_with_routes, routes, net_file, net, document))
+    if routes is None:
+        raise UsageError(problems)
     own = _edges_of_players(document, net, routes)
     area = network.drivable_area(net, own)
     open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
     opened = [collect(problems, partial(open_one, role)) for role in ROLES]
     vehicles = {player.vehicle for player in document.players}
-    collect(problems, lambda: check_departures(vehicles, net, routes))
+    collect(problems, lambda: check_departures(vehicles, net, routes, document.traffic_window_s))
     players = [player for player in opened if player is not None]
     if problems or len(players) < len(ROLES):
         raise UsageError(problems)
@@ -189,6 +207,12 @@ def _checked_net(path: Path, folder: Path) -> Net:
 def _checked_routes(path: Path, folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
     _check_within(path, folder)
     return _with_ego_type(read_route_file(path), document, ego_type)
+
+
+def _with_routes(routes: RouteFile, net_file: Path, net: Net, document: Scene) -> RouteFile:
+    """The route file with routes for the trips of the players, and for those that may depart in a game."""
+    players = [routes.vehicles[each.vehicle] for each in document.players if each.vehicle in routes.vehicles]
+    return with_routes(routes, net_file, net, [*players, *routes.within(*document.traffic_window_s)])
 
 
 def _actuators(document: Scene, types: Sequence[VehicleType]) -> Actuators:

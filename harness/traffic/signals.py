@@ -10,6 +10,7 @@ from libsumo import _libsumo  # the same functions without Python wrappers, for 
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.right_of_way import Signal
+from harness.traffic.simulation import SignalsAtReset
 
 _STATES = {
     "G": Signal.GREEN,
@@ -50,11 +51,16 @@ class Signals:
             states[game] = self._of(game)
         return states
 
-    def reset(self, game: int, share: float) -> tuple[IntArray, FloatArray]:
-        """Set the lights of a game to a place, from 0 to 1, in their cycles.
+    def texts(self) -> tuple[str, ...]:
+        """[G] the whole states of the lights, as `id=state` separated by spaces."""
+        return tuple(self._text(game) for game in range(len(self._prefixes)))
 
-        Returns the states of the links [L], and the seconds since they changed [L].
-        """
+    def _text(self, game: int) -> str:
+        states = map(libsumo.trafficlight.getRedYellowGreenState, self._names[game])
+        return " ".join(f"{name}={state}" for name, state in zip(self._lights, states, strict=True))
+
+    def reset(self, game: int, share: float) -> SignalsAtReset:
+        """Set the lights of a game to a place, from 0 to 1, in their cycles."""
         for name in self._names[game]:
             logic = self._programme(name)
             durations_s = np.array([phase.duration for phase in logic.phases])
@@ -66,7 +72,7 @@ class Signals:
         since_s = np.zeros(self._count)
         for (columns, links), name in zip(self._links, self._names[game], strict=True):
             since_s[columns] = self._since_change_s(name, links, share)
-        return self._of(game), since_s
+        return SignalsAtReset(self._of(game), since_s, self._text(game))
 
     def _of(self, game: int) -> IntArray:
         row = np.zeros(self._count, dtype=np.int8)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,17 @@ class Reading:
     """[G, P, 4] x_m, y_m, heading_rad, speed_mps; NaN for players that the harness drives, None if it drives all."""
     signals: IntArray | None = None
     """[G, L] int8 states of the signal links of the scene's right of way; None if it has none."""
+    signal_texts: tuple[str, ...] | None = None
+    """[G] the whole states of the traffic lights on the players' routes, as `id=state` separated by spaces, if games
+    are recorded."""
+
+
+class SignalsAtReset(NamedTuple):
+    """The signals of a game after a reset: states of links [L], seconds since they changed [L], and the text."""
+
+    states: IntArray
+    since_s: FloatArray
+    text: str
 
 
 class Simulation(Protocol):
@@ -42,11 +53,10 @@ class Simulation(Protocol):
     def reload(self, seed: int) -> None:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> tuple[IntArray, FloatArray]:
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> SignalsAtReset:
         """Clear a game's tile and place its players at their start. Background vehicles depart at their times.
 
-        Traffic lights are set to their place in the cycle. Returns the states of the signal links [L], and the seconds
-        since they changed [L].
+        Traffic lights are set to their place in the cycle.
         """
         ...
 

@@ -21,11 +21,11 @@ from pathlib import Path
 from typing import IO, Any
 
 from harness.errors import SimulationError
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.simulation import Reading
+from harness.traffic.simulation import Reading, SignalsAtReset
 
 _LENGTH = struct.Struct("<Q")
 _PATIENCE_S = 10.0  # time limit for a child to end
@@ -53,12 +53,9 @@ class SubprocessSimulation:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._call("reload", seed)
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> tuple[IntArray, FloatArray]:
-        """Clear a game's tile and place its players at their start. Background vehicles depart at their times.
-
-        The result is that of `Simulation.reset`.
-        """
-        signals: tuple[IntArray, FloatArray] = self._call("reset", game, start, departures)
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> SignalsAtReset:
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
+        signals: SignalsAtReset = self._call("reset", game, start, departures)
         return signals
 
     def halt(self, game: int, player: int) -> None:

@@ -38,6 +38,22 @@ lane = "approach_0"
 beside_ego_m = [-8.0, 8.0]
 speed_mps = [11.0, 14.0]
 """
+GOALS = """
+[ego.goal]
+edge = "exit"
+position_m = 45.0
+[non_ego.goal]
+edge = "exit"
+position_m = 40.0
+"""
+
+
+def arriving(after_s: str, speed_mps: str) -> str:
+    """The scene, with a non-ego that is timed by its arrival after the ego."""
+    scene = SCENE.replace('lane = "approach_0"\nbeside_ego_m = [-8.0, 8.0]', f"arrival_after_ego_s = {after_s}")
+    return scene.replace("[11.0, 14.0]", speed_mps)
+
+
 PERSONA = """
 name = "p"
 description = "a person to test with"
@@ -148,9 +164,15 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
         # what does not fit together
         (Scene, SCENE.replace("[-8.0, 8.0]", "[8.0, -8.0]"), "non_ego.beside_ego_m", "is empty: write the lower end"),
         (Scene, SCENE.replace("[11, 14]", "[-1, 14]"), "ego", "speed_mps must not be negative"),
-        (Scene, SCENE.replace("beside_ego_m = [-8.0, 8.0]", ""), "non_ego", "give either position_m or beside_ego_m"),
-        (Scene, SCENE.replace("beside", "position_m = [0, 9]\nbeside"), "non_ego", "give either position_m or beside"),
-        (Scene, SCENE.replace("position_m = [30.0, 45.0]", "beside_ego_m = [0, 1]"), "", "the ego can't start beside"),
+        (Scene, SCENE.replace("beside_ego_m = [-8.0, 8.0]", ""), "non_ego", "give one of position_m, beside_ego_m"),
+        (Scene, SCENE.replace("beside", "position_m = [0, 9]\nbeside"), "non_ego", "give one of position_m, beside"),
+        (Scene, SCENE.replace("position_m = [30.0, 45.0]", "beside_ego_m = [0, 1]"), "", "can't start relative to itself"),
+        (Scene, SCENE.replace("beside_ego_m", "route_m"), "non_ego", "route_m is along the route: leave out lane"),
+        (Scene, SCENE.replace('lane = "approach_1"\n', ""), "ego", "position_m needs the lane of the start"),
+        (Scene, arriving("[1.0, 2.0]", "[0, 14]"), "non_ego", "arrival_after_ego_s needs speeds above 0"),
+        (Scene, arriving("[2.0, 1.0]", "[11, 14]"), "non_ego.arrival_after_ego_s", "is empty: write the lower end"),
+        (Scene, SCENE.replace("[goal]", "[ego.goal]"), "", "non_ego has no goal: give [goal] for all players, or"),
+        (Scene, SCENE + GOALS, "", "every player has a goal of its own: leave out [goal]"),
         (Campaign, CAMPAIGN + "seeds = [1, 2, 1]", "seeds", "a seed occurs twice"),
         (Campaign, CAMPAIGN + "[training]\nbuffer = 1000", "training", "must be a multiple of games (64)"),
         (Campaign, CAMPAIGN + "[training]\nminibatch = 4096", "training", "must not exceed buffer (2048)"),

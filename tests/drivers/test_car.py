@@ -36,11 +36,23 @@ def test_actions__request_the_given_acceleration_and_steering(
 ) -> None:
     view = observation_with(speed_mps=speed_mps / 30.0)
     speed = car.physical(view)[:, LAYOUT.index("speed_mps")]
-    _, largest = requests(np.array([[[0.0, 1.0]]]), speed[None], car.actuators)
+    _, largest = requests(np.array([[[0.0, 1.0]]]), speed[None], np.zeros((1, 1)), car.actuators)
     steering = share * largest[0]
-    requested = requests(car.actions(np.array([acceleration]), steering, view)[:, None], speed[None], car.actuators)
+    action = car.actions(np.array([acceleration]), steering, view)[:, None]
+    requested = requests(action, speed[None], np.zeros((1, 1)), car.actuators)
     assert requested[0] == pytest.approx(acceleration, abs=1e-9)
     assert requested[1][0] == pytest.approx(steering, abs=1e-9)
+
+
+@pytest.mark.parametrize("bend_rad", [-0.2, 0.03, 0.25])
+@pytest.mark.parametrize("steering_rad", [-0.1, 0.0, 0.2])
+def test_actions__count_the_wheel_from_the_bend_of_the_road(car: Car, bend_rad: float, steering_rad: float) -> None:
+    view = observation_with(speed_mps=5.0 / 30.0, road_steering_rad=bend_rad / 0.6)
+    bend = car.physical(view)[:, [LAYOUT.index("road_steering_rad")]]
+    assert bend[0, 0] == pytest.approx(bend_rad)
+    action = car.actions(np.zeros(1), np.array([steering_rad]), view)[:, None]
+    assert np.sign(action[0, 0, 1]) == np.sign(steering_rad - bend_rad)
+    assert requests(action, np.array([[5.0]]), bend, car.actuators)[1][0, 0] == pytest.approx(steering_rad, abs=1e-6)
 
 
 def test_actions__are_clipped_to_the_limits_of_the_car(car: Car) -> None:
@@ -55,6 +67,7 @@ def test_physical__has_the_units_of_the_names(merge: OpenScene, car: Car, moment
     values = dict(zip(LAYOUT, car.physical(observe(quantities)[:, EGO])[0], strict=True))
     expected = {
         "speed_mps": 11.0,
+        "speed_limit_mps": 13.89,
         "speed_over_limit": quantities.speed_over_limit[0, EGO],
         "acceleration_mps2": -2.5,
         "steering_rad": 0.05,
@@ -67,6 +80,8 @@ def test_physical__has_the_units_of_the_names(merge: OpenScene, car: Car, moment
         "other0_left_mps": 7.0 * np.sin(0.1),
         "other0_turned_sin": np.sin(0.1),
         "other0_turned_cos": np.cos(0.1),
+        "other0_length_m": 4.6,
+        "other0_width_m": 1.8,
         "other1_seen": 0.0,
     }
     assert {name: values[name] for name in expected} == pytest.approx(expected, abs=1e-5)

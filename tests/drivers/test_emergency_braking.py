@@ -24,6 +24,7 @@ from harness.game.arrays import BoolArray, FloatArray
 KMH = 1.0 / 3.6
 LENGTH_M, WIDTH_M, LANE_M = 4.3, 1.9, 3.5  # of the cars and the lanes in the programme
 STEP_S = 0.1
+NO_CONFLICT = (np.inf, np.inf, False)  # the other's way does not cross the own path
 
 React = Callable[[Encounters, FloatArray, FloatArray, FloatArray], tuple[BoolArray, FloatArray]]
 
@@ -31,7 +32,7 @@ React = Callable[[Encounters, FloatArray, FloatArray, FloatArray], tuple[BoolArr
 def encounter(gap_m: float, offset_m: float = 0.0, other_mps: float = 0.0, approach_mps: float = 0.0) -> Encounters:
     """One other car of the own size, in one game."""
     values = (True, gap_m + LENGTH_M, gap_m, offset_m, abs(offset_m) - WIDTH_M, other_mps, approach_mps, LENGTH_M)
-    return Encounters(*(np.array([[value]]) for value in values))
+    return Encounters(*(np.array([[value]]) for value in (*values, *NO_CONFLICT)))
 
 
 # --- formulas, by hand -------------------------------------------------------------------------------------------
@@ -259,7 +260,9 @@ def crashes(driver: str, *, own_kmh: float, other_kmh: float, gaps_m: FloatArray
         crashed |= (clearance < 0.0) & (gap < 0.0) & (gap > -2.0 * LENGTH_M)
         moving = np.where(offset > 1e-9, approach_mps, 0.0)
         columns = (gap + LENGTH_M, gap, offset, clearance, other, moving, np.full_like(gap, LENGTH_M))
-        encounters = Encounters(np.ones((len(gap), 1), dtype=bool), *(column[:, None] for column in columns))
+        no_conflict = (np.full((len(gap), 1), value) for value in NO_CONFLICT)
+        seen = np.ones((len(gap), 1), dtype=bool)
+        encounters = Encounters(seen, *(column[:, None] for column in columns), *no_conflict)
         began = state.braking_mps2[:, None]
         each, demand = reaction(encounters, own[:, None], ((own - before) / STEP_S)[:, None], began)
         state, _, braking = react(

@@ -22,19 +22,19 @@ from harness.drivers.external import find_driver
 from harness.drivers.lane_keeping import steering_rad
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.drivers.protocol import Driver
-from harness.drivers.rules import UNKNOWN_LIMIT_MPS, RulesDriver
+from harness.drivers.rules import RulesDriver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
 from harness.game.bicycle import lateral_acceleration_mps2, move, requests
-from harness.game.observation_layout import AHEAD_M, LAYOUT, SIZE
+from harness.game.observation_layout import AHEAD_M, LAYOUT
 from harness.game.state import EGO, State
 from harness.traffic.scene import OpenScene, open_scene
+from tests.support.observations import observation_of
 from tests.support.scenes import build_scene
 
 EGOS = ("adas", "careful_and_competent", "fuzzy", "rss")
 NOTHING = {"kind": "rules", "name": "somebody", "description": "Somebody who drives by rules."}
-SCALES = {"speed_mps": 30.0, "ahead_m": 50.0, "left_m": 8.0, "ahead_mps": 10.0, "left_mps": 5.0, "path_left_m": 8.0}
 
 
 @pytest.fixture(scope="module")
@@ -51,19 +51,21 @@ def rules(**tables: dict[str, float]) -> Rules:
     return Rules.model_validate(NOTHING | tables)
 
 
-def seeing(speed_mps: float = 13.89, over: float = 0.0, turned: float = 0.0, **other: float) -> np.ndarray:
-    """The observation of one game with one other car, from physical units; `turned` is the heading of the path."""
-    view = np.zeros((1, SIZE))
-    values = {"speed_mps": speed_mps, "speed_over_limit": over, "path_left_m": other.pop("path_left_m", 0.0)}
-    values |= {f"path_turned_rad@{d:g}m": 2.0 * turned for d in AHEAD_M}
+def seeing(
+    speed_mps: float = 13.89, limit_mps: float | None = None, turned: float = 0.0, **other: float
+) -> np.ndarray:
+    """The observation of one game with one other car, from physical units; `turned` is the heading of the path.
+
+    The limit is the own speed unless it is given. The other car is 4.6 m long and 1.8 m wide.
+    """
+    own = {name: other.pop(name) for name in list(other) if name in LAYOUT}
+    values = {"speed_mps": speed_mps, "speed_limit_mps": speed_mps if limit_mps is None else limit_mps, **own}
+    values |= {f"path_turned_rad@{d:g}m": turned for d in AHEAD_M}
     if other:
         sin = other.get("turned_sin", 0.0)
-        values |= {"other0_seen": 1.0, "other0_turned_cos": np.sqrt(1.0 - sin**2)}
-        values |= {f"other0_{name}": value for name, value in other.items()}
-    for name, value in values.items():
-        scale = SCALES.get(name.removeprefix("other0_"), 1.0)
-        view[0, LAYOUT.index(name)] = np.clip(value / scale, -1.0, 1.0)
-    return view
+        usual = {"seen": 1.0, "turned_cos": np.sqrt(1.0 - sin**2), "length_m": 4.6, "width_m": 1.8}
+        values |= {f"other0_{name}": value for name, value in {**usual, **other}.items()}
+    return observation_of(values)
 
 
 # --- documents -----------------------------------------------------------------------------------------------------
@@ -132,12 +134,12 @@ def test_page__lists_every_parameter_with_its_default(repository: Path) -> None:
 
 
 def test_perceive__a_car_ahead_in_the_path(car: Car) -> None:
-    view, encounters = perceive(car, seeing(12.0, -0.2, ahead_m=20.0, left_m=0.5, ahead_mps=-4.0))
+    view, encounters = perceive(car, seeing(12.0, 15.0, ahead_m=20.0, left_m=0.5, ahead_mps=-4.0))
     assert (view.speed_mps[0], view.limit_mps[0]) == pytest.approx((12.0, 15.0))
     first = {name: values[0, 0] for name, values in encounters._asdict().items()}
     expected = {"gap_m": 15.4, "offset_m": 0.5, "clearance_m": -1.3, "speed_mps": 8.0, "approach_mps": 0.0}
     assert {name: first[name] for name in expected} == pytest.approx(expected)
-    assert encounters.seen.tolist() == [[True, False, False]]
+    assert encounters.seen.tolist() == [[True, False, False, False]]
 
 
 def test_perceive__a_car_moving_over_approaches_from_either_side(car: Car) -> None:
@@ -158,14 +160,26 @@ def test_perceive__the_path_turns_with_the_road(car: Car) -> None:
     assert encounters.speed_mps[0, 0] == pytest.approx(10.0)
 
 
-def test_perceive__a_closing_speed_beyond_the_bound_means_standing(car: Car) -> None:
-    _, encounters = perceive(car, seeing(25.0, ahead_m=40.0, ahead_mps=-25.0))
-    assert encounters.speed_mps[0, 0] == 0.0
+@pytest.mark.parametrize("other_mps", [0.0, 3.0, 40.0, -25.0])
+def test_perceive__a_closing_speed_is_known_at_every_speed(car: Car, other_mps: float) -> None:
+    """A car that stands, and an oncoming one that closes at 50 m/s, are told apart."""
+    _, encounters = perceive(car, seeing(25.0, ahead_m=40.0, ahead_mps=other_mps - 25.0))
+    assert encounters.speed_mps[0, 0] == pytest.approx(other_mps)
 
 
-def test_perceive__the_limit_is_not_seen_while_standing(car: Car) -> None:
-    view, _ = perceive(car, seeing(0.0, -1.0))
-    assert np.isnan(view.limit_mps[0])
+def test_perceive__the_limit_is_seen_while_standing(car: Car) -> None:
+    view, _ = perceive(car, seeing(0.0, 13.89))
+    assert view.limit_mps[0] == pytest.approx(13.89)
+
+
+def test_perceive__a_crossing_car_with_priority(car: Car) -> None:
+    """It is 30 m before the place where it crosses the own path, at 12 m/s: 2.5 s. The own car is 18 m before it."""
+    crossing = {"left_mps": 12.0, "ahead_mps": -10.0, "turned_sin": 1.0, "has_priority": 1.0}
+    places = {"own_to_conflict_m": 18.0, "other_to_conflict_m": 30.0}
+    _, encounters = perceive(car, seeing(10.0, ahead_m=20.0, left_m=-30.0, **crossing, **places))
+    assert encounters.own_to_conflict_m[0] == pytest.approx([18.0, np.inf, np.inf, np.inf])
+    assert encounters.other_to_conflict_s[0] == pytest.approx([2.5, np.inf, np.inf, np.inf])
+    assert encounters.has_priority.tolist() == [[True, False, False, False]]
 
 
 # --- cruising ------------------------------------------------------------------------------------------------------
@@ -209,26 +223,37 @@ def test_cruise__is_comfortable(gap: float, own: float, other: float, before: fl
     assert abs(requested - before) <= 0.5 + 1e-9
 
 
+def motion(
+    speed_mps: float, limit_mps: float, *, turned: float = 0.0, left: float = 0.0, steering: float = 0.0
+) -> OwnMotion:
+    """The motion of a car in one game, without a stop line ahead."""
+    return OwnMotion(
+        speed_mps=np.array([speed_mps]),
+        limit_mps=np.array([limit_mps]),
+        acceleration_mps2=np.zeros(1),
+        steering_rad=np.array([steering]),
+        path_left_m=np.array([left]),
+        path_turned_rad=np.full((1, len(AHEAD_M)), turned),
+        stop_line_m=np.array([np.inf]),
+        stop_sign=np.array([False]),
+        signal_red=np.array([False]),
+        signal_yellow=np.array([False]),
+    )
+
+
 def _cruise(gap_m: float, own_mps: float, other_mps: float, before_mps2: float | None = None) -> float:
     """The request of the cruise control behind a car; without `before_mps2` the jerk has no limit."""
     nothing = np.zeros((1, 1))
-    columns = (gap_m + 4.6, gap_m, 0.0, -1.8, other_mps, 0.0, 4.6)
-    encounters = Encounters(np.array([[True]]), *(nothing + column for column in columns))
-    own = np.array([own_mps])
-    view = OwnMotion(
-        speed_mps=own,
-        limit_mps=np.array([13.89]),
-        acceleration_mps2=np.zeros(1),
-        steering_rad=np.zeros(1),
-        path_left_m=np.zeros(1),
-        path_turned_rad=np.zeros((1, len(AHEAD_M))),
+    columns = (gap_m + 4.6, gap_m, 0.0, -1.8, other_mps, 0.0, 4.6, np.inf, np.inf)
+    encounters = Encounters(
+        np.array([[True]]), *(nothing + column for column in columns), has_priority=np.array([[False]])
     )
+    view = motion(own_mps, 13.89)
     step_s = 1000.0 if before_mps2 is None else 0.1
     return float(
         cruise_mps2(
             view,
             encounters,
-            limit_mps=view.limit_mps,
             before_mps2=np.array([before_mps2 or 0.0]),
             law=Cruise(),
             step_s=step_s,
@@ -244,15 +269,7 @@ def test_steering__by_hand() -> None:
     and the front axle is 1.35 sin(0.1) farther from the path."""
     law = LaneKeeping(max_lateral_mps2=6.0, max_lateral_jerk_mps3=20.0)
     for turned, expected in ((0.0, 0.0299910), (0.1, 0.05 + np.arctan(0.03 * (1.0 + 1.35 * np.sin(0.1))))):
-        along = np.full((1, len(AHEAD_M)), turned)
-        view = OwnMotion(
-            speed_mps=np.array([9.0]),
-            limit_mps=np.array([13.9]),
-            acceleration_mps2=np.zeros(1),
-            steering_rad=np.array([expected]),
-            path_left_m=np.ones(1),
-            path_turned_rad=along,
-        )
+        view = motion(9.0, 13.9, turned=turned, left=1.0, steering=expected)
         assert steering_rad(view, law=law, wheelbase_m=2.7, step_s=0.1)[0] == pytest.approx(expected, abs=1e-6)
 
 
@@ -267,7 +284,7 @@ def test_steering__brings_the_car_onto_its_path_within_limits(car: Car, speed_mp
         view[0, LAYOUT.index("steering_rad")] = state.steering_rad[0, 0] / actuators.max_steering_rad[0]
         seen, _ = perceive(car, view)
         action = car.actions(np.zeros(1), steering_rad(seen, law=law, wheelbase_m=2.7, step_s=car.step_s), view)
-        acceleration, steering = requests(action[:, None], state.speed_mps, actuators)
+        acceleration, steering = requests(action[:, None], state.speed_mps, np.zeros((1, 1)), actuators)
         move(state, acceleration, steering, np.ones((1, 1), dtype=bool), actuators, car.step_s)
         offsets.append(float(state.y_m[0, 0]))
         lateral.append(float(lateral_acceleration_mps2(state, actuators)[0, 0]))
@@ -339,10 +356,10 @@ def test_driver__decisions_are_independent_of_other_games(car: Car) -> None:
     np.testing.assert_allclose(together, alone, atol=1e-12)
 
 
-def test_driver__starts_from_standing_without_knowing_the_limit(car: Car) -> None:
+def test_driver__starts_from_standing(car: Car) -> None:
     driver = new_driver(rules(), car)
-    requested = decided(driver, car, *[seeing(0.0, -1.0)] * 30)
-    assert requested[-1] == pytest.approx(min(UNKNOWN_LIMIT_MPS / 2.0, 2.0))
+    requested = decided(driver, car, *[seeing(0.0, 13.89)] * 30)
+    assert requested[-1] == pytest.approx(2.0)  # of 13.89 / 2 m/s2, by the greatest acceleration
 
 
 # --- whole games ---------------------------------------------------------------------------------------------------

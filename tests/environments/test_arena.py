@@ -281,8 +281,8 @@ def test_background__is_observed_at_its_position_in_sumo(straight: OpenScene, op
     seen = {name: arena.observation[0, 0, k] for k, name in enumerate(LAYOUT)}
     x = libsumo.vehicle.getPosition("van")[0] - 3.0
     assert seen["other0_seen"] == 1.0
-    assert seen["other0_ahead_m"] * 50.0 == pytest.approx(x - 101.0, abs=1e-4)
-    assert seen["other0_left_m"] * 8.0 == pytest.approx(3.2, abs=1e-4)
+    assert seen["other0_ahead_m"] == pytest.approx((x - 101.0) / (x - 101.0 + 20.0), abs=1e-6)
+    assert seen["other0_left_m"] == pytest.approx(3.2 / (3.2 + 8.0), abs=1e-5)
 
 
 def test_background__contact_is_a_collision(straight: OpenScene, opened: Open) -> None:

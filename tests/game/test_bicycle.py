@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import (
     GRAVITY_MPS2,
     Actuators,
+    actions,
     curvature_per_m,
     lateral_acceleration_mps2,
     move,
@@ -191,6 +192,41 @@ def test_steering_range__is_the_lock_or_the_grip_limit(speed: float, steering: f
 )
 def test_requests__scale_pedals_and_wheel(action: tuple[float, float], acceleration: float, steering: float) -> None:
     speed: FloatArray = np.array([[10.0]])
-    requested, wheel = requests(np.array([[action]]), speed, actuators())
+    requested, wheel = requests(np.array([[action]]), speed, np.zeros((1, 1)), actuators())
     assert requested[0, 0] == pytest.approx(acceleration)
     assert wheel[0, 0] == pytest.approx(steering, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("wheel", "road", "steering"),
+    [
+        (0.0, 0.15, 0.15),  # a wheel of 0 follows the road
+        (-0.5, 0.15, 0.15 - 0.045677),
+        (1.0, -0.15, -0.15 + 0.208807),
+        (1.0, 0.5, 0.6),  # not beyond the lock
+        (-1.0, -0.9, -0.6),
+    ],
+)
+def test_requests__the_wheel_is_relative_to_the_bend_of_the_road(wheel: float, road: float, steering: float) -> None:
+    speed = np.array([[10.0]])
+    _, requested = requests(np.array([[(0.0, wheel)]]), speed, np.array([[road]]), actuators())
+    assert requested[0, 0] == pytest.approx(steering, abs=1e-6)
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    pedals=st.floats(-1.0, 1.0), wheel=st.floats(-1.0, 1.0), speed=st.floats(0.0, 40.0), road=st.floats(-0.3, 0.3)
+)
+def test_actions__are_the_inverse_of_requests_in_a_bend(pedals: float, wheel: float, speed: float, road: float) -> None:
+    speeds, roads, car = np.array([[speed]]), np.array([[road]]), actuators(max_steering_rad=1.2)
+    asked = requests(np.array([[(pedals, wheel)]]), speeds, roads, car)
+    found = actions(*asked, speeds, roads, car)
+    # not beyond the lock of 1.2 rad: what the lock cuts off can't be found again
+    assume(abs(asked[1][0, 0]) < 1.2)
+    assert found[0, 0] == pytest.approx([pedals, wheel], abs=1e-6)
+
+
+def test_actions__of_the_bend_itself_leave_the_wheel_at_0() -> None:
+    bend = np.array([[0.12]])
+    found = actions(np.array([[-2.0]]), bend, np.array([[10.0]]), bend, actuators())
+    assert found[0, 0] == pytest.approx([-0.25, 0.0])  # 2 of 8 m/s2

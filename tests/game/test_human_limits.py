@@ -28,7 +28,7 @@ from harness.game.human_limits import (
 )
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
-from harness.game.observation_layout import LAYOUT
+from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.quantities import Quantities
 from harness.game.state import State
 from harness.game.world import World
@@ -155,7 +155,8 @@ def car(x: float, y: float = -1.6, **more: Any) -> dict[str, Any]:
 
 
 def seen(q: Quantities) -> dict[str, float]:
-    return dict(zip(LAYOUT, observe(q)[0, 0].tolist(), strict=True))
+    """The ego's observation in the units that the names of the entries end with."""
+    return dict(zip(LAYOUT, in_units(observe(q)[0, 0], 0.6).tolist(), strict=True))
 
 
 def test_range__a_vehicle_beyond_it_is_not_seen(moment: Moment, world: World) -> None:
@@ -172,19 +173,20 @@ def test_range__a_vehicle_beyond_it_is_not_seen(moment: Moment, world: World) ->
 def test_errors__of_distance_are_a_share_in_every_direction(moment: Moment, world: World) -> None:
     # 20 m ahead and 3.2 m to the right; a quarter farther is 25 m and 4 m
     entries = seen(moment(world, [car(50.0, distance_error=0.25), car(70.0, -4.8)]))
-    assert entries["other0_ahead_m"] * 50.0 == pytest.approx(25.0)
-    assert entries["other0_left_m"] * 8.0 == pytest.approx(-4.0)
+    assert entries["other0_ahead_m"] == pytest.approx(25.0, rel=1e-5)
+    assert entries["other0_left_m"] == pytest.approx(-4.0, rel=1e-5)
     near = seen(moment(world, [car(50.0, distance_error=-0.25), car(50.5, -4.8)]))
     # its flank is at 2.4 - 0.9 = 1.5 m rather than at 3.2 - 0.9 = 2.3 m
-    assert near["free_right_m@0m"] * 8.0 == pytest.approx(-1.5, abs=0.01)
+    assert near["free_right_m@0m"] == pytest.approx(-1.5, abs=0.01)
 
 
 def test_errors__of_closing_speed_grow_with_the_distance(moment: Moment, world: World) -> None:
     for ahead_m in (10.0, 40.0):
         players = [car(50.0, closing_error_per_s=0.05), car(50.0 + ahead_m, speed_mps=7.0)]
         entries = seen(moment(world, players))
-        assert entries["other0_ahead_mps"] * 10.0 == pytest.approx(7.0 - 10.0 + 0.05 * ahead_m)
-        assert entries["other0_ahead_m"] * 50.0 == pytest.approx(ahead_m)
+        assert entries["other0_ahead_mps"] == pytest.approx(7.0 - 10.0 + 0.05 * ahead_m, abs=1e-5)
+        assert entries["other0_ahead_m"] == pytest.approx(ahead_m, rel=1e-5)
+        assert entries["leader_mps"] == pytest.approx(7.0 - 10.0 + 0.05 * ahead_m, abs=1e-5)
 
 
 def test_errors__of_zero_are_exact_sight(moment: Moment, world: World) -> None:
@@ -221,7 +223,7 @@ def test_errors__an_arena_applies_the_error_of_each_step(arena: Arena, straight:
     steps = played(arena, {0: start, 1: limited(start, 0, Limits(estimation_errors=errors))}, coast)
     ahead = LAYOUT.index("other0_ahead_m")
     for step, (_, _, observation) in enumerate(steps, 1):
-        exact, seen = observation[:, 0, ahead]
+        exact, seen = in_units(observation[:, 0], 0.6)[:, ahead]
         assert seen == pytest.approx(exact * (1.0 + errors[step, 0]), rel=1e-5)
         assert (observation[1, 1] == observation[0, 1]).all()  # the other player has no errors
 

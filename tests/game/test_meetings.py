@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from harness.game.meetings import Meetings
-from harness.game.quantities import Quantities, World
+from harness.game.quantities import Quantities
 from harness.game.right_of_way import Conflicts, RightOfWay, Signal, StopLines, Streams
+from harness.game.world import World
 from harness.traffic.scene import OpenScene
 
 Moment = Callable[..., Quantities]
@@ -182,7 +183,7 @@ def test_meetings__without_conflicts_there_are_none(moment: Moment, merge: OpenS
 
 def must_yield(moment: Moment, world: World, own: int, other: int, x_m: float = 70.0, y_m: float = -40.0) -> bool:
     q = moment(world, [ego(x_m), FAR], [northbound(y_m)])
-    q.signals = np.array([[own, other]], dtype=np.int8)
+    q.state.signals = np.array([[own, other]], dtype=np.int8)
     return bool(meeting(q).must_yield)
 
 

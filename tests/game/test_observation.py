@@ -39,7 +39,8 @@ def car(x: float, y: float = -1.6, **more: Any) -> dict[str, Any]:
 
 def test_layout__names_every_entry_once() -> None:
     assert len(set(LAYOUT)) == len(LAYOUT) == SIZE
-    assert OF_OTHERS.sum() == OTHERS * 7
+    assert SIZE == 90
+    assert OF_OTHERS.sum() == OTHERS * 13 + 2  # and the leader
 
 
 def test_observation__of_a_car_on_the_merge_road(moment: Moment, world: World) -> None:
@@ -49,11 +50,15 @@ def test_observation__of_a_car_on_the_merge_road(moment: Moment, world: World) -
     entries = seen(q)
     expected = {
         "speed_mps": 12.0 / 30.0,
+        "speed_limit_mps": 13.89 / 30.0,
         "speed_over_limit": 12.0 / 13.89 - 1.0,
         "acceleration_mps2": -0.2,
         "steering_rad": 0.1,  # of 0.6
+        "road_steering_rad": 0.0,
         "lane_end_m": 0.4,  # 40 of 100 m
         "goal_m": 115.0 / 200.0,
+        "own_side_left_m": 1.0,  # a one-way road
+        "own_side_right_m": -1.0,
         "path_turned_rad@0m": 0.0,
         "path_left_m": 0.4,  # the route is 3.2 of 8 m to the left
         "free_left_m@0m": 4.8 / 8.0,
@@ -62,12 +67,24 @@ def test_observation__of_a_car_on_the_merge_road(moment: Moment, world: World) -
         "free_right_m@20m": -1.6 / 8.0,
         "free_right_m@50m": -0.5333 / 8.0,  # at x = 110 the taper is at y = -6.4 + 10 * 3.2 / 30 = -5.3333
         "other0_seen": 1.0,
-        "other0_ahead_m": 24.0 / 50.0,
-        "other0_left_m": 3.2 / 8.0,
-        "other0_ahead_mps": -0.3,  # 3 of 10 m/s slower
+        "stop_line_m": 37.7 / (37.7 + 20.0),  # the junction at 100 m; no sign and no signal
+        "give_way": 0.0,
+        "stop_sign": 0.0,
+        "signal_green": 0.0,
+        "signal_yellow": 0.0,
+        "signal_red": 0.0,
+        "leader_gap_m": 1.0,  # none: the other car is in the other lane
+        "leader_mps": 0.0,
+        "other0_ahead_m": 24.0 / (24.0 + 20.0),
+        "other0_left_m": 3.2 / (3.2 + 8.0),
+        "other0_ahead_mps": -3.0 / (3.0 + 10.0),  # 3 m/s slower
         "other0_left_mps": 0.0,
         "other0_turned_sin": 0.0,
         "other0_turned_cos": 1.0,
+        "other0_length_m": 4.6 / 20.0,
+        "other0_width_m": 1.8 / 4.0,
+        "other0_own_to_conflict_m": 0.0,  # no junction
+        "other0_has_priority": 0.0,
         "other1_seen": 0.0,
         "other2_turned_cos": 0.0,
     }
@@ -138,13 +155,22 @@ def test_free_width__is_narrowed_by_a_car_alongside_on_its_side(
 def test_others__are_sorted_by_distance(moment: Moment, world: World) -> None:
     others = [car(90.0), car(62.0), car(40.0), car(75.0)]
     entries = seen(moment(world, [car(50.0), car(56.0, -4.8)], others))
-    ahead = [entries[f"other{k}_ahead_m"] * 50.0 for k in range(OTHERS)]
-    assert ahead == pytest.approx([6.0, -10.0, 12.0], abs=1e-3)
+    ahead = [entries[f"other{k}_ahead_m"] for k in range(OTHERS)]
+    # 6, 10, 12 and 25 m away; the car 40 m ahead is the fifth
+    assert ahead == pytest.approx([6.0 / 26.0, -10.0 / 30.0, 12.0 / 32.0, 25.0 / 45.0], abs=1e-6)
 
 
-def test_others__beyond_100_m_are_not_seen(moment: Moment, world: World) -> None:
-    assert seen(moment(world, [car(10.0), car(111.0)]))["other0_seen"] == 0.0
-    assert seen(moment(world, [car(10.0), car(109.0)]))["other0_seen"] == 1.0
+def test_others__beyond_120_m_are_not_seen(moment: Moment, world: World) -> None:
+    assert seen(moment(world, [car(10.0), car(131.0)]))["other0_seen"] == 0.0
+    assert seen(moment(world, [car(10.0), car(129.0)]))["other0_seen"] == 1.0
+
+
+def test_leader__is_the_nearest_car_ahead_in_the_own_lane(moment: Moment, world: World) -> None:
+    others = [car(60.0, -4.8), car(80.0, speed_mps=4.0), car(75.0, speed_mps=7.0)]
+    entries = seen(moment(world, [car(50.0, speed_mps=12.0), car(20.0)], others))
+    # from bumper to bumper 25 - 4.6 = 20.4 m; 5 m/s slower
+    assert entries["leader_gap_m"] == pytest.approx(20.4 / 40.4)
+    assert entries["leader_mps"] == pytest.approx(-5.0 / 15.0)
 
 
 # --- symmetries ------------------------------------------------------------------------------------------------------
@@ -167,6 +193,8 @@ def road(world: World, heading: float, x0: float, y0: float, left: float, right:
         heading_rad=np.full(n, heading),
         left_edge_m=np.full(n, left),
         right_edge_m=np.full(n, right),
+        own_left_m=np.full(n, left - 1.0),
+        own_right_m=np.full(n, right + 1.0),
         speed_limit_mps=np.full(n, 14.0),
         lane_offset_m=np.tile(lanes, (n, 1)),
         lane_end_m=np.tile(ends, (n, 1)),
@@ -243,7 +271,10 @@ def test_observation__of_the_mirror_image_is_the_mirror_image(
     names = {name: k for k, name in enumerate(LAYOUT)}
     back = np.empty_like(two)
     for name, k in names.items():
-        swapped = name.replace("free_left", "free_?").replace("free_right", "free_left").replace("free_?", "free_right")
+        swapped = name
+        for side in ("free", "own_side"):
+            swapped = swapped.replace(f"{side}_left", "?").replace(f"{side}_right", f"{side}_left")
+            swapped = swapped.replace("?", f"{side}_right")
         odd = any(part in name for part in ("left", "right", "turned_rad", "turned_sin", "steering"))
         back[..., k] = two[..., names[swapped]] * (-1.0 if odd else 1.0)
     assert close_but_for_ties(one, back)
@@ -266,8 +297,8 @@ def test_observation__does_not_show_controls_or_lapses_of_others(moment: Moment,
 def test_observation__shows_a_wreck_as_a_stationary_vehicle(moment: Moment, world: World) -> None:
     wreck = moment(world, [car(50.0), car(70.0, speed_mps=0.0, outcome=Outcome.RAIL)])
     parked = moment(world, [car(50.0), car(10.0, -4.8)], [car(70.0, speed_mps=0.0)])
-    assert seen(wreck)["other0_ahead_m"] == pytest.approx(0.4)
-    assert seen(wreck)["other0_ahead_mps"] == pytest.approx(-1.0)
+    assert seen(wreck)["other0_ahead_m"] == pytest.approx(20.0 / 40.0)
+    assert seen(wreck)["other0_ahead_mps"] == pytest.approx(-10.0 / 20.0)
     assert seen(parked)["other0_ahead_m"] == seen(wreck)["other0_ahead_m"]
 
 

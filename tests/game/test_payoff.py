@@ -104,6 +104,7 @@ PER_SECOND = [
     # 0.03711437 1/m * 100 = 3.711437 m/s2 (see test_bicycle): 0.3711437^2
     ("lateral_acceleration", None, car(50.0, steering_rad=-0.1), FAR, -0.13774765),
     ("time_pressure", None, car(50.0), FAR, -1.0),
+    ("wrong_way", None, car(50.0), FAR, 0.0),  # a one-way road; roads with oncoming lanes: see test_traffic_rules
 ]
 
 
@@ -127,13 +128,42 @@ def test_progress__is_paid_per_100_m_whatever_the_step(moment: Moment, world: Wo
         assert value_of(q, "progress", weight=4.0) == pytest.approx(-0.052)
 
 
+@pytest.mark.parametrize(("since_s", "value"), [(-1.0, 0.0), (0.0, 0.0), (1.9, 0.0), (2.0, -1.0), (30.0, -1.0)])
+def test_red_light__counts_once_from_its_time_on(moment: Moment, world: World, since_s: float, value: float) -> None:
+    q = with_quantity(moment(world, [car(50.0), FAR]), "_passed", (np.array([[since_s, -1.0]]), NO_LINE))
+    assert value_of(q, "red_light", 2.0, weight=5.0) == 5.0 * value
+
+
+@pytest.mark.parametrize("after_s", [0.0, 2.0])
+def test_red_light__not_passed_costs_nothing(moment: Moment, world: World, after_s: float) -> None:
+    assert value_of(moment(world, [car(50.0), FAR]), "red_light", after_s) == 0.0
+
+
+@pytest.mark.parametrize(("speed_mps", "value"), [(-1.0, 0.0), (0.0, 0.0), (2.9, 0.0), (3.0, -1.0), (12.0, -1.0)])
+def test_stop_sign__counts_once_from_its_speed_on(
+    moment: Moment, world: World, speed_mps: float, value: float
+) -> None:
+    q = with_quantity(moment(world, [car(50.0), FAR]), "_passed", (NO_LINE, np.array([[speed_mps, -1.0]])))
+    assert value_of(q, "stop_sign", 3.0, weight=5.0) == 5.0 * value
+
+
+NO_LINE = np.full((1, 2), -1.0)
+
+
+def with_quantity(q: Quantities, name: str, value: Any) -> Quantities:
+    """The quantities, with a value of one of them given."""
+    q.__dict__[name] = value
+    return q
+
+
 def test_terms__are_all_tested_here() -> None:
-    by_hand = {"collision", "rail", "goal", "timeout", "progress", *(each[0] for each in PER_SECOND)}
+    events = {"collision", "rail", "goal", "timeout", "red_light", "stop_sign"}
+    by_hand = {*events, "progress", *(each[0] for each in PER_SECOND)}
     assert by_hand == set(TERMS)
 
 
 def test_terms__only_goal_and_progress_are_positive(moment: Moment, world: World) -> None:
-    limits = {"within_m": 5.0, "within_s": 5.0, "": None}
+    limits = {"within_m": 5.0, "within_s": 5.0, "after_s": 0.0, "from_mps": 1.0, "": None}
     for ego in (car(50.0, outcome=Outcome.COLLISION), car(20.0, speed_mps=25.0), car(108.0, -4.8)):
         for other in (car(52.0), car(30.0), car(54.0, -4.8)):
             q = moment(world, [ego, other])

@@ -40,6 +40,8 @@ def turning(world: World, radius_m: float, turned_rad: float) -> World:
         heading_rad=turned,
         left_edge_m=np.full(n, 1.6),
         right_edge_m=np.full(n, -1.6),
+        own_left_m=np.full(n, np.inf),
+        own_right_m=np.full(n, -np.inf),
         speed_limit_mps=np.full(n, 10.0),
         lane_offset_m=np.zeros((n, 1)),
         lane_end_m=np.full((n, 1), np.inf),

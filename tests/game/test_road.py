@@ -20,6 +20,8 @@ def route(x: FloatArray, y: FloatArray, heading: FloatArray, length: float, lane
         heading_rad=heading,
         left_edge_m=np.full(n, 3.0),
         right_edge_m=np.full(n, -3.0),
+        own_left_m=np.full(n, np.inf),
+        own_right_m=np.full(n, -np.inf),
         speed_limit_mps=np.full(n, 13.0),
         lane_offset_m=np.zeros((n, lanes)),
         lane_end_m=np.full((n, lanes), np.inf),
@@ -104,12 +106,6 @@ def test_locate__follows_a_car_round_a_hairpin() -> None:
         found, _ = locate(routes, [on_arc(6.0, true, -3.0)], [station])
         station = float(found[0])
         assert station == pytest.approx(true, abs=0.02)
-
-
-def test_find__needs_no_previous_station() -> None:
-    routes = Routes.of([straight(0.0), arc(20.0)])
-    points = np.array([(33.3, 2.0), on_arc(20.0, 41.2, 1.0)])
-    assert routes.find(*points.T[:, None])[0] == pytest.approx([33.3, 41.2], abs=SPACING_M / 2)
 
 
 def test_rows__stay_within_a_players_own_route() -> None:

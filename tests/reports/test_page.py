@@ -274,7 +274,9 @@ def test_words__a_person_that_cannot_drive_leaves_both_questions_unanswered():
         assert sentence == (
             "The speedy driver can't drive this scene: alone it reaches its goal in 0 of 60 games (0 %), below 80 %."
         )
+    arguments["manifest"]["campaign"]["competence"] = {"ego_goal_share": 0.97, "non_ego_goal_share": 0.8}
     text = text_of(arguments).replace("\N{NO-BREAK SPACE}", " ")
+    assert "in a share of games: 97 % of an ego, 80 % of a non-ego." in text
     assert "1 training did not learn to drive this scene." in text
     stopped = "did not learn: goal in 0 of 60 games alone, at least 80 % asked"
     assert f"speedy-seed1: {stopped}" in text

@@ -15,6 +15,7 @@ import sumo
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.traffic.scene import OpenScene, open_scene
+from tests.support.stations import nearest_station_m
 
 STRAIGHT_NODES = '<node id="a" x="0" y="0"/><node id="b" x="300" y="0"/>'
 STRAIGHT_EDGES = '<edge id="road" from="a" to="b" numLanes="2" speed="13.89" spreadType="right"/>'
@@ -99,5 +100,6 @@ def placed(scene: OpenScene, *poses: tuple[float, float, float, float] | None) -
         heading_rad=values[:, 2],
         speed_mps=values[:, 3],
         position_m=values[:, 0] + 0.5 * scene.world.length_m,
+        station_m=nearest_station_m(scene.world.road.routes, values[None, :, 0], values[None, :, 1])[0],
         present=np.array([pose is not None for pose in poses]),
     )

@@ -10,8 +10,8 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.manoeuvres.thresholds import SAME_WITHIN_S
-from harness.evaluation.trace_quantities import drove_in, quantities_of
-from harness.game.arrays import BoolArray, FloatArray
+from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.quantities import Quantities
 from harness.game.route_coordinates import PATH_M
 from harness.game.state import EGO, ROLES, Bodies
@@ -20,7 +20,6 @@ from harness.game.world import World
 _HERE = int(np.flatnonzero(PATH_M == 0.0)[0])
 _NEARBY_M = 10.0  # of road, behind and ahead
 _LARGEST_STEP_M = 1.0  # sideways in a step; more means that another lane is now the nearest
-_USUAL_SIZE_M = (5.0, 1.8)  # of SUMO's default vehicle type
 _ROUNDING_S = 1e-9
 
 Stretch = tuple[int, int]  # its first and last step
@@ -38,14 +37,16 @@ class Course:
     """[T, P] whether each player was driving; in a game with an ego, only until the ego's game ends."""
 
     @classmethod
-    def of(cls, trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]]) -> Course:
-        """From one game's trace. `sizes_m` are length and width of vehicle types, by default those of SUMO."""
-        kinds = trace.drop_duplicates("player")
-        sizes = {
-            str(name): sizes_m.get(str(kind), _USUAL_SIZE_M)
-            for name, kind in zip(kinds["player"], kinds["vehicle_type"], strict=True)
-        }
-        quantities = quantities_of(trace, world, sizes)
+    def of(
+        cls,
+        trace: pd.DataFrame,
+        world: World,
+        sizes_m: Mapping[str, tuple[float, float]],
+        signals: IntArray | None = None,
+    ) -> Course:
+        """From one game's trace. `sizes_m` are length and width of vehicle types, by default those of SUMO; `signals`
+        [T, L] are the states of signal links, by default off."""
+        quantities = quantities_of(trace, world, sizes_by_name(trace, sizes_m), signals)
         players = len(ROLES)
         bodies = Bodies(*(getattr(quantities.bodies, each.name)[:, :players].copy() for each in fields(Bodies)))
         between = Quantities(world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m)
