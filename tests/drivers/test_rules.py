@@ -27,7 +27,8 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
 from harness.game.bicycle import lateral_acceleration_mps2, move, requests
-from harness.game.observation_layout import AHEAD_M, LAYOUT
+from harness.game.observation_layout import LAYOUT
+from harness.game.road import AHEAD_M
 from harness.game.state import EGO, State
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.observations import observation_of
@@ -51,9 +52,7 @@ def rules(**tables: dict[str, float]) -> Rules:
     return Rules.model_validate(NOTHING | tables)
 
 
-def seeing(
-    speed_mps: float = 13.89, limit_mps: float | None = None, turned: float = 0.0, **other: float
-) -> np.ndarray:
+def seeing(speed_mps: float = 13.89, limit_mps: float | None = None, turned: float = 0.0, **other: float) -> np.ndarray:
     """The observation of one game with one other car, from physical units; `turned` is the heading of the path.
 
     The limit is the own speed unless it is given. The other car is 4.6 m long and 1.8 m wide.

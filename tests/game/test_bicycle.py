@@ -214,9 +214,7 @@ def test_requests__the_wheel_is_relative_to_the_bend_of_the_road(wheel: float, r
 
 
 @settings(max_examples=100, deadline=None)
-@given(
-    pedals=st.floats(-1.0, 1.0), wheel=st.floats(-1.0, 1.0), speed=st.floats(0.0, 40.0), road=st.floats(-0.3, 0.3)
-)
+@given(pedals=st.floats(-1.0, 1.0), wheel=st.floats(-1.0, 1.0), speed=st.floats(0.0, 40.0), road=st.floats(-0.3, 0.3))
 def test_actions__are_the_inverse_of_requests_in_a_bend(pedals: float, wheel: float, speed: float, road: float) -> None:
     speeds, roads, car = np.array([[speed]]), np.array([[road]]), actuators(max_steering_rad=1.2)
     asked = requests(np.array([[(pedals, wheel)]]), speeds, roads, car)
