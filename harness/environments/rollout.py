@@ -175,6 +175,8 @@ def _series_of(
         leader_gap_m=series(lambda step: step.quantities.leader_gap_m),
         time_to_collision_s=series(lambda step: step.quantities.time_to_collision_s),
         payoff=series(lambda step: step.payoff),
+        passed_red_s=series(lambda step: step.quantities.passed_red_s),
+        wrong_way=series(lambda step: step.quantities.wrong_way),
         encounters=encounters,
     )
 

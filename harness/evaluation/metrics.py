@@ -27,6 +27,10 @@ class PlayerSeries:
     leader_gap_m: FloatArray
     time_to_collision_s: FloatArray
     payoff: FloatArray
+    passed_red_s: FloatArray
+    """Where the player passed a stop line on red: seconds since the signal became red; else -1."""
+    wrong_way: FloatArray
+    """1 while the player was among oncoming lanes, else 0."""
     encounters: tuple[Encounter, ...] = ()
 
 
@@ -70,6 +74,21 @@ def payoff(drive: PlayerSeries) -> float | None:
     return float(drive.payoff.sum())
 
 
+def red_lights(drive: PlayerSeries) -> float:
+    """Number of stop lines that the player passed on red."""
+    return float(np.count_nonzero(drive.passed_red_s >= 0.0))
+
+
+def latest_red_s(drive: PlayerSeries) -> float | None:
+    """Longest time since the onset of red at which the player passed a stop line."""
+    return _finite(np.where(drive.passed_red_s >= 0.0, drive.passed_red_s, np.nan), np.max)
+
+
+def wrong_way_s(drive: PlayerSeries) -> float:
+    """Time among oncoming lanes."""
+    return float(drive.wrong_way.sum()) * drive.step_s
+
+
 def min_pet_s(drive: PlayerSeries) -> float | None:
     """Least post-encroachment time (PET) of the player and another road user in a zone of conflict of a junction."""
     return _finite(np.array([each.post_encroachment_s for each in drive.encounters]), np.min)
@@ -96,6 +115,8 @@ OF_EGO: Mapping[str, Callable[[PlayerSeries], float | str | None]] = {
     "ego_max_deceleration_mps2": max_deceleration_mps2,
     "ego_max_lateral_acceleration_mps2": max_lateral_acceleration_mps2,
     "ego_time_to_goal_s": time_to_goal_s,
+    "ego_red_lights": red_lights,
+    "ego_wrong_way_s": wrong_way_s,
     "ego_min_pet_s": min_pet_s,
     "ego_pet_priority": pet_priority,
     "ego_accepted_gap_s": accepted_gap_s,
@@ -103,5 +124,8 @@ OF_EGO: Mapping[str, Callable[[PlayerSeries], float | str | None]] = {
 }
 OF_NON_EGO: Mapping[str, Callable[[PlayerSeries], float | None]] = {
     "non_ego_mean_speed_mps": mean_speed_mps,
+    "non_ego_red_lights": red_lights,
+    "non_ego_latest_red_s": latest_red_s,
+    "non_ego_wrong_way_s": wrong_way_s,
     "non_ego_payoff": payoff,
 }

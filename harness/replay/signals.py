@@ -1,8 +1,8 @@
 """The traffic lights of a recorded game, as programmes that SUMO plays in place of the net's own.
 
 A light's programme has a phase for each time in which its recorded state did not change. SUMO uses the programme of a
-light that was loaded last, and additional files are loaded after the net. Lights that the recording does not name, those
-off the players' routes, keep the net's programme.
+light that was loaded last, and additional files are loaded after the net. Lights off the players' routes are not
+recorded: they keep the net's programme.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ outline, without the openings where roads enter and leave the scene, is the rail
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +18,7 @@ from sumolib.net import Net
 from sumolib.net.connection import Connection
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
+from sumolib.net.node import Node
 
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
@@ -26,6 +27,7 @@ from harness.game.rails import Rails
 from harness.traffic import surface
 from harness.traffic.surface import Part
 
+KEPT_M = 300.0  # beside the players' routes
 _OPENING_M = 0.3  # reach of an opening along the outline
 _BEYOND_M = 10.0  # of the lanes before and after a junction that a car follows
 _CAR = "passenger"
@@ -57,8 +59,8 @@ def car_lanes(edge: Edge) -> list[Lane]:
 
 
 def paved_lanes(edge: Edge) -> list[Lane]:
-    """The edge's lanes that a car can physically use: those of motor vehicles, hard shoulders, and painted bicycle lanes
-    beside them. Pavements and lanes beyond a pavement are none."""
+    """The edge's lanes that a car can physically use: those of motor vehicles, hard shoulders, and painted bicycle
+    lanes beside them. Pavements and lanes beyond a pavement are none."""
     lanes = edge.getLanes()
     paved = {k for k, lane in enumerate(lanes) if any(lane.allows(each) for each in _MOTOR)}
     for order in (range(len(lanes)), range(len(lanes) - 1, -1, -1)):
@@ -77,69 +79,84 @@ def lane_line(lane: Lane) -> FloatArray:
 def drivable_area(net: Net, own: Collection[Edge] = ()) -> BaseGeometry:
     """The area that cars can drive on, with hard shoulders, in network coordinates.
 
-    Where roads lie over one another, the area is flat: it has the level of the edges `own`, and roads of other levels
-    are cut off beside them. Without `own`, and where two of them lie over one another, the levels are one area.
+    With the edges `own` of the players' routes, the area ends `KEPT_M` beside them. Where roads lie over one another,
+    it is flat: it has the level of `own`, and roads of other levels are cut off beside them. Where two of `own` lie
+    over one another, and without `own`, the levels are one area.
     """
-    outside = _turnarounds_outside(net)
-    parts = [*_lane_parts(net, set(own), outside), *_junction_parts(net, set(own))]
+    edges = _near(net, own) if own else net.getEdges(withInternal=True)
+    own_edges = set(own)
+    nodes = {node for edge in own_edges for node in (edge.getFromNode(), edge.getToNode())}
+    parts = [*_lane_parts(net, edges, own_edges, nodes), *_junction_parts(edges, nodes)]
     level = surface.own_level(parts)
     is_cut = any(part is not kept for part, kept in zip(parts, level, strict=True))
     area = surface.without_slits(surface.joined([part.shape for part in level if not part.shape.is_empty]))
-    paths = [line for edge, line in _followed_lines(net) if not is_cut or edge in own]
-    return surface.with_swept_paths(area, paths)
+    followed = [edge for edge in edges if edge in own_edges] if is_cut else edges
+    return surface.with_swept_paths(area, list(_followed_lines(net, followed)))
 
 
-def _lane_parts(net: Net, own: Collection[Edge], outside: Collection[str]) -> Iterator[Part]:
-    """The parts of lanes, and of connections that have no lane inside their junction."""
-    nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
-    for edge in net.getEdges(withInternal=True):
-        is_own = edge in own or (edge.isSpecial() and edge.getFromNode() in nodes)
+def _near(net: Net, own: Collection[Edge]) -> list[Edge]:
+    """The edges that are within `KEPT_M` of the edges `own`, in the net's order."""
+    lines = {edge: [shapely.LineString(lane_line(lane)) for lane in edge.getLanes()] for edge in net.getEdges()}
+    around = shapely.union_all([line for edge in own for line in lines[edge]])
+    shapely.prepare(around)
+    return [edge for edge in net.getEdges() if shapely.dwithin(around, lines[edge], KEPT_M).any()]
+
+
+def _lane_parts(net: Net, edges: Iterable[Edge], own: Collection[Edge], own_nodes: Collection[Node]) -> Iterator[Part]:
+    """The parts of the edges' lanes, and of connections that have no lane inside their junction."""
+    outside = _turnarounds_outside(net)
+    for edge in edges:
+        is_own = edge in own or (edge.isSpecial() and edge.getFromNode() in own_nodes)
         for lane in paved_lanes(edge):
             line = lane_line(lane)
             if lane.getID() not in outside and np.ptp(line, axis=0).any():
                 shape = surface.lane_shape(line, lane.getWidth())
                 yield Part(shape=shape, line=np.array(lane.getShape3D(), dtype=float), own=is_own)
-            for link in lane.getOutgoing():
-                if not link.getViaLaneID() and not edge.isSpecial() and _is_for_cars(link):
-                    curve = surface.curve_between(line[-2:], lane_line(link.getToLane())[:2])
-                    if np.ptp(curve, axis=0).any():
-                        width_m = min(lane.getWidth(), link.getToLane().getWidth())
-                        height = np.full((len(curve), 1), lane.getShape3D()[-1][2])
-                        shape = surface.lane_shape(curve, width_m)
-                        yield Part(shape=shape, line=np.hstack((curve, height)), own=is_own)
+            if not edge.isSpecial():
+                yield from _curved_parts(lane, is_own)
 
 
-def _junction_parts(net: Net, own: Collection[Edge]) -> Iterator[Part]:
-    """The areas of junctions without the pavements inside them."""
-    nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
-    pavements = [
-        shapely.Polygon(lane_line(edge.getLane(0))).buffer(0)
-        for edge in net.getEdges(withInternal=True)
-        if edge.getFunction() == "walkingarea" and len(edge.getLane(0).getShape()) > 2
-    ]
-    tree = shapely.STRtree(pavements)
-    for node in net.getNodes():
+def _curved_parts(lane: Lane, is_own: bool) -> Iterator[Part]:
+    """The parts of a lane's connections that have no lane inside the junction."""
+    for link in lane.getOutgoing():
+        if not link.getViaLaneID() and _is_for_cars(link):
+            after = link.getToLane()
+            curve = surface.curve_between(lane_line(lane)[-2:], lane_line(after)[:2])
+            if np.ptp(curve, axis=0).any():
+                shape = surface.lane_shape(curve, min(lane.getWidth(), after.getWidth()))
+                heights_m = np.linspace(lane.getShape3D()[-1][2], after.getShape3D()[0][2], len(curve))
+                yield Part(shape=shape, line=np.column_stack((curve, heights_m)), own=is_own)
+
+
+def _junction_parts(edges: Iterable[Edge], own_nodes: Collection[Node]) -> Iterator[Part]:
+    """The areas of the junctions at edges, without the pavements inside them."""
+    pavements: dict[Node, list[BaseGeometry]] = {}
+    nodes: dict[Node, None] = {}  # in the order of the edges
+    for edge in edges:
+        nodes |= dict.fromkeys((edge.getFromNode(), edge.getToNode()))
+        if edge.getFunction() == "walkingarea" and len(edge.getLane(0).getShape()) > 2:
+            shape = shapely.Polygon(lane_line(edge.getLane(0))).buffer(0)
+            pavements.setdefault(edge.getFromNode(), []).append(shape)
+    for node in nodes:
         if len(node.getShape()) > 2:
             shape = shapely.Polygon([point[:2] for point in node.getShape()]).buffer(0)
-            inside = [pavements[k] for k in tree.query(shape, predicate="intersects")]
-            if inside:
-                shape = shape.difference(shapely.union_all(inside))
-            line = np.array(node.getShape3D(), dtype=float)
-            yield Part(shape=shape, line=line, own=node in nodes)
+            if node in pavements:
+                shape = shape.difference(shapely.union_all(pavements[node]))
+            yield Part(shape=shape, line=np.array(node.getShape3D(), dtype=float), own=node in own_nodes)
 
 
-def _followed_lines(net: Net) -> Iterator[tuple[Edge, FloatArray]]:
+def _followed_lines(net: Net, edges: Sequence[Edge]) -> Iterator[FloatArray]:
     """The lines [n, 2] that cars follow: each lane, and each connection with parts of the lanes before and after it.
 
     Turnarounds are left out: no car can follow their arcs, which are about as wide as a lane.
     """
-    for edge in net.getEdges(withInternal=False):
-        for lane in car_lanes(edge):
-            yield edge, lane_line(lane)
-            for link in lane.getOutgoing():
-                if _is_for_cars(link):
-                    before, after = _stretch(net, lane, ahead=False), _stretch(net, link.getToLane(), ahead=True)
-                    yield edge, np.concatenate((before, *connection_lines(net, link), after))
+    kept = {edge for edge in edges if not edge.isSpecial()}
+    for lane in (lane for edge in edges if edge in kept for lane in car_lanes(edge)):
+        yield lane_line(lane)
+        for link in lane.getOutgoing():
+            if _is_for_cars(link) and link.getTo() in kept:
+                before, after = _stretch(net, lane, ahead=False), _stretch(net, link.getToLane(), ahead=True)
+                yield np.concatenate((before, *connection_lines(net, link), after))
 
 
 def _stretch(net: Net, lane: Lane, *, ahead: bool) -> FloatArray:
@@ -175,13 +192,17 @@ def connection_lines(net: Net, link: Connection) -> list[FloatArray]:
     return lines or [surface.curve_between(lane_line(link.getFromLane())[-2:], lane_line(link.getToLane())[:2])]
 
 
-def rail_lines(net: Net, area: BaseGeometry) -> list[FloatArray]:
-    """The rails as polylines [n, 2]: the outline of the net's drivable area without the openings."""
+def rail_lines(net: Net, area: BaseGeometry, own: Collection[Edge] = ()) -> list[FloatArray]:
+    """The rails as polylines [n, 2]: the outline of the net's drivable area, found with the same `own`, without the
+    openings where roads leave the scene or the area."""
+    edges = _near(net, own) if own else net.getEdges(withInternal=True)
+    kept = set(edges)
+    nodes = {node for edge in edges for node in (edge.getFromNode(), edge.getToNode())}
     openings = [
         shapely.LineString(_cross_section(lane, at_end)).buffer(_OPENING_M, cap_style="square")
         for edge in net.getEdges(withInternal=False)
-        for at_end in (False, True)
-        if _is_fringe(edge, at_end)
+        for at_end, node in ((False, edge.getFromNode()), (True, edge.getToNode()))
+        if (_is_fringe(edge, at_end) if edge in kept else node in nodes)
         for lane in paved_lanes(edge)
     ]
     outline = area.boundary

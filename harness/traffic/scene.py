@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import ConfigDict
 from sumolib.net import Net
+from sumolib.net.edge import Edge
 
 from harness.config.scene import PlainFile, Scene, scene_file
 from harness.config.toml_reading import Document, nearest, read_document
@@ -18,14 +19,14 @@ from harness.files import leads_out
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
-from harness.game.initial_state import StartDistribution, StartRange
+from harness.game.initial_state import Conditions, StartDistribution, StartRange
 from harness.game.quantities import REACH_M
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.state import ROLES
 from harness.game.world import World
 from harness.traffic import network
-from harness.traffic.departures import check_departures
+from harness.traffic.departures import check_departures, edges_of
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
@@ -102,6 +103,7 @@ class OpenScene:
             steps=self.world.steps,
             step_s=self.world.step_s,
             routes=self.world.road.routes,
+            conditions=_conditions(self.document),
             along_route_share=along_route_share,
         )
 
@@ -136,7 +138,8 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     routes = collect(problems, partial(_with_routes, routes, net_file, net, document))
     if routes is None:
         raise UsageError(problems)
-    area = network.drivable_area(net)
+    own = _edges_of_players(document, net, routes)
+    area = network.drivable_area(net, own)
     open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
     opened = [collect(problems, partial(open_one, role)) for role in ROLES]
     vehicles = {player.vehicle for player in document.players}
@@ -152,7 +155,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     places = tuple(start for start in starts if start is not None)
     if problems:
         raise UsageError(problems)
-    lines = network.rail_lines(net, area)
+    lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
     world = World(
         road=Road(network.rails(lines, REACH_M + 10.0), Routes.of([player.route for player in players])),
@@ -171,6 +174,21 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         places=places,
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
+    )
+
+
+def _edges_of_players(document: Scene, net: Net, routes: RouteFile) -> list[Edge]:
+    """The edges of the players' routes; those of invalid routes are left out."""
+    vehicles = [routes.vehicles[player.vehicle] for player in document.players if player.vehicle in routes.vehicles]
+    return [edge for each in vehicles for edge in collect([], partial(edges_of, each, net, routes)) or []]
+
+
+def _conditions(document: Scene) -> Conditions:
+    varies = document.varies
+    return Conditions(
+        friction=varies.friction or (document.friction, document.friction),
+        limit_share=varies.speed_limit_share or (1.0, 1.0),
+        signal_place=varies.signal_place,
     )
 
 

@@ -2,14 +2,15 @@
 
 Two tolerances hold for every net. Slits and holes thinner than `SLIT_M` are closed: no car fits into them, and they are
 mostly gaps between lanes and junctions that were drawn apart. A net does not say whether such a strip is paved, and
-opposite carriageways that touch have no wall between them either. Lanes that differ by more than `CLEARANCE_M` in height
-lie on different levels: no road passes under a bridge that is lower.
+opposite carriageways that touch have no wall between them either. Lanes that differ by more than `CLEARANCE_M` in
+height lie on different levels: no road passes under a bridge that is lower.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -22,7 +23,7 @@ SEAM_M = 0.05  # gaps up to twice this between parts are closed with every join
 SLIT_M = 1.0
 CLEARANCE_M = 2.5
 CAR_LENGTH_M, CAR_WIDTH_M = 4.6, 1.8
-_APART_M = 0.5  # between the surface of a level and what remains of another one
+_APART_M = 1.2  # between the surface of a level and what remains of another one: wider than a slit
 _SLIVER_M = 0.02  # thinner gaps are rounding errors
 _SPARE_M = 0.05  # around a car that follows a lane
 _STEP_M, _FINE = 0.5, 8  # between two places of it, and how many times finer where it touches an outline
@@ -108,8 +109,7 @@ def with_swept_paths(area: BaseGeometry, paths: Sequence[FloatArray]) -> BaseGeo
         fine = _cars(paths[k], _FINE)
         for place in np.unique(rows):  # from the place before the one that touches to the place after it
             near = fine[max(place - 1, 0) * _FINE : (place + 1) * _FINE + 1]
-            pairs = zip(near[:-1], near[1:], strict=True)
-            swept += [shapely.convex_hull(shapely.multipolygons(pair)) for pair in pairs]
+            swept += [shapely.convex_hull(shapely.multipolygons(pair)) for pair in pairwise(near)]
     return without_slits(joined([area, shapely.union_all(swept)])) if swept else area
 
 

@@ -124,6 +124,8 @@ CAMPAIGNS = [
         ("a driver misspelt", '"../policies/mine"', '"lerned"', ("ego.driver", "'learned'")),
         ("a driver that is a program", '"../policies/mine"', '"os.system"', ("ego.driver",)),
         ("a buffer that is no multiple", "buffer = 512", "buffer = 515", ("training", "multiple")),
+        ("per cent for a share", "[assessment]", "[competence]\nego_goal_share = 97\n[assessment]", ("competence.ego_goal_share",)),
+        ("a misspelt bound", "[assessment]", "[competence]\negos_goal_share = 0.9\n[assessment]", ("competence.egos_goal_share", "'ego_goal_share'")),
         ("no layers", "network = [8]", "network = []", ("training.network",)),
         ("a layer of none", "network = [8]", "network = [0]", ("training.network[0]",)),
         ("policies, and how to train", "seeds = [1]", 'seeds = [1]\npolicies = "../policies"', ("training",)),

@@ -11,10 +11,13 @@ import pandas as pd
 import pytest
 from defusedxml import ElementTree
 
+from harness.drivers.sumo import SumoDriver
 from harness.replay import write_replay
 from harness.replay.signals import programmes
+from harness.traffic.scene import open_scene
 from tests.support.replays import STEP_S, drive, straight, sumo_program
 from tests.support.repository import REPOSITORY
+from tests.support.rollouts import arm, play, trace
 from tests.support.tiny import PATIENCE_S
 
 LEFT_ACROSS = REPOSITORY / "networks" / "left_across"
@@ -31,8 +34,8 @@ def changing(light: str, links: int) -> pd.DataFrame:
     states = ["r", "G", "y", "r", "u", "g"]
     until = [1, 7, 8, 9, 30, 60]
     texts = [f"{light}={states[next(k for k, end in enumerate(until) if step < end)] * links}" for step in range(60)]
-    trace = drive("ego", straight(-110.0, -1.6, 8.0, 60), outcome="timeout")
-    return trace.assign(signals=texts)
+    drawn = drive("ego", straight(-110.0, -1.6, 8.0, 60), outcome="timeout")
+    return drawn.assign(signals=texts)
 
 
 def shown(folder: Path, light: str) -> dict[int, str]:
@@ -54,31 +57,46 @@ def shown(folder: Path, light: str) -> dict[int, str]:
     return found
 
 
-def write(trace: pd.DataFrame, folder: Path) -> Path:
+def write(recorded: pd.DataFrame, folder: Path) -> Path:
     net, routes = (LEFT_ACROSS / f"left_across.{kind}.xml" for kind in ("net", "rou"))
-    write_replay(trace, net, routes, folder, title="lights", step_length_s=STEP_S)
+    write_replay(recorded, net, routes, folder, title="lights", step_length_s=STEP_S)
     return folder
 
 
 def test_replay__each_frame_has_the_lights_of_the_trace(tmp_path: Path) -> None:
     light, links = light_of(LEFT_ACROSS / "left_across.net.xml")
-    trace = changing(light, links)
-    states = shown(write(trace, tmp_path / "replay"), light)
-    recorded = {step: text.rpartition("=")[2] for step, text in zip(trace["step"], trace["signals"], strict=True)}
-    assert {step: states[step + 1] for step in recorded} == recorded  # SUMO shows the game's step k in its step k + 1
+    drawn = changing(light, links)
+    states = shown(write(drawn, tmp_path / "replay"), light)
+    texts = dict(zip(drawn["step"], drawn["signals"], strict=True))
+    assert {
+        step: f"{light}={states[step + 1]}" for step in texts
+    } == texts  # SUMO shows the game's step k in its step k + 1
+
+
+def test_replay__of_a_game_that_was_played_has_its_lights(tmp_path: Path) -> None:
+    """Each game starts at another place in the cycle, and the replay follows it."""
+    scene, (light, _) = open_scene(LEFT_ACROSS), light_of(LEFT_ACROSS / "left_across.net.xml")
+    firsts = set()
+    for number, game in enumerate(play(arm(scene, SumoDriver(), SumoDriver()), episodes=3)):
+        recorded = trace(game)
+        states = shown(write(recorded, tmp_path / str(number) / "replay"), light)
+        texts = dict(zip(recorded["step"], recorded["signals"], strict=True))
+        assert {step: f"{light}={states[step + 1]}" for step in texts} == texts
+        firsts.add(texts[0])
+    assert len(firsts) > 1
 
 
 def test_replay__without_recorded_lights_keeps_the_nets(tmp_path: Path) -> None:
     light, _ = light_of(LEFT_ACROSS / "left_across.net.xml")
-    trace = drive("ego", straight(-110.0, -1.6, 8.0, 60), outcome="timeout")
-    states = shown(write(trace, tmp_path / "replay"), light)
+    drawn = drive("ego", straight(-110.0, -1.6, 8.0, 60), outcome="timeout")
+    states = shown(write(drawn, tmp_path / "replay"), light)
     first = ElementTree.parse(LEFT_ACROSS / "left_across.net.xml").getroot().find("tlLogic/phase").get("state")
     assert set(states.values()) == {first}
 
 
 def test_programmes__one_for_each_light_with_a_phase_for_each_state() -> None:
-    trace = drive("ego", straight(0.0, 0.0, 8.0, 4)).assign(signals=["a=b=Gr x=r", "a=b=Gr x=r", "a=b=ry x=r", ""])
-    first, second = programmes(pd.concat([trace, trace.assign(player="non_ego")]), STEP_S)
+    drawn = drive("ego", straight(0.0, 0.0, 8.0, 4)).assign(signals=["a=b=Gr x=r", "a=b=Gr x=r", "a=b=ry x=r", ""])
+    first, second = programmes(pd.concat([drawn, drawn.assign(player="non_ego")]), STEP_S)
     assert (first.get("id"), second.get("id")) == ("a=b", "x")
     assert [(each.get("duration"), each.get("state")) for each in first] == [("0.300", "Gr"), ("3600.000", "ry")]
     assert [each.get("state") for each in second] == ["r"]
