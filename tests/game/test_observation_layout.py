@@ -59,7 +59,13 @@ def test_in_units__of_the_bounds_is_finite_and_keeps_the_sign(sign: float) -> No
     assert np.abs(values[~COMPRESSED]) == pytest.approx(expected[~COMPRESSED])
 
 
-CROSSING = [(9.0, 5.0), (20.0, 7.0), (40.0, 10.0), (60.0, 12.0), (80.0, 14.0)]  # distance to the side, m, and speed, m/s
+CROSSING = [
+    (9.0, 5.0),
+    (20.0, 7.0),
+    (40.0, 10.0),
+    (60.0, 12.0),
+    (80.0, 14.0),
+]  # distance to the side, m, and speed, m/s
 
 
 def test_crossing_cars__from_9_m_to_80_m_and_from_5_to_14_mps_look_different(moment: Moment, merge: OpenScene) -> None:

@@ -140,9 +140,7 @@ def test_red_light__not_passed_costs_nothing(moment: Moment, world: World, after
 
 
 @pytest.mark.parametrize(("speed_mps", "value"), [(-1.0, 0.0), (0.0, 0.0), (2.9, 0.0), (3.0, -1.0), (12.0, -1.0)])
-def test_stop_sign__counts_once_from_its_speed_on(
-    moment: Moment, world: World, speed_mps: float, value: float
-) -> None:
+def test_stop_sign__counts_once_from_its_speed_on(moment: Moment, world: World, speed_mps: float, value: float) -> None:
     q = with_quantity(moment(world, [car(50.0), FAR]), "_passed", (NO_LINE, np.array([[speed_mps, -1.0]])))
     assert value_of(q, "stop_sign", 3.0, weight=5.0) == 5.0 * value
 

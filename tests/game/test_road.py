@@ -13,7 +13,7 @@ from harness.game.arrays import FloatArray
 from harness.game.bicycle import curvature_per_m, requests
 from harness.game.rails import Rails
 from harness.game.road import MARGIN_M, SPACING_M, Routes, steering_of_bend_rad
-from tests.support.bicycle import STEP_S, actuators, advance, state_of
+from tests.support.bicycle import actuators, advance, state_of
 from tests.support.roads import arc, on_arc, straight
 
 

@@ -1,4 +1,4 @@
-"""Starts anywhere along the players' routes: on a lane of the route, apart from one another, in a share of the games."""
+"""Starts anywhere along the players' routes: on a lane, apart from one another, in a share of the games."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def test_initial_state__along_the_route_changes_no_other_draw(merge: OpenScene) 
     moved = [np.isnan(each.position_m).all() for each in along]
     assert 15 < sum(moved) < 45
     for one, other, is_moved in zip(plain, along, moved, strict=True):
-        names = ["present", "unseen_behind_m", "member", "noise", "seed", "signal_share"]
+        names = ["present", "unseen_behind_m", "member", "noise", "seed", "signal_place"]
         if not is_moved:
             names += ["x_m", "y_m", "heading_rad", "speed_mps", "position_m", "station_m"]
         for name in names:

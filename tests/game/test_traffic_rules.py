@@ -1,5 +1,4 @@
 """Signals, signs and sides of the road by hand, on the merge road with a stop line at 90 m.
-
 The players drive east on the line y = -1.6, so their stations are their x. Cars are 4.6 m long: the front bumper is
 2.3 m ahead. The limit is 13.89 m/s. Comfortable braking is 2 m/s2.
 """
@@ -187,13 +186,11 @@ def test_permitted__a_free_junction_asks_for_nothing(moment: Moment, merge: Open
 
 
 CROSSING: Mapping[str, Any] = {
-    "player": 0,
-    "stream": 0,
+    **dict.fromkeys(Conflicts._fields, 0),
     "begin_m": 98.5,
     "end_m": 101.5,
     "crossing": True,
     "yields": True,
-    "first_come": False,
     "stop_m": LINE_M,
     "right_m": -np.inf,
     "left_m": np.inf,
@@ -206,11 +203,11 @@ CROSSING: Mapping[str, Any] = {
 }
 
 
-def crossed(merge: OpenScene, **changes: Any) -> World:
+def crossed(merge: OpenScene, yields: bool = True) -> World:
     """The merge road, crossed at 100 m by a stream from the south with its stop line at y = -10."""
     y_m = np.arange(-120.0, 20.0, 4.0)
     samples = np.array([(100.0, y, 0.0, 1.0, 1.6, 2.0, y + 10.0) for y in y_m])
-    conflicts = Conflicts.of([{**CROSSING, **changes}])
+    conflicts = Conflicts.of([{**CROSSING, "yields": yields}])
     streams = Streams.of(samples, np.zeros(len(y_m), dtype=np.int64), conflicts, players=2)
     lines = StopLines.of([(0, LINE_M, Control.GIVE_WAY, -1)])
     return replace(merge.world, right_of_way=RightOfWay(conflicts, streams, lines, ()))

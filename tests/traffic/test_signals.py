@@ -1,13 +1,13 @@
 """Traffic lights: each game starts at a place in their cycles, and reads the states that SUMO has.
 
-At the junction of the scene, the ego's link is green for 42 s, yellow for 3 s and red for 45 s. The crossing street is
-red for 45 s, green for 42 s and yellow for 3 s.
+At the junction of the scene, the link of the non-ego is green for 42 s, yellow for 3 s and red for 45 s. That of the
+ego is red for 45 s, green for 42 s and yellow for 3 s.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import libsumo
 import numpy as np
@@ -17,6 +17,7 @@ from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.game.right_of_way import Signal
+from harness.game.state import EGO, NON_EGO
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Simulation
@@ -42,7 +43,9 @@ def opened(scene: OpenScene) -> Iterator[Open]:
     """Opens simulations of both kinds, and closes them."""
     simulations: list[Simulation] = []
 
-    def opened(kind: type[LibsumoSimulation] | type[SubprocessSimulation] = LibsumoSimulation, games: int = 1) -> Simulation:
+    def opened(
+        kind: type[LibsumoSimulation] | type[SubprocessSimulation] = LibsumoSimulation, games: int = 1
+    ) -> Simulation:
         simulations.append(kind(scene, games, (True, True), 1))
         return simulations[-1]
 
@@ -51,20 +54,9 @@ def opened(scene: OpenScene) -> Iterator[Open]:
         each.close()
 
 
-@dataclass(frozen=True, kw_only=True)
-class At(InitialState):
-    """An initial state with a given place in the cycles."""
-
-    share: float
-
-    @property
-    def signal_share(self) -> float:
-        return self.share
-
-
-def starting(scene: OpenScene, share: float) -> InitialState:
+def starting(scene: OpenScene, place: float) -> InitialState:
     """A game that starts at a place in the cycles."""
-    return At(**vars(drawn(scene, "lights")), share=share)
+    return replace(drawn(scene, "lights"), signal_range=(place, place))
 
 
 def seconds(*times_s: float) -> list[float]:
@@ -88,7 +80,7 @@ def read(simulation: Simulation, start: InitialState, steps: int) -> IntArray:
 
 
 @pytest.mark.parametrize(
-    ("time_s", "ego", "other"),
+    ("time_s", "non_ego", "ego"),
     [
         (0.0, (GREEN, 0.0), (RED, 0.0)),
         (40.0, (GREEN, 40.0), (RED, 40.0)),
@@ -100,12 +92,12 @@ def read(simulation: Simulation, start: InitialState, steps: int) -> IntArray:
     ],
 )
 def test_reset__sets_states_and_seconds_since_they_changed(
-    scene: OpenScene, opened: Open, time_s: float, ego: tuple[int, float], other: tuple[int, float]
+    scene: OpenScene, opened: Open, time_s: float, non_ego: tuple[int, float], ego: tuple[int, float]
 ) -> None:
     found = opened().reset(0, starting(scene, time_s / CYCLE_S), [])
-    own, crossing = column(scene, 0), column(scene, 1)
-    assert (found.states[own], found.states[crossing]) == (ego[0], other[0])
-    assert found.since_s[[own, crossing]] == pytest.approx([ego[1], other[1]])
+    columns = [column(scene, player) for player in (EGO, NON_EGO)]
+    assert found.states[columns].tolist() == [ego[0], non_ego[0]]
+    assert found.since_s[columns] == pytest.approx([ego[1], non_ego[1]])
 
 
 @pytest.mark.parametrize("share", [*np.linspace(0.0, 1.0, 19, endpoint=False), 0.999])
@@ -140,7 +132,7 @@ def test_reset__a_game_does_not_move_the_lights_of_the_others(scene: OpenScene, 
     assert states is not None
     assert states[0].tolist() == before[0].states.tolist()
     assert states[2].tolist() == before[2].states.tolist()
-    assert states[1, column(scene, 0)] == GREEN  # at 20 s; it was yellow at 43 s
+    assert states[1, column(scene, NON_EGO)] == GREEN  # at 20 s; it was yellow at 43 s
 
 
 # --- many games, and a child process ---------------------------------------------------------------------------------
@@ -173,7 +165,7 @@ def test_games__together_have_the_signals_that_each_has_alone(scene: OpenScene) 
 
 def test_arena__seconds_since_the_change_count_from_it(scene: OpenScene) -> None:
     states, since_s = played(scene, [starting(scene, seconds(41.0)[0])], 60)
-    own = column(scene, 0)
+    own = column(scene, NON_EGO)
     changed = np.flatnonzero(np.diff(states[:, 0, own]))
     assert changed.tolist() == [10, 40]  # yellow after 1 s, red after 4 s, each in the step that begins then
     assert since_s[:11, 0, own] == pytest.approx(41.0 + STEP_S * np.arange(11))
@@ -196,18 +188,18 @@ def test_child_process__has_the_same_signals(scene: OpenScene, opened: Open) -> 
 
 
 def test_share__is_drawn_per_game_from_0_to_1(scene: OpenScene) -> None:
-    shares = np.array([drawn(scene, "game", game).signal_share for game in range(400)])
+    shares = np.array([drawn(scene, "game", game).signal_place for game in range(400)])
     assert len(np.unique(shares)) == 400
     assert shares.min() >= 0.0
     assert shares.max() < 1.0
     assert np.histogram(shares, 4, (0.0, 1.0))[0] == pytest.approx([100] * 4, abs=4 * 8.7)  # sqrt(400 / 4 * 3 / 4)
-    assert [drawn(scene, "game", game).signal_share for game in range(5)] == shares[:5].tolist()
+    assert [drawn(scene, "game", game).signal_place for game in range(5)] == shares[:5].tolist()
 
 
 def test_share__is_another_draw_than_the_start(scene: OpenScene) -> None:
     drawn_once = drawn(scene, "game", 7)
     before = drawn_once.x_m.copy(), drawn_once.noise.copy()
-    assert drawn_once.signal_share == drawn_once.signal_share
+    assert drawn_once.signal_place == drawn_once.signal_place
     again = drawn(scene, "game", 7)
     assert (again.x_m == before[0]).all()
     assert (again.noise == before[1]).all()
