@@ -277,6 +277,7 @@ def test_steering__brings_the_car_onto_its_path_within_limits(car: Car, speed_mp
     """From 1.5 m beside and 0.05 rad turned away, within UN R79's limits."""
     state, actuators, law = State.empty(1, 1), car.actuators, LaneKeeping()
     state.y_m[:], state.heading_rad[:], state.speed_mps[:], state.present[:] = 1.5, 0.05, speed_mps, True
+    state.friction[:] = actuators.friction
     offsets, lateral = [], []
     for _ in range(250):
         view = seeing(speed_mps, turned=-float(state.heading_rad[0, 0]), path_left_m=-float(state.y_m[0, 0]))
