@@ -36,7 +36,7 @@ class Sources:
 
     net: Path | None = None
     additional: tuple[Path, ...] = ()
-    begin: str = "0"
+    begin_s: float = 0.0
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -77,7 +77,15 @@ def _configured(folder: Path) -> Iterator[tuple[Path, Sources]]:
         nets = paths("net-file")
         for route_file in paths("route-files"):
             if nets:
-                yield route_file, Sources(nets[0], tuple(paths("additional-files")), values.get("begin", "0"))
+                yield route_file, Sources(nets[0], tuple(paths("additional-files")), _seconds(values.get("begin", "0")))
+
+
+def _seconds(time: str) -> float:
+    """Seconds of a time in seconds or as hours:minutes:seconds."""
+    seconds = 0.0
+    for part in time.split(":"):
+        seconds = 60.0 * seconds + float(part)
+    return seconds
 
 
 def _beside(file: Path) -> Sources:
@@ -111,9 +119,11 @@ def _sumo(file: Path, sources: Sources) -> str:
         return ""
     additional = ["--additional-files", ",".join(map(str, sources.additional))] if sources.additional else []
     program = Path(sumo.SUMO_HOME) / "bin" / "sumo"
-    options = ["--net-file", str(sources.net), "--route-files", str(file), "--begin", sources.begin, *additional]
+    options = ["--net-file", str(sources.net), "--route-files", str(file), "--begin", str(sources.begin_s), *additional]
     run = subprocess.run(
-        [program, *options, "--no-step-log", "--no-warnings", "--end", "100"], capture_output=True, text=True
+        [program, *options, "--no-step-log", "--no-warnings", "--end", str(sources.begin_s + 100.0)],
+        capture_output=True,
+        text=True,
     )
     return "runs" if run.returncode == 0 else run.stderr.strip().splitlines()[0].replace("|", "/")[:_LONGEST_REASON]
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-import defusedxml.ElementTree as SafeXml
 import pandas as pd
+
+from harness.traffic.xml_file import parse_xml
 
 PLAYER_COLOURS = {"ego": "31,119,255", "non_ego": "255,127,14"}  # blue and orange, as in the paper's figure 2
 _BACKGROUND_COLOUR = "190,190,190"
@@ -88,7 +89,7 @@ def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, DrawnV
 @lru_cache(maxsize=8)
 def _defined_types(route_file: Path, modified_ns: int) -> dict[str, dict[str, str]]:
     """The attributes of each type in a route file. It is read again when it has been modified."""
-    root = SafeXml.parse(route_file).getroot()
+    root = parse_xml(route_file)
     return {str(element.get("id")): dict(element.attrib) for element in root.iter("vType")}
 
 

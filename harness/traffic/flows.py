@@ -11,6 +11,7 @@ from harness.game.arrays import FloatArray
 
 LEAST_PERIOD_S = 0.05
 MOST_AT_ONCE = 1000  # vehicles of a flow that all depart at its begin
+_LEAST_DENSITY = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,21 +35,30 @@ def times_of(
     `density` is a factor on the rate. Vehicles with a fixed period are numbered from the flow's begin, the others from
     `begin_s`.
     """
+    if density < _LEAST_DENSITY:
+        return []
     number = rate.number
     if number is not None and rate.spread:
         number = round(number * density)
     if rate.period_s == 0.0:
         return [(k, first_s) for k in range(number or 0) if begin_s <= first_s]
     if rate.period_s is not None:
-        period_s = rate.period_s / density
-        skipped = max(ceil((begin_s - first_s) / period_s - 1e-9), 0)
-        times: FloatArray = np.arange(first_s, end_s, period_s)[skipped:]
+        skipped, times = _regular_times(first_s, end_s, begin_s, rate.period_s / density)
     elif rate.mean_period_s is not None:
         skipped, times = 0, _random_times(max(first_s, begin_s), end_s, rate.mean_period_s / density, generator)
     else:
         skipped, times = 0, _times_by_second(rate.probability_per_s or 0.0, first_s, end_s, begin_s, density, generator)
     numbered = [(skipped + k, time) for k, time in enumerate(times.tolist())]
     return numbered if number is None else [each for each in numbered if each[0] < number]
+
+
+def _regular_times(first_s: float, end_s: float, begin_s: float, period_s: float) -> tuple[int, FloatArray]:
+    """The number of the first time from `begin_s` on, and the times."""
+    before = max(ceil((begin_s - first_s) / period_s) - 2, 0)  # rounding may move a time by one period
+    after = max(ceil((end_s - first_s) / period_s) + 2, before)
+    times: FloatArray = first_s + period_s * np.arange(before, after)
+    skipped = int(np.searchsorted(times, begin_s))
+    return before + skipped, times[skipped : np.searchsorted(times, end_s)]
 
 
 def _random_times(begin_s: float, end_s: float, mean_period_s: float, generator: np.random.Generator) -> FloatArray:
@@ -64,7 +74,7 @@ def _times_by_second(
     probability: float, first_s: float, end_s: float, begin_s: float, density: float, generator: np.random.Generator
 ) -> FloatArray:
     """In each second a vehicle departs with a probability. A probability above 1 is a vehicle for certain, and more."""
-    first_s += max(ceil(begin_s - first_s - 1e-9), 0)
+    first_s += max(ceil(begin_s - first_s), 0)
     seconds = np.arange(first_s, end_s, 1.0)
     counts = np.ceil(probability * density - generator.random(len(seconds))).astype(int)
     return np.repeat(seconds, counts)

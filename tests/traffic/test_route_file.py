@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from harness.errors import UsageError
-from harness.traffic.route_file import Departure, RouteFile, VehicleType
+from harness.traffic.flows import Rate, times_of
+from harness.traffic.route_file import Departure, Flow, RouteFile, VehicleType
 from harness.traffic.route_reading import read_route_file
 
 Write = Callable[[str], Path]
@@ -186,3 +191,138 @@ def test_file__an_external_entity_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.rou.xml"
     path.write_text('<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><routes>&x;</routes>', encoding="utf-8")
     assert problem(path).startswith("carries XML entities")
+
+
+# --- trips, distributions, stops ----------------------------------------------------------------------------------
+
+
+def test_trip__is_kept_until_its_route_is_found(write: Write) -> None:
+    routes = read_route_file(write('<trip id="t" from="a" to="d" via="b c" depart="0:01:30"/>'))
+    assert routes.vehicles["t"].trip == ("a", "b", "c", "d")
+    assert routes.vehicles["t"].depart_s == 90.0
+
+
+def test_trip__of_stops_alone_leads_from_the_first_to_the_last(write: Write) -> None:
+    stops = '<stop lane="a_0" duration="5"/><stop lane="b_1" endPos="20" duration="0:0:7" parking="true"/>'
+    trip = read_route_file(write(f'<trip id="t">{stops}</trip>')).vehicles["t"]
+    assert trip.trip == ("a", "b")
+    assert [(stop.edge, stop.lane, stop.end_m, stop.duration_s, stop.parking) for stop in trip.stops] == [
+        ("a", 0, None, 5.0, False),
+        ("b", 1, 20.0, 7.0, True),
+    ]
+
+
+def test_stop__may_be_at_a_bus_stop_of_the_file(write: Write) -> None:
+    bus_stop = '<busStop id="market" lane="b_0" startPos="10" endPos="25" name="Market"/>'
+    vehicle = '<vehicle id="v"><route edges="a b"/><stop busStop="market" until="30"/></vehicle>'
+    (stop,) = read_route_file(write(bus_stop + vehicle)).vehicles["v"].stops
+    assert (stop.edge, stop.lane, stop.start_m, stop.end_m, stop.until_s) == ("b", 0, 10.0, 25.0, 30.0)
+
+
+def test_distributions__are_drawn_by_their_shares(write: Write) -> None:
+    mix = '<vTypeDistribution id="mix"><vType id="a" probability="3"/><vType id="b"/></vTypeDistribution>'
+    ways = '<route id="r" edges="one"/><route id="s" edges="two"/>'
+    choice = '<routeDistribution id="d" routes="r s" probabilities="1 4"/>'
+    routes = read_route_file(write(mix + ways + choice + '<flow id="f" type="mix" route="d" period="1"/>'))
+    drawn = departures(routes, until_s=4000.0)
+    assert {(each.vehicle_type, each.edges) for each in drawn} == {(t, e) for t in "ab" for e in (("one",), ("two",))}
+    # standard deviations of shares of 4000 draws: below 0.007
+    assert np.mean([each.vehicle_type == "a" for each in drawn]) == pytest.approx(0.75, abs=0.03)
+    assert np.mean([each.edges == ("two",) for each in drawn]) == pytest.approx(0.8, abs=0.03)
+
+
+def test_distribution__may_replace_the_default_type(write: Write) -> None:
+    mix = '<vTypeDistribution id="DEFAULT_VEHTYPE"><vType id="a"/><vType id="b"/></vTypeDistribution>'
+    routes = read_route_file(write(mix + '<flow id="f" period="1"><route edges="one"/></flow>'))
+    assert {each.vehicle_type for each in departures(routes)} == {"a", "b"}
+
+
+def test_route__repeats_as_in_sumo(write: Write) -> None:
+    # SUMO 1.28 drives a route of repeat="2" three times
+    route = '<vehicle id="v"><route edges="one two" repeat="2"><stop lane="one_0" until="5"/></route></vehicle>'
+    vehicle = read_route_file(write(route.replace('repeat="2"', 'repeat="2" cycleTime="60"'))).vehicles["v"]
+    assert vehicle.edges == ("one", "two") * 3
+    assert [stop.until_s for stop in vehicle.stops] == [5.0, 65.0, 125.0]
+
+
+def test_vehicle__departs_and_arrives_within_its_route(write: Write) -> None:
+    vehicle = '<vehicle id="v" departEdge="1" arrivalEdge="2"><route edges="a b c d"/></vehicle>'
+    assert read_route_file(write(vehicle)).vehicles["v"].edges == ("b", "c")
+
+
+def test_flow__takes_its_times_from_the_interval(write: Write) -> None:
+    interval = '<interval begin="2" end="7"><flow id="f" period="2"><route edges="a"/></flow></interval>'
+    assert times(read_route_file(write(interval))) == [2.0, 4.0, 6.0]
+
+
+def test_flow__random_periods_have_the_rate(write: Write) -> None:
+    drawn = times(read_route_file(write(flow('begin="10" end="5010" period="exp(0.4)"'))), 1e4)
+    # 2000 expected, standard deviation sqrt(2000) = 45
+    assert abs(len(drawn) - 2000) < 5 * 45
+    assert 10.0 <= min(drawn) < max(drawn) < 5010.0
+    assert np.std(np.diff(drawn)) == pytest.approx(2.5, rel=0.15)
+
+
+@pytest.mark.parametrize("attributes", ['number="7"', 'number="7" end="0"', 'number="0" end="0"'])
+def test_flow__all_of_a_number_may_depart_at_once(write: Write, attributes: str) -> None:
+    if "end" not in attributes:
+        assert problem(write(flow(attributes))).startswith("flow f: has no rate")
+    else:
+        assert times(read_route_file(write(flow(attributes)))) == [0.0] * int(attributes[8])
+
+
+def test_file__what_only_draws_or_records_is_left_out(write: Write) -> None:
+    car = '<vType id="car" imgFile="/etc/passwd" osgFile="b" emissionClass="PHEMlight/../c" sigma="0.3">'
+    params = '<param key="has.battery.device" value="true"/><param key="device.battery.capacity" value="9"/>'
+    routes = read_route_file(write(f'{car}{params}<param key="note" value="x"/></vType>'))
+    assert routes.types_xml == '<routes><vType id="car" sigma="0.3"><param key="note" value="x" /></vType></routes>'
+
+
+def test_file__each_kind_of_refused_element_is_one_problem(write: Write) -> None:
+    people = '<person id="p" depart="0"><walk edges="a"/></person><person id="q" depart="0"><walk edges="a"/></person>'
+    expected = "person: people on foot and passengers are not supported (2 times) (remove these elements)"
+    assert problem(write(people)) == expected
+
+
+# --- the window and the density of a game -------------------------------------------------------------------------
+
+
+@given(
+    begin_s=st.floats(0.0, 50.0),
+    period_s=st.floats(0.1, 20.0),
+    split_s=st.floats(0.0, 100.0),
+    number=st.none() | st.integers(0, 30),
+)
+def test_flow__a_window_and_the_rest_make_up_the_whole(
+    begin_s: float, period_s: float, split_s: float, number: int | None
+) -> None:
+    rate = Rate(period_s=period_s, number=number)
+    draw = partial(times_of, rate, begin_s, density=1.0, generator=np.random.default_rng(0))
+    whole = draw(end_s=100.0, begin_s=0.0)
+    assert draw(end_s=min(split_s, 100.0), begin_s=0.0) + draw(end_s=100.0, begin_s=split_s) == whole
+
+
+@given(st.floats(0.0, 5.0), st.floats(0.0, 60.0), st.integers(0, 1000))
+def test_departures__lie_within_the_game_and_have_names_of_their_own(density: float, begin_s: float, seed: int) -> None:
+    drawn = MANY.departures(set(), begin_s + 20.0, np.random.default_rng(seed), begin_s, density)
+    assert all(0.0 <= each.depart_s < 20.0 for each in drawn)
+    assert [each.depart_s for each in drawn] == sorted(each.depart_s for each in drawn)
+    assert len({each.name for each in drawn}) == len(drawn)
+
+
+def test_density__is_a_factor_on_all_traffic() -> None:
+    counts = [len(MANY.departures(set(), 60.0, np.random.default_rng(k), 0.0, 2.0)) for k in range(100)]
+    # at a density of 1: 20 + 30 vehicles of flows, 12 + 12 on average of random flows, and 6 single vehicles
+    assert np.mean(counts) == pytest.approx(2 * 80, rel=0.03)
+
+
+def _many() -> RouteFile:
+    departure = Departure(name="", vehicle_type="t", edges=("a",), depart_s=0.0, lane="0", position="0", speed="0")
+    rates = (Rate(period_s=3.0), Rate(period_s=2.0, number=30, spread=True))
+    rates += (Rate(probability_per_s=0.2), Rate(mean_period_s=5.0))
+    flows = (Flow(departure=replace(departure, name=f"f{k}"), end_s=60.0, rate=rate) for k, rate in enumerate(rates))
+    vehicles = {f"v{k}": replace(departure, name=f"v{k}", depart_s=9.0 * k) for k in range(6)}
+    return RouteFile(path=Path("a.rou.xml"), types={}, vehicles=vehicles, flows=tuple(flows), types_xml="")
+
+
+MANY = _many()
