@@ -107,6 +107,8 @@ class Scene(Document):
     """The SUMO net file in the folder of the scene."""
     routes: PlainFile
     """The SUMO file of routes, vehicle types and vehicles in the folder of the scene."""
+    additional: tuple[PlainFile, ...] = ()
+    """More SUMO files in that folder: route files, or additional files of vehicle types, routes and bus stops."""
     step_length_s: float = Field(0.1, ge=0.01, le=0.2)
     """Length of a step. Contact is tested once per step; in a longer step one car could pass through another."""
     time_limit_s: float = Field(gt=0.0, le=600.0)
@@ -144,6 +146,11 @@ class Scene(Document):
     def players(self) -> tuple[Player, Player]:
         """Ego and non-ego, in the order of the player axis of arrays."""
         return self.ego, self.non_ego
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files of the scene in its folder, the document first."""
+        return SCENE_FILE, self.net, self.routes, *self.additional
 
     @property
     def game_window_s(self) -> tuple[float, float]:
