@@ -20,6 +20,7 @@ from harness.game.arrays import FloatArray
 
 LENGTH_M, WIDTH_M = 4.6, 1.8
 _STEP_M = 0.5
+_ROOM_M = 0.1  # between a car and the end of a lane: some lanes begin or end at a wall
 _BEYOND_M = 10.0  # of the lanes before and after a junction
 _TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
 
@@ -92,7 +93,8 @@ def _line(lane: Lane) -> FloatArray:
 def _cars(points: FloatArray) -> NDArray[np.object_]:
     """Outlines of cars whose centres lie on a line [n, 2] and that reach beyond none of its ends."""
     line = shapely.LineString(points)
-    stations = np.arange(0.5 * LENGTH_M, line.length - 0.5 * LENGTH_M + 1e-9, _STEP_M)
+    margin_m = 0.5 * LENGTH_M + _ROOM_M
+    stations = np.arange(margin_m, line.length - margin_m, _STEP_M)
     ahead, behind, centre = (
         shapely.get_coordinates(shapely.line_interpolate_point(line, np.clip(stations + d, 0.0, line.length)))
         for d in (_STEP_M, -_STEP_M, 0.0)

@@ -47,8 +47,8 @@ def shipped_nets() -> list[Path]:
     return sorted([*home.rglob("*.net.xml"), *home.rglob("*.net.xml.gz")])
 
 
-def survey(file: Path, most: int | None = None) -> Surveyed:
-    """Open a net as a scene does, with the tables of some routes; at most `most` lanes and connections are followed."""
+def survey(file: Path, most: int | None = None, routes: int = _ROUTES) -> Surveyed:
+    """Open a net as a scene does, with the tables of some routes; about `most` lanes and connections are followed."""
     try:
         start_s = time.perf_counter()
         check_net(file)
@@ -63,7 +63,7 @@ def survey(file: Path, most: int | None = None) -> Surveyed:
         return Surveyed(file=file, crashed=_last_line())
     crashed = ""
     try:
-        for edges in routes_through(net, _ROUTES):
+        for edges in routes_through(net, routes)[:routes]:
             route_table(net, area, edges, goal=edges[-1], goal_position_m=0.0)
     except Exception:
         crashed = _last_line()

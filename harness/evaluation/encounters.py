@@ -97,6 +97,8 @@ class _Search:
         speed_mps, length_m = q.bodies.speed_mps[steps, body], float(q.bodies.length_m[steps[0], body])
         on_stream = (along_m >= conflicts.from_m[c]) & (along_m <= conflicts.until_m[c])
         steps, along_m, speed_mps = steps[on_stream], along_m[on_stream], speed_mps[on_stream]
+        if not len(steps) or not self._follows(c, body, steps, along_m, speed_mps):
+            return
         other = other_passage(steps, along_m, speed_mps, length_m, conflicts, c, self._step_s)
         gap_s = self._gap_s(own, other, steps, conflicts.zone_m[c] - along_m - 0.5 * length_m, speed_mps)
         if other is not None or gap_s < np.inf:
@@ -107,6 +109,16 @@ class _Search:
             other_first = other is not None and other.enters_s <= own.enters_s
             must_yield = has_duty(c, own_signal, other_signal, other_first, self._tables.streams.conflicts)
             yield Encounter(conflict=c, body=body, own=own, other=other, must_yield=bool(must_yield), gap_s=gap_s)
+
+    def _follows(self, c: int, body: int, steps: IntArray, along_m: FloatArray, speed_mps: FloatArray) -> bool:
+        """Whether a body in the stream of conflict `c` in `steps` [N] follows it: it comes in before the junction, and
+        does not leave it before the end of the zone. Its first and last step in the game are no such moments."""
+        present, conflicts = self._q.bodies.present[:, body], self._tables.conflicts
+        reach_m = speed_mps * self._step_s  # in a step
+        there = np.flatnonzero(present)
+        comes_in = along_m[0] <= reach_m[0] or steps[0] == there[0]
+        end_m = min(conflicts.zone_m[c] + conflicts.length_m[c], conflicts.until_m[c])
+        return bool(comes_in and (along_m[-1] + 2.0 * reach_m[-1] >= end_m or steps[-1] == there[-1]))
 
     def _gap_s(
         self, own: Passage, other: Passage | None, steps: IntArray, to_zone_m: FloatArray, speed_mps: FloatArray

@@ -20,6 +20,7 @@ _BEGIN_M, _END_M, _STOP_M, _RIGHT_M, _LEFT_M, _FROM_M, _UNTIL_M, _ZONE_M, _LENGT
 _YIELDS, _FIRST_COME, _OWN_LINK, _OTHER_LINK = (
     Conflicts._fields.index(name) for name in ("yields", "first_come", "own_link", "other_link")
 )
+_BESIDE_M = 0.8
 # plain integers: compiled code can't convert a member
 _OFF, _GREEN, _RED = int(Signal.OFF), int(Signal.GREEN), int(Signal.RED)
 
@@ -120,13 +121,18 @@ def meetings(
 def streams_at(
     x_m: float, y_m: float, heading_rad: float, streams: Streams, in_streams: IntArray, along_m: FloatArray
 ) -> int:
-    """The number of streams in which a body drives; written to `in_streams` in order, and its place to `along_m`."""
+    """The number of streams in which a body drives; written to `in_streams` in order, and its place to `along_m`.
+
+    Streams that are farther beside the body than another one by more than `_BESIDE_M` are left out: inside a junction,
+    it is on its way to leave them, or has only come near to their end.
+    """
     column = int((x_m - streams.origin_m[0]) // CELL_M)
     line = int((y_m - streams.origin_m[1]) // CELL_M)
     if column < 0 or line < 0 or column >= streams.first.shape[0] or line >= streams.first.shape[1] - 1:
         return 0
-    count, nearest2 = 0, np.inf
+    count, nearest2, least_m = 0, np.inf, np.inf
     cosine, sine = np.cos(heading_rad), np.sin(heading_rad)
+    beside_m = np.empty(len(in_streams))
     for place in range(streams.first[column, line], streams.first[column, line + 1]):
         k = streams.rows[place]
         sample = streams.samples[k]
@@ -140,7 +146,14 @@ def streams_at(
             count += 0 if again else 1
             in_streams[count - 1], nearest2 = streams.stream[k], u * u + v * v
             along_m[streams.stream[k]] = sample[6] + u
-    return count
+            beside_m[count - 1] = abs(v)
+            least_m = min(least_m, abs(v))
+    near = 0
+    for k in range(count):
+        if beside_m[k] <= least_m + _BESIDE_M:
+            in_streams[near] = in_streams[k]
+            near += 1
+    return near
 
 
 @compiled

@@ -2,7 +2,7 @@
 each side is there.
 
 A stream is the traffic of one link of a junction: its lanes before, inside and shortly beyond the junction. A conflict
-is the zone in which the widths of a player's lane and of a stream overlap. A body conflicts with a player if it drives
+is the zone in which cars on the player's lane and in a stream need the same room. A body conflicts with a player if it drives
 in a stream that conflicts with the player's route. This is geometry: it is what a driver sees, without knowledge of the
 other's route or intention.
 """

@@ -145,15 +145,16 @@ def _junction_parts(edges: Iterable[Edge], own_nodes: Collection[Node]) -> Itera
             yield Part(shape=shape, line=np.array(node.getShape3D(), dtype=float), own=node in own_nodes)
 
 
-def _followed_lines(net: Net, edges: Iterable[Edge]) -> Iterator[FloatArray]:
+def _followed_lines(net: Net, edges: Sequence[Edge]) -> Iterator[FloatArray]:
     """The lines [n, 2] that cars follow: each lane, and each connection with parts of the lanes before and after it.
 
     Turnarounds are left out: no car can follow their arcs, which are about as wide as a lane.
     """
-    for lane in (lane for edge in edges if not edge.isSpecial() for lane in car_lanes(edge)):
+    kept = {edge for edge in edges if not edge.isSpecial()}
+    for lane in (lane for edge in edges if edge in kept for lane in car_lanes(edge)):
         yield lane_line(lane)
         for link in lane.getOutgoing():
-            if _is_for_cars(link):
+            if _is_for_cars(link) and link.getTo() in kept:
                 before, after = _stretch(net, lane, ahead=False), _stretch(net, link.getToLane(), ahead=True)
                 yield np.concatenate((before, *connection_lines(net, link), after))
 

@@ -35,8 +35,8 @@ class Reading:
     signals: IntArray | None = None
     """[G, L] int8 states of the signal links of the scene's right of way; None if it has none."""
     signal_texts: tuple[str, ...] | None = None
-    """[G] the whole states of the traffic lights on the players' routes, as `id=state` separated by spaces, if games are
-    recorded."""
+    """[G] the whole states of the traffic lights on the players' routes, as `id=state` separated by spaces, if games
+    are recorded."""
 
 
 class SignalsAtReset(NamedTuple):

@@ -1,7 +1,7 @@
 """Conflicts and stop lines of small nets, by hand.
 
 The crossing has its centre at the origin (100, 100 in the net), lanes of 3.2 m, and stop lines 7.2 m from the centre.
-The road from west to east has priority. Lanes count as 3.0 m wide, so that lanes which touch do not overlap.
+The road from west to east has priority. Cars need 2.2 m of a lane's width.
 """
 
 from __future__ import annotations
@@ -82,20 +82,20 @@ def conflict(net: Net, route: str, stream: str) -> dict[str, Any] | None:
 
 
 @pytest.mark.parametrize("kind", ["priority", "traffic_light", "unregulated", "bare"])
-def test_zone__of_two_straight_streams_is_where_their_lanes_overlap(crossings: dict[str, Net], kind: str) -> None:
+def test_zone__of_two_straight_streams_is_where_their_cars_need_room(crossings: dict[str, Net], kind: str) -> None:
     # northbound on x = 1.6, a route from y = -100; westbound traffic on y = 1.6 has its stop line at x = 7.2
     met = conflict(crossings[kind], "sc cn", "ec cw")
     assert met is not None
     assert met["crossing"]
-    assert (met["begin_m"], met["end_m"]) == pytest.approx((100.1, 103.1))
-    assert (met["zone_m"], met["length_m"]) == pytest.approx((7.2 - 3.1, 3.0))
+    assert (met["begin_m"], met["end_m"]) == pytest.approx((100.5, 102.7))
+    assert (met["zone_m"], met["length_m"]) == pytest.approx((7.2 - 2.7, 2.2))
     assert met["stop_m"] == pytest.approx(92.8)
 
 
 def test_zone__mirrored_with_left_hand_traffic(crossings: dict[str, Net]) -> None:
     met = conflict(crossings["lefthand"], "sc cn", "wc ce")  # eastbound traffic is on y = 1.6
     assert met is not None
-    assert (met["begin_m"], met["end_m"]) == pytest.approx((100.1, 103.1))
+    assert (met["begin_m"], met["end_m"]) == pytest.approx((100.5, 102.7))
     assert met["yields"]
 
 

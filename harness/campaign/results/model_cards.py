@@ -195,13 +195,19 @@ def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:
     return str(recorded["in_words"]) if recorded else f"the policy `{campaign.ego.driver}`"
 
 
+def _limit(key: str) -> str:
+    """A limit of a term in words, with a place for its value: "within {:g} m" for `within_m`."""
+    word, _, unit = key.rpartition("_")
+    return f"{word} {{:g}} {unit.replace('mps', 'm/s')}"
+
+
 def _terms(persona: Persona) -> Iterator[_Term]:
     for group in GROUPS:
         for name, given in getattr(persona, group).terms.items():
             term, weight, limit = TERMS[name], given, ""
             if isinstance(given, Parametrised):
                 weight = given.weight
-                limit = f", within {given.within_s:g} s" if given.within_m is None else f", within {given.within_m:g} m"
+                limit = "".join(f", {_limit(key)}".format(value) for key, value in given.limits.items())
             counts = "per second" if term.per_second else "per event"
             yield _Term(group=group, name=name, weight=f"{weight:g}", counts=counts, meaning=term.meaning + limit)
     for each in persona.human.fuzzy:

@@ -143,6 +143,20 @@ def test_card__of_a_persona_with_fuzzy_terms_and_no_blind_spot_check() -> None:
     assert any(line.startswith("| no blind-spot check | in 85 % of drives") for line in card)
 
 
+def test_card__of_a_persona_with_terms_of_every_limit() -> None:
+    terms = {
+        "clearance": {"weight": 1.0, "within_m": 0.5},
+        "red_light": {"weight": 2.0, "after_s": 2.0},
+        "stop_sign": {"weight": 1.0, "from_mps": 1.5},
+        "time_gap": {"weight": 1.0, "within_s": 1.2},
+    }
+    document = {**persona("careful"), "safety": {"terms": terms}}
+    manifest = {**MANIFEST, "persona_documents": {"distracted": document}}
+    card = model_card("distracted-seed1", manifest, SUMMARY, NON_EGO_POLICY)
+    for limit in (", within 0.5 m |", ", after 2 s |", ", from 1.5 m/s |", ", within 1.2 s |"):
+        assert limit in card, limit
+
+
 def test_card__of_a_persona_with_human_factors() -> None:
     document = {
         **persona("careful"),

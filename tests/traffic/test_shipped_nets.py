@@ -1,0 +1,48 @@
+"""The nets of the installed SUMO, which the harness did not draw: each opens, or is refused for a reason that is right.
+
+Property of every net: a car that follows the centre line of a lane or of a connection touches no rail.
+`python -m benchmarks.nets` prints a line for each net; `python -m benchmarks.nets FOLDER` takes those of a folder.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import sumo
+
+from benchmarks.nets import shipped_nets, survey
+
+SMALL_BYTES = 200_000
+FOR_OTHERS = {"racing/spreewaldring.net.xml": "vip", "rail/net.net.xml": "rail", "rail_demo/net.net.xml": "rail"}
+"""Nets without a lane for cars, and what their lanes are for."""
+NETS = shipped_nets()
+SOME = [path for path in NETS if path.stat().st_size < SMALL_BYTES]
+
+
+def label(path: Path) -> str:
+    return f"{path.parent.name}/{path.name}"
+
+
+def check(path: Path, most: int | None = None, routes: int = 10) -> None:
+    found = survey(path, most, routes)
+    assert not found.crashed
+    assert not found.phantom
+    expected = FOR_OTHERS.get(label(path))
+    assert found.refused == (f"has no lane that cars may use: its lanes are for {expected}" if expected else "")
+    assert expected or found.paths > 0
+
+
+def test_shipped_nets__are_found() -> None:
+    assert len(NETS) >= 28, sumo.SUMO_HOME
+    assert {label(path) for path in NETS} >= set(FOR_OTHERS)
+
+
+@pytest.mark.parametrize("path", SOME, ids=label)
+def test_shipped_nets__small_ones_open_and_have_no_phantom_rail_on_some_paths(path: Path) -> None:
+    check(path, most=30, routes=1)
+
+
+@pytest.mark.parametrize("path", NETS, ids=label)
+def test_shipped_nets__every_one_opens_and_has_no_phantom_rail(path: Path) -> None:
+    check(path)
