@@ -17,12 +17,12 @@ def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
 
 
 def _positive(interval: tuple[float, float]) -> tuple[float, float]:
-    if interval[0] < 0.0 or not 0.0 < interval[1] <= _DENSEST:
-        raise ValueError(f"the density lies outside 0 to {_DENSEST:g}")
+    if interval[0] < 0.0 or not 0.0 < interval[1] <= _LARGEST:
+        raise ValueError(f"the range lies outside 0 to {_LARGEST:g}")
     return interval
 
 
-_DENSEST = 10.0
+_LARGEST = 10.0
 Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
 Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
