@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from harness.config.toml_reading import Document
 
@@ -96,6 +96,20 @@ class Varies(Document):
 
     traffic_density: Annotated[Interval, AfterValidator(_positive)] | None = None
     """Range of a factor on the background traffic: on the rates of flows, and on the number of single vehicles."""
+    friction: Annotated[Interval, AfterValidator(_positive)] | None = None
+    """Range of the coefficient of friction, instead of the scene's `friction`."""
+    speed_limit_share: Annotated[Interval, AfterValidator(_positive)] | None = None
+    """Range of a factor on all speed limits of the net."""
+    signal_place: Interval = (0.0, 1.0)
+    """Range of the place in the cycles of the traffic lights at which a game starts, from 0 to 1. [0.0, 0.0] starts every
+    game with the first phase."""
+
+    @field_validator("signal_place")
+    @classmethod
+    def _within_the_cycle(cls, place: tuple[float, float]) -> tuple[float, float]:
+        if place[0] < 0.0 or place[1] > 1.0:
+            raise ValueError("signal_place is a part of the cycle: keep it from 0 to 1")
+        return place
 
 
 class Scene(Document):

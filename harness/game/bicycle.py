@@ -23,7 +23,8 @@ WHEEL_CENTRE = 0.25  # gain of the wheel near its centre; at full deflection the
 
 
 class Actuators(NamedTuple):
-    """Limits of the players' cars. Arrays are [P]; `friction` is the friction coefficient of the road."""
+    """Limits of the players' cars. Arrays are [P]; `friction` is the usual friction coefficient of the road. That of a
+    game is in its state; drivers know the usual one."""
 
     max_acceleration_mps2: FloatArray
     max_braking_mps2: FloatArray
@@ -100,7 +101,7 @@ def move(
     small for the curve, the car runs wide.
     """
     motion = (state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad)
-    _move(*motion, acceleration_mps2, steering_rad, moving, actuators, step_s)
+    _move(*motion, acceleration_mps2, steering_rad, moving, state.friction, actuators, step_s)
 
 
 @compiled
@@ -114,12 +115,13 @@ def _move(
     requested_acceleration_mps2: FloatArray,
     requested_steering_rad: FloatArray,
     moving: BoolArray,
+    friction: FloatArray,
     actuators: Actuators,
     step_s: float,
 ) -> None:
-    grip = actuators.friction * GRAVITY_MPS2
     for g, p in np.ndindex(moving.shape):
         if moving[g, p]:
+            grip = friction[g] * GRAVITY_MPS2
             rack = actuators.max_steering_rate_radps[p] * step_s
             turn = _clamped(requested_steering_rad[g, p] - steering_rad[g, p], rack)
             steering = _clamped(steering_rad[g, p] + turn, actuators.max_steering_rad[p])
@@ -151,19 +153,24 @@ def curvature_per_m(steering_rad: FloatArray, wheelbase_m: FloatArray) -> FloatA
 
 def lateral_acceleration_mps2(state: State, actuators: Actuators) -> FloatArray:
     """[G, P] lateral acceleration (m/s^2) at the state's steering and speed, bounded by the grip left by the pedals."""
-    return _lateral_acceleration_mps2(state.steering_rad, state.speed_mps, state.acceleration_mps2, actuators)
+    motion = (state.steering_rad, state.speed_mps, state.acceleration_mps2)
+    return _lateral_acceleration_mps2(*motion, state.friction[:, None], actuators.wheelbase_m)
 
 
 @compiled
 def _lateral_acceleration_mps2(
-    steering_rad: FloatArray, speed_mps: FloatArray, acceleration_mps2: FloatArray, actuators: Actuators
+    steering_rad: FloatArray,
+    speed_mps: FloatArray,
+    acceleration_mps2: FloatArray,
+    friction: FloatArray,
+    wheelbase_m: FloatArray,
 ) -> FloatArray:
-    sideways = curvature_per_m(steering_rad, actuators.wheelbase_m) * speed_mps**2
-    return _clamped(sideways, _remaining_grip(actuators.friction * GRAVITY_MPS2, acceleration_mps2))
+    sideways = curvature_per_m(steering_rad, wheelbase_m) * speed_mps**2
+    return _clamped(sideways, _remaining_grip(friction * GRAVITY_MPS2, acceleration_mps2))
 
 
 @compiled
-def _remaining_grip(grip_mps2: float, used_mps2: FloatArray) -> FloatArray:
+def _remaining_grip(grip_mps2: FloatArray | float, used_mps2: FloatArray) -> FloatArray:
     """[...] grip that the friction circle leaves in one direction when `used_mps2` is used in the other."""
     return np.sqrt(np.maximum(grip_mps2**2 - used_mps2**2, 0.0))
 

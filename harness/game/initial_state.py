@@ -122,12 +122,15 @@ class InitialState:
     unseen_behind_m: FloatArray  # least distance ahead of a player at which it sees road users
     limits: tuple[Limits, ...]
     member: tuple[int, ...]  # index of the driver that each player has in this game
+    friction: float
+    limit_share: float
+    signal_range: tuple[float, float]
     parts: tuple[str | int, ...]  # parts of the seeds
 
     @property
-    def signal_share(self) -> float:
+    def signal_place(self) -> float:
         """The place in the cycles of traffic lights at which the game starts, from 0 to 1."""
-        return float(generator_of(*self.parts, "signals").random())
+        return between(self.signal_range, float(generator_of(*self.parts, "signals").random()))
 
     @property
     def noise(self) -> FloatArray:
@@ -138,6 +141,15 @@ class InitialState:
     def seed(self) -> int:
         """The seed of the background traffic."""
         return seed_of(*self.parts, "traffic") % 2**31
+
+
+@dataclass(frozen=True, kw_only=True)
+class Conditions:
+    """The ranges of what differs from game to game beside the players."""
+
+    friction: tuple[float, float]
+    limit_share: tuple[float, float] = (1.0, 1.0)
+    signal_place: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -157,6 +169,7 @@ class StartDistribution:
     steps: int
     step_s: float
     routes: Routes
+    conditions: Conditions
     along_route_share: float = 0.0
 
 
@@ -209,8 +222,16 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
         unseen_behind_m=np.array(unseen),
         limits=tuple(limits),
         member=tuple(member),
+        friction=_varied(start_distribution.conditions.friction, "friction", *parts),
+        limit_share=_varied(start_distribution.conditions.limit_share, "speed limit", *parts),
+        signal_range=start_distribution.conditions.signal_place,
         parts=parts,
     )
+
+
+def _varied(bounds: tuple[float, float], name: str, *parts: str | int) -> float:
+    """A condition of one game, drawn from a generator of its own; without a range, nothing is drawn."""
+    return bounds[0] if bounds[0] == bounds[1] else between(bounds, generator_of(*parts, name).random())
 
 
 def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:

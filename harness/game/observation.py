@@ -44,7 +44,7 @@ def observe(q: Quantities) -> FloatArray:
     state, bodies, actuators = q.state, q.bodies, q.world.actuators
     return _observe(
         *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
-        *(state.station_m, q.lateral_offset_m, state.present, q.road_steering_rad),
+        *(state.station_m, q.lateral_offset_m, state.present, q.road_steering_rad, q.speed_limit_mps),
         (state.unseen_behind_m, state.sight_m, state.distance_error, state.closing_error_per_s),
         *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
         bodies.present,
@@ -66,6 +66,7 @@ def _observe(
     offset_m: FloatArray,
     present: BoolArray,
     road_steering_rad: FloatArray,
+    speed_limit_mps: FloatArray,
     sight: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     body_x_m: FloatArray,
     body_y_m: FloatArray,
@@ -97,8 +98,8 @@ def _observe(
             row = row_at(station, first, last)
             _, lane_end = lane_at(row, offset, routes.lane_offset_m, routes.lane_end_m)
             view[:] = 0.0
-            view[0], view[1] = speed, routes.speed_limit_mps[row]
-            view[2] = speed / routes.speed_limit_mps[row] - 1.0
+            view[0], view[1] = speed, speed_limit_mps[g, p]
+            view[2] = speed / speed_limit_mps[g, p] - 1.0
             view[3] = acceleration_mps2[g, p]
             view[4] = steering_rad[g, p] / max_steering_rad[p]
             view[5] = road_steering_rad[g, p] / max_steering_rad[p]

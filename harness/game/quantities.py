@@ -65,9 +65,9 @@ class Quantities:
     def _along(self) -> Along:
         return self.world.road.routes.along(self.state.station_m, self.lateral_offset_m)
 
-    @property
+    @cached_property
     def speed_limit_mps(self) -> FloatArray:
-        return self._along.speed_limit_mps
+        return self._along.speed_limit_mps * self.state.limit_share[:, None]
 
     @cached_property
     def speed_over_limit(self) -> FloatArray:
@@ -131,7 +131,7 @@ class Quantities:
     def permitted_mps(self) -> FloatArray:
         """Speed that the limits, signals, signs and right of way permit."""
         right_of_way, routes = self.world.right_of_way, self.world.road.routes
-        approach_mps = routes.approach_mps[routes.rows(self.state.station_m)]
+        approach_mps = routes.approach_mps[routes.rows(self.state.station_m)] * self.state.limit_share[:, None]
         return permitted_mps(
             *(self.front_m, self.state.speed_mps, approach_mps, self.next_stop_line, self.state.signals),
             *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),

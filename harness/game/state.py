@@ -56,6 +56,8 @@ class State:
     distance_error: FloatArray  # error of estimated distances, as a share: + is farther than true
     closing_error_per_s: FloatArray  # error of closing speeds, per distance: + is moving away
     step: IntArray  # [G]
+    friction: FloatArray  # [G] coefficient of friction of the road
+    limit_share: FloatArray  # [G] factor on the speed limits
     signals: IntArray  # [G, L] int8, states of signal links (`right_of_way.Signal`)
     signal_s: FloatArray  # [G, L] seconds since they changed
 
@@ -79,6 +81,8 @@ class State:
             distance_error=np.zeros(shape),
             closing_error_per_s=np.zeros(shape),
             step=np.zeros(games, dtype=np.int64),
+            friction=np.zeros(games),
+            limit_share=np.ones(games),
             signals=np.zeros((games, signals), dtype=np.int8),
             signal_s=np.zeros((games, signals)),
         )

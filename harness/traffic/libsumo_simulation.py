@@ -36,6 +36,7 @@ from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.signals import Signals
 from harness.traffic.simulation import Reading, SignalsAtReset
+from harness.traffic.speed_limits import SpeedLimits
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.traffic.warm_up import clear_of_players
 
@@ -127,7 +128,9 @@ class LibsumoSimulation:
         self._present = np.zeros((self._games, len(self._taken_over)), dtype=bool)
         self._insertions = [self._insertion(player) for player in range(len(self._taken_over))]
         world = self._scene.world
-        self._signals = Signals([tile.prefix for tile in self._tiles], world.right_of_way.signal_links)
+        prefixes = [tile.prefix for tile in self._tiles]
+        self._signals = Signals(prefixes, world.right_of_way.signal_links)
+        self._speed_limits = SpeedLimits(prefixes) if self._scene.document.varies.speed_limit_share else None
         self._background = BackgroundTraffic(
             prefixes=[tile.prefix for tile in self._tiles],
             offsets_m=self._offsets,
@@ -152,7 +155,9 @@ class LibsumoSimulation:
             for player in sorted(taking_part - staying):
                 self._add_player(game, player, start)
             self._background.reset(game, clear_of_players(departures, start, self._scene.world.length_m))
-            return self._signals.reset(game, start.signal_share if self._signals else 0.0)
+            if self._speed_limits is not None:
+                self._speed_limits.reset(game, start.limit_share)
+            return self._signals.reset(game, start.signal_place if self._signals else 0.0)
 
     def halt(self, game: int, player: int) -> None:
         """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""

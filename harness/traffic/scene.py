@@ -19,7 +19,7 @@ from harness.files import leads_out
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
-from harness.game.initial_state import StartDistribution, StartRange
+from harness.game.initial_state import Conditions, StartDistribution, StartRange
 from harness.game.quantities import REACH_M
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
@@ -103,6 +103,7 @@ class OpenScene:
             steps=self.world.steps,
             step_s=self.world.step_s,
             routes=self.world.road.routes,
+            conditions=_conditions(self.document),
             along_route_share=along_route_share,
         )
 
@@ -180,6 +181,15 @@ def _edges_of_players(document: Scene, net: Net, routes: RouteFile) -> list[Edge
     """The edges of the players' routes; those of invalid routes are left out."""
     vehicles = [routes.vehicles[player.vehicle] for player in document.players if player.vehicle in routes.vehicles]
     return [edge for each in vehicles for edge in collect([], partial(edges_of, each, net, routes)) or []]
+
+
+def _conditions(document: Scene) -> Conditions:
+    varies = document.varies
+    return Conditions(
+        friction=varies.friction or (document.friction, document.friction),
+        limit_share=varies.speed_limit_share or (1.0, 1.0),
+        signal_place=varies.signal_place,
+    )
 
 
 def _with_ego_type(routes: RouteFile, document: Scene | None, ego_type: str | None) -> RouteFile:
