@@ -101,8 +101,8 @@ class Varies(Document):
     speed_limit_share: Annotated[Interval, AfterValidator(_positive)] | None = None
     """Range of a factor on all speed limits of the net."""
     signal_place: Interval = (0.0, 1.0)
-    """Range of the place in the cycles of the traffic lights at which a game starts, from 0 to 1. [0.0, 0.0] starts every
-    game with the first phase."""
+    """Range of the place in the cycles of the traffic lights at which a game starts, from 0 to 1. [0.0, 0.0] starts
+    every game with the first phase."""
 
     @field_validator("signal_place")
     @classmethod
