@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -26,7 +26,7 @@ from harness.game.seeding import between
 from harness.game.state import ROLES
 from harness.game.world import World
 from harness.traffic import network
-from harness.traffic.departures import check_departures, edges_of
+from harness.traffic.departures import background_departures, check_departures, edges_of
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
@@ -48,6 +48,7 @@ class OpenScene:
     places: tuple[StartRange, ...]
     edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
     rail_lines: tuple[FloatArray, ...]
+    junctions: frozenset[str] | None = None  # those that games need; None: all of the net
 
     @property
     def net_file(self) -> Path:
@@ -180,6 +181,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         places=places,
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
+        junctions=network.junctions_near(net, [*own, *_background_edges(vehicles, net, routes)]),
     )
 
 
@@ -196,6 +198,12 @@ def _conditions(document: Scene) -> Conditions:
         limit_share=varies.speed_limit_share or (1.0, 1.0),
         signal_place=varies.signal_place,
     )
+
+
+def _background_edges(players: Collection[str], net: Net, routes: RouteFile) -> list[Edge]:
+    """The edges of all routes of background traffic, which games need whole."""
+    names = {name for each in background_departures(routes, players) for name in each.edges}
+    return [net.getEdge(name) for name in sorted(names)]
 
 
 def _with_ego_type(routes: RouteFile, document: Scene | None, ego_type: str | None) -> RouteFile:
