@@ -29,7 +29,7 @@ class RecordedGame:
     def of(cls, trace: pd.DataFrame, scene: OpenScene) -> RecordedGame:
         """The game of a trace."""
         sizes_m = {
-            name: (each.length_m, each.width_m) for name, each in types_of_vehicles(trace, scene.routes.path).items()
+            name: (each.length_m, each.width_m) for name, each in types_of_vehicles(trace, scene.route_files).items()
         }
         quantities = quantities_of(trace, scene.world, sizes_m)
         return cls(quantities=quantities, drove=drove_in(trace)[:, NON_EGO])

@@ -27,7 +27,8 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
 from harness.game.bicycle import lateral_acceleration_mps2, move, requests
-from harness.game.observation_layout import AHEAD_M, LAYOUT
+from harness.game.observation_layout import LAYOUT
+from harness.game.road import AHEAD_M
 from harness.game.state import EGO, State
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.observations import observation_of
