@@ -148,7 +148,7 @@ def test_games__a_driver_by_rules_stops_at_red_and_goes_at_green(
     slowest = np.nanmin(played["speed_mps"], axis=0)
     stopped = slowest < 0.5
     assert 3 <= stopped.sum() <= 10, "in some games it is red when it arrives, in some it is not"
-    assert (slowest[~stopped] > 3.0).all()
+    assert (slowest > 9.0).sum() >= 3, "it does not slow down for a green light"
 
 
 def test_games__it_waits_within_3_m_before_the_line(played: dict[str, FloatArray], lights: OpenScene) -> None:

@@ -1,7 +1,7 @@
 """Starts along the route, timed starts and goals of each player by hand, and every impossible one in words.
 
-The ego drives east on y = -1.6, the other north on x = 1.6. Each road has 100 m before the crossing and 100 m behind
-it. So the ways meet 101.6 m along the ego's route and 98.4 m along the other's.
+The ego drives east on y = 98.4, the other north on x = 101.6. Each road is 200 m long, from 0 to 200 m.
+So the ways meet 101.6 m along the ego's route and 98.4 m along the other's.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from tests.support.roads import arc, straight
 from tests.support.scenes import CARS, CROSSING_EDGES, CROSSING_NODES, build_scene, drawn
 
 EGO = 'position_m = [30.0, 50.0]\nlane = "wc_0"'
-TIMED = "arrival_after_ego_s = [-1.0, 2.0]"
+TIMED = "arrival_after_ego_s = [-1.0, 1.0]"
 GOALS = ('{ edge = "ce", position_m = 50.0 }', '{ edge = "cn", position_m = 40.0 }')
 Write = Callable[..., Path]
 
@@ -43,7 +43,7 @@ def write(built: Path, tmp_path: Path) -> Write:
         non_ego: str = TIMED,
         goals: tuple[str, str] = GOALS,
         routes: tuple[str, str] = ("wc ce", "sc cn"),
-        speeds: tuple[str, str] = ("[8.0, 10.0]", "[8.0, 10.0]"),
+        speeds: tuple[str, str] = ("[9.0, 10.0]", "[9.0, 10.0]"),
     ) -> Path:
         folder = tmp_path / "scene"
         folder.mkdir(exist_ok=True)
@@ -118,23 +118,23 @@ def test_arrival__of_every_game_is_within_its_range(write: Write) -> None:
     late_s = []
     for start in games(scene):
         front_x, front_y = start.x_m[0] + 2.3, start.y_m[1] + 2.3
-        assert start.y_m[0] == pytest.approx(-1.6)
-        assert start.x_m[1] == pytest.approx(1.6)
-        ego_s, other_s = (1.6 - front_x) / start.speed_mps[0], (-1.6 - front_y) / start.speed_mps[1]
+        assert start.y_m[0] == pytest.approx(98.4)
+        assert start.x_m[1] == pytest.approx(101.6)
+        ego_s, other_s = (101.6 - front_x) / start.speed_mps[0], (98.4 - front_y) / start.speed_mps[1]
         late_s.append(other_s - ego_s)
         assert 30.0 <= start.position_m[0] <= 50.0
     # to the nearest half metre of the meeting point, 0.05 s
     assert min(late_s) >= -1.0 - 0.1
-    assert max(late_s) <= 2.0 + 0.1
-    assert max(late_s) - min(late_s) > 2.5
+    assert max(late_s) <= 1.0 + 0.1
+    assert max(late_s) - min(late_s) > 1.5
 
 
 def test_arrival__works_with_an_ego_along_its_route(write: Write) -> None:
     scene = open_scene(write(ego="route_m = [30.0, 50.0]"))
     for start in games(scene, 20):
-        ego_s = (1.6 - start.x_m[0] - 2.3) / start.speed_mps[0]
-        other_s = (-1.6 - start.y_m[1] - 2.3) / start.speed_mps[1]
-        assert -1.1 <= other_s - ego_s <= 2.1
+        ego_s = (101.6 - start.x_m[0] - 2.3) / start.speed_mps[0]
+        other_s = (98.4 - start.y_m[1] - 2.3) / start.speed_mps[1]
+        assert -1.1 <= other_s - ego_s <= 1.1
 
 
 # --- starts along the route ------------------------------------------------------------------------------------------
@@ -147,8 +147,8 @@ def test_route_m__reaches_over_the_edges_of_the_route(write: Write) -> None:
     fronts = np.array([start.position_m for start in starts])
     assert np.ptp(fronts[:, 0]) > 80.0
     for start in starts:
-        assert start.x_m[0] == pytest.approx(-100.0 + start.position_m[0] - 2.3, abs=0.05)
-        assert start.y_m[1] == pytest.approx(-100.0 + start.position_m[1] - 2.3, abs=0.05)
+        assert start.x_m[0] == pytest.approx(start.position_m[0] - 2.3, abs=0.05)
+        assert start.y_m[1] == pytest.approx(start.position_m[1] - 2.3, abs=0.05)
         assert start.heading_rad == pytest.approx([0.0, np.pi / 2.0], abs=0.01)
 
 
@@ -161,9 +161,9 @@ def test_goals__each_player_has_its_own(write: Write) -> None:
     net = network.read_net(scene.net_file)
     room_m = [net.getEdge(name).getLength() - goal_m for name, goal_m in (("ce", 50.0), ("cn", 40.0))]
     rows = routes.rows(routes.goal_m[None])[0]
-    # the edges end at x = 100 and y = 100
-    assert routes.x_m[rows] == pytest.approx([100.0 - room_m[0], 1.6], abs=0.3)
-    assert routes.y_m[rows] == pytest.approx([-1.6, 100.0 - room_m[1]], abs=0.3)
+    # the edges end at x = 200 and y = 200
+    assert routes.x_m[rows] == pytest.approx([200.0 - room_m[0], 101.6], abs=0.3)
+    assert routes.y_m[rows] == pytest.approx([98.4, 200.0 - room_m[1]], abs=0.3)
 
 
 def test_goals__one_for_both_may_stand_beside_none(write: Write) -> None:
@@ -226,9 +226,9 @@ def test_goals__one_for_both_may_stand_beside_none(write: Write) -> None:
             r"\(let it arrive later, or start the ego farther away\)",
         ),
         (
-            # the farthest ego arrives after (101.5 - 30) / 8 = 8.94 s; 5 s later, at 10 m/s, 139.4 m: 40.9 m too many
+            # the farthest ego arrives after (101.5 - 30) / 9 = 7.94 s; 5 s later, at 10 m/s, 129.4 m: 30.9 m too many
             {"non_ego": "arrival_after_ego_s = [0.0, 5.0]"},
-            r"non_ego.arrival_after_ego_s: it would have to start up to 41 m before its route "
+            r"non_ego.arrival_after_ego_s: it would have to start up to 31 m before its route "
             r"\(let it arrive earlier or drive more slowly, start the ego nearer, or add edges before its route\)",
         ),
         (
