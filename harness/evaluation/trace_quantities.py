@@ -69,6 +69,7 @@ def quantities_of(
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "lapsed"):
         setattr(state, name, motion[name][:, :players].copy())
     state.present = present[:, :players].copy()
+    state.friction[:] = world.actuators.friction
     bodies = Bodies(
         motion["x_m"],
         motion["y_m"],
