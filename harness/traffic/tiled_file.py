@@ -95,11 +95,11 @@ def _written(attributes: dict[str, str]) -> str:
     return "".join(f" {name}={quoteattr(value)}" for name, value in attributes.items())
 
 
-def _cut(root: ElementTree.Element, kept: Collection[str]) -> Iterator[ElementTree.Element]:
+def _cut(root: ElementTree.Element, kept: set[str]) -> Iterator[ElementTree.Element]:
     """The elements of a net that belong to junctions, in the net's order."""
     ends = {edge.get("id", ""): (edge.get("from"), edge.get("to")) for edge in root.findall("edge")}
     edges = {name for name, both in ends.items() if kept & set(both) or _junction_of(name) in kept}
-    outer = {end for name in edges for end in ends[name] if end} - set(kept)
+    outer = {end for name in edges for end in ends[name] if end} - kept
 
     def is_kept(link: ElementTree.Element) -> bool:
         name = link.get("from", "")
@@ -124,7 +124,7 @@ def _cut(root: ElementTree.Element, kept: Collection[str]) -> Iterator[ElementTr
             if name in signals:
                 yield element
         elif element.tag == "roundabout":
-            if set(element.get("nodes", "").split()) <= set(kept):
+            if set(element.get("nodes", "").split()) <= kept:
                 yield element
         else:
             yield element
