@@ -17,7 +17,7 @@ SPACING_M = 0.5  # between stations of a route
 MARGIN_M = 100.0  # straight extension of a route's table before its start and beyond its end
 _BEND_M = 4.0  # a driver steers by the mean curvature of this length: the lines of a net have corners
 _TIGHTEST = 1.0  # product of curvature and wheelbase: beyond the lock of any car
-PREVIEW_S = 0.2  # time ahead of the bend for which a driver steers; the steering rack needs some of it
+PREVIEW_S = 0.05  # time ahead of the bend for which a driver steers: half a step
 AHEAD_M = np.array([0.0, 5.0, 10.0, 20.0, 30.0, 50.0])  # distances ahead of a player at which it sees the road
 _LAST_SECTION_M = 30.0
 COMFORTABLE_MPS2 = 2.0  # braking before a curve or a stop that was seen in time
@@ -122,7 +122,8 @@ class Routes(NamedTuple):
     def road_steering_rad(self, station_m: FloatArray, speed_mps: FloatArray, wheelbase_m: FloatArray) -> FloatArray:
         """[G, P] steering angle (rad) with which cars follow the routes at stations and speeds [G, P].
 
-        The angle is that of the bend `PREVIEW_S` ahead, for wheelbases [P].
+        The angle is that of the bend at the rear axle, which has no slip, in `PREVIEW_S`, for wheelbases [P]. With the
+        bend at the centre, a car would leave a quarter circle by two metres.
         """
         return _road_steering_rad(station_m, speed_mps, wheelbase_m, self.bend_per_m, self.first_row, self.last_row)
 
@@ -158,7 +159,8 @@ def _road_steering_rad(
 ) -> FloatArray:
     steering = np.empty(station_m.shape)
     for g, p in np.ndindex(station_m.shape):
-        row = row_at(station_m[g, p] + PREVIEW_S * speed_mps[g, p], first_row[p], last_row[p])
+        rear_axle_m = station_m[g, p] - 0.5 * wheelbase_m[p] + PREVIEW_S * speed_mps[g, p]
+        row = row_at(rear_axle_m, first_row[p], last_row[p])
         steering[g, p] = steering_of_bend_rad(bend_per_m[row], wheelbase_m[p])
     return steering
 

@@ -99,22 +99,22 @@ def test_road_steering__a_wheel_of_0_follows_a_quarter_circle(radius: float, spe
         advance(state, float(acceleration[0, 0]), float(steering[0, 0]), car)
         state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
         offsets.append(offset[0, 0])
-    assert np.abs(offsets).max() < 0.2
-    assert state.heading_rad[0, 0] == pytest.approx(np.sign(radius) * np.pi / 2.0, abs=0.05)
+    assert np.abs(offsets).max() < 0.1
+    assert state.heading_rad[0, 0] == pytest.approx(np.sign(radius) * np.pi / 2.0, abs=0.02)
 
 
 @pytest.mark.parametrize(
     ("station", "speed", "bend"),
     [
         (-20.0, 5.0, 0.0),  # straight
-        (-4.0, 10.0, 0.0),  # 0.2 s ahead, at -2 m: the 4 m around it are straight
-        (-2.0, 10.0, 0.5),  # at 0 m: the bend begins half-way through the 4 m
-        (0.0, 10.0, 1.0),  # at 2 m: all of them
-        (-2.0, 5.0, 0.25),
-        (30.0, 0.0, 1.0),
+        (-1.15, 10.0, 0.0),  # the rear axle is 1.35 m behind, in 0.05 s at -2 m: the 4 m around it are straight
+        (0.85, 10.0, 0.5),  # at 0 m: the bend begins half-way through the 4 m
+        (2.85, 10.0, 1.0),  # at 2 m: all of them
+        (0.35, 0.0, 0.25),  # at -1 m
+        (31.35, 0.0, 1.0),
     ],
 )
-def test_road_steering__looks_ahead_by_a_fifth_of_a_second(station: float, speed: float, bend: float) -> None:
+def test_road_steering__is_that_of_the_bend_at_the_rear_axle(station: float, speed: float, bend: float) -> None:
     routes = Routes.of([arc(20.0)])
     found = routes.road_steering_rad(np.array([[station]]), np.array([[speed]]), np.array([2.7]))
     # a bend of 20 m: tan = 2.7 / 20 / sqrt(1 - (2.7 / 20 / 2)^2)
