@@ -28,6 +28,7 @@ def game(episode: int, steps: int = 3) -> dict[str, list[Any]]:
         "steering_rad": [0.01] * steps,
         "lapsed": [k == 1 for k in rows],
         "outcome": [""] * (steps - 1) + ["goal"],
+        "signals": ["crossing=Gr"] * (steps - 1) + ["crossing=yr"],
     }
 
 
