@@ -77,10 +77,9 @@ def test_report__says_it_on_its_first_lines_and_on_each_card(run: Path) -> None:
 
 
 def test_command__again_has_nothing_to_do_and_says_the_same(run: Path, tmp_path: Path) -> None:
-    shutil.copytree(run.parent, tmp_path / "again")
-    again = tmp_path / "again" / run.name
+    again = shutil.copytree(run, tmp_path / "again")
     before = (again / "manifest.json").read_bytes()
-    command = harness("campaign", again.with_suffix(".toml"), "--out", again)
+    command = harness("campaign", run.with_suffix(".toml"), "--out", again)
     assert command.returncode == 0, command.stdout + command.stderr
     text = " ".join(command.stdout.split())
     assert text.startswith("Nothing to do")
