@@ -24,6 +24,8 @@ def drive(**changes: Any) -> PlayerSeries:
         "leader_gap_m": [INF, 20.0, 10.0, INF],
         "time_to_collision_s": [INF, 9.0, 2.5, 4.0],
         "payoff": [0.25, 0.5, -1.0, 5.0],
+        "passed_red_s": [-1.0, 0.5, -1.0, 3.0],
+        "wrong_way": [0.0, 1.0, 1.0, 0.0],
     }
     outcome = changes.pop("outcome", Outcome.GOAL)
     return PlayerSeries(
@@ -39,10 +41,18 @@ def test_metrics__by_hand() -> None:
         "ego_max_deceleration_mps2": 7.5,
         "ego_max_lateral_acceleration_mps2": 1.5,
         "ego_time_to_goal_s": 2.0,
+        "ego_red_lights": 2.0,
+        "ego_wrong_way_s": 1.0,
+        "ego_min_pet_s": None,
+        "ego_pet_priority": None,
+        "ego_accepted_gap_s": None,
         "ego_payoff": 4.75,
     }
     assert {name: metric(drive()) for name, metric in OF_NON_EGO.items()} == {
         "non_ego_mean_speed_mps": 9.0,
+        "non_ego_red_lights": 2.0,
+        "non_ego_latest_red_s": 3.0,
+        "non_ego_wrong_way_s": 1.0,
         "non_ego_payoff": 4.75,
     }
 

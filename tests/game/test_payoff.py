@@ -91,6 +91,7 @@ PER_SECOND = [
     ("time_to_collision", 10.0, car(20.0, speed_mps=14.0), car(50.0, speed_mps=9.0), -0.492),
     ("time_to_collision", 10.0, car(20.0, speed_mps=9.0), car(50.0, speed_mps=14.0), 0.0),
     ("time_to_collision", 10.0, car(50.0), car(52.0), -1.0),  # in contact
+    ("gap", 3.0, car(50.0), FAR, 0.0),  # no junction
     # 15 % over 13.89 m/s
     ("speed_over_limit", None, car(50.0, speed_mps=1.15 * 13.89), FAR, -0.15),
     ("speed_over_limit", None, car(50.0, speed_mps=5.0), FAR, 0.0),
@@ -119,6 +120,22 @@ def test_rate__is_paid_per_second(
     assert value_of(halved, term, limit) == pytest.approx(value_of(q, term, limit) / 2.0)
 
 
+def test_gap__is_paid_per_second(moment: Moment, world: World) -> None:
+    q = moment(world, [car(50.0), FAR])
+    q.gap_s = np.array([[0.5, np.inf]])
+    assert value_of(q, "gap", 2.0, weight=4.0) == pytest.approx(-4.0 * 0.75 * 0.1)
+
+
+@pytest.mark.parametrize(("before_s", "value"), [(0.0, -1.0), (1.0, -0.75), (4.0, 0.0), (np.inf, 0.0)])
+def test_yield__counts_once_by_how_near_the_other_is(
+    moment: Moment, world: World, before_s: float, value: float
+) -> None:
+    for step_s in (0.1, 0.5):
+        q = moment(replace(world, step_s=step_s), [car(50.0), FAR])
+        q.entered_before_s = np.array([[before_s, np.inf]])
+        assert value_of(q, "yield", 4.0, weight=3.0) == pytest.approx(3.0 * value)
+
+
 def test_progress__is_paid_per_100_m_whatever_the_step(moment: Moment, world: World) -> None:
     for step_s in (0.1, 0.5):
         q = moment(replace(world, step_s=step_s), [car(50.0), FAR])
@@ -140,9 +157,7 @@ def test_red_light__not_passed_costs_nothing(moment: Moment, world: World, after
 
 
 @pytest.mark.parametrize(("speed_mps", "value"), [(-1.0, 0.0), (0.0, 0.0), (2.9, 0.0), (3.0, -1.0), (12.0, -1.0)])
-def test_stop_sign__counts_once_from_its_speed_on(
-    moment: Moment, world: World, speed_mps: float, value: float
-) -> None:
+def test_stop_sign__counts_once_from_its_speed_on(moment: Moment, world: World, speed_mps: float, value: float) -> None:
     q = with_quantity(moment(world, [car(50.0), FAR]), "_passed", (NO_LINE, np.array([[speed_mps, -1.0]])))
     assert value_of(q, "stop_sign", 3.0, weight=5.0) == 5.0 * value
 
@@ -157,7 +172,7 @@ def with_quantity(q: Quantities, name: str, value: Any) -> Quantities:
 
 
 def test_terms__are_all_tested_here() -> None:
-    events = {"collision", "rail", "goal", "timeout", "red_light", "stop_sign"}
+    events = {"collision", "rail", "goal", "timeout", "red_light", "stop_sign", "yield"}
     by_hand = {*events, "progress", *(each[0] for each in PER_SECOND)}
     assert by_hand == set(TERMS)
 
@@ -367,7 +382,7 @@ def test_harm__a_fuzzy_term_can_not_use_such_a_quantity(read: Callable[[str], Pe
     assert "unknown quantity" in problems(read, text)[0]
 
 
-@pytest.mark.parametrize("quantity", ["clearance_m", "time_gap_s"])
+@pytest.mark.parametrize("quantity", ["clearance_m", "time_gap_s", "gap_s"])
 @pytest.mark.parametrize(
     "sets",
     [

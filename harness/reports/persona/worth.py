@@ -35,6 +35,8 @@ LIMITED: Mapping[str, str] = {
     "vehicle_clearance": "vehicle_clearance_m",
     "time_gap": "time_gap_s",
     "time_to_collision": "time_to_collision_s",
+    "yield": "entered_before_s",
+    "gap": "gap_s",
 }
 """The quantity of each term with a limit. In the example it is half of the limit."""
 POINTS = 401
