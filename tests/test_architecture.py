@@ -44,7 +44,7 @@ ROOMS: dict[str, set[str]] = {
     "campaign.execution": GROUND
     | {"traffic", "drivers", "evaluation", "environments", "reports", "training"}
     | CAMPAIGN,
-    "cli": GROUND | {"environments", "reports"} | CAMPAIGN,
+    "cli": GROUND | {"traffic", "environments", "reports"} | CAMPAIGN,
     "__main__": {"cli"},
     "harness": GROUND | {"traffic", "drivers", "environments"},
 }

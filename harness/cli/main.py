@@ -13,6 +13,7 @@ import typer
 
 from harness.cli import wording
 from harness.cli.documents import AllowCode, check_driver, persona_app, schema
+from harness.cli.scenes import check_scene, folder_of_scene, scene_app
 from harness.cli.workers import Ray, started_on
 
 if TYPE_CHECKING:
@@ -120,9 +121,23 @@ def campaign(
 
 
 @app.command()
-def check(file: CampaignFile, allow_code: AllowCode = False) -> None:
-    """Check a campaign and everything it names, and list its stages; nothing is run or written."""
+def check(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PATH",
+            help="The TOML file of a campaign, or a scene.toml, or a scene's folder.",
+            show_default=False,
+        ),
+    ],
+    allow_code: AllowCode = False,
+) -> None:
+    """Check a campaign and everything it names, and list its stages; or check one scene. Nothing is run or written."""
     from rich.console import Console
+
+    if (folder := folder_of_scene(file)) is not None:
+        _print_plain(check_scene(folder), Console())
+        return
 
     from harness.campaign.plan.plan import plan
     from harness.campaign.preflight import open_campaign
@@ -197,6 +212,7 @@ def replay(
 
 app.command("check-driver")(check_driver)
 app.add_typer(persona_app, name="persona")
+app.add_typer(scene_app, name="scene")
 app.command()(schema)
 
 

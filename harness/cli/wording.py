@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from harness.game.state import ROLES
+
 if TYPE_CHECKING:
     from harness.campaign.plan.stages import Stage
     from harness.campaign.preflight import OpenCampaign
+    from harness.traffic.scene import OpenScene
 
 NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
 INTERRUPTED = "Interrupted. Finished work is kept: run the same command again to continue."
@@ -86,6 +89,18 @@ def error_games(count: int) -> str:
 
 def in_order(file: Path) -> str:
     return f"{file} is in order."
+
+
+def scene_lines(scene: OpenScene) -> Iterator[str]:
+    """What a checked scene is: its players with their routes, and whether there is other traffic."""
+    for role, player, edges in zip(ROLES, scene.document.players, scene.edges, strict=False):
+        goal = scene.document.goal_of(player)[1]
+        yield f"{role}: vehicle {player.vehicle}, {len(edges)} edges, goal {goal.position_m:g} m along {goal.edge}"
+    yield "with background traffic" if scene.has_background_traffic else "without background traffic"
+
+
+def lanes_left_out(number: int) -> str:
+    return f"{number} more lanes are not listed: choose some with --near EDGE and --within M, or give a larger --rows"
 
 
 def ego(campaign: OpenCampaign) -> str:

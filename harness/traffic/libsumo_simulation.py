@@ -95,7 +95,7 @@ class LibsumoSimulation:
         if self._needs_sublanes():
             lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO accepts one of the two options
         self._options = [
-            *("--net-file", str(tiled_net(scene.net_file, games)), "--route-files", str(types)),
+            *("--net-file", str(tiled_net(scene.net_file, games, scene.junctions)), "--route-files", str(types)),
             *("--step-length", str(document.step_length_s), "--collision.action", "none"),
             *lateral,
             *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),

@@ -1,7 +1,6 @@
-"""The load check: SUMO loads a scene in separate processes before a campaign uses it, because a net may crash SUMO.
+"""The load check: SUMO loads a scene in a separate process before a campaign uses it, because a net may crash SUMO.
 
-Two programs of the installed SUMO read the scene. `sumo` validates it by SUMO's schemas and lets one background vehicle
-of each kind depart. `netconvert` copies the net, as it does for several games side by side.
+It validates the scene by SUMO's schemas and lets one background vehicle of each kind depart.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import re
 import signal
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
@@ -41,25 +40,22 @@ def check_loads(scene: OpenScene) -> None:
         types, vehicles = folder / "types.rou.xml", folder / "vehicles.rou.xml"
         types.write_text(scene.routes.types_xml, encoding="utf-8")
         end_s = _write_vehicles(scene, vehicles)
-        commands = {
-            "netconvert": ["-s", str(net), "--prefix", "g0_", "-o", "copy.net.xml", "--xml-validation", "never"],
-            "sumo": [
+        process = _spawn(
+            [
                 *("--net-file", str(net), "--route-files", f"{types},{vehicles}", "--end", str(end_s)),
                 *("--step-length", "1", "--collision.action", "none", "--time-to-teleport", "-1"),
                 *("--no-step-log", "--no-warnings"),
                 *("--xml-validation", "always", "--xml-validation.net", "always", "--xml-validation.routes", "always"),
             ],
-        }
-        running = _spawn(commands, folder)
+            folder,
+        )
         try:
-            complaints = {program: _complaint(process, patience_s) for program, process in running.items()}
+            complaint = _complaint(process, patience_s)
         finally:
-            for process in running.values():
-                process.kill()
-                process.wait()
-                assert process.stderr is not None
-                process.stderr.close()
-    complaint = complaints["sumo"] or complaints["netconvert"]
+            process.kill()
+            process.wait()
+            assert process.stderr is not None
+            process.stderr.close()
     if complaint:
         about_net = not (str(types) in complaint or str(vehicles) in complaint or _ABOUT_VEHICLES.search(complaint))
         raise UsageError([_problem(complaint, net if about_net else routes, about_net)])
@@ -90,21 +86,17 @@ def _write_vehicles(scene: OpenScene, file: Path) -> int:
     return _INTERVAL_S * len(kinds) + _AFTERWARDS_S if kinds else 0
 
 
-def _spawn(commands: Mapping[str, Sequence[str]], folder: Path) -> dict[str, subprocess.Popen[str]]:
-    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    return {
-        program: subprocess.Popen(
-            [Path(sumo.SUMO_HOME) / "bin" / program, *arguments],
-            cwd=folder,
-            env=environment,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            errors="replace",
-        )
-        for program, arguments in commands.items()
-    }
+def _spawn(arguments: Sequence[str], folder: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [Path(sumo.SUMO_HOME) / "bin" / "sumo", *arguments],
+        cwd=folder,
+        env={**os.environ, "SUMO_HOME": sumo.SUMO_HOME},
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="replace",
+    )
 
 
 def _complaint(process: subprocess.Popen[str], patience_s: float) -> str:

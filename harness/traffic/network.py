@@ -94,6 +94,13 @@ def drivable_area(net: Net, own: Collection[Edge] = ()) -> BaseGeometry:
     return surface.with_swept_paths(area, list(_followed_lines(net, followed)))
 
 
+def junctions_near(net: Net, own: Collection[Edge]) -> frozenset[str] | None:
+    """The junctions of the edges within `KEPT_M` of the edges `own`; None if they are all junctions of the net."""
+    nodes = {node for edge in _near(net, own) for node in (edge.getFromNode(), edge.getToNode())}
+    everything = {node for edge in net.getEdges(withInternal=False) for node in (edge.getFromNode(), edge.getToNode())}
+    return None if nodes >= everything else frozenset(node.getID() for node in nodes)
+
+
 def _near(net: Net, own: Collection[Edge]) -> list[Edge]:
     """The edges that are within `KEPT_M` of the edges `own`, in the net's order."""
     lines = {edge: [shapely.LineString(lane_line(lane)) for lane in edge.getLanes()] for edge in net.getEdges()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -26,7 +26,7 @@ from harness.game.seeding import between
 from harness.game.state import ROLES
 from harness.game.world import World
 from harness.traffic import network
-from harness.traffic.departures import check_departures, edges_of
+from harness.traffic.departures import background_departures, check_departures, edges_of
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
@@ -48,11 +48,17 @@ class OpenScene:
     places: tuple[StartRange, ...]
     edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
     rail_lines: tuple[FloatArray, ...]
+    junctions: frozenset[str] | None = None  # those that games need; None: all of the net
 
     @property
     def net_file(self) -> Path:
         """The scene's net."""
         return self.folder / self.document.net
+
+    @property
+    def route_files(self) -> list[Path]:
+        """The scene's route file and additional files."""
+        return [self.folder / each for each in (self.document.routes, *self.document.additional)]
 
     @cached_property
     def has_background_traffic(self) -> bool:
@@ -114,6 +120,7 @@ class _NamedFiles(Document):
     model_config = ConfigDict(extra="ignore")
     net: PlainFile
     routes: PlainFile
+    additional: tuple[PlainFile, ...] = ()
 
 
 def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
@@ -130,9 +137,9 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     named = document or collect([], lambda: read_document(document_file, _NamedFiles))
     if named is None:
         raise UsageError(problems)
-    net_file, route_path = folder / named.net, folder / named.routes
+    net_file, route_files = folder / named.net, [folder / each for each in (named.routes, *named.additional)]
     net = collect(problems, lambda: _checked_net(net_file, folder))
-    routes = collect(problems, lambda: _checked_routes(route_path, folder, document, ego_type))
+    routes = collect(problems, lambda: _checked_routes(route_files, folder, document, ego_type))
     if document is None or net is None or routes is None:
         raise UsageError(problems)
     routes = collect(problems, partial(_with_routes, routes, net_file, net, document))
@@ -174,6 +181,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         places=places,
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
+        junctions=network.junctions_near(net, [*own, *_background_edges(vehicles, net, routes)]),
     )
 
 
@@ -190,6 +198,12 @@ def _conditions(document: Scene) -> Conditions:
         limit_share=varies.speed_limit_share or (1.0, 1.0),
         signal_place=varies.signal_place,
     )
+
+
+def _background_edges(players: Collection[str], net: Net, routes: RouteFile) -> list[Edge]:
+    """The edges of all routes of background traffic, which games need whole."""
+    names = {name for each in background_departures(routes, players) for name in each.edges}
+    return [net.getEdge(name) for name in sorted(names)]
 
 
 def _with_ego_type(routes: RouteFile, document: Scene | None, ego_type: str | None) -> RouteFile:
@@ -214,9 +228,10 @@ def _checked_net(path: Path, folder: Path) -> Net:
     return network.read_net(path)
 
 
-def _checked_routes(path: Path, folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
-    _check_within(path, folder)
-    return _with_ego_type(read_route_file(path), document, ego_type)
+def _checked_routes(paths: Sequence[Path], folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
+    for path in paths:
+        _check_within(path, folder)
+    return _with_ego_type(read_route_file(*paths), document, ego_type)
 
 
 def _with_routes(routes: RouteFile, net_file: Path, net: Net, document: Scene) -> RouteFile:

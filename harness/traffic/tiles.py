@@ -1,29 +1,24 @@
 """Tiled nets: G copies of a scene's net side by side in one net, so that one SUMO plays G games.
 
-netconvert prefixes the names and shifts the coordinates of each copy. The tiled net is cached by the net's content, the
-number of games and SUMO's version.
+The tiled net is cached by the net's content, the number of games, the junctions that are kept, and the format.
 """
 
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import logging
 import os
-import shutil
-import subprocess
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Collection
 from pathlib import Path
 
 import platformdirs
-import sumo
 
-from harness.errors import SimulationError
+from harness.traffic.tiled_file import write_tiles
 from harness.traffic.xml_file import parse_xml
 
 _GAP_M = 200.0
-_MOST_AT_ONCE = 8  # netconverts that shift a tile each
+_FORMAT = 2  # raised when the same net gives another file
 _LOGGER = logging.getLogger("harness.preparation")
 
 
@@ -41,53 +36,33 @@ def tile_offset_m(net_file: Path, games: int) -> float:
     return float(round(high - low + _GAP_M))
 
 
-def tiled_net(net_file: Path, games: int) -> Path:
-    """A net with G = `games` tiles of the scene's net: the net itself for one game, else a file of the cache.
+def tiled_net(net_file: Path, games: int, junctions: Collection[str] | None = None) -> Path:
+    """A net with G = `games` tiles of the scene's net, cut down to these junctions and their edges if they are given.
 
-    Raises SimulationError if netconvert fails.
+    One game on the whole net needs no copy; other nets are files of the cache.
     """
-    if games == 1:
+    if games == 1 and junctions is None:
         return net_file
-    version = importlib.metadata.version("eclipse-sumo")  # `sumo.__version__` is 0.0.0
-    digest = hashlib.sha256(net_file.read_bytes() + f"{games} {_GAP_M} {version}".encode()).hexdigest()[:24]
+    kept = "all" if junctions is None else "\n".join(sorted(junctions))
+    key = f"{games} {_GAP_M} {_FORMAT} {kept}".encode()
+    digest = hashlib.sha256(net_file.read_bytes() + key).hexdigest()[:24]
     cache = Path(platformdirs.user_cache_dir("harness")) / "tiles"
     cache.mkdir(parents=True, exist_ok=True)
     merged = cache / f"{digest}.net.xml"
     if not merged.exists():
         with tempfile.TemporaryDirectory(dir=cache) as scratch:
-            os.replace(_merge(net_file, games, Path(scratch)), merged)
+            os.replace(_merge(net_file, games, Path(scratch), junctions), merged)
     return merged
 
 
-def _merge(net_file: Path, games: int, scratch: Path) -> Path:
-    offset_m = tile_offset_m(net_file, games)
-
-    def tile(game: int) -> str:
-        copy, shift_m = scratch / f"{game}.net.xml", game * offset_m
-        options = ("--prefix", tile_prefix(game, games), "--offset.y", str(shift_m), "-o", str(copy))
-        _netconvert("-s", str(net_file), *options)
-        return str(copy)
-
-    tiles = []
+def _merge(net_file: Path, games: int, scratch: Path, junctions: Collection[str] | None) -> Path:
     _log_merging(0, games)
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, _MOST_AT_ONCE)) as threads:
-        for copy in threads.map(tile, range(games)):
-            tiles.append(copy)
-            _log_merging(len(tiles), games)
     merged = scratch / "merged.net.xml"
-    _netconvert("-s", ",".join(tiles), "--offset.disable-normalization", "-o", str(merged))
+    prefixes = [tile_prefix(game, games) for game in range(games)]
+    write_tiles(net_file, merged, prefixes, tile_offset_m(net_file, games), junctions)
+    _log_merging(games, games)
     return merged
 
 
 def _log_merging(done: int, games: int) -> None:
     _LOGGER.info("merging %d copies of the network, once per scene", games, extra={"done": done, "total": games + 1})
-
-
-def _netconvert(*arguments: str) -> None:
-    program = shutil.which("netconvert", path=os.path.join(sumo.SUMO_HOME, "bin"))
-    if program is None:
-        raise SimulationError("netconvert is missing from the installed SUMO: install eclipse-sumo again")
-    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    run = subprocess.run([program, *arguments], capture_output=True, text=True, env=environment, check=False)
-    if run.returncode:
-        raise SimulationError(f"netconvert failed: {run.stderr.strip()[-500:]}")

@@ -91,7 +91,6 @@ PER_SECOND = [
     ("time_to_collision", 10.0, car(20.0, speed_mps=14.0), car(50.0, speed_mps=9.0), -0.492),
     ("time_to_collision", 10.0, car(20.0, speed_mps=9.0), car(50.0, speed_mps=14.0), 0.0),
     ("time_to_collision", 10.0, car(50.0), car(52.0), -1.0),  # in contact
-    ("gap", 3.0, car(50.0), FAR, 0.0),  # no junction
     # 15 % over 13.89 m/s
     ("speed_over_limit", None, car(50.0, speed_mps=1.15 * 13.89), FAR, -0.15),
     ("speed_over_limit", None, car(50.0, speed_mps=5.0), FAR, 0.0),
@@ -120,22 +119,6 @@ def test_rate__is_paid_per_second(
     assert value_of(halved, term, limit) == pytest.approx(value_of(q, term, limit) / 2.0)
 
 
-def test_gap__is_paid_per_second(moment: Moment, world: World) -> None:
-    q = moment(world, [car(50.0), FAR])
-    q.gap_s = np.array([[0.5, np.inf]])
-    assert value_of(q, "gap", 2.0, weight=4.0) == pytest.approx(-4.0 * 0.75 * 0.1)
-
-
-@pytest.mark.parametrize(("before_s", "value"), [(0.0, -1.0), (1.0, -0.75), (4.0, 0.0), (np.inf, 0.0)])
-def test_yield__counts_once_by_how_near_the_other_is(
-    moment: Moment, world: World, before_s: float, value: float
-) -> None:
-    for step_s in (0.1, 0.5):
-        q = moment(replace(world, step_s=step_s), [car(50.0), FAR])
-        q.entered_before_s = np.array([[before_s, np.inf]])
-        assert value_of(q, "yield", 4.0, weight=3.0) == pytest.approx(3.0 * value)
-
-
 def test_progress__is_paid_per_100_m_whatever_the_step(moment: Moment, world: World) -> None:
     for step_s in (0.1, 0.5):
         q = moment(replace(world, step_s=step_s), [car(50.0), FAR])
@@ -162,6 +145,20 @@ def test_stop_sign__counts_once_from_its_speed_on(moment: Moment, world: World, 
     assert value_of(q, "stop_sign", 3.0, weight=5.0) == 5.0 * value
 
 
+@pytest.mark.parametrize(("before_s", "value"), [(np.inf, 0.0), (4.0, 0.0), (1.0, -0.75), (0.0, -1.0)])
+def test_yield__is_the_nearness_of_the_body_with_priority(
+    moment: Moment, world: World, before_s: float, value: float
+) -> None:
+    q = with_quantity(moment(world, [car(50.0), FAR]), "entered_before_s", np.array([[before_s, np.inf]]))
+    assert value_of(q, "yield", 4.0, weight=2.0) == 2.0 * value
+
+
+def test_gap__is_paid_per_second_and_by_its_nearness(moment: Moment, world: World) -> None:
+    for gap_s, rate in ((np.inf, 0.0), (3.0, 0.0), (0.75, -0.75), (0.0, -1.0)):
+        q = with_quantity(moment(world, [car(50.0), FAR]), "gap_s", np.array([[gap_s, np.inf]]))
+        assert value_of(q, "gap", 3.0) == pytest.approx(0.1 * rate)
+
+
 NO_LINE = np.full((1, 2), -1.0)
 
 
@@ -173,7 +170,7 @@ def with_quantity(q: Quantities, name: str, value: Any) -> Quantities:
 
 def test_terms__are_all_tested_here() -> None:
     events = {"collision", "rail", "goal", "timeout", "red_light", "stop_sign", "yield"}
-    by_hand = {*events, "progress", *(each[0] for each in PER_SECOND)}
+    by_hand = {*events, "progress", "gap", *(each[0] for each in PER_SECOND)}
     assert by_hand == set(TERMS)
 
 

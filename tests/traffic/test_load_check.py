@@ -25,12 +25,11 @@ def complaint(scene: OpenScene) -> str:
 
 
 def fake_sumo(folder: Path, script: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Replace SUMO's programs by a shell script."""
-    for name in ("sumo", "netconvert"):
-        program = folder / "home" / "bin" / name
-        program.parent.mkdir(parents=True, exist_ok=True)
-        program.write_text(f"#!/bin/sh\n{script}\n")
-        program.chmod(0o755)
+    """Replace SUMO by a shell script."""
+    program = folder / "home" / "bin" / "sumo"
+    program.parent.mkdir(parents=True, exist_ok=True)
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(0o755)
     monkeypatch.setattr(sumo, "SUMO_HOME", str(folder / "home"))
 
 

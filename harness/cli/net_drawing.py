@@ -1,0 +1,82 @@
+"""The drawing of a net, and of a scene on it, for its page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import draw_initial_state
+from harness.game.state import ROLES
+from harness.reports.net_page import Drawing, DrawnShape
+from harness.traffic.net_listing import ListedJunction, ListedLane
+from harness.traffic.scene import OpenScene
+
+
+def drawing_of(
+    title: str,
+    lanes: Sequence[ListedLane],
+    junctions: Sequence[ListedJunction],
+    scene: OpenScene | None,
+    *,
+    starts: int,
+) -> Drawing:
+    """The drawing of these lanes and junctions; for a scene also its routes and goals, and seeded starts."""
+    shapes = [*_junction_shapes(junctions), *(_lane_shape(lane) for lane in lanes)]
+    marks = [
+        DrawnShape(points=point[None], kind="signal", text=f"signal of junction {junction.name}")
+        for junction in junctions
+        for point in junction.signals
+    ]
+    if scene is not None:
+        shapes += _routes_and_goals(scene)
+        marks += _starts(scene, starts)
+    signals = sum(len(junction.signals) for junction in junctions)
+    summary = f"{len(lanes)} lanes, {len(junctions)} junctions, {signals} lanes with a signal."
+    return Drawing(title=title, summary=summary, shapes=shapes, marks=marks)
+
+
+def _junction_shapes(junctions: Sequence[ListedJunction]) -> Iterator[DrawnShape]:
+    for junction in junctions:
+        if len(junction.outline) > 2:
+            text = f"junction {junction.name} ({junction.kind})"
+            yield DrawnShape(points=junction.outline, kind="junction", text=text)
+
+
+def _lane_shape(lane: ListedLane) -> DrawnShape:
+    text = f"{lane.name}: {lane.length_m:.1f} m, {lane.limit_mps:.2f} m/s, {lane.permissions}; "
+    text += f"from {lane.start_junction} to {lane.end_junction}"
+    kind = "lane" if lane.for_cars else "lane other"
+    return DrawnShape(points=lane.outline, kind=kind, text=text, label=lane.name)
+
+
+def _kind(player: int) -> str:
+    return "ego" if player == 0 else "person"
+
+
+def _routes_and_goals(scene: OpenScene) -> Iterator[DrawnShape]:
+    routes = scene.world.road.routes
+    for player, edges in enumerate(scene.edges):
+        rows = slice(int(routes.first_row[player]), int(routes.last_row[player]) + 1)
+        line = np.stack((routes.x_m[rows], routes.y_m[rows]), axis=1)
+        goal = int(routes.rows(np.array([routes.goal_m]))[0, player])
+        place = np.array([routes.x_m[goal], routes.y_m[goal]])
+        across = 3.0 * np.array([-routes.sin[goal], routes.cos[goal]])
+        name = ROLES[player]
+        begin = int(routes.rows(np.zeros((1, len(routes.goal_m))))[0, player]) - rows.start
+        way = line[begin : goal - rows.start + 1]
+        yield DrawnShape(points=way, kind=f"route {_kind(player)}", text=f"route of {name}: {' '.join(edges)}")
+        ends = np.stack((place - across, place + across))
+        yield DrawnShape(points=ends, kind=f"goal {_kind(player)}", text=f"goal of {name}")
+
+
+def _starts(scene: OpenScene, number: int) -> Iterator[DrawnShape]:
+    players = len(scene.places)
+    distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
+    for k in range(number):
+        state = draw_initial_state(distribution, "drawing", k)
+        for player in range(players):
+            point = np.array([[state.x_m[player], state.y_m[player]]])
+            text = f"start of {ROLES[player]}, {state.speed_mps[player]:.1f} m/s"
+            yield DrawnShape(points=point, kind=f"start {_kind(player)}", text=text)
