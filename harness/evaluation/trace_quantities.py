@@ -65,6 +65,7 @@ def quantities_of(
     motion = {name: _filled(places, trace[name].to_numpy()) for name in _MOTION}
     sizes = np.array([sizes_m.get(name, (0.0, 0.0)) for name in names])
     state = State.empty(len(present), players, len(world.right_of_way.signal_links))
+    state.friction[:] = world.actuators.friction  # that of the game is not in its trace
     state.signals = _signals(trace, len(present), world.right_of_way.signal_links)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "lapsed"):
         setattr(state, name, motion[name][:, :players].copy())

@@ -7,50 +7,20 @@ the stream. Cars are 4.6 m long.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import replace
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from harness.game.meetings import Meetings
 from harness.game.quantities import Quantities
-from harness.game.right_of_way import Conflicts, RightOfWay, Signal, StopLines, Streams
+from harness.game.right_of_way import Signal
 from harness.game.world import World
 from harness.traffic.scene import OpenScene
+from tests.support.conflicts import CROSSING, with_conflicts
 
 Moment = Callable[..., Quantities]
 NORTH = np.pi / 2.0
-CROSSING: Mapping[str, Any] = {
-    "player": 0,
-    "stream": 0,
-    "begin_m": 98.5,
-    "end_m": 101.5,
-    "crossing": True,
-    "yields": True,
-    "first_come": False,
-    "stop_m": 90.0,
-    "right_m": -np.inf,
-    "left_m": np.inf,
-    "own_link": 0,
-    "other_link": 1,
-    "from_m": -np.inf,
-    "until_m": np.inf,
-    "zone_m": 7.0,
-    "length_m": 3.0,
-    "across": False,
-}
-
-
-def with_conflicts(world: World, *rows: Mapping[str, Any]) -> World:
-    """A world with conflicts with stream 0, which comes from the south. Stream 1 is 30 m to the east of it."""
-    y_m = np.arange(-120.0, 20.0, 4.0)
-    samples = np.array([(x, y, 0.0, 1.0, 1.6, 2.0, y + 10.0) for x in (100.0, 130.0) for y in y_m])
-    conflicts = Conflicts.of(rows)
-    streams = Streams.of(samples, np.repeat([0, 1], len(y_m)), conflicts, players=2)
-    tables = RightOfWay(conflicts, streams, StopLines.of([]), (("light", 0), ("light", 1)))
-    return replace(world, right_of_way=tables)
 
 
 @pytest.fixture(scope="module")
@@ -214,14 +184,53 @@ def test_must_yield__by_signals(moment: Moment, world: World, own: Signal, other
 
 def test_must_yield__a_signal_does_not_count_for_a_side_that_has_passed_it(moment: Moment, merge: OpenScene) -> None:
     major = with_conflicts(merge.world, {**CROSSING, "yields": False})
-    assert must_yield(moment, major, Signal.RED, Signal.GREEN)
-    assert not must_yield(moment, major, Signal.RED, Signal.GREEN, x_m=91.0)
+    assert must_yield(moment, major, Signal.RED, Signal.YELLOW)
+    assert not must_yield(moment, major, Signal.RED, Signal.YELLOW, x_m=91.0)
     minor = with_conflicts(merge.world, CROSSING)
     assert not must_yield(moment, minor, Signal.YELLOW, Signal.RED, y_m=-13.0)
     assert must_yield(moment, minor, Signal.YELLOW, Signal.RED, y_m=-12.0), "its front is at y = -9.7"
+
+
+def test_must_yield__to_a_stream_with_green_after_passing_the_own_light(moment: Moment, merge: OpenScene) -> None:
+    major = with_conflicts(merge.world, {**CROSSING, "yields": False})
+    assert must_yield(moment, major, Signal.RED, Signal.GREEN, x_m=91.0)
 
 
 def test_must_yield__to_the_first_that_comes_at_an_all_way_stop(moment: Moment, merge: OpenScene) -> None:
     world = with_conflicts(merge.world, {**CROSSING, "first_come": True})
     assert must_yield(moment, world, Signal.OFF, Signal.OFF, x_m=70.0, y_m=-20.0)
     assert not must_yield(moment, world, Signal.OFF, Signal.OFF, x_m=70.0, y_m=-40.0)
+
+
+# --- for payoffs -----------------------------------------------------------------------------------------------------
+
+
+def test_gap__counts_zones_that_the_player_reaches_soon(moment: Moment, world: World) -> None:
+    near, far = (moment(world, [ego(x_m), FAR], [northbound(-40.0)]) for x_m in (50.0, 40.0))
+    assert near.meetings.own_s[0, 0, 2] < 5.0 < far.meetings.own_s[0, 0, 2]
+    assert near.gap_s[0].tolist() == [near.meetings.gap_s[0, 0, 2], np.inf]
+    assert far.gap_s[0].tolist() == [np.inf, np.inf]
+
+
+@pytest.mark.parametrize(
+    ("meaning", "x_m", "y_m", "expected"),
+    [
+        # the zone begins at 98.5 m: the front enters it between 96.1 and 97.1 m of the centre, in a step of 1 m
+        ("enters, the other is 10 m from the zone", 96.5, -15.3, 1.0),
+        ("enters, the other is inside", 96.5, -4.0, 0.0),
+        ("has not entered yet", 96.1, -15.3, np.inf),
+        ("has entered before", 97.3, -15.3, np.inf),
+    ],
+)
+def test_entered_before__in_the_step_of_the_entry(
+    moment: Moment, world: World, meaning: str, x_m: float, y_m: float, expected: float
+) -> None:
+    q = moment(world, [ego(x_m), FAR], [northbound(y_m)])
+    q.advanced_m = np.array([[1.0, 1.0]])
+    assert q.entered_before_s[0].tolist() == pytest.approx([expected, np.inf]), meaning
+
+
+def test_entered_before__with_priority_it_is_no_offence(moment: Moment, merge: OpenScene) -> None:
+    q = moment(with_conflicts(merge.world, {**CROSSING, "yields": False}), [ego(96.5), FAR], [northbound(-15.3)])
+    q.advanced_m = np.array([[1.0, 1.0]])
+    assert q.entered_before_s[0].tolist() == [np.inf, np.inf]

@@ -379,7 +379,7 @@ def test_harm__a_fuzzy_term_can_not_use_such_a_quantity(read: Callable[[str], Pe
     assert "unknown quantity" in problems(read, text)[0]
 
 
-@pytest.mark.parametrize("quantity", ["clearance_m", "time_gap_s"])
+@pytest.mark.parametrize("quantity", ["clearance_m", "time_gap_s", "gap_s"])
 @pytest.mark.parametrize(
     "sets",
     [

@@ -96,6 +96,8 @@ def test_profile__has_a_moment_for_every_term() -> None:
         "time_gap": (-0.5, "per second at 0.5 s"),
         "time_to_collision": (-0.5, "per second at 0.5 s"),
         "speed_over_limit": (-0.1, "per second at 10 % over"),
+        "yield": (-0.5, "at 0.5 s"),
+        "gap": (-0.5, "per second at 0.5 s"),
         "goal": (1.0, "once"),
         "timeout": (-1.0, "once"),
         "progress": (1.0, "for 100 m"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -34,7 +35,7 @@ def _entries(course: Course, player: int, within_s: float, what: str, conflicts:
         if marked and each.must_yield and each.gap_s <= within_s + SLACK and each.body not in seen:
             seen[each.body] = each
     for each in seen.values():
-        first = min(round(each.own.enters_s / course.step_s), len(course.drove) - 1)
+        first = min(math.ceil(each.own.enters_s / course.step_s - SLACK), len(course.drove) - 1)
         leaves_s = min(each.own.leaves_s, (len(course.drove) - 1) * course.step_s)
         last = max(int(leaves_s / course.step_s), first)
         where = "already there" if each.gap_s == 0.0 else f"{each.gap_s:.1f} s away"

@@ -33,12 +33,14 @@ def cut_ins(course: Course, player: int, other: int) -> Iterator[Span]:
     gap = np.maximum(course.gap_m(player, other), 0.0)
     time_gap = gap / np.maximum(course.quantities.speed_mps[:, other], 0.1)
     ttc = course.between.time_to_collision_s[:, other]
+    turned_rad = course.quantities.state.heading_rad[:, player] - course.quantities.state.heading_rad[:, other]
+    alike = np.cos(turned_rad) >= np.cos(least.CUT_IN_TURNED_RAD)
     near = (time_gap <= least.CUT_IN_TIME_GAP_S + SLACK) | (ttc <= least.CUT_IN_TTC_S + SLACK)
     enters = both & ahead & in_way & ~course.quantities.state.lapsed[:, player]
     enters[1:] &= ~in_way[:-1] & both[:-1]
     enters[0] = False
     same_until = -1
-    for step in np.flatnonzero(enters & near).tolist():
+    for step in np.flatnonzero(enters & near & alike).tolist():
         if step > same_until and _moved_more(course, player, other, step):
             last = _while(in_way & both & ahead, step)
             yield Span(

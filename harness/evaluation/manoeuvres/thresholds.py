@@ -12,6 +12,8 @@ of an automated car at 50 km/h, the speed limit of the paper's road."""
 CUT_IN_TTC_S = 4.0
 """Alternatively: largest time to collision. Van der Horst and Hogema (1993), "Time-to-collision and collision avoidance
 systems": 4 s separates drivers in danger from drivers in control."""
+CUT_IN_TURNED_RAD = math.radians(60.0)
+"""Largest angle between the two cars: a car at a larger one crosses the way, or turns into it. Our own."""
 CUT_IN_LOOK_BACK_S = 1.0
 """The player that moved more towards the other's path during this time before is the one that cuts in. Our own."""
 

@@ -1,0 +1,246 @@
+"""Encounters at a conflict made by hand (`tests.support.conflicts`): who is in the zone when, and what is named.
+
+Steps of 0.1 s, cars of 4.6 m by 1.8 m. The ego drives east at 10 m/s and is in the zone (98.5 to 101.5 m) from 2.85 s
+after its centre is at 67.7 m until its rear leaves it, 0.76 s later. The other drives north at 10 m/s and is in the
+zone (y = -3 to 0) for 0.76 s as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from harness.evaluation.encounters import Encounter, encounters_of
+from harness.evaluation.manoeuvres import Manoeuvre, find_manoeuvres
+from harness.evaluation.metrics import PlayerSeries, accepted_gap_s, min_pet_s, pet_priority
+from harness.evaluation.trace_quantities import drove_in, quantities_of
+from harness.game.arrays import FloatArray
+from harness.game.right_of_way import Control
+from harness.game.state import Outcome
+from harness.game.world import World
+from harness.traffic.scene import OpenScene
+from tests.support.conflicts import CROSSING, with_conflicts
+
+STEPS = 60
+SIZE = {"ego": (4.6, 1.8), "non_ego": (4.6, 1.8), "car": (4.6, 1.8)}
+EAST, NORTH = 0.0, np.pi / 2.0
+
+
+def driving(
+    name: str, x_m: float, y_m: float, heading_rad: float, speed_mps: float | FloatArray = 10.0, signals: str = ""
+) -> pd.DataFrame:
+    """A car's rows: straight on from a place, at a speed or the speeds of every step."""
+    speeds = np.broadcast_to(np.asarray(speed_mps, dtype=float), STEPS)
+    way_m = np.concatenate(([0.0], np.cumsum(speeds[1:]) * 0.1))
+    columns: dict[str, Any] = {
+        "episode": 0,
+        "step": np.arange(STEPS),
+        "time_s": np.arange(STEPS) * 0.1,
+        "player": name,
+        "vehicle_type": "car",
+        "x_m": x_m + way_m * np.cos(heading_rad),
+        "y_m": y_m + way_m * np.sin(heading_rad),
+        "heading_rad": heading_rad,
+        "speed_mps": speeds,
+        "acceleration_mps2": 0.0,
+        "steering_rad": 0.0,
+        "lapsed": False,
+        "outcome": "",
+        "signals": signals,
+    }
+    return pd.DataFrame(columns)
+
+
+def ego(x_m: float = 67.7, **more: Any) -> pd.DataFrame:
+    return driving("ego", x_m, -1.6, EAST, **more)
+
+
+def northbound(y_m: float, name: str = "non_ego", **more: Any) -> pd.DataFrame:
+    return driving(name, 100.0, y_m, NORTH, **more)
+
+
+def trace_of(*cars: pd.DataFrame) -> pd.DataFrame:
+    return pd.concat(cars).sort_values(["step", "player"], ignore_index=True)
+
+
+def met(world: World, *cars: pd.DataFrame) -> list[Encounter]:
+    trace = trace_of(*cars)
+    return encounters_of(quantities_of(trace, world, SIZE), 0, drove_in(trace)[:, 0])
+
+
+def named(world: World, *cars: pd.DataFrame) -> list[Manoeuvre]:
+    new = ("fails_to_yield", "turns_across", "runs_red", "rolls_through", "wrong_way")
+    return [each for each in find_manoeuvres(trace_of(*cars), world, SIZE) if each.manoeuvre in new]
+
+
+@pytest.fixture(scope="module")
+def world(merge: OpenScene) -> World:
+    return with_conflicts(merge.world, CROSSING)
+
+
+def series(encounters: list[Encounter]) -> PlayerSeries:
+    none = np.zeros(0)
+    return PlayerSeries(
+        outcome=Outcome.GOAL,
+        step_s=0.1,
+        speed_mps=none,
+        acceleration_mps2=none,
+        lateral_acceleration_mps2=none,
+        leader_gap_m=none,
+        time_to_collision_s=none,
+        payoff=none,
+        passed_red_s=none,
+        wrong_way=none,
+        encounters=tuple(encounters),
+    )
+
+
+# --- passages and post-encroachment time -----------------------------------------------------------------------------
+
+
+def test_encounter__passages_of_both_sides_and_the_time_between_them(world: World) -> None:
+    (found,) = met(world, ego(), northbound(-44.3))
+    assert found.own == pytest.approx(((98.5 - 70.0) / 10.0, (101.5 + 2.3 - 67.7) / 10.0))
+    assert found.other == pytest.approx(((-3.0 - (-42.0)) / 10.0, (44.3 + 2.3) / 10.0))
+    assert found.post_encroachment_s == pytest.approx(3.9 - 3.61)
+
+
+def test_encounter__the_other_may_be_first(world: World) -> None:
+    (found,) = met(world, ego(60.0), northbound(-10.0))
+    assert found.other is not None
+    assert found.post_encroachment_s == pytest.approx((98.5 - 62.3) / 10.0 - 1.23)
+
+
+def test_encounter__both_inside_at_once_is_no_time_between_them(world: World) -> None:
+    (found,) = met(world, ego(), northbound(-34.0))
+    assert found.post_encroachment_s == 0.0
+
+
+def test_encounter__a_body_that_stops_before_the_zone_is_not_passed(world: World) -> None:
+    speeds = np.where(np.arange(STEPS) < 20, 10.0, 0.0)
+    (found,) = met(world, ego(), northbound(-34.0, speed_mps=np.maximum(speeds, 0.5)))
+    assert found.other is None
+    assert found.post_encroachment_s == np.inf
+    assert min_pet_s(series([found])) is None
+
+
+def test_encounter__none_with_a_body_that_crosses_elsewhere(world: World) -> None:
+    assert met(world, ego(), driving("non_ego", 130.0, -44.0, NORTH)) == []
+
+
+def test_encounter__none_with_a_body_that_leaves_the_stream_before_the_zone(world: World) -> None:
+    turning = northbound(-44.3)
+    away = turning["step"] >= 36  # its front is 3 m before the zone
+    turning.loc[away, "x_m"] += 3.0
+    assert met(world, ego(), turning) == []
+
+
+def test_encounter__none_for_a_player_that_does_not_get_there(world: World) -> None:
+    assert met(world, ego(20.0, speed_mps=5.0), northbound(-44.3)) == []
+
+
+def test_encounter__with_background_traffic(world: World) -> None:
+    (found,) = met(world, ego(), driving("non_ego", 20.0, -1.6, EAST), northbound(-44.3, name="car"))
+    assert found.body == 2
+
+
+# --- priority and the accepted gap -----------------------------------------------------------------------------------
+
+
+def test_metrics__priority_and_accepted_gap(world: World, merge: OpenScene) -> None:
+    drive = series(met(world, ego(), northbound(-44.3)))
+    assert pet_priority(drive) == "other"
+    # the ego enters in 2.85 s; in the first step after that, 2.9 s, the other's front is 10 m before the zone
+    assert accepted_gap_s(drive) == pytest.approx(1.0)
+    major = with_conflicts(merge.world, {**CROSSING, "yields": False})
+    drive = series(met(major, ego(), northbound(-44.3)))
+    assert pet_priority(drive) == "ego"
+    assert accepted_gap_s(drive) is None
+
+
+def test_metrics__without_an_encounter_are_unscored() -> None:
+    assert (min_pet_s(series([])), pet_priority(series([])), accepted_gap_s(series([]))) == (None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("lights", "must_yield"),
+    # the ego's link is the first of the light, the other's the second
+    [("light=Gr", False), ("light=rG", True), ("light=gG", True), ("light=yr", False), ("light=OO", True), ("", True)],
+)
+def test_priority__by_the_signals_of_the_trace(world: World, lights: str, must_yield: bool) -> None:
+    (found,) = met(world, ego(signals=lights), northbound(-44.3, signals=lights))
+    assert found.must_yield == must_yield
+
+
+# --- manoeuvres ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("y_m", "gap_s"), [(-44.3, 1.0), (-64.3, 3.0), (-65.3, None)])
+def test_fails_to_yield__to_a_road_user_that_is_at_most_3_s_away(world: World, y_m: float, gap_s: float | None) -> None:
+    found = named(world, ego(), northbound(y_m))
+    assert [each.manoeuvre for each in found] == (["fails_to_yield"] if gap_s else [])
+    if gap_s:
+        assert found[0].text == f"does not yield to traffic, {gap_s:.1f} s away"
+        assert (found[0].time_s, found[0].until_s) == (pytest.approx(2.9), pytest.approx(3.6))
+
+
+def test_fails_to_yield__not_with_priority(merge: OpenScene) -> None:
+    major = with_conflicts(merge.world, {**CROSSING, "yields": False})
+    assert named(major, ego(), northbound(-44.3)) == []
+
+
+@pytest.mark.parametrize(("y_m", "names"), [(-75.3, ["turns_across"]), (-76.3, [])])
+def test_turns_across__in_a_gap_of_at_most_4_1_s(merge: OpenScene, y_m: float, names: list[str]) -> None:
+    turning = with_conflicts(merge.world, {**CROSSING, "across": True})
+    assert [each.manoeuvre for each in named(turning, ego(), northbound(y_m))] == names
+
+
+def lines(merge: OpenScene, control: Control) -> World:
+    return with_conflicts(merge.world, CROSSING, stop_lines=[(0, 90.0, control, 0)])
+
+
+@pytest.mark.parametrize(("letters", "count"), [("rG", 1), ("uG", 1), ("yG", 0), ("Gr", 0), ("gG", 0), ("OO", 0)])
+def test_runs_red__passes_the_line_on_red(merge: OpenScene, letters: str, count: int) -> None:
+    found = named(lines(merge, Control.SIGNAL), ego(signals=f"light={letters}"))
+    assert [each.manoeuvre for each in found] == ["runs_red"] * count
+
+
+def test_runs_red__states_the_time_since_the_onset(merge: OpenScene) -> None:
+    drive = ego()  # its front is at 90 m after 2 s
+    drive["signals"] = np.where(drive["step"] < 12, "light=yr", "light=rG")
+    (found,) = named(lines(merge, Control.SIGNAL), drive)
+    assert found.text == "passes a red light, 1.0 s after its onset"
+
+
+def slowing(to_mps: float) -> FloatArray:
+    """Speeds from 10 m/s down to `to_mps` after 2 s, with 19 m driven, and up again."""
+    return np.interp(np.arange(STEPS) * 0.1, [0.0, 1.8, 2.0, 2.2, 3.0], [10.0, 10.0, to_mps, to_mps, 10.0])
+
+
+@pytest.mark.parametrize(("least_mps", "names"), [(0.4, []), (0.6, ["rolls_through"])])
+@pytest.mark.parametrize("control", [Control.STOP, Control.ALL_WAY_STOP])
+def test_rolls_through__a_stop_sign(merge: OpenScene, control: Control, least_mps: float, names: list[str]) -> None:
+    found = named(lines(merge, control), ego(speed_mps=slowing(least_mps)))
+    assert [each.manoeuvre for each in found] == names
+
+
+def test_rolls_through__no_other_line(merge: OpenScene) -> None:
+    assert named(lines(merge, Control.GIVE_WAY), ego()) == []
+
+
+@pytest.mark.parametrize(("speed_mps", "seconds"), [(10.0, 2.0), (25.0, 0.8)])
+def test_wrong_way__among_oncoming_lanes_for_a_second(merge: OpenScene, speed_mps: float, seconds: float) -> None:
+    road, routes = merge.world.road, merge.world.road.routes
+    there = (routes.x_m > 80.0) & (routes.x_m < 100.0)  # the ego's line is beyond its own lanes
+    oncoming = replace(road, routes=routes._replace(own_left_m=np.where(there, -0.1, routes.own_left_m)))
+    found = named(replace(merge.world, road=oncoming), ego(speed_mps=speed_mps))
+    assert [each.manoeuvre for each in found] == (["wrong_way"] if seconds >= 1.0 else [])
+
+
+def test_crossing__is_no_cut_in(world: World) -> None:
+    found = find_manoeuvres(trace_of(ego(), northbound(-40.0)), world, SIZE)
+    assert "cut_in" not in {each.manoeuvre for each in found}
