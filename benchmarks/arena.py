@@ -7,7 +7,7 @@ import itertools
 from benchmarks.bare_sumo import place_and_step, record_placements, start_bare_sumo
 from benchmarks.budget import Budget
 from benchmarks.figures import Measured
-from benchmarks.games import GAMES, CoastingGames, merge_scene
+from benchmarks.games import GAMES, CoastingGames, junction_scene, merge_scene
 from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers, take_turns
 
 _WARM_UP_STEPS = 200
@@ -15,9 +15,9 @@ _RECORDED_STEPS = 300
 _GAMES_MEASURED = (1, 8, GAMES, 256)
 
 
-def arena_side(timer: LapTimer, games: int) -> None:
+def arena_side(timer: LapTimer, games: int, at_junction: bool = False) -> None:
     """Game-steps of an arena with two learners, resets included."""
-    coasting = CoastingGames(merge_scene(), games)
+    coasting = CoastingGames(junction_scene() if at_junction else merge_scene(), games)
     coasting.reset(list(range(games)))
     for _ in range(_WARM_UP_STEPS):
         coasting.step()
@@ -33,12 +33,12 @@ def arena_side(timer: LapTimer, games: int) -> None:
         coasting.arena.close()
 
 
-def libsumo_side(timer: LapTimer, games: int, by_socket: bool = False) -> None:
+def libsumo_side(timer: LapTimer, games: int, by_socket: bool = False, at_junction: bool = False) -> None:
     """Steps of SUMO alone, in libsumo or through a socket, counted in game-steps.
 
     It places the same vehicles on the same net at the places where such an arena had them.
     """
-    scene = merge_scene()
+    scene = junction_scene() if at_junction else merge_scene()
     coasting = CoastingGames(scene, games)
     coasting.reset(list(range(games)))
     placements = itertools.cycle(record_placements(coasting, _RECORDED_STEPS))
@@ -64,6 +64,17 @@ def arena_vs_libsumo(budget: Budget, on_progress: OnProgress) -> Measured:
     laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.lap_s, on_progress=on_progress)
     value = best_rate(laps["arena"]) / best_rate(laps["libsumo"])
     return {"arena_vs_libsumo": value}, {"unit": "game-steps/s", "games": GAMES, **raw_numbers(laps)}
+
+
+def arena_vs_libsumo_junction(budget: Budget, on_progress: OnProgress) -> Measured:
+    """The same at a crossing with traffic lights, where the players' ways cross."""
+    sides = {
+        "arena": Side(run=arena_side, arguments=(GAMES, True)),
+        "libsumo": Side(run=libsumo_side, arguments=(GAMES, False, True)),
+    }
+    laps = take_turns(sides, repeats=budget.repeats, lap_s=budget.lap_s, on_progress=on_progress)
+    value = best_rate(laps["arena"]) / best_rate(laps["libsumo"])
+    return {"arena_vs_libsumo_junction": value}, {"unit": "game-steps/s", "games": GAMES, **raw_numbers(laps)}
 
 
 def libsumo_vs_traci(budget: Budget, on_progress: OnProgress) -> Measured:

@@ -76,7 +76,7 @@ def start_bare_sumo(scene: OpenScene, games: int, by_socket: bool = False) -> It
             for game, (player, role) in itertools.product(range(games), enumerate(ROLES)):
                 prefix = tile_prefix(game, games)
                 api.route.add(f"{prefix}route {role}", [prefix + edge for edge in scene.edges[player]])
-                lane = scene.document.players[player].lane.rsplit("_", 1)[1]
+                lane = (scene.document.players[player].lane or "_0").rsplit("_", 1)[1]
                 kind = scene.vehicle(player).vehicle_type
                 api.vehicle.add(prefix + role, f"{prefix}route {role}", kind, "now", lane, str(20 + 20 * player), "10")
             yield api

@@ -52,6 +52,12 @@ FIGURES = (
         at_least=True,
     ),
     Figure(
+        key="arena_vs_libsumo_junction",
+        meaning="the same at a crossing with traffic lights, where the players' ways cross",
+        target=0.50,
+        at_least=True,
+    ),
+    Figure(
         key="training_vs_sb3",
         meaning="training steps/s, in multiples of those with Stable-Baselines3's own learner",
         unit="×",
@@ -201,6 +207,13 @@ MEASUREMENTS = (
         keys=("arena_vs_libsumo",),
         module="arena",
         function="arena_vs_libsumo",
+        seconds=partial(_seconds_of_turns, 2, _lap_s),
+    ),
+    Measurement(
+        name="arena at a junction",
+        keys=("arena_vs_libsumo_junction",),
+        module="arena",
+        function="arena_vs_libsumo_junction",
         seconds=partial(_seconds_of_turns, 2, _lap_s),
     ),
     Measurement(

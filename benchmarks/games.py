@@ -29,6 +29,11 @@ def merge_scene() -> OpenScene:
     return open_scene(MERGE)
 
 
+def junction_scene() -> OpenScene:
+    """A crossing with traffic lights, where the players' ways cross."""
+    return open_scene(REPOSITORY / "networks" / "left_across")
+
+
 def persona_file(name: str) -> Path:
     """The file of one of the repository's personas."""
     return REPOSITORY / "personas" / f"{name}.toml"

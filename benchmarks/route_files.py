@@ -4,7 +4,8 @@
 
 Each route file below the folders is read and, if its net is there too, checked against the net as a scene's route file
 is: over the whole time of the file, with routes for all its trips. The net and the additional files are those of the
-SUMO configuration that names the route file, otherwise the only net beside it. SUMO itself runs the file for 100 s, as
+SUMO configuration that names the route file, otherwise the only net beside it. Additional files that the harness does
+not read are left out. SUMO itself runs the file for 100 s, as
 a comparison.
 """
 
@@ -101,7 +102,7 @@ def _beside(file: Path) -> Sources:
 def _reason(file: Path, sources: Sources) -> str:
     """The reason for which the harness refuses a route file; empty if it does not."""
     try:
-        routes = read_route_file(file)
+        routes = read_route_file(file, *filter(_is_readable, sources.additional))
         if sources.net is not None:
             net = network.read_net(sources.net)
             routes = with_routes(routes, sources.net, net, routes.within(0.0, float("inf")))
@@ -111,6 +112,15 @@ def _reason(file: Path, sources: Sources) -> str:
         text = f"{first.key}: {first.message}" + (f" (and {more} more)" if more else "")
         return text.replace("|", "/")[:_LONGEST_REASON]
     return ""
+
+
+def _is_readable(additional: Path) -> bool:
+    """Whether a scene may name an additional file: many only draw or measure."""
+    try:
+        read_route_file(additional)
+    except UsageError:
+        return False
+    return True
 
 
 def _sumo(file: Path, sources: Sources) -> str:

@@ -98,7 +98,7 @@ def moment() -> Callable[..., Quantities]:
     def make(world: World, players: Sequence[dict[str, Any]], others: Sequence[dict[str, Any]] = ()) -> Quantities:
         state = State.empty(1, len(players))
         state.present[:] = True
-        state.speed_mps[:] = 10.0
+        state.speed_mps[:], state.friction[:] = 10.0, world.actuators.friction
         for p, car in enumerate(players):
             for name, value in car.items():
                 getattr(state, name)[0, p] = value

@@ -11,8 +11,8 @@ import pandas as pd
 from harness.evaluation.trace_quantities import drove_in, quantities_of
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities
-from harness.game.world import World
 from harness.game.state import NON_EGO
+from harness.game.world import World
 from harness.replay.vehicles import types_of_vehicles
 from harness.traffic.scene import OpenScene
 
@@ -29,7 +29,7 @@ class RecordedGame:
     def of(cls, trace: pd.DataFrame, scene: OpenScene) -> RecordedGame:
         """The game of a trace."""
         sizes_m = {
-            name: (each.length_m, each.width_m) for name, each in types_of_vehicles(trace, scene.routes.path).items()
+            name: (each.length_m, each.width_m) for name, each in types_of_vehicles(trace, scene.route_files).items()
         }
         quantities = quantities_of(trace, scene.world, sizes_m)
         return cls(quantities=quantities, drove=drove_in(trace)[:, NON_EGO])

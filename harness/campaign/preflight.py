@@ -118,7 +118,7 @@ class _Documents:
         """All files that were read, but those of policies."""
         assert self.scene is not None
         scene = self.scene.document
-        found = [*self.persona_files, *(self.scene.folder / each for each in ("scene.toml", scene.net, scene.routes))]
+        found = [*self.persona_files, *(self.scene.folder / each for each in scene.files)]
         for driver in (self.ego_driver, *self.other_egos.values()):
             found += map(Path, driver.files if driver is not None else ())
         return found

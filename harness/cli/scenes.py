@@ -41,7 +41,8 @@ def show_scene(
         ),
     ] = None,
 ) -> None:
-    """List the lanes of a net: id, length, speed limit, permissions, and the junctions at both ends.
+    """List the lanes of a net: id, length, speed limit, permissions, the junctions at both ends, and the edges to which
+    each lane leads: straight on (s), to the right (r, R), to the left (l, L) or back (t).
 
     The page shows junctions and signals, too, and for a scene the players' routes, starts and goals.
     """
@@ -60,11 +61,12 @@ def show_scene(
     edges = edges_near(net, net_file, near, within)
     lanes = listed_lanes(edges)
     table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("lane", "length m", "limit m/s", "width m", "for", "from", "to"):
-        table.add_column(name, justify="right" if " " in name else "left", overflow="fold")
+    for name in ("lane", "length m", "limit m/s", "width m", "for", "from", "to", "leads to"):
+        table.add_column(name, justify="left" if name.isalpha() or name == "leads to" else "right", overflow="fold")
     for lane in lanes[:rows]:
         numbers = (f"{lane.length_m:.1f}", f"{lane.limit_mps:.2f}", f"{lane.width_m:.1f}")
-        table.add_row(lane.name, *numbers, lane.permissions, lane.start_junction, lane.end_junction)
+        ends = (lane.start_junction, lane.end_junction, "\n".join(lane.leads_to))
+        table.add_row(lane.name, *numbers, lane.permissions, *ends)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # the terminal may not have every character
     console = Console()

@@ -17,12 +17,12 @@ def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
 
 
 def _positive(interval: tuple[float, float]) -> tuple[float, float]:
-    if interval[0] < 0.0 or not 0.0 < interval[1] <= _DENSEST:
-        raise ValueError(f"the density lies outside 0 to {_DENSEST:g}")
+    if interval[0] < 0.0 or not 0.0 < interval[1] <= _LARGEST:
+        raise ValueError(f"the range lies outside 0 to {_LARGEST:g}")
     return interval
 
 
-_DENSEST = 10.0
+_LARGEST = 10.0
 Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
 Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
@@ -101,8 +101,8 @@ class Varies(Document):
     speed_limit_share: Annotated[Interval, AfterValidator(_positive)] | None = None
     """Range of a factor on all speed limits of the net."""
     signal_place: Interval = (0.0, 1.0)
-    """Range of the place in the cycles of the traffic lights at which a game starts, from 0 to 1. [0.0, 0.0] starts every
-    game with the first phase."""
+    """Range of the place in the cycles of the traffic lights at which a game starts, from 0 to 1. [0.0, 0.0] starts
+    every game with the first phase."""
 
     @field_validator("signal_place")
     @classmethod
@@ -121,6 +121,8 @@ class Scene(Document):
     """The SUMO net file in the folder of the scene."""
     routes: PlainFile
     """The SUMO file of routes, vehicle types and vehicles in the folder of the scene."""
+    additional: tuple[PlainFile, ...] = ()
+    """More SUMO files in that folder: route files, or additional files of vehicle types, routes and bus stops."""
     step_length_s: float = Field(0.1, ge=0.01, le=0.2)
     """Length of a step. Contact is tested once per step; in a longer step one car could pass through another."""
     time_limit_s: float = Field(gt=0.0, le=600.0)
@@ -158,6 +160,11 @@ class Scene(Document):
     def players(self) -> tuple[Player, Player]:
         """Ego and non-ego, in the order of the player axis of arrays."""
         return self.ego, self.non_ego
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """The files of the scene in its folder, the document first."""
+        return SCENE_FILE, self.net, self.routes, *self.additional
 
     @property
     def game_window_s(self) -> tuple[float, float]:

@@ -8,9 +8,10 @@ import numpy as np
 from harness.config.rule_driver import Cruise
 from harness.drivers.perception import Encounters, OwnMotion
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.observation_layout import AHEAD_M
+from harness.game.road import AHEAD_M
 from harness.game.traffic_rules import AMBER_MPS2, ROLLING_MPS
 
+_SLOWING_S = 0.5  # time in which a speed above the target is corrected: a slower response would be late for curves
 _BEFORE_LINE_M = 1.0  # place of the front bumper of a car that waits at a stop line
 _THROUGH_M = 10.0  # length of the place where two ways meet, plus that of a car
 _SPARE_S = 1.0  # time between the own car's leaving that place and the other's arrival
@@ -32,12 +33,11 @@ def time_gap_law_mps2(gap_m: FloatArray, speed_mps: FloatArray, other_mps: Float
     return (other_mps - speed_mps + law.gap_gain_per_s * error) / law.time_gap_s
 
 
-def target_speed_mps(limit_mps: FloatArray, path_turned_rad: FloatArray, law: Cruise) -> FloatArray:
+def target_speed_mps(limit_mps: FloatArray, path_bend_per_m: FloatArray, law: Cruise) -> FloatArray:
     """[N] target speed for the limit and for the curves in sight. A curve is entered at sqrt(a_lateral / curvature);
     the car slows down for it with half of the strongest braking (v^2 = v_curve^2 + 2 b d)."""
-    curvature = np.abs(np.diff(path_turned_rad, axis=1)) / np.diff(AHEAD_M)
-    in_curve2 = law.max_lateral_mps2 / np.maximum(curvature, 1e-6)
-    now2 = in_curve2 + 2.0 * (0.5 * law.max_braking_mps2) * AHEAD_M[:-1]
+    in_curve2 = law.max_lateral_mps2 / np.maximum(np.abs(path_bend_per_m), 1e-6)
+    now2 = in_curve2 + 2.0 * (0.5 * law.max_braking_mps2) * AHEAD_M
     return np.minimum(law.speed_share * limit_mps, np.sqrt(now2.min(axis=1)))
 
 
@@ -66,10 +66,11 @@ def cruise_mps2(
     motion: OwnMotion, encounters: Encounters, *, before_mps2: FloatArray, law: Cruise, step_s: float
 ) -> FloatArray:
     """[N] acceleration that the cruise control requests, given its request of the step before (`before_mps2`)."""
-    target = target_speed_mps(motion.limit_mps, motion.path_turned_rad, law)
+    target = target_speed_mps(motion.limit_mps, motion.path_bend_per_m, law)
     rolling = np.sqrt(ROLLING_MPS**2 + law.max_braking_mps2 * np.maximum(motion.stop_line_m, 0.0))
     target = np.where(motion.stop_sign, np.minimum(target, rolling), target)
-    free = (target - motion.speed_mps) / law.speed_response_s
+    over = target - motion.speed_mps
+    free = over / np.where(over < 0.0, min(law.speed_response_s, _SLOWING_S), law.speed_response_s)
     own = np.broadcast_to(motion.speed_mps[:, None], encounters.gap_m.shape)
     behind = time_gap_law_mps2(encounters.gap_m, own, encounters.speed_mps, law)
     behind = np.where(in_path(encounters, law.anticipates_s), behind, np.inf).min(axis=1)

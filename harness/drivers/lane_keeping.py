@@ -7,12 +7,11 @@ import numpy as np
 from harness.config.rule_driver import LaneKeeping
 from harness.drivers.perception import OwnMotion
 from harness.game.arrays import FloatArray
-from harness.game.observation_layout import AHEAD_M
 
 
 def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, step_s: float) -> FloatArray:
     """Steering angle to request (Stanley's law: Hoffmann et al. 2007, Autonomous Automobile Trajectory Tracking,
-    with feedforward of the path's curvature):
+    with feedforward of the path's curvature, as the observation gives it):
 
         steering = atan(wheelbase curvature) + heading_gain turned + atan(offset_gain left / (v + softening))
 
@@ -21,9 +20,8 @@ def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, ste
     """
     turned, speed = motion.path_turned_rad[:, 0], motion.speed_mps
     left = motion.path_left_m + 0.5 * wheelbase_m * np.sin(turned)
-    curvature = (motion.path_turned_rad[:, 1] - turned) / (AHEAD_M[1] - AHEAD_M[0])
     wanted = (
-        np.arctan(wheelbase_m * curvature)
+        motion.road_steering_rad
         + law.heading_gain * turned
         + np.arctan(law.offset_gain_per_s * left / (speed + law.softening_mps))
     )

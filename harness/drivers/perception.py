@@ -9,10 +9,11 @@ import numpy as np
 
 from harness.drivers.car import Car
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.observation_layout import AHEAD_M, ENTRIES, LAYOUT, OTHERS
+from harness.game.observation_layout import ENTRIES, LAYOUT, OTHERS
+from harness.game.road import AHEAD_M
 
 _AT = {name: LAYOUT.index(name) for name in LAYOUT}
-_TURNED, _OTHER = _AT["path_turned_rad@0m"], _AT["other0_seen"]
+_TURNED, _BEND, _OTHER = _AT["path_turned_rad@0m"], _AT["path_bend_per_m@0m"], _AT["other0_seen"]
 
 
 class Encounters(NamedTuple):
@@ -49,8 +50,12 @@ class OwnMotion(NamedTuple):
     """Speed limit."""
     acceleration_mps2: FloatArray
     steering_rad: FloatArray
+    road_steering_rad: FloatArray
+    """The steering angle that follows the path."""
     path_left_m: FloatArray
     path_turned_rad: FloatArray
+    path_bend_per_m: FloatArray
+    """The tightest curvature of the path in each section from `AHEAD_M` on."""
     stop_line_m: FloatArray
     """From the front bumper to the next stop line; very large without one."""
     stop_sign: BoolArray
@@ -70,8 +75,10 @@ def perceive(car: Car, observation: FloatArray) -> tuple[OwnMotion, Encounters]:
         limit_mps=entry("speed_limit_mps"),
         acceleration_mps2=entry("acceleration_mps2"),
         steering_rad=entry("steering_rad"),
+        road_steering_rad=entry("road_steering_rad"),
         path_left_m=entry("path_left_m"),
         path_turned_rad=values[:, _TURNED : _TURNED + len(AHEAD_M)],
+        path_bend_per_m=values[:, _BEND : _BEND + len(AHEAD_M)],
         stop_line_m=entry("stop_line_m"),
         stop_sign=entry("stop_sign") > 0.5,
         signal_red=entry("signal_red") > 0.5,

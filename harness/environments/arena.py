@@ -26,6 +26,7 @@ import numpy as np
 
 from harness.drivers.protocol import Driver
 from harness.environments.nearby_bodies import nearby_bodies
+from harness.environments.sumo_players import read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import release_controls
 from harness.game.bicycle import move, requests
@@ -151,7 +152,7 @@ class Arena:
             state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, self.world.step_s)
             state.signals = reading.signals
             self.signal_texts = list(reading.signal_texts or self.signal_texts)
-        self._read_sumo_players(reading, drove)
+        read_sumo_players(state, reading, drove, self._taken_over, self.world.step_s)
         bodies = self._bodies(state)
         advanced_m, offset_m = self._locate()
         quantities = Quantities(
@@ -201,18 +202,6 @@ class Arena:
             acceleration, steering = self._limits.within(acceleration, steering)
         state.lapsed = release_controls(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
         return acceleration, steering
-
-    def _read_sumo_players(self, reading: Reading, drove: BoolArray) -> None:
-        if reading.players is None:
-            return
-        state = self.state
-        for player in np.flatnonzero(~self._taken_over):
-            games = np.flatnonzero(drove[:, player])
-            x, y, heading, speed = reading.players[games, player].T
-            gained = np.where(state.step[games] > 0, speed - state.speed_mps[games, player], 0.0)
-            state.acceleration_mps2[games, player] = gained / self.world.step_s
-            state.x_m[games, player], state.y_m[games, player] = x, y
-            state.heading_rad[games, player], state.speed_mps[games, player] = heading, speed
 
     def _locate(self) -> tuple[FloatArray, FloatArray]:
         """[G, P] distance along the route in this step, and lateral offset from the route."""

@@ -41,27 +41,32 @@ Info: TypeAlias = dict[str, Any]
 class DrivingEnv(gymnasium.Env[Any, Any]):
     """One player's game on a scene with SUMO traffic. Also `gymnasium.make("harness/Ego-v0")`, `"harness/NonEgo-v0"`.
 
-    Observation: Box(-1, 1, (46,), float32), in the player's frame; `harness.game.observation.LAYOUT` names its
-    entries. Each entry is a quantity divided by its scale and clipped to [-1, 1].
+    Observation: Box(-1, 1, (96,), float32), in the player's frame; `harness.game.observation_layout` names its entries.
+    An entry x is divided by its scale and clipped to [-1, 1], or compressed:
 
     | entries | quantity | scale |
     | --- | --- | --- |
-    | 0 | speed_mps | 30 m/s |
-    | 1 | speed_over_limit, as a share of the limit | 1 |
-    | 2 | acceleration_mps2 | 10 m/s2 |
-    | 3 | steering_rad | the car's lock |
-    | 4 | lane_end_m, distance to the end of the player's lane | 100 m |
-    | 5 | goal_m, distance to the goal | 200 m |
-    | 6-11 | path_turned_rad, the route's heading 0, 5, 10, 20, 30, 50 m ahead, relative to the player's | 0.5 rad |
-    | 12 | path_left_m, distance of the route's line to the left | 8 m |
-    | 13-18 | free_left_m, distance to the nearest surface on the left, at the same distances ahead | 8 m |
-    | 19-24 | free_right_m, distance to the nearest surface on the right (negative) | 8 m |
-    | 25-31 | other0, the nearest road user: seen (0 or 1), ahead_m, left_m, | 1, 50 m, 8 m, |
-    |  | ahead_mps (relative), left_mps (absolute), turned_sin, turned_cos | 10 m/s, 5 m/s, 1, 1 |
-    | 32-38, 39-45 | other1 and other2, the next nearest; zeros if there are fewer | as other0 |
+    | 0, 1 | speed_mps, speed_limit_mps | 30 m/s |
+    | 2, 3 | speed_over_limit, as a share of the limit; acceleration_mps2 | 1, 10 m/s2 |
+    | 4, 5 | steering_rad, road_steering_rad (the angle that follows the route) | the car's lock |
+    | 6, 7 | lane_end_m, goal_m, distance to the end of the player's lane and to the goal | 100 m, 200 m |
+    | 8-10 | own_side_left_m, own_side_right_m (marks to oncoming lanes), path_left_m (the route's line) | 8 m |
+    | 11-16 | path_turned_rad, the route's heading 0, 5, 10, 20, 30, 50 m ahead | x/(|x| + 0.5 rad) |
+    | 17-22 | path_bend_per_m, the tightest bend from there on to the next | x/(|x| + 0.1/m) |
+    | 23-28, 29-34 | free_left_m, free_right_m, to the nearest surface on that side (right negative), there | 8 m |
+    | 35 | stop_line_m, distance of the front bumper to the next stop line | x/(|x| + 20 m) |
+    | 36-40 | at that line: give_way, stop_sign, signal_green, signal_yellow, signal_red | 1 |
+    | 41 | signal_s, time since the signal changed | x/(|x| + 5 s) |
+    | 42, 43 | leader_gap_m, leader_mps (relative), of the vehicle ahead on the route | x/(|x| + 20 m), + 10 m/s |
+    | 44-56 | other0, the most urgent road user: seen (0 or 1), ahead_m, left_m | 1, x/(|x| + 20 m), + 8 m |
+    |  | ahead_mps (relative), left_mps (absolute) | x/(|x| + 10 m/s), + 5 m/s |
+    |  | turned_sin, turned_cos (its heading), length_m, width_m | 1, 1, 20 m, 4 m |
+    |  | own_to_conflict_m, other_to_conflict_m, to the place where the two ways meet | x/(|x| + 20 m) |
+    |  | arrives_later_s than the player, has_priority (1, -1, 0 without a conflict) | x/(|x| + 3 s), 1 |
+    | 57-69, 70-82, 83-95 | other1 to other3, the next most urgent; zeros if there are fewer | as other0 |
 
-    Action: Box(-1, 1, (2,), float32): pedals (-1 full brake, 0 coast, 1 full throttle) and wheel (-1 largest angle to
-    the right, 1 largest to the left; the largest useful angle depends on the speed).
+    Action: Box(-1, 1, (2,), float32): pedals (-1 full brake, 0 coast, 1 full throttle) and wheel (0 follows the route;
+    -1 and 1 add the largest angle to the right and to the left; the largest useful angle depends on the speed).
 
     Reward: float, the step's payoff to the player's persona (equation 1 of the paper).
 

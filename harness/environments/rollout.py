@@ -20,7 +20,7 @@ from harness.environments.arena import Arena, Seat, Step
 from harness.evaluation.encounters import Encounter, encounters_of
 from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
 from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
-from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.arrays import BoolArray, FloatArray
 from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.game.state import EGO, NON_EGO, ROLES, Outcome
@@ -112,7 +112,6 @@ def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode
     arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
     trace = _Trace(arm, arena, episode)
     trace.add_players(arena.state.present[0])
-    signals = arena.state.signals.copy()
     steps: list[Step] = []
     while arena.state.running.any():
         present = arena.state.present[0].copy()
@@ -120,22 +119,18 @@ def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode
         steps.append(step)
         trace.add_players(present, step)
         trace.add_background()
-    encounters = _encounters(arm, trace.columns, np.concatenate([signals, *_signals_of(steps)]))
+    encounters = _encounters(arm, trace.columns)
     return Game(record=_record(arm, arena, episode, steps, encounters), trace=trace.columns)
 
 
-def _signals_of(steps: Sequence[Step]) -> list[IntArray]:
-    return [step.quantities.state.signals for step in steps]
-
-
-def _encounters(arm: Arm, trace: Mapping[str, Sequence[Any]], signals: IntArray) -> tuple[tuple[Encounter, ...], ...]:
-    """The encounters at junctions of each player in one game; `signals` [T, L] are the states of signal links."""
+def _encounters(arm: Arm, trace: Mapping[str, Sequence[Any]]) -> tuple[tuple[Encounter, ...], ...]:
+    """The encounters at junctions of each player in one game."""
     world = arm.scene.world
     if not len(world.right_of_way.conflicts.player):
         return ((),) * len(ROLES)
     frame = pd.DataFrame(trace)
     types_m = {name: (kind.length_m, kind.width_m) for name, kind in arm.scene.routes.types.items()}
-    quantities, drove = quantities_of(frame, world, sizes_by_name(frame, types_m), signals), drove_in(frame)
+    quantities, drove = quantities_of(frame, world, sizes_by_name(frame, types_m)), drove_in(frame)
     return tuple(tuple(encounters_of(quantities, player, drove[:, player])) for player in range(len(ROLES)))
 
 

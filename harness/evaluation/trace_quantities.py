@@ -6,8 +6,9 @@ arrays [T, P] is step t.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.quantities import Quantities
+from harness.game.right_of_way import SIGNALS, Signal
 from harness.game.road import MARGIN_M, SPACING_M, Routes
 from harness.game.state import ROLES, Bodies, State
 from harness.game.world import World
@@ -51,11 +53,9 @@ def quantities_of(
     trace: pd.DataFrame,
     world: World,
     sizes_m: Mapping[str, tuple[float, float]],
-    signals: IntArray | None = None,
 ) -> Quantities:
     """The quantities of every step of one game. They do not depend on the previous step (advanced_m is 0).
 
-    `signals` [T, L] are the states of signal links; by default they are off.
     The position along the route is located separately in each step: on a route that crosses itself, a player on the
     crossing may be located on the other branch.
     """
@@ -65,11 +65,11 @@ def quantities_of(
     motion = {name: _filled(places, trace[name].to_numpy()) for name in _MOTION}
     sizes = np.array([sizes_m.get(name, (0.0, 0.0)) for name in names])
     state = State.empty(len(present), players, len(world.right_of_way.signal_links))
-    if signals is not None:
-        state.signals = signals[: len(present)]
+    state.signals = _signals(trace, len(present), world.right_of_way.signal_links)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "lapsed"):
         setattr(state, name, motion[name][:, :players].copy())
     state.present = present[:, :players].copy()
+    state.friction[:] = world.actuators.friction
     bodies = Bodies(
         motion["x_m"],
         motion["y_m"],
@@ -82,6 +82,25 @@ def quantities_of(
     station_m = _stations_m(world.road.routes, state.x_m, state.y_m)
     state.station_m, offset_m = world.road.routes.locate(state.x_m, state.y_m, station_m)
     return Quantities(world, state, bodies, np.zeros_like(offset_m), offset_m)
+
+
+def _signals(trace: pd.DataFrame, steps: int, links: Sequence[tuple[str, int]]) -> IntArray:
+    """[T, L] states of signal links; off in a trace without them."""
+    states = np.zeros((steps, len(links)), dtype=np.int8)
+    if not links or "signals" not in trace:
+        return states
+    by_step = trace.drop_duplicates("step")
+    for step, text in zip(by_step["step"].tolist(), by_step["signals"].tolist(), strict=True):
+        states[step] = _states_of(str(text), tuple(links))
+    return states
+
+
+@lru_cache(maxsize=1024)
+def _states_of(text: str, links: tuple[tuple[str, int], ...]) -> tuple[int, ...]:
+    """The states of links in a cell of the trace, `id=state` of each light separated by spaces."""
+    lights = dict(each.rpartition("=")[::2] for each in text.split())  # an id may contain '='
+    letters = (lights.get(light, "")[link : link + 1] for light, link in links)
+    return tuple(int(SIGNALS.get(letter, Signal.OFF)) for letter in letters)
 
 
 def drove_in(trace: pd.DataFrame) -> BoolArray:

@@ -22,16 +22,18 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.meetings import Meetings
-from harness.game.observation_layout import AHEAD_M, BEHIND, COMPRESSED, ENTRIES, LAYOUT, OTHERS, SCALE, SIZE
+from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, LAYOUT, OTHERS, SCALE, SIZE
 from harness.game.quantities import Quantities
 from harness.game.right_of_way import Control, Signal, StopLines
-from harness.game.road import Routes, lane_at, row_at
+from harness.game.road import AHEAD_M, Routes, lane_at, row_at
 from harness.game.route_coordinates import half_extents_m, place_along_route, row_ahead
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
 _COUNT = len(AHEAD_M)
 _PATH_LEFT, _STOP_LINE, _LEADER = (LAYOUT.index(name) for name in ("path_left_m", "stop_line_m", "leader_gap_m"))
-_TURNED, _LEFT, _RIGHT = (LAYOUT.index(f"{name}@0m") for name in ("path_turned_rad", "free_left_m", "free_right_m"))
+_TURNED, _BEND, _LEFT, _RIGHT = (
+    LAYOUT.index(f"{name}@0m") for name in ("path_turned_rad", "path_bend_per_m", "free_left_m", "free_right_m")
+)
 _FIRST_OTHER = LAYOUT.index("other0_seen")
 
 SEEN_M = 120.0  # bodies farther away are not in an observation
@@ -111,6 +113,7 @@ def _observe(
                 ahead = row_ahead(row, BEHIND + k, first, last)
                 turned = routes.heading_rad[ahead] - heading
                 view[_TURNED + k] = (turned + np.pi) % (2.0 * np.pi) - np.pi
+                view[_BEND + k] = routes.bend_ahead_per_m[row, k]
                 view[_LEFT + k] = routes.left_edge_m[ahead] - offset
                 view[_RIGHT + k] = routes.right_edge_m[ahead] - offset
             front_m = station + 0.5 * length_m[p]

@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from harness.game.arrays import FloatArray
+from harness.game.road import AHEAD_M
 from harness.game.route_coordinates import PATH_M
 
 BEHIND = int(np.searchsorted(PATH_M, 0.0))  # number of entries of PATH_M behind the player
-AHEAD_M = PATH_M[BEHIND:]
 OTHERS = 4
 """Number of other bodies in an observation."""
 
@@ -28,7 +28,7 @@ class Scale(NamedTuple):
     compressed: bool = False
 
 
-_SPEED, _ONE, _SIDE, _ANGLE = Scale(30.0), Scale(1.0), Scale(8.0), Scale(0.5)
+_SPEED, _ONE, _SIDE, _ANGLE = Scale(30.0), Scale(1.0), Scale(8.0), Scale(0.5, compressed=True)
 _OWN: dict[str, Scale] = {
     "speed_mps": _SPEED,
     "speed_limit_mps": _SPEED,
@@ -42,6 +42,7 @@ _OWN: dict[str, Scale] = {
     "own_side_right_m": _SIDE,
     "path_left_m": _SIDE,
     **{f"path_turned_rad@{d:g}m": _ANGLE for d in AHEAD_M},
+    **{f"path_bend_per_m@{d:g}m": Scale(0.1, compressed=True) for d in AHEAD_M},  # tightest from there to the next
     **{f"free_left_m@{d:g}m": _SIDE for d in AHEAD_M},
     **{f"free_right_m@{d:g}m": _SIDE for d in AHEAD_M},
     "stop_line_m": Scale(20.0, compressed=True),

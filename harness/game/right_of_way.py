@@ -2,9 +2,9 @@
 each side is there.
 
 A stream is the traffic of one link of a junction: its lanes before, inside and shortly beyond the junction. A conflict
-is the zone in which cars on the player's lane and in a stream need the same room. A body conflicts with a player if it drives
-in a stream that conflicts with the player's route. This is geometry: it is what a driver sees, without knowledge of the
-other's route or intention.
+is the zone in which cars on the player's lane and in a stream need the same room. A body conflicts with a player if it
+drives in a stream that conflicts with the player's route. This is geometry: it is what a driver sees, without knowledge
+of the other's route or intention.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 CELL_M = 8.0  # of the grid of a stream's samples
 _DTYPES = {
     **dict.fromkeys(("player", "stream", "own_link", "other_link", "control", "link"), np.int64),
-    **dict.fromkeys(("crossing", "yields", "first_come"), np.bool_),
+    **dict.fromkeys(("crossing", "yields", "first_come", "across"), np.bool_),
 }
 
 
@@ -32,6 +32,18 @@ class Signal(IntEnum):
     GREEN_YIELDING = 2  # 'g'
     YELLOW = 3  # 'y'
     RED = 4  # 'r', and red with yellow 'u'
+
+
+SIGNALS = {
+    "G": Signal.GREEN,
+    "g": Signal.GREEN_YIELDING,
+    "s": Signal.GREEN_YIELDING,  # a green arrow to the right, after a stop
+    "y": Signal.YELLOW,
+    "Y": Signal.YELLOW,
+    "r": Signal.RED,
+    "u": Signal.RED,
+}
+"""By the letter that SUMO uses; any other is off."""
 
 
 class Control(IntEnum):
@@ -66,6 +78,7 @@ class Conflicts(NamedTuple):
     until_m: FloatArray
     zone_m: FloatArray  # begin of the zone along the stream
     length_m: FloatArray  # of the zone along the stream
+    across: BoolArray  # the player turns across oncoming traffic
 
     @classmethod
     def of(cls, rows: Sequence[Mapping[str, Any]]) -> Conflicts:
@@ -92,7 +105,7 @@ class Streams(NamedTuple):
     rows: IntArray
     first_conflict: IntArray  # [P, S] the player's conflicts with a stream: the first row of `conflicts`
     last_conflict: IntArray  # [P, S] and the row after the last one
-    conflicts: FloatArray  # [C, 16] the columns of `Conflicts` in one array
+    conflicts: FloatArray  # [C, 17] the columns of `Conflicts` in one array
 
     @classmethod
     def of(cls, samples: FloatArray, stream: IntArray, conflicts: Conflicts, players: int) -> Streams:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,9 @@ SPACING_M = 0.5  # between stations of a route
 MARGIN_M = 100.0  # straight extension of a route's table before its start and beyond its end
 _BEND_M = 4.0  # a driver steers by the mean curvature of this length: the lines of a net have corners
 _TIGHTEST = 1.0  # product of curvature and wheelbase: beyond the lock of any car
-PREVIEW_S = 0.2  # time ahead of the bend for which a driver steers; the steering rack needs some of it
+PREVIEW_S = 0.05  # time ahead of the bend for which a driver steers: half a step
+AHEAD_M = np.array([0.0, 5.0, 10.0, 20.0, 30.0, 50.0])  # distances ahead of a player at which it sees the road
+_LAST_SECTION_M = 30.0
 COMFORTABLE_MPS2 = 2.0  # braking before a curve or a stop that was seen in time
 _LEAST_STRETCH = 0.25  # bound for points near or beyond a curve's centre, where the nearest station is not unique
 
@@ -64,6 +67,9 @@ class Routes(NamedTuple):
     sin: FloatArray
     curvature_per_m: FloatArray
     bend_per_m: FloatArray  # curvature, smoothed over `_BEND_M`
+    bend_ahead_per_m: (
+        FloatArray  # [N, K] the tightest bend in each section between `AHEAD_M`, and from the last for 30 m
+    )
     left_edge_m: FloatArray
     right_edge_m: FloatArray
     own_left_m: FloatArray
@@ -96,6 +102,7 @@ class Routes(NamedTuple):
             cos=np.cos(columns["heading_rad"]),
             sin=np.sin(columns["heading_rad"]),
             curvature_per_m=np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
+            bend_ahead_per_m=np.concatenate([_bend_ahead_per_m(route.heading_rad) for route in routes]),
             approach_mps=np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
             bend_per_m=np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
             first_row=first,
@@ -115,7 +122,8 @@ class Routes(NamedTuple):
     def road_steering_rad(self, station_m: FloatArray, speed_mps: FloatArray, wheelbase_m: FloatArray) -> FloatArray:
         """[G, P] steering angle (rad) with which cars follow the routes at stations and speeds [G, P].
 
-        The angle is that of the bend `PREVIEW_S` ahead, for wheelbases [P].
+        The angle is that of the bend at the rear axle, which has no slip, in `PREVIEW_S`, for wheelbases [P]. With the
+        bend at the centre, a car would leave a quarter circle by two metres.
         """
         return _road_steering_rad(station_m, speed_mps, wheelbase_m, self.bend_per_m, self.first_row, self.last_row)
 
@@ -151,7 +159,8 @@ def _road_steering_rad(
 ) -> FloatArray:
     steering = np.empty(station_m.shape)
     for g, p in np.ndindex(station_m.shape):
-        row = row_at(station_m[g, p] + PREVIEW_S * speed_mps[g, p], first_row[p], last_row[p])
+        rear_axle_m = station_m[g, p] - 0.5 * wheelbase_m[p] + PREVIEW_S * speed_mps[g, p]
+        row = row_at(rear_axle_m, first_row[p], last_row[p])
         steering[g, p] = steering_of_bend_rad(bend_per_m[row], wheelbase_m[p])
     return steering
 
@@ -235,6 +244,19 @@ def _bend_per_m(heading_rad: FloatArray) -> FloatArray:
     before, after = np.maximum(rows - reach, 0), np.minimum(rows + reach, len(turned) - 1)
     bend: FloatArray = (turned[after] - turned[before]) / ((after - before) * SPACING_M)
     return bend
+
+
+def _bend_ahead_per_m(heading_rad: FloatArray) -> FloatArray:
+    """[N, K] the curvature of greatest size in each section of the road ahead."""
+    bend = _bend_per_m(heading_rad)
+    sections = np.rint(np.append(AHEAD_M, AHEAD_M[-1] + _LAST_SECTION_M) / SPACING_M).astype(int)
+    columns = []
+    for first, end in pairwise(sections.tolist()):
+        padded = np.pad(bend, (0, end), mode="edge")
+        windows = np.lib.stride_tricks.sliding_window_view(padded[first:], end - first)[: len(bend)]
+        tightest = np.abs(windows).argmax(1)
+        columns.append(windows[np.arange(len(bend)), tightest])
+    return np.stack(columns, axis=1)
 
 
 def _approach_mps(speed_limit_mps: FloatArray) -> FloatArray:

@@ -8,10 +8,10 @@ import numpy as np
 
 from harness.game.arrays import FloatArray
 from harness.game.jit import compiled
-from harness.game.road import MARGIN_M, SPACING_M, Routes, row_at
+from harness.game.road import AHEAD_M, MARGIN_M, SPACING_M, Routes, row_at
 
 # distances ahead of a player at which its route is sampled
-PATH_M = np.array([-20.0, -10.0, 0.0, 5.0, 10.0, 20.0, 30.0, 50.0])
+PATH_M = np.concatenate(([-20.0, -10.0], AHEAD_M))
 _PATH_ROWS = np.rint(PATH_M / SPACING_M).astype(np.int64)
 
 

@@ -81,7 +81,7 @@ class State:
             distance_error=np.zeros(shape),
             closing_error_per_s=np.zeros(shape),
             step=np.zeros(games, dtype=np.int64),
-            friction=np.zeros(games),
+            friction=np.ones(games),
             limit_share=np.ones(games),
             signals=np.zeros((games, signals), dtype=np.int8),
             signal_s=np.zeros((games, signals)),

@@ -33,7 +33,7 @@ _RING_RADIUS_M = 4.0
 def write_replay(
     trace: pd.DataFrame,
     net_file: Path,
-    route_file: Path,
+    route_files: Sequence[Path],
     folder: Path,
     *,
     title: str,
@@ -42,14 +42,14 @@ def write_replay(
 ) -> None:
     """Write one game's replay to `folder`, which is replaced. The folder appears only when it is complete.
 
-    `trace` is the game's rows (columns as in `traces/`), `route_file` defines its vehicle types, `rails` are
+    `trace` is the game's rows (columns as in `traces/`), `route_files` define its vehicle types, `rails` are
     polylines [n, 2] in net coordinates. The same arguments give the same bytes. Raises ValueError for a trace
     with no row or with more than one game.
     """
     if trace["episode"].nunique() != 1:
         raise ValueError(f"a replay is of one game; the trace has {trace['episode'].nunique()}")
     trace = trace.astype({"player": str, "vehicle_type": str, "outcome": str})
-    types = types_of_vehicles(trace, route_file)
+    types = types_of_vehicles(trace, route_files)
     lanes = Lanes.read(net_file)
     touches = contacts(trace, types, rails)
     view = choose_view(trace, touches)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -68,13 +68,15 @@ class DrawnVehicle:
         }
 
 
-def types_of_vehicles(trace: pd.DataFrame, route_file: Path) -> dict[str, DrawnVehicle]:
+def types_of_vehicles(trace: pd.DataFrame, route_files: Sequence[Path]) -> dict[str, DrawnVehicle]:
     """The drawing of each vehicle of one game, by the vehicle's id.
 
     The players get types of their own. Background vehicles keep their type, in grey where it has no colour. A type that
-    the route file does not define is SUMO's default.
+    the route files do not define is SUMO's default.
     """
-    defined = _defined_types(route_file, route_file.stat().st_mtime_ns)
+    defined: dict[str, dict[str, str]] = {}
+    for route_file in route_files:
+        defined |= _defined_types(route_file, route_file.stat().st_mtime_ns)
     vehicles = trace.drop_duplicates("player")
     types = {}
     for vehicle, type_id in sorted(zip(vehicles["player"], vehicles["vehicle_type"], strict=True)):

@@ -25,6 +25,7 @@ ARRIVAL_LANES = ("current", "random", "first")
 ARRIVAL_POSITIONS = ("random", "max", "center")
 ARRIVAL_SPEEDS = ("current",)
 _MOST_PROBLEMS = 20
+_ROUNDED = 1.001  # recorded speeds and speed factors are rounded; SUMO raises the factor
 _ALL_THE_TIME_S = (0.0, inf)
 
 
@@ -91,7 +92,7 @@ def _end_problems(
 ) -> list[Problem]:
     """The problems of a departure's lane, position and speed on its first edge, and on arrival on its last edge."""
     most_mps = routes.types[departure.vehicle_type].max_speed_mps
-    factor = max(departure.speed_factor or 1.0, 1.0)
+    factor = max(departure.speed_factor * _ROUNDED, 1.0) if departure.speed_factor else 1.0
     written = (departure.lane, departure.position, departure.speed)
     checks = [
         *_checks("depart", first, min(first.getSpeed() * factor, most_mps), written, (LANES, POSITIONS, SPEEDS)),

@@ -27,6 +27,8 @@ class ListedLane:
     edge: str
     start_junction: str
     end_junction: str
+    leads_to: tuple[str, ...]
+    """The next edges, each after SUMO's letter of the direction: `l north_out` is to the left."""
     length_m: float
     limit_mps: float
     width_m: float
@@ -96,6 +98,7 @@ def _listed(lane: Lane) -> ListedLane:
         name=lane.getID(),
         edge=edge.getID(),
         start_junction=edge.getFromNode().getID(),
+        leads_to=tuple(f"{link.getDirection()} {link.getTo().getID()}" for link in lane.getOutgoing()),
         end_junction=edge.getToNode().getID(),
         length_m=lane.getLength(),
         limit_mps=lane.getSpeed(),

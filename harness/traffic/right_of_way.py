@@ -24,6 +24,7 @@ _MERGING_M = 10.0  # length of the zone of a stream that joins the route
 _LEAST_AREA_M2 = 0.5
 _STEP_M = 0.5
 _ALIKE = float(np.cos(np.pi / 4.0))
+_STRAIGHT = float(np.cos(np.pi / 6.0))
 _CONTROL = {"m": Control.GIVE_WAY, "=": Control.GIVE_WAY, "s": Control.STOP, "w": Control.ALL_WAY_STOP}
 _MAJOR = "MO"  # states of links with the right of way
 
@@ -101,8 +102,16 @@ class _Builder:
                         "left_m": own.left_m,
                         "own_link": self._column(own.link),
                         "other_link": self._column(foe),
+                        "across": zone["crossing"] and self._turns_across(own.link, foe),
                         **zone,
                     }
+
+    def _turns_across(self, own: Connection, foe: Connection) -> bool:
+        """Whether a link turns, and a foe comes from the opposite direction."""
+        way, stream = self._stream(own), self._stream(foe)
+        begin_rad = _heading_rad(way.onward, 0.0)
+        turned = np.cos(_heading_rad(way.onward, way.length_m) - begin_rad) < _STRAIGHT
+        return bool(turned and np.cos(_heading_rad(stream.onward, 0.0) - begin_rad) < -_ALIKE)
 
     def _zone(self, junction: JunctionOnRoute, own: Connection, foe: Connection) -> dict[str, float | bool] | None:
         """Where the lanes of two links overlap, in the columns of `Conflicts`; None if they do not."""
@@ -123,6 +132,10 @@ class _Builder:
             "from_m": from_m,
             "until_m": until_m,
         }
+
+
+def _heading_rad(line: shapely.LineString, place_m: float) -> float:
+    return float(_points_and_headings(line, np.array([place_m]))[1][0])
 
 
 def _own_links(junction: JunctionOnRoute) -> list[_OwnLink]:

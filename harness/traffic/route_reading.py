@@ -25,10 +25,11 @@ _RANDOM_PERIOD = re.compile(r"exp\((.+)\)")
 _LATERAL = ("left", "right", "center", "random")
 
 
-def read_route_file(path: Path) -> RouteFile:
-    """Read a `.rou.xml`. Raises UsageError for invalid or unsupported content."""
-    root = parse_xml(path)
-    check_content(path, root)
+def read_route_file(path: Path, *additional: Path) -> RouteFile:
+    """Read a `.rou.xml`, with the content of additional files. Raises UsageError for invalid or unsupported content."""
+    root = _content(path)
+    for each in additional:
+        root.extend(_content(each))
     only_types = ElementTree.Element("routes")
     only_types.extend(element for element in root if element.tag in ("vType", "vTypeDistribution"))
     problems: list[Problem] = []
@@ -59,6 +60,12 @@ def read_route_file(path: Path) -> RouteFile:
         flows=tuple(flows.values()),
         types_xml=ElementTree.tostring(only_types, encoding="unicode"),
     )
+
+
+def _content(path: Path) -> ElementTree.Element:
+    root = parse_xml(path)
+    check_content(path, root)
+    return root
 
 
 def _vehicles(root: ElementTree.Element) -> list[ElementTree.Element]:

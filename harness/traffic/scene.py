@@ -55,6 +55,11 @@ class OpenScene:
         """The scene's net."""
         return self.folder / self.document.net
 
+    @property
+    def route_files(self) -> list[Path]:
+        """The scene's route file and additional files."""
+        return [self.folder / each for each in (self.document.routes, *self.document.additional)]
+
     @cached_property
     def has_background_traffic(self) -> bool:
         """Whether vehicles other than the players may depart."""
@@ -115,6 +120,7 @@ class _NamedFiles(Document):
     model_config = ConfigDict(extra="ignore")
     net: PlainFile
     routes: PlainFile
+    additional: tuple[PlainFile, ...] = ()
 
 
 def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
@@ -131,9 +137,9 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     named = document or collect([], lambda: read_document(document_file, _NamedFiles))
     if named is None:
         raise UsageError(problems)
-    net_file, route_path = folder / named.net, folder / named.routes
+    net_file, route_files = folder / named.net, [folder / each for each in (named.routes, *named.additional)]
     net = collect(problems, lambda: _checked_net(net_file, folder))
-    routes = collect(problems, lambda: _checked_routes(route_path, folder, document, ego_type))
+    routes = collect(problems, lambda: _checked_routes(route_files, folder, document, ego_type))
     if document is None or net is None or routes is None:
         raise UsageError(problems)
     routes = collect(problems, partial(_with_routes, routes, net_file, net, document))
@@ -222,9 +228,10 @@ def _checked_net(path: Path, folder: Path) -> Net:
     return network.read_net(path)
 
 
-def _checked_routes(path: Path, folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
-    _check_within(path, folder)
-    return _with_ego_type(read_route_file(path), document, ego_type)
+def _checked_routes(paths: Sequence[Path], folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
+    for path in paths:
+        _check_within(path, folder)
+    return _with_ego_type(read_route_file(*paths), document, ego_type)
 
 
 def _with_routes(routes: RouteFile, net_file: Path, net: Net, document: Scene) -> RouteFile:

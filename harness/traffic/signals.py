@@ -9,20 +9,11 @@ import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
 
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.right_of_way import Signal
+from harness.game.right_of_way import SIGNALS, Signal
 from harness.traffic.simulation import SignalsAtReset
 
-_STATES = {
-    "G": Signal.GREEN,
-    "g": Signal.GREEN_YIELDING,
-    "s": Signal.GREEN_YIELDING,  # a green arrow to the right, after a stop
-    "y": Signal.YELLOW,
-    "Y": Signal.YELLOW,
-    "r": Signal.RED,
-    "u": Signal.RED,
-}
 _CODE = np.full(256, int(Signal.OFF), dtype=np.int8)  # by character; 'o' and 'O' are off
-for _letter, _state in _STATES.items():
+for _letter, _state in SIGNALS.items():
     _CODE[ord(_letter)] = _state
 
 

@@ -89,6 +89,11 @@ class Stream:
         return line_over_junction(self._feeders.net, self.link)
 
     @cached_property
+    def length_m(self) -> float:
+        """Length of the link's line over the junction."""
+        return float(_joined([self._inner]).length)
+
+    @cached_property
     def onward(self) -> shapely.LineString:
         """The line from the stop line on, to a point beyond the junction."""
         beyond = shapely.LineString(lane_line(self.link.getToLane()))

@@ -12,22 +12,16 @@ from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.research_questions import INCOMPETENT
 from harness.evaluation.tables import read_csv
 from tests.support.pages import Page
-from tests.support.tiny import DISTRACTED, SPEEDY, finished, harness
+from tests.support.tiny import finished, harness
 
 pytestmark = pytest.mark.slow
 
 LABEL = "not answered: the person can't drive this scene"
-CHANGES = {
-    "name": "unlearned",
-    "competence": None,  # the table is left out: its defaults hold
-    "population": [{"name": "town", "shares": {"speedy": 1.0, "distracted": 1.0}}],
-    "crossplay": {},
-}
 
 
 @pytest.fixture(scope="session")
 def run() -> Path:
-    return finished(personas=[str(SPEEDY), str(DISTRACTED)], **CHANGES)
+    return finished(name="unlearned", competence=None)  # the table is left out: its defaults hold
 
 
 def printed(run: Path) -> str:
@@ -37,38 +31,27 @@ def printed(run: Path) -> str:
 
 def test_terminal__names_each_training_that_did_not_learn(run: Path) -> None:
     text = printed(run)
-    for training in ("speedy-seed1", "distracted-seed1"):
-        assert f"did not learn: {training}: alone it reaches its goal in" in text  # as soon as its arm was played
-        assert f"Did not learn: {training}: alone it reaches its goal in" in text  # and at the end
+    assert "did not learn: speedy-seed1: alone it reaches its goal in" in text  # as soon as its arm was played
+    assert "Did not learn: speedy-seed1: alone it reaches its goal in" in text  # and at the end
     assert "converged" not in text
 
 
 def test_terminal__no_question_is_answered(run: Path) -> None:
     text = printed(run)
-    for persona in ("speedy", "distracted", "town"):
-        for question in ("RQ1", "RQ2"):
-            assert f"{persona}, {question}: {LABEL}" in text
+    for question in ("RQ1", "RQ2"):
+        assert f"speedy, {question}: {LABEL}" in text
     assert "significant" not in text
     assert "p = " not in text
 
 
 def test_comparisons__have_a_reason_and_no_test(run: Path) -> None:
     table = read_csv(run / "comparisons.csv")
-    assert len(table) == 12
+    assert len(table) == 4
     assert set(table["verdict"]) <= {verdict.value for verdict in INCOMPETENT}
     assert table["p_value"].isna().all()
     assert table["p_holm"].isna().all()
     assert not table["rejects_h0"].any()
     assert table["reason"].str.contains("below 80 %", regex=False).all()
-    of_town = table.loc[table["persona"] == "town", "reason"]
-    assert of_town.str.contains("the speedy driver can't drive").all()  # its members are named
-    assert of_town.str.contains("the distracted driver can't drive").all()
-
-
-def test_generalisation__claims_nothing_about_these_players(run: Path) -> None:
-    found = read_csv(run / "generalisation.csv")
-    assert len(found)
-    assert set(found["verdict"]) <= {verdict.value for verdict in INCOMPETENT}
 
 
 def test_manifest__and_curves_end_with_the_judgement(run: Path) -> None:
@@ -88,9 +71,8 @@ def test_manifest__and_curves_end_with_the_judgement(run: Path) -> None:
 def test_report__says_it_on_its_first_lines_and_on_each_card(run: Path) -> None:
     page = Page((run / "report.html").read_text(encoding="utf-8"))
     assert "did not learn to drive this scene." in page.text.partition("Watch")[0]  # before the links to the sections
-    assert page.text.count(f"RQ1: {LABEL}") == 3
-    assert page.text.count(f"RQ2: {LABEL}") == 3
-    assert "Not every player of these tables can drive this scene." in page.text
+    assert f"RQ1: {LABEL}" in page.text
+    assert f"RQ2: {LABEL}" in page.text
     assert "early: converged" not in page.text
 
 

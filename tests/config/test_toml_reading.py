@@ -125,7 +125,7 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
         # unknown keys, at every depth
         (Campaign, CAMPAIGN + "sede = [1]", "sede", "unknown key (did you mean 'seeds'?)"),
         (Campaign, CAMPAIGN + "[trainin]", "trainin", "unknown key (did you mean 'training'?)"),
-        (Campaign, CAMPAIGN + "[training]\nlr = 1", "training.lr", "unknown key (valid: buffer, clip, "),
+        (Campaign, CAMPAIGN + "[training]\nlr = 1", "training.lr", "unknown key (valid: along_route_share, buffer, "),
         (Scene, SCENE + "[ego.actuators]\nwheelbse_m = 2", "ego.actuators.wheelbse_m", "(did you mean 'wheelbase_m'?)"),
         (Persona, PERSONA + FUZZY + "wieght = 1", "human.fuzzy[0].wieght", "unknown key (did you mean 'weight'?)"),
         (
@@ -166,7 +166,7 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
         (Scene, SCENE.replace("[11, 14]", "[-1, 14]"), "ego", "speed_mps must not be negative"),
         (Scene, SCENE.replace("beside_ego_m = [-8.0, 8.0]", ""), "non_ego", "give one of position_m, beside_ego_m"),
         (Scene, SCENE.replace("beside", "position_m = [0, 9]\nbeside"), "non_ego", "give one of position_m, beside"),
-        (Scene, SCENE.replace("position_m = [30.0, 45.0]", "beside_ego_m = [0, 1]"), "", "can't start relative to itself"),
+        (Scene, SCENE.replace("position_m = [30.0, 45.0]", "beside_ego_m = [0, 1]"), "", "the ego can't start"),
         (Scene, SCENE.replace("beside_ego_m", "route_m"), "non_ego", "route_m is along the route: leave out lane"),
         (Scene, SCENE.replace('lane = "approach_1"\n', ""), "ego", "position_m needs the lane of the start"),
         (Scene, arriving("[1.0, 2.0]", "[0, 14]"), "non_ego", "arrival_after_ego_s needs speeds above 0"),

@@ -27,7 +27,8 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
 from harness.game.bicycle import lateral_acceleration_mps2, move, requests
-from harness.game.observation_layout import AHEAD_M, LAYOUT
+from harness.game.observation_layout import LAYOUT
+from harness.game.road import AHEAD_M
 from harness.game.state import EGO, State
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.observations import observation_of
@@ -51,9 +52,7 @@ def rules(**tables: dict[str, float]) -> Rules:
     return Rules.model_validate(NOTHING | tables)
 
 
-def seeing(
-    speed_mps: float = 13.89, limit_mps: float | None = None, turned: float = 0.0, **other: float
-) -> np.ndarray:
+def seeing(speed_mps: float = 13.89, limit_mps: float | None = None, turned: float = 0.0, **other: float) -> np.ndarray:
     """The observation of one game with one other car, from physical units; `turned` is the heading of the path.
 
     The limit is the own speed unless it is given. The other car is 4.6 m long and 1.8 m wide.
@@ -193,11 +192,11 @@ def test_time_gap_law__by_hand() -> None:
 
 
 def test_target_speed__slows_for_a_curve_in_time() -> None:
-    """0.1 rad between 20 and 30 m: 0.01 / m, entered at sqrt(2 / 0.01) = 14.1 m/s, and now sqrt(200 + 2 1.75 20)."""
-    turned = np.where(AHEAD_M >= 30.0, 0.1, 0.0)[None]
-    found = target_speed_mps(np.array([30.0]), turned, Cruise())
-    assert found[0] == pytest.approx(np.sqrt(270.0))
-    assert target_speed_mps(np.array([13.89]), turned, Cruise())[0] == 13.89
+    """A bend of 0.01 / m from 20 m ahead: entered at sqrt(2 / 0.01) = 14.1 m/s, and now sqrt(200 + 2 1.75 20)."""
+    for sign in (1.0, -1.0):
+        bend = np.where(AHEAD_M == 20.0, sign * 0.01, 0.0)[None]
+        assert target_speed_mps(np.array([30.0]), bend, Cruise())[0] == pytest.approx(np.sqrt(270.0))
+        assert target_speed_mps(np.array([13.89]), bend, Cruise())[0] == 13.89
 
 
 def test_in_path__anticipates_a_car_that_moves_over(car: Car) -> None:
@@ -224,7 +223,13 @@ def test_cruise__is_comfortable(gap: float, own: float, other: float, before: fl
 
 
 def motion(
-    speed_mps: float, limit_mps: float, *, turned: float = 0.0, left: float = 0.0, steering: float = 0.0
+    speed_mps: float,
+    limit_mps: float,
+    *,
+    turned: float = 0.0,
+    left: float = 0.0,
+    steering: float = 0.0,
+    road: float = 0.0,
 ) -> OwnMotion:
     """The motion of a car in one game, without a stop line ahead."""
     return OwnMotion(
@@ -232,8 +237,10 @@ def motion(
         limit_mps=np.array([limit_mps]),
         acceleration_mps2=np.zeros(1),
         steering_rad=np.array([steering]),
+        road_steering_rad=np.array([road]),
         path_left_m=np.array([left]),
         path_turned_rad=np.full((1, len(AHEAD_M)), turned),
+        path_bend_per_m=np.zeros((1, len(AHEAD_M))),
         stop_line_m=np.array([np.inf]),
         stop_sign=np.array([False]),
         signal_red=np.array([False]),
@@ -273,11 +280,20 @@ def test_steering__by_hand() -> None:
         assert steering_rad(view, law=law, wheelbase_m=2.7, step_s=0.1)[0] == pytest.approx(expected, abs=1e-6)
 
 
+def test_steering__adds_the_angle_that_follows_the_road() -> None:
+    """On the path and along it, in a bend for which the road asks 0.08 rad: nothing else is added."""
+    law = LaneKeeping(max_lateral_mps2=6.0, max_lateral_jerk_mps3=20.0)
+    for road in (0.08, -0.08):
+        view = motion(9.0, 13.9, steering=road, road=road)
+        assert steering_rad(view, law=law, wheelbase_m=2.7, step_s=0.1)[0] == pytest.approx(road)
+
+
 @pytest.mark.parametrize("speed_mps", [3.0, 8.0, 14.0, 25.0])
 def test_steering__brings_the_car_onto_its_path_within_limits(car: Car, speed_mps: float) -> None:
     """From 1.5 m beside and 0.05 rad turned away, within UN R79's limits."""
     state, actuators, law = State.empty(1, 1), car.actuators, LaneKeeping()
     state.y_m[:], state.heading_rad[:], state.speed_mps[:], state.present[:] = 1.5, 0.05, speed_mps, True
+    state.friction[:] = actuators.friction
     offsets, lateral = [], []
     for _ in range(250):
         view = seeing(speed_mps, turned=-float(state.heading_rad[0, 0]), path_left_m=-float(state.y_m[0, 0]))

@@ -92,6 +92,14 @@ def test_drive__too_fast_for_the_curve_the_car_runs_wide() -> None:
     assert state.acceleration_mps2[0, 0] == 0.0  # no grip is left for the engine
 
 
+def test_drive__on_ice_the_grip_is_that_of_the_game() -> None:
+    # 0.1 * 9.81 = 0.981 m/s2 for the brakes, in one game; the other has the friction of a dry road
+    state = State.empty(2, 1)
+    state.speed_mps[:], state.friction[:] = 10.0, [0.1, 0.8]
+    move(state, np.full((2, 1), -8.0), np.zeros((2, 1)), np.ones((2, 1), dtype=bool), actuators(), STEP_S)
+    assert state.acceleration_mps2[:, 0] == pytest.approx([-0.981, -7.848])
+
+
 def test_drive__brakes_to_a_stand_and_not_backwards() -> None:
     state = state_of(0.3)
     advance(state, -8.0, 0.0)
@@ -102,7 +110,7 @@ def test_drive__brakes_to_a_stand_and_not_backwards() -> None:
 
 def test_drive__players_that_do_not_move_are_untouched() -> None:
     state = State.empty(1, 2)
-    state.speed_mps[:], state.heading_rad[:], state.steering_rad[:] = 10.0, 1.0, 0.05
+    state.speed_mps[:], state.heading_rad[:], state.steering_rad[:], state.friction[:] = 10.0, 1.0, 0.05, 0.8
     before = state.copy()
     two = Actuators(
         **{name: value if name == "friction" else np.repeat(value, 2) for name, value in actuators()._asdict().items()}
@@ -214,9 +222,7 @@ def test_requests__the_wheel_is_relative_to_the_bend_of_the_road(wheel: float, r
 
 
 @settings(max_examples=100, deadline=None)
-@given(
-    pedals=st.floats(-1.0, 1.0), wheel=st.floats(-1.0, 1.0), speed=st.floats(0.0, 40.0), road=st.floats(-0.3, 0.3)
-)
+@given(pedals=st.floats(-1.0, 1.0), wheel=st.floats(-1.0, 1.0), speed=st.floats(0.0, 40.0), road=st.floats(-0.3, 0.3))
 def test_actions__are_the_inverse_of_requests_in_a_bend(pedals: float, wheel: float, speed: float, road: float) -> None:
     speeds, roads, car = np.array([[speed]]), np.array([[road]]), actuators(max_steering_rad=1.2)
     asked = requests(np.array([[(pedals, wheel)]]), speeds, roads, car)

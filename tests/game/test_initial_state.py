@@ -120,7 +120,7 @@ PART = st.one_of(st.text(max_size=5), st.integers(-5, 5))
 PARTS = st.lists(PART, min_size=1, max_size=4).map(tuple)
 
 
-@settings(max_examples=100)
+@settings(max_examples=100, deadline=None)
 @given(PARTS, PARTS)
 def test_seed__differs_for_different_parts(one: tuple[str | int, ...], two: tuple[str | int, ...]) -> None:
     assert (seed_of(*one) == seed_of(*two)) == (one == two)

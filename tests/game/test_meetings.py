@@ -39,6 +39,7 @@ CROSSING: Mapping[str, Any] = {
     "until_m": np.inf,
     "zone_m": 7.0,
     "length_m": 3.0,
+    "across": False,
 }
 
 

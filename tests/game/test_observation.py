@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 
 from harness.game.arrays import FloatArray
 from harness.game.observation import observe
-from harness.game.observation_layout import AHEAD_M, LAYOUT, OF_OTHERS, OTHERS, SIZE
+from harness.game.observation_layout import LAYOUT, OF_OTHERS, OTHERS, SIZE
 from harness.game.quantities import Quantities
 from harness.game.rails import Rails
-from harness.game.road import MARGIN_M, SPACING_M, Road, Route, Routes
+from harness.game.road import AHEAD_M, MARGIN_M, SPACING_M, Road, Route, Routes
 from harness.game.state import Outcome
 from harness.game.world import World
 from harness.traffic.scene import OpenScene
@@ -39,7 +39,7 @@ def car(x: float, y: float = -1.6, **more: Any) -> dict[str, Any]:
 
 def test_layout__names_every_entry_once() -> None:
     assert len(set(LAYOUT)) == len(LAYOUT) == SIZE
-    assert SIZE == 90
+    assert SIZE == 96
     assert OF_OTHERS.sum() == OTHERS * 13 + 2  # and the leader
 
 
@@ -60,6 +60,7 @@ def test_observation__of_a_car_on_the_merge_road(moment: Moment, world: World) -
         "own_side_left_m": 1.0,  # a one-way road
         "own_side_right_m": -1.0,
         "path_turned_rad@0m": 0.0,
+        "path_bend_per_m@0m": 0.0,
         "path_left_m": 0.4,  # the route is 3.2 of 8 m to the left
         "free_left_m@0m": 4.8 / 8.0,
         "free_right_m@0m": -1.6 / 8.0,
@@ -275,7 +276,7 @@ def test_observation__of_the_mirror_image_is_the_mirror_image(
         for side in ("free", "own_side"):
             swapped = swapped.replace(f"{side}_left", "?").replace(f"{side}_right", f"{side}_left")
             swapped = swapped.replace("?", f"{side}_right")
-        odd = any(part in name for part in ("left", "right", "turned_rad", "turned_sin", "steering"))
+        odd = any(part in name for part in ("left", "right", "turned_rad", "turned_sin", "steering", "bend"))
         back[..., k] = two[..., names[swapped]] * (-1.0 if odd else 1.0)
     assert close_but_for_ties(one, back)
 

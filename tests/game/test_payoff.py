@@ -140,11 +140,23 @@ def test_red_light__not_passed_costs_nothing(moment: Moment, world: World, after
 
 
 @pytest.mark.parametrize(("speed_mps", "value"), [(-1.0, 0.0), (0.0, 0.0), (2.9, 0.0), (3.0, -1.0), (12.0, -1.0)])
-def test_stop_sign__counts_once_from_its_speed_on(
-    moment: Moment, world: World, speed_mps: float, value: float
-) -> None:
+def test_stop_sign__counts_once_from_its_speed_on(moment: Moment, world: World, speed_mps: float, value: float) -> None:
     q = with_quantity(moment(world, [car(50.0), FAR]), "_passed", (NO_LINE, np.array([[speed_mps, -1.0]])))
     assert value_of(q, "stop_sign", 3.0, weight=5.0) == 5.0 * value
+
+
+@pytest.mark.parametrize(("before_s", "value"), [(np.inf, 0.0), (4.0, 0.0), (1.0, -0.75), (0.0, -1.0)])
+def test_yield__is_the_nearness_of_the_body_with_priority(
+    moment: Moment, world: World, before_s: float, value: float
+) -> None:
+    q = with_quantity(moment(world, [car(50.0), FAR]), "entered_before_s", np.array([[before_s, np.inf]]))
+    assert value_of(q, "yield", 4.0, weight=2.0) == 2.0 * value
+
+
+def test_gap__is_paid_per_second_and_by_its_nearness(moment: Moment, world: World) -> None:
+    for gap_s, rate in ((np.inf, 0.0), (3.0, 0.0), (0.75, -0.75), (0.0, -1.0)):
+        q = with_quantity(moment(world, [car(50.0), FAR]), "gap_s", np.array([[gap_s, np.inf]]))
+        assert value_of(q, "gap", 3.0) == pytest.approx(0.1 * rate)
 
 
 NO_LINE = np.full((1, 2), -1.0)
@@ -157,8 +169,8 @@ def with_quantity(q: Quantities, name: str, value: Any) -> Quantities:
 
 
 def test_terms__are_all_tested_here() -> None:
-    events = {"collision", "rail", "goal", "timeout", "red_light", "stop_sign"}
-    by_hand = {*events, "progress", *(each[0] for each in PER_SECOND)}
+    events = {"collision", "rail", "goal", "timeout", "red_light", "stop_sign", "yield"}
+    by_hand = {*events, "progress", "gap", *(each[0] for each in PER_SECOND)}
     assert by_hand == set(TERMS)
 
 

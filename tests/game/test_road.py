@@ -2,53 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.game.arrays import FloatArray
+from harness.game.bicycle import curvature_per_m, requests
 from harness.game.rails import Rails
-from harness.game.road import MARGIN_M, SPACING_M, Route, Routes
-
-
-def route(x: FloatArray, y: FloatArray, heading: FloatArray, length: float, lanes: int = 1) -> Route:
-    n = len(x)
-    return Route(
-        x_m=x,
-        y_m=y,
-        heading_rad=heading,
-        left_edge_m=np.full(n, 3.0),
-        right_edge_m=np.full(n, -3.0),
-        own_left_m=np.full(n, np.inf),
-        own_right_m=np.full(n, -np.inf),
-        speed_limit_mps=np.full(n, 13.0),
-        lane_offset_m=np.zeros((n, lanes)),
-        lane_end_m=np.full((n, lanes), np.inf),
-        length_m=length,
-        goal_m=length - 5.0,
-    )
-
-
-def straight(heading: float, length: float = 80.0, lanes: int = 1, x0: float = 0.0, y0: float = 0.0) -> Route:
-    stations = np.arange(-MARGIN_M, length + MARGIN_M + SPACING_M, SPACING_M)
-    x, y = x0 + stations * np.cos(heading), y0 + stations * np.sin(heading)
-    return route(x, y, np.full(len(x), heading), length, lanes)
-
-
-def arc(radius: float, length: float = 60.0) -> Route:
-    """A circular arc from the origin, to the east and then left (negative radius: right), straight at both ends."""
-    stations = np.arange(-MARGIN_M, length + MARGIN_M + SPACING_M, SPACING_M)
-    within = np.clip(stations, 0.0, length)
-    turned, beyond = within / radius, stations - within
-    x = radius * np.sin(turned) + beyond * np.cos(turned)
-    y = radius * (1.0 - np.cos(turned)) + beyond * np.sin(turned)
-    return route(x, y, turned, length)
-
-
-def on_arc(radius: float, station: float, offset: float) -> tuple[float, float]:
-    turned = station / radius
-    return (radius - offset) * np.sin(turned), radius - (radius - offset) * np.cos(turned)
+from harness.game.road import MARGIN_M, SPACING_M, Routes, steering_of_bend_rad
+from tests.support.bicycle import actuators, advance, state_of
+from tests.support.roads import arc, on_arc, straight
 
 
 def locate(routes: Routes, points: list[tuple[float, float]], before: list[float]) -> tuple[FloatArray, FloatArray]:
@@ -113,6 +79,75 @@ def test_rows__stay_within_a_players_own_route() -> None:
     rows = routes.rows(np.array([[1e4, -1e4]]))
     assert rows[0, 0] == routes.last_row[0]
     assert rows[0, 1] == routes.first_row[1]
+
+
+# --- the wheel that follows the road ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("radius", [15.0, -15.0, 25.0, -60.0])
+@pytest.mark.parametrize("speed", [4.0, 8.0])
+def test_road_steering__a_wheel_of_0_follows_a_quarter_circle(radius: float, speed: float) -> None:
+    """From the straight into the bend, through a quarter circle and out of it, without any correction."""
+    routes = Routes.of([arc(radius, length=abs(radius) * np.pi / 2.0)])
+    state, car = state_of(speed), actuators()
+    state.x_m[:] = -10.0
+    state.station_m, offset = routes.locate(state.x_m, state.y_m, np.full((1, 1), -10.0))
+    offsets = []
+    while state.station_m[0, 0] < abs(radius) * np.pi / 2.0 + 5.0:
+        bend = routes.road_steering_rad(state.station_m, state.speed_mps, car.wheelbase_m)
+        acceleration, steering = requests(np.zeros((1, 1, 2)), state.speed_mps, bend, car)
+        advance(state, float(acceleration[0, 0]), float(steering[0, 0]), car)
+        state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
+        offsets.append(offset[0, 0])
+    assert np.abs(offsets).max() < 0.1
+    assert state.heading_rad[0, 0] == pytest.approx(np.sign(radius) * np.pi / 2.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("station", "speed", "bend"),
+    [
+        (-20.0, 5.0, 0.0),  # straight
+        (-1.15, 10.0, 0.0),  # the rear axle is 1.35 m behind, in 0.05 s at -2 m: the 4 m around it are straight
+        (0.85, 10.0, 0.5),  # at 0 m: the bend begins half-way through the 4 m
+        (2.85, 10.0, 1.0),  # at 2 m: all of them
+        (0.35, 0.0, 0.25),  # at -1 m
+        (31.35, 0.0, 1.0),
+    ],
+)
+def test_road_steering__is_that_of_the_bend_at_the_rear_axle(station: float, speed: float, bend: float) -> None:
+    routes = Routes.of([arc(20.0)])
+    found = routes.road_steering_rad(np.array([[station]]), np.array([[speed]]), np.array([2.7]))
+    # a bend of 20 m: tan = 2.7 / 20 / sqrt(1 - (2.7 / 20 / 2)^2)
+    turn = bend * 2.7 / 20.0
+    assert found[0, 0] == pytest.approx(np.arctan(turn / np.sqrt(1.0 - 0.25 * turn**2)), abs=1e-9)
+
+
+@settings(max_examples=100, deadline=None)
+@given(radius=st.floats(2.7, 1e4), sign=st.sampled_from([-1.0, 1.0]))
+def test_steering_of_bend__drives_the_bend(radius: float, sign: float) -> None:
+    steering = steering_of_bend_rad(sign / radius, 2.7)
+    assert curvature_per_m(np.array(steering), np.array(2.7)) == pytest.approx(sign / radius, rel=1e-9)
+
+
+def test_steering_of_bend__of_a_corner_is_finite() -> None:
+    # the lines of a net may turn at a point: as a bend as tight as the wheelbase, 0.8571 rad
+    assert steering_of_bend_rad(50.0, 2.7) == pytest.approx(np.arctan(1.0 / np.sqrt(0.75)))
+
+
+# --- limits ahead ----------------------------------------------------------------------------------------------------
+
+
+def test_approach__comfortable_braking_reaches_a_lower_limit_ahead() -> None:
+    slow_from = 40.0
+    road = straight(0.0)
+    stations = np.arange(len(road.x_m)) * SPACING_M - MARGIN_M
+    routes = Routes.of([replace(road, speed_limit_mps=np.where(stations >= slow_from, 5.0, 13.0))])
+    rows = routes.rows(np.array([[slow_from], [slow_from - 6.0], [slow_from - 36.0], [slow_from - 40.0]]))[:, 0]
+    # 25 + 2 * 2 * 6 = 49; 25 + 2 * 2 * 36 = 169
+    assert routes.approach_mps[rows] == pytest.approx([5.0, 7.0, 13.0, 13.0])
+
+
+# --- rails -----------------------------------------------------------------------------------------------------------
 
 
 POINT = st.tuples(st.floats(-150.0, 150.0), st.floats(-80.0, 80.0))

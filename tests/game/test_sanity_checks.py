@@ -183,9 +183,9 @@ def displace_in_sumo(monkeypatch: pytest.MonkeyPatch, far_m: float) -> None:
     steps = {"now": 0, "games": 0}
     reset, step = LibsumoSimulation.reset, LibsumoSimulation.step
 
-    def counted_reset(simulation: LibsumoSimulation, *arguments: Any) -> None:
+    def counted_reset(simulation: LibsumoSimulation, *arguments: Any) -> Any:
         steps.update(now=0, games=steps["games"] + 1)
-        reset(simulation, *arguments)
+        return reset(simulation, *arguments)
 
     def displaced_step(simulation: LibsumoSimulation, *poses: FloatArray) -> Any:
         steps["now"] += 1

@@ -116,7 +116,7 @@ def test_scenery__another_vehicles_type_called_ego_stays_its_own(merge_net: Path
     routes = tmp_path / "own.rou.xml"
     routes.write_text('<routes><vType id="ego" length="4.0"/><vType id="car" length="4.6"/></routes>')
     trace = game(drive("ego", straight(30, -1.6, 9, 5)), drive("flow.0", straight(50, -1.6, 9, 5), vehicle_type="ego"))
-    types = types_of_vehicles(trace, routes)
+    types = types_of_vehicles(trace, [routes])
     assert (types["ego"].name, types["ego"].length_m) == ("ego", 4.6)
     assert (types["flow.0"].name, types["flow.0"].length_m) == ("ego_type", 4.0)
     assert types["flow.0"].colour != types["ego"].colour
@@ -124,17 +124,17 @@ def test_scenery__another_vehicles_type_called_ego_stays_its_own(merge_net: Path
 
 def test_contacts__are_found_where_and_when_the_bodies_touch(merge_net: Path, tmp_path: Path) -> None:
     routes = merge_net.with_name("merge.rou.xml")
-    (crash,) = contacts(collision_game(), types_of_vehicles(collision_game(), routes), RAILS)
+    (crash,) = contacts(collision_game(), types_of_vehicles(collision_game(), [routes]), RAILS)
     assert crash.time_s == pytest.approx(3.2)
     assert crash.label == "collision at 3.2 s"
     assert 78.0 < crash.x_m < 82.0
     assert -3.0 < crash.y_m < -1.5
 
-    (scrape,) = contacts(rail_game(), types_of_vehicles(rail_game(), routes), RAILS)
+    (scrape,) = contacts(rail_game(), types_of_vehicles(rail_game(), [routes]), RAILS)
     assert scrape.label == "rail at 3.0 s"
     assert scrape.y_m == pytest.approx(0.0)
-    assert contacts(clean_game(), types_of_vehicles(clean_game(), routes), RAILS) == []
-    assert contacts(busy_game(), types_of_vehicles(busy_game(), routes), RAILS) == []
+    assert contacts(clean_game(), types_of_vehicles(clean_game(), [routes]), RAILS) == []
+    assert contacts(busy_game(), types_of_vehicles(busy_game(), [routes]), RAILS) == []
 
 
 def test_contacts__one_wreck_after_another(merge_net: Path) -> None:
@@ -143,7 +143,7 @@ def test_contacts__one_wreck_after_another(merge_net: Path) -> None:
         drive("non_ego", straight(68.0, -4.8, 12.0, 10) + wreck, outcome="rail"),
         drive("ego", straight(40.0, -4.8, 12.0, 31) + [(76.5, -4.8, 0.0, 0.0)] * 10, outcome="collision"),
     )
-    found = contacts(trace, types_of_vehicles(trace, merge_net.with_name("merge.rou.xml")), RAILS)
+    found = contacts(trace, types_of_vehicles(trace, [merge_net.with_name("merge.rou.xml")]), RAILS)
     assert [contact.label for contact in found] == ["rail at 1.0 s", "collision at 3.1 s"]
 
 

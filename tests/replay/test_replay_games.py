@@ -101,7 +101,7 @@ def test_replay__every_frame_is_the_game_that_was_played(
     write_replay(
         trace,
         scene.net_file,
-        scene.routes.path,
+        scene.route_files,
         tmp_path / "replay",
         title="a game",
         step_length_s=scene.world.step_s,

@@ -59,7 +59,7 @@ def shown(folder: Path, light: str) -> dict[int, str]:
 
 def write(recorded: pd.DataFrame, folder: Path) -> Path:
     net, routes = (LEFT_ACROSS / f"left_across.{kind}.xml" for kind in ("net", "rou"))
-    write_replay(recorded, net, routes, folder, title="lights", step_length_s=STEP_S)
+    write_replay(recorded, net, [routes], folder, title="lights", step_length_s=STEP_S)
     return folder
 
 

@@ -58,7 +58,7 @@ def photograph(folder: Path, screen: str, steps: list[int]) -> list[np.ndarray]:
 
 def place(mask: np.ndarray, trace: pd.DataFrame, net: Path) -> tuple[float, float]:
     """The centre of the marked pixels in net coordinates."""
-    found = contacts(trace, types_of_vehicles(trace, net.with_name("merge.rou.xml")), RAILS)
+    found = contacts(trace, types_of_vehicles(trace, [net.with_name("merge.rou.xml")]), RAILS)
     view = choose_view(trace, found)
     height, width = mask.shape
     metres = max(view.width_m / width, view.height_m / height)  # per pixel

@@ -30,16 +30,11 @@ def actuators(**changes: float) -> Actuators:
 def state_of(speed_mps: float, heading_rad: float = 0.0, steering_rad: float = 0.0) -> State:
     state = State.empty(1, 1)
     state.speed_mps[:], state.heading_rad[:], state.steering_rad[:] = speed_mps, heading_rad, steering_rad
-    state.present[:] = True
+    state.present[:], state.friction[:] = True, 0.8
     return state
 
 
 def advance(state: State, acceleration_mps2: float, steering_rad: float, car: Actuators | None = None) -> None:
-    move(
-        state,
-        np.array([[acceleration_mps2]]),
-        np.array([[steering_rad]]),
-        np.array([[True]]),
-        car or actuators(),
-        STEP_S,
-    )
+    car = car or actuators()
+    state.friction[:] = car.friction
+    move(state, np.array([[acceleration_mps2]]), np.array([[steering_rad]]), np.array([[True]]), car, STEP_S)

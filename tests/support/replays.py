@@ -132,7 +132,7 @@ GAMES = {"clean": clean_game, "collision": collision_game, "rail": rail_game, "b
 
 def write(trace: pd.DataFrame, net: Path, folder: Path, **changes: object) -> Path:
     options = {"title": "test game", "step_length_s": STEP_S, "rails": RAILS} | changes
-    write_replay(trace, net, net.with_name("merge.rou.xml"), folder, **options)  # type: ignore[arg-type]
+    write_replay(trace, net, [net.with_name("merge.rou.xml")], folder, **options)  # type: ignore[arg-type]
     return folder
 
 

@@ -326,3 +326,13 @@ def _many() -> RouteFile:
 
 
 MANY = _many()
+
+
+def test_additional_file__gives_types_and_bus_stops(write: Write, tmp_path: Path) -> None:
+    more = tmp_path / "more.add.xml"
+    more.write_text('<additional><vType id="bus"/><busStop id="s" lane="b_0"/></additional>', encoding="utf-8")
+    path = write('<trip id="t" type="bus" from="a" to="c"><stop busStop="s" duration="9"/></trip>')
+    assert read_route_file(path, more).vehicles["t"].trip == ("a", "b", "c")
+    more.write_text("<additional><tlLogic/></additional>", encoding="utf-8")
+    with pytest.raises(UsageError, match=r"more.add.xml: tlLogic: is not understood here"):
+        read_route_file(path, more)

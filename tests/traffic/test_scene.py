@@ -168,7 +168,8 @@ def test_files__two_missing_ones_are_both_named(folder: Path) -> None:
             (
                 "scene.toml",
                 "non_ego.beside_ego_m",
-                "reaches from -18 to 53 m, off lane 'approach_0' of 100 m (keep it between 0 and 100 m)",
+                "reaches from -18 to 53 m, off lane 'approach_0' of 100 m "
+                "(keep it between 0 and 100 m, or give route_m instead of lane)",
             ),
         ),
         (
@@ -208,7 +209,7 @@ def test_start__off_the_lane_is_an_error(folder: Path) -> None:
     assert (ego.key, non_ego.key) == ("ego.position_m", "non_ego.beside_ego_m")
     assert ego.message == "reaches from 30 to 120 m, off lane 'approach_1' of 100 m"
     assert non_ego.message == "reaches from 22 to 128 m, off lane 'approach_0' of 100 m"
-    assert ego.remedy == non_ego.remedy == "keep it between 0 and 100 m"
+    assert ego.remedy == non_ego.remedy == "keep it between 0 and 100 m, or give route_m instead of lane"
 
 
 def own_route(folder: Path, edges: str) -> None:
@@ -228,8 +229,11 @@ def test_route__an_unknown_edge_is_named(folder: Path) -> None:
 
 def test_route__must_reach_the_goal(folder: Path) -> None:
     own_route(folder, "approach")
-    expected = "its route does not pass the goal's edge 'exit' (correct the route's edges)"
-    assert only(folder) == ("merge.rou.xml", "vehicle ego", expected)
+    expected = (
+        "edge 'exit' is not on the route of vehicle 'ego', after its start "
+        "(choose one of its edges (it ends with approach), or give [ego.goal])"
+    )
+    assert only(folder) == ("scene.toml", "goal.edge", expected)
 
 
 def test_route__must_be_connected(folder: Path) -> None:

@@ -34,7 +34,7 @@ from harness.evaluation.strategies import BestResponse
 def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str]:
     """Each stage's key. It covers what the stage reads itself, and the keys of the stages that it needs."""
     scene = campaign.scene.document
-    files = {name: campaign.hash_of(campaign.scene.folder / name) for name in ("scene.toml", scene.net, scene.routes)}
+    files = {name: campaign.hash_of(campaign.scene.folder / name) for name in scene.files}
     shared = {
         "format": NUMBERS_FORMAT,
         "scene": files,

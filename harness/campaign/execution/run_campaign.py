@@ -39,7 +39,7 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: Start
         with console.status(CHECKING):
             manifest = _ManifestKeeper(campaign, folder, stages, keys)
             scene = campaign.scene.document
-            folder.keep_scene(campaign.scene.folder, ("scene.toml", scene.net, scene.routes))
+            folder.keep_scene(campaign.scene.folder, scene.files)
             finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
             kept = kept_result(folder, manifest.content) if len(finished) == len(stages) else None
         if kept is not None:

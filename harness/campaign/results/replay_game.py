@@ -103,7 +103,7 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
         write_replay(
             trace,
             scene.net_file,
-            scene.routes.path,
+            scene.route_files,
             replay,
             title=title,
             step_length_s=scene.world.step_s,

@@ -208,7 +208,7 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
         write_replay(
             reader.read(folder.traces(stage_id(game.arm, game.seed)), game.episode),
             scene.net_file,
-            scene.routes.path,
+            scene.route_files,
             folder.replays / name,
             title=f"{game.arm}, seed {game.seed}, episode {game.episode}",
             step_length_s=scene.world.step_s,

@@ -9,9 +9,10 @@ from functools import cached_property
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.encounters import Encounter, encounters_of
 from harness.evaluation.manoeuvres.thresholds import SAME_WITHIN_S
 from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
-from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities
 from harness.game.route_coordinates import PATH_M
 from harness.game.state import EGO, ROLES, Bodies
@@ -42,11 +43,9 @@ class Course:
         trace: pd.DataFrame,
         world: World,
         sizes_m: Mapping[str, tuple[float, float]],
-        signals: IntArray | None = None,
     ) -> Course:
-        """From one game's trace. `sizes_m` are length and width of vehicle types, by default those of SUMO; `signals`
-        [T, L] are the states of signal links, by default off."""
-        quantities = quantities_of(trace, world, sizes_by_name(trace, sizes_m), signals)
+        """From one game's trace. `sizes_m` are length and width of vehicle types, by default those of SUMO."""
+        quantities = quantities_of(trace, world, sizes_by_name(trace, sizes_m))
         players = len(ROLES)
         bodies = Bodies(*(getattr(quantities.bodies, each.name)[:, :players].copy() for each in fields(Bodies)))
         between = Quantities(world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m)
@@ -80,6 +79,10 @@ class Course:
         for (first, last), count in zip(spans, counts, strict=True):
             if count >= self.steps(least_s):
                 yield first, last
+
+    def encounters(self, player: int) -> list[Encounter]:
+        """The player's encounters with other road users at junctions."""
+        return encounters_of(self.quantities, player, self.drove[:, player])
 
     # --- across the road ------------------------------------------------------------------------------------------
 

@@ -10,8 +10,8 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.manoeuvres.course import Course
-from harness.evaluation.manoeuvres.rules import RULES, Span
-from harness.game.arrays import IntArray
+from harness.evaluation.manoeuvres.rules import RULES
+from harness.evaluation.manoeuvres.spans import Span
 from harness.game.state import ROLES
 from harness.game.world import World
 
@@ -32,18 +32,15 @@ class Manoeuvre:
 
 
 def find_manoeuvres(
-    trace: pd.DataFrame,
-    world: World,
-    sizes_m: Mapping[str, tuple[float, float]] | None = None,
-    signals: IntArray | None = None,
+    trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]] | None = None
 ) -> list[Manoeuvre]:
     """The manoeuvres of both players in one game, by the time they begin.
 
     `trace` are the game's rows (columns as in `traces/`) on the scene of `world`; `sizes_m` are length and width of
     the vehicle types in it, with SUMO's default for the others. In a game with an ego, manoeuvres end with the ego's
-    game. `signals` [T, L] are the states of signal links in each step, by default off.
+    game.
     """
-    course = Course.of(trace, world, sizes_m or {}, signals)
+    course = Course.of(trace, world, sizes_m or {})
     found = []
     for player, role in enumerate(ROLES):
         if course.drove[:, player].any():

@@ -6,26 +6,20 @@ The numbers of the rules are in `thresholds`. Players are indices of the players
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from harness.evaluation.manoeuvres import thresholds as least
 from harness.evaluation.manoeuvres.course import Course, runs
+from harness.evaluation.manoeuvres.junction_rules import (
+    fails_to_yield,
+    rolls_through,
+    runs_red,
+    turns_across,
+    wrong_ways,
+)
+from harness.evaluation.manoeuvres.spans import SLACK, Span, span_of
 from harness.game.arrays import BoolArray
-
-_SLACK = 1e-9  # of rounding: a number equal to its threshold counts
-
-
-@dataclass(frozen=True, kw_only=True)
-class Span:
-    """One manoeuvre: its first and last step, gap and time to collision (inf: none), and a description."""
-
-    first: int
-    last: int
-    gap_m: float
-    ttc_s: float
-    text: str
 
 
 def cut_ins(course: Course, player: int, other: int) -> Iterator[Span]:
@@ -39,7 +33,7 @@ def cut_ins(course: Course, player: int, other: int) -> Iterator[Span]:
     gap = np.maximum(course.gap_m(player, other), 0.0)
     time_gap = gap / np.maximum(course.quantities.speed_mps[:, other], 0.1)
     ttc = course.between.time_to_collision_s[:, other]
-    near = (time_gap <= least.CUT_IN_TIME_GAP_S + _SLACK) | (ttc <= least.CUT_IN_TTC_S + _SLACK)
+    near = (time_gap <= least.CUT_IN_TIME_GAP_S + SLACK) | (ttc <= least.CUT_IN_TTC_S + SLACK)
     enters = both & ahead & in_way & ~course.quantities.state.lapsed[:, player]
     enters[1:] &= ~in_way[:-1] & both[:-1]
     enters[0] = False
@@ -70,9 +64,9 @@ def _moved_more(course: Course, player: int, other: int, step: int) -> bool:
 def hard_brakes(course: Course, player: int, other: int) -> Iterator[Span]:
     """The player brakes harder than an ordinary stop needs."""
     braking = -course.quantities.state.acceleration_mps2[:, player]
-    mask = course.drove[:, player] & (braking >= least.HARD_BRAKE_MPS2 - _SLACK)
+    mask = course.drove[:, player] & (braking >= least.HARD_BRAKE_MPS2 - SLACK)
     for first, last in course.stretches(mask, least.HARD_BRAKE_LEAST_S):
-        yield _span(course, player, first, last, f"brakes at up to {braking[first : last + 1].max():.1f} m/s²")
+        yield span_of(course, player, first, last, f"brakes at up to {braking[first : last + 1].max():.1f} m/s²")
 
 
 def swerves(course: Course, player: int, other: int) -> Iterator[Span]:
@@ -80,12 +74,12 @@ def swerves(course: Course, player: int, other: int) -> Iterator[Span]:
     for sign, side in ((1.0, "left"), (-1.0, "right")):
         sideways, turned = course.swerving_mps2(player, sign), sign * course.turned_rad[:, player]
         back = course.swerving_mps2(player, -sign) >= least.SWERVE_MPS2
-        mask = course.drove[:, player] & (sideways >= least.SWERVE_MPS2 - _SLACK)
+        mask = course.drove[:, player] & (sideways >= least.SWERVE_MPS2 - SLACK)
         for first, last in course.stretches(mask, least.SWERVE_LEAST_S, back):
             steps = first + np.flatnonzero(mask[first : last + 1])
-            if turned[steps].max() >= least.SWERVE_TURN_RAD - _SLACK:
+            if turned[steps].max() >= least.SWERVE_TURN_RAD - SLACK:
                 text = f"swerves to the {side}, at up to {sideways[steps].max():.1f} m/s² sideways"
-                yield _span(course, player, first, last, text)
+                yield span_of(course, player, first, last, text)
 
 
 def drifts(course: Course, player: int, other: int) -> Iterator[Span]:
@@ -99,7 +93,7 @@ def drifts(course: Course, player: int, other: int) -> Iterator[Span]:
         return  # SUMO drives it and records no steering
     still = np.abs(np.diff(steering, prepend=steering[:1])) <= least.HANDS_OFF_RADPS * course.step_s
     for first, last in runs(drove & still & ~lapsed):
-        out = course.quantities.lane_offset_m[first : last + 1, player] >= least.OUT_OF_LANE_M - _SLACK
+        out = course.quantities.lane_offset_m[first : last + 1, player] >= least.OUT_OF_LANE_M - SLACK
         if last - first + 1 >= course.steps(least.HANDS_OFF_LEAST_S) and out.any():
             yield from _drift(course, player, first, last, "out of its lane with the wheel held still")
 
@@ -108,9 +102,9 @@ def _drift(course: Course, player: int, first: int, last: int, how: str) -> Iter
     begin = max(first - 1, 0)  # a row has the position at the end of its step
     moved = course.sideways_m[begin : last + 1, player] - course.sideways_m[begin, player]
     most = moved[np.abs(moved).argmax()]
-    if abs(most) >= least.DRIFT_M - _SLACK:
+    if abs(most) >= least.DRIFT_M - SLACK:
         side = "left" if most > 0.0 else "right"
-        yield _span(course, player, first, last, f"drifts {abs(most):.1f} m to the {side} {how}")
+        yield span_of(course, player, first, last, f"drifts {abs(most):.1f} m to the {side} {how}")
 
 
 def overtakes(course: Course, player: int, other: int) -> Iterator[Span]:
@@ -124,7 +118,7 @@ def overtakes(course: Course, player: int, other: int) -> Iterator[Span]:
     draws_level[0] = False
     search_from = 0
     for step in np.flatnonzero(draws_level).tolist():
-        behind = np.flatnonzero(ahead[search_from:step] <= -least.OVERTAKE_FROM_M + _SLACK)
+        behind = np.flatnonzero(ahead[search_from:step] <= -least.OVERTAKE_FROM_M + SLACK)
         last = _while(both & (ahead >= 0.0), step)
         past = np.flatnonzero(gap[step : last + 1] >= 0.0)
         if len(behind) and len(past):
@@ -132,7 +126,7 @@ def overtakes(course: Course, player: int, other: int) -> Iterator[Span]:
             reached = np.flatnonzero(ahead[:step] <= -length)
             first = int(reached[-1]) + 1 if len(reached) else 0
             until = step + int(past[0])
-            yield _span(
+            yield span_of(
                 course, player, first, until, f"overtakes on the lane that ends, {lane_end[step]:.0f} m before its end"
             )
             search_from = step + 1
@@ -142,11 +136,11 @@ def tailgates(course: Course, player: int, other: int) -> Iterator[Span]:
     """The player follows its leader too closely for some time."""
     quantities = course.quantities
     time_gap = quantities.time_gap_s[:, player]
-    mask = course.drove[:, player] & (time_gap < least.TAILGATE_TIME_GAP_S - _SLACK)
+    mask = course.drove[:, player] & (time_gap < least.TAILGATE_TIME_GAP_S - SLACK)
     mask &= quantities.speed_mps[:, player] >= least.TAILGATE_SPEED_MPS
     for first, last in course.stretches(mask, least.TAILGATE_LEAST_S):
         closest = time_gap[first : last + 1].min()
-        yield _span(course, player, first, last, f"follows as close as {closest:.1f} s")
+        yield span_of(course, player, first, last, f"follows as close as {closest:.1f} s")
 
 
 def forced_stops(course: Course, player: int, other: int) -> Iterator[Span]:
@@ -155,14 +149,14 @@ def forced_stops(course: Course, player: int, other: int) -> Iterator[Span]:
     speed, gap = quantities.speed_mps[:, player], quantities.leader_gap_m[:, player]
     lane_end = quantities.lane_end_m[:, player]
     has_driven = np.maximum.accumulate(np.where(drove, speed, 0.0)) >= least.FORCED_FROM_MPS
-    behind = gap <= least.FORCED_GAP_M + _SLACK
-    at_end = lane_end <= least.FORCED_LANE_END_M + _SLACK
-    mask = drove & has_driven & (speed <= least.STANDSTILL_MPS + _SLACK) & (behind | at_end)
+    behind = gap <= least.FORCED_GAP_M + SLACK
+    at_end = lane_end <= least.FORCED_LANE_END_M + SLACK
+    mask = drove & has_driven & (speed <= least.STANDSTILL_MPS + SLACK) & (behind | at_end)
     for first, last in course.stretches(mask, least.FORCED_LEAST_S):
         where = (
             f"{gap[first]:.1f} m behind another" if behind[first] else f"{lane_end[first]:.1f} m before its lane ends"
         )
-        yield _span(course, player, first, last, f"is brought to {speed[first : last + 1].min():.1f} m/s, {where}")
+        yield span_of(course, player, first, last, f"is brought to {speed[first : last + 1].min():.1f} m/s, {where}")
 
 
 RULES: Mapping[str, Callable[[Course, int, int], Iterator[Span]]] = {
@@ -173,14 +167,12 @@ RULES: Mapping[str, Callable[[Course, int, int], Iterator[Span]]] = {
     "overtake": overtakes,
     "tailgate": tailgates,
     "forced_stop": forced_stops,
+    "fails_to_yield": fails_to_yield,
+    "turns_across": turns_across,
+    "runs_red": runs_red,
+    "rolls_through": rolls_through,
+    "wrong_way": wrong_ways,
 }
-
-
-def _span(course: Course, player: int, first: int, last: int, text: str) -> Span:
-    """A span with the player's least trailing distance and time to collision during it."""
-    gap = course.quantities.leader_gap_m[first : last + 1, player].min()
-    ttc = course.quantities.time_to_collision_s[first : last + 1, player].min()
-    return Span(first=first, last=last, gap_m=float(gap), ttc_s=float(ttc), text=text)
 
 
 def _while(mask: BoolArray, step: int) -> int:

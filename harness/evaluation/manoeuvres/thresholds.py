@@ -76,6 +76,27 @@ FORCED_LANE_END_M = 15.0
 FORCED_LEAST_S = 0.5
 """Least duration. Our own."""
 
+# --- fails_to_yield, turns_across ---
+
+FAILS_TO_YIELD_S = 3.0
+"""Largest gap, from the player's entry into the other's way until the other would be there. A car needs about a second
+to pass, and interactions with more than 2 s between the passages are normal (Varhelyi 1998, "Drivers' speed behaviour
+at a zebra crossing"). One driver in two accepts 6.5 s (Fitzpatrick 1991, Transportation Research Record 1303)."""
+TURNS_ACROSS_S = 4.1
+"""Largest gap. Highway Capacity Manual 2010: the critical headway of a left turn from a major road."""
+
+# --- rolls_through ---
+
+STOPPED_MPS = 0.5
+"""A car that is not slower has not stopped. Our own: half of a walking pace."""
+STOPS_WITHIN_M = 5.0
+"""A stop counts in front of the line by at most this. Our own: one car, which may wait at the line already."""
+
+# --- wrong_way ---
+
+WRONG_WAY_LEAST_S = 1.0
+"""Least duration: shorter ones are corners cut. Our own."""
+
 # --- all ---
 
 SAME_WITHIN_S = 0.5

@@ -19,11 +19,12 @@ from harness.game.state import Outcome
 EXAMPLES: Mapping[str, tuple[str, str, float]] = {
     "collision": ("once", "outcome", float(Outcome.COLLISION)),
     "rail": ("once", "outcome", float(Outcome.RAIL)),
-    "speed_over_limit": ("at 10 % over", "speed_over_limit", 0.1),
+    "speed_over_limit": ("at 10 % over", "speed_over_permitted", 0.1),
+    "wrong_way": ("on the wrong side", "wrong_way", 1.0),
     "goal": ("once", "outcome", float(Outcome.GOAL)),
     "timeout": ("once", "outcome", float(Outcome.TIMEOUT)),
     "progress": ("for 100 m", "advanced_m", 100.0),
-    "speed_under_limit": ("at 10 % under", "speed_over_limit", -0.1),
+    "speed_under_limit": ("at 10 % under", "speed_over_permitted", -0.1),
     "lane_offset": ("at 1 m", "lane_offset_m", 1.0),
     "acceleration": ("at 5 m/s²", "acceleration_mps2", 5.0),
     "lateral_acceleration": ("at 3 m/s²", "lateral_acceleration_mps2", 3.0),
@@ -35,8 +36,12 @@ LIMITED: Mapping[str, str] = {
     "vehicle_clearance": "vehicle_clearance_m",
     "time_gap": "time_gap_s",
     "time_to_collision": "time_to_collision_s",
+    "yield": "entered_before_s",
+    "gap": "gap_s",
 }
-"""The quantity of each term with a limit. In the example it is half of the limit."""
+"""The quantity of each term that counts within a limit. In the example it is half of the limit."""
+FROM: Mapping[str, str] = {"red_light": "passed_red_s", "stop_sign": "passed_stop_sign_mps"}
+"""The quantity of each term that counts from a limit on. In the example it is at the limit."""
 POINTS = 401
 """How many evenly spaced inputs a function is evaluated at, besides the points of its sets."""
 
@@ -101,9 +106,11 @@ def term_examples(persona: Persona) -> list[TermExample]:
         term = TERMS[each.name]
         limit, moment, worth = "", "", np.nan
         if each.parameter is not None:
-            unit = unit_of(term.parameter)
-            limit, moment = f"within {each.parameter:g} {unit}", f"at {each.parameter / 2:g} {unit}"
-            worth = _in_a_second(payoff, each, {LIMITED[each.name]: each.parameter / 2})
+            unit, word = unit_of(term.parameter), term.parameter.split("_")[0]
+            limit = f"{word} {each.parameter:g} {unit}"
+            at = each.parameter if each.name in FROM else each.parameter / 2
+            moment = f"at {at:g} {unit}"
+            worth = _in_a_second(payoff, each, {{**FROM, **LIMITED}[each.name]: at})
         elif each.name in EXAMPLES:
             moment, quantity, value = EXAMPLES[each.name]
             worth = _in_a_second(payoff, each, {quantity: value})
@@ -165,6 +172,7 @@ def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]
         return np.array([[quantities.get(name, calm)]])
 
     far = {name: array(name, np.inf) for name in LIMITED.values()}
+    not_passed = {name: array(name, -1.0) for name in FROM.values()}
     state: Any = SimpleNamespace(
         step=np.array([0]),
         x_m=np.zeros((1, 1)),
@@ -176,9 +184,11 @@ def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]
         world=SimpleNamespace(step_s=1.0),
         state=state,
         advanced_m=array("advanced_m", 0.0),
-        speed_over_limit=array("speed_over_limit", 0.0),
+        speed_over_permitted=array("speed_over_permitted", 0.0),
+        wrong_way=array("wrong_way", 0.0),
         lane_offset_m=array("lane_offset_m", 0.0),
         lateral_acceleration_mps2=array("lateral_acceleration_mps2", 0.0),
         **far,
+        **not_passed,
     )
     return float(Payoff(alpha=payoff.alpha, terms=(term,), fuzzy={}).evaluate(moment, 0)[term.name][0])

@@ -1,0 +1,369 @@
+"""Signals, signs and sides of the road by hand, on the merge road with a stop line at 90 m.
+The players drive east on the line y = -1.6, so their stations are their x. Cars are 4.6 m long: the front bumper is
+2.3 m ahead. The limit is 13.89 m/s. Comfortable braking is 2 m/s2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from harness.game.observation import observe
+from harness.game.observation_layout import LAYOUT, in_units
+from harness.game.payoff import Payoff, Weighted
+from harness.game.payoff_terms import GROUPS
+from harness.game.quantities import Quantities
+from harness.game.right_of_way import NO_JUNCTIONS, Conflicts, Control, RightOfWay, Signal, StopLines, Streams
+from harness.game.traffic_rules import since_change_s
+from harness.game.world import World
+from harness.traffic.scene import OpenScene
+
+Moment = Callable[..., Quantities]
+LINE_M, LIMIT_MPS, HALF_M = 90.0, 13.89, 2.3
+FAR = {"x_m": 190.0, "y_m": -1.6}
+
+
+def world_of(merge: OpenScene, control: Control, link: int = -1) -> World:
+    """The merge road with a stop line of the ego."""
+    links = (("light", 0), ("light", 1)) if link >= 0 else ()
+    lines = StopLines.of([(0, LINE_M, control, link)])
+    return replace(merge.world, right_of_way=NO_JUNCTIONS._replace(stop_lines=lines, signal_links=links))
+
+
+def at(
+    moment: Moment,
+    world: World,
+    front_m: float,
+    speed_mps: float = 10.0,
+    signal: tuple[int, float] = (0, 0.0),
+    advanced_m: float = 1.0,
+    others: Any = (),
+) -> Quantities:
+    """The ego with its front bumper at a station, after a step in which it advanced; the signal of link 1 and the
+    seconds since it changed."""
+    ego = {"x_m": front_m - HALF_M, "y_m": -1.6, "speed_mps": speed_mps}
+    q = moment(world, [ego, FAR], others)
+    q.state.signals = np.array([[Signal.OFF, signal[0]]], dtype=np.int8)
+    q.state.signal_s = np.array([[0.0, signal[1]]])
+    q.advanced_m = np.array([[advanced_m, 1.0]])
+    return q
+
+
+@pytest.fixture(scope="module")
+def light(merge: OpenScene) -> World:
+    return world_of(merge, Control.SIGNAL, link=1)
+
+
+# --- stop lines ------------------------------------------------------------------------------------------------------
+
+
+def test_next_stop_line__is_the_first_that_the_front_has_not_passed(moment: Moment, merge: OpenScene) -> None:
+    lines = [(0, 40.0, Control.NONE, -1), (0, LINE_M, Control.STOP, -1), (1, 60.0, Control.STOP, -1)]
+    world = replace(merge.world, right_of_way=NO_JUNCTIONS._replace(stop_lines=StopLines.of(lines)))
+    expected = [(39.9, 0), (40.0, 0), (40.1, 1), (90.0, 1), (90.1, -1)]
+    found = [int(at(moment, world, front_m).next_stop_line[0, 0]) for front_m, _ in expected]
+    assert found == [line for _, line in expected]
+    assert at(moment, world, 39.9).next_stop_line[0, 1] == -1, "the other player is past its only line"
+
+
+@pytest.mark.parametrize(
+    ("front_m", "signal", "passed_s"),
+    [
+        (90.4, Signal.RED, 3.0),  # from 89.4 m to 90.4 m in this step
+        (90.4, Signal.GREEN, -1.0),
+        (90.4, Signal.GREEN_YIELDING, -1.0),
+        (90.4, Signal.YELLOW, -1.0),
+        (90.4, Signal.OFF, -1.0),
+        (89.9, Signal.RED, -1.0),  # not yet
+        (90.0, Signal.RED, -1.0),  # on the line
+        (91.0, Signal.RED, 3.0),  # from the line on
+        (91.1, Signal.RED, -1.0),  # in the step before
+    ],
+)
+def test_passed_red__in_the_step_in_which_the_front_passes(
+    moment: Moment, light: World, front_m: float, signal: Signal, passed_s: float
+) -> None:
+    assert at(moment, light, front_m, signal=(signal, 3.0)).passed_red_s[0].tolist() == [passed_s, -1.0]
+
+
+@pytest.mark.parametrize(
+    ("control", "passed_mps"),
+    [
+        (Control.STOP, 4.0),
+        (Control.ALL_WAY_STOP, 4.0),
+        (Control.GIVE_WAY, -1.0),
+        (Control.SIGNAL, -1.0),
+        (Control.NONE, -1.0),
+    ],
+)
+def test_passed_stop_sign__at_the_speed_of_that_step(
+    moment: Moment, merge: OpenScene, control: Control, passed_mps: float
+) -> None:
+    world = world_of(merge, control)
+    for front_m, passed in ((89.9, -1.0), (90.4, passed_mps), (91.1, -1.0)):
+        assert at(moment, world, front_m, speed_mps=4.0).passed_stop_sign_mps[0].tolist() == [passed, -1.0]
+
+
+def value_of(q: Quantities, name: str, parameter: float | None) -> float:
+    """The ego's value of one term in this step."""
+    term = Weighted(name=name, weight=1.0, parameter=parameter)
+    return float(Payoff(alpha=dict.fromkeys(GROUPS, 1.0), terms=(term,), fuzzy={}).evaluate(q, 0)[name][0])
+
+
+@pytest.mark.parametrize(("since_s", "after_s", "value"), [(1.9, 2.0, 0.0), (2.0, 2.0, -1.0), (0.0, 0.0, -1.0)])
+def test_red_light__may_spare_the_first_seconds_of_red(
+    moment: Moment, light: World, since_s: float, after_s: float, value: float
+) -> None:
+    assert value_of(at(moment, light, 90.4, signal=(Signal.RED, since_s)), "red_light", after_s) == value
+    assert value_of(at(moment, light, 90.4, signal=(Signal.GREEN, since_s)), "red_light", after_s) == 0.0
+
+
+@pytest.mark.parametrize(("speed_mps", "value"), [(0.4, 0.0), (2.9, 0.0), (3.0, -1.0), (9.0, -1.0)])
+def test_stop_sign__may_spare_a_slow_passage(moment: Moment, merge: OpenScene, speed_mps: float, value: float) -> None:
+    world = world_of(merge, Control.STOP)
+    assert value_of(at(moment, world, 90.4, speed_mps=speed_mps), "stop_sign", 3.0) == value
+    assert value_of(at(moment, world, 80.0, speed_mps=speed_mps), "stop_sign", 3.0) == 0.0
+
+
+# --- permitted speed -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("front_m", "signal", "permitted_mps"),
+    [
+        (74.0, Signal.RED, 8.0),  # sqrt(2 * 2 * 16)
+        (89.0, Signal.RED, 2.0),
+        (90.0, Signal.RED, 0.0),
+        (90.1, Signal.RED, LIMIT_MPS),  # past the line
+        (40.0, Signal.RED, LIMIT_MPS),  # sqrt(2 * 2 * 50) = 14.1
+        (74.0, Signal.GREEN, LIMIT_MPS),
+        (74.0, Signal.GREEN_YIELDING, LIMIT_MPS),
+        (74.0, Signal.OFF, LIMIT_MPS),
+    ],
+)
+def test_permitted__before_a_red_light(
+    moment: Moment, light: World, front_m: float, signal: Signal, permitted_mps: float
+) -> None:
+    q = at(moment, light, front_m, signal=(signal, 1.0))
+    assert q.permitted_mps[0, 0] == pytest.approx(permitted_mps)
+    assert q.permitted_mps[0, 1] == pytest.approx(LIMIT_MPS)
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "room_m", "stops"),
+    [
+        (10.0, 17.0, True),  # 100 / (2 * 17) = 2.9 m/s2
+        (10.0, 16.0, False),  # 3.1 m/s2: more than 3 m/s2
+        (12.0, 25.0, True),  # 2.88
+        (12.0, 23.0, False),  # 3.13
+        (0.0, 1.0, True),
+    ],
+)
+def test_permitted__yellow_means_stop_if_moderate_braking_is_enough(
+    moment: Moment, light: World, speed_mps: float, room_m: float, stops: bool
+) -> None:
+    q = at(moment, light, LINE_M - room_m, speed_mps=speed_mps, signal=(Signal.YELLOW, 0.5))
+    assert q.permitted_mps[0, 0] == pytest.approx(min(np.sqrt(4.0 * room_m), LIMIT_MPS) if stops else LIMIT_MPS)
+
+
+@pytest.mark.parametrize("control", [Control.STOP, Control.ALL_WAY_STOP])
+def test_permitted__before_a_stop_sign_ends_at_a_rolling_half_metre_per_second(
+    moment: Moment, merge: OpenScene, control: Control
+) -> None:
+    world = world_of(merge, control)
+    # sqrt(2 * 2 * 16 + 0.5^2) = sqrt(64.25)
+    for front_m, permitted in ((74.0, np.sqrt(64.25)), (90.0, 0.5), (90.1, LIMIT_MPS)):
+        assert at(moment, world, front_m).permitted_mps[0, 0] == pytest.approx(permitted)
+
+
+@pytest.mark.parametrize("control", [Control.NONE, Control.GIVE_WAY])
+def test_permitted__a_free_junction_asks_for_nothing(moment: Moment, merge: OpenScene, control: Control) -> None:
+    assert at(moment, world_of(merge, control), 80.0).permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
+
+
+CROSSING: Mapping[str, Any] = {
+    **dict.fromkeys(Conflicts._fields, 0),
+    "begin_m": 98.5,
+    "end_m": 101.5,
+    "crossing": True,
+    "yields": True,
+    "stop_m": LINE_M,
+    "right_m": -np.inf,
+    "left_m": np.inf,
+    "own_link": -1,
+    "other_link": -1,
+    "from_m": -np.inf,
+    "until_m": np.inf,
+    "zone_m": 7.0,
+    "length_m": 3.0,
+}
+
+
+def crossed(merge: OpenScene, yields: bool = True) -> World:
+    """The merge road, crossed at 100 m by a stream from the south with its stop line at y = -10."""
+    y_m = np.arange(-120.0, 20.0, 4.0)
+    samples = np.array([(100.0, y, 0.0, 1.0, 1.6, 2.0, y + 10.0) for y in y_m])
+    conflicts = Conflicts.of([{**CROSSING, "yields": yields}])
+    streams = Streams.of(samples, np.zeros(len(y_m), dtype=np.int64), conflicts, players=2)
+    lines = StopLines.of([(0, LINE_M, Control.GIVE_WAY, -1)])
+    return replace(merge.world, right_of_way=RightOfWay(conflicts, streams, lines, ()))
+
+
+def from_the_south(arrives_s: float, speed_mps: float = 10.0) -> dict[str, float]:
+    """A car that reaches the zone after this time: its front is at y = -3 then."""
+    y_m = -3.0 - HALF_M - arrives_s * speed_mps
+    return {"x_m": 100.0, "y_m": y_m, "heading_rad": np.pi / 2.0, "speed_mps": speed_mps}
+
+
+@pytest.mark.parametrize(
+    ("front_m", "arrives_s", "permitted_mps"),
+    [
+        (74.0, 3.9, 8.0),  # stop at the line: sqrt(2 * 2 * 16)
+        (74.0, 4.1, LIMIT_MPS),  # it arrives late enough
+        (90.0, 1.0, 0.0),
+        (92.25, 1.0, 5.0),  # past the line: stop before the zone, sqrt(2 * 2 * 6.25)
+        (99.0, 1.0, LIMIT_MPS),  # in the zone: clear it
+    ],
+)
+def test_permitted__waits_for_a_car_with_priority(
+    moment: Moment, merge: OpenScene, front_m: float, arrives_s: float, permitted_mps: float
+) -> None:
+    q = at(moment, crossed(merge), front_m, others=[from_the_south(arrives_s)])
+    assert q.meetings.other_s[0, 0, 2] == pytest.approx(arrives_s)
+    assert q.permitted_mps[0, 0] == pytest.approx(permitted_mps)
+
+
+def test_permitted__does_not_wait_for_a_car_that_must_yield(moment: Moment, merge: OpenScene) -> None:
+    q = at(moment, crossed(merge, yields=False), 74.0, others=[from_the_south(2.0)])
+    assert q.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
+
+
+def test_permitted__does_not_wait_for_a_car_that_stands(moment: Moment, merge: OpenScene) -> None:
+    q = at(moment, crossed(merge), 74.0, others=[{**from_the_south(2.0), "speed_mps": 0.0}])
+    assert q.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
+
+
+def test_speed_over_permitted__is_a_share_of_the_limit(moment: Moment, light: World) -> None:
+    # 8 m/s are permitted 16 m before a red light; 10 m/s are 2 m/s more, 6 m/s are 2 m/s less
+    for speed_mps, over_mps in ((10.0, 2.0), (6.0, -2.0)):
+        q = at(moment, light, 74.0, speed_mps=speed_mps, signal=(Signal.RED, 1.0))
+        assert q.speed_over_permitted[0, 0] == pytest.approx(over_mps / LIMIT_MPS)
+        assert value_of(q, "speed_over_limit", None) == pytest.approx(-0.1 * max(over_mps, 0.0) / LIMIT_MPS)
+        assert value_of(q, "speed_under_limit", None) == pytest.approx(0.1 * min(over_mps, 0.0) / LIMIT_MPS)
+        assert q.speed_over_limit[0, 0] == pytest.approx(speed_mps / LIMIT_MPS - 1.0), "the limit itself is the same"
+
+
+def test_waiting__at_a_red_light_costs_no_speed_under_the_limit(moment: Moment, light: World) -> None:
+    waiting = at(moment, light, LINE_M, speed_mps=0.0, signal=(Signal.RED, 20.0), advanced_m=0.0)
+    assert value_of(waiting, "speed_under_limit", None) == 0.0
+    dawdling = at(moment, light, LINE_M, speed_mps=0.0, signal=(Signal.GREEN, 20.0), advanced_m=0.0)
+    assert value_of(dawdling, "speed_under_limit", None) == pytest.approx(-0.1)
+
+
+# --- what is observed of them ----------------------------------------------------------------------------------------
+
+
+def seen(q: Quantities) -> dict[str, float]:
+    return dict(zip(LAYOUT, in_units(observe(q)[0, 0], 0.6).tolist(), strict=True))
+
+
+@pytest.mark.parametrize(
+    ("signal", "name"),
+    [
+        (Signal.GREEN, "signal_green"),
+        (Signal.GREEN_YIELDING, "signal_green"),
+        (Signal.YELLOW, "signal_yellow"),
+        (Signal.RED, "signal_red"),
+        (Signal.OFF, ""),
+    ],
+)
+def test_observation__of_a_signal(moment: Moment, light: World, signal: Signal, name: str) -> None:
+    entries = seen(at(moment, light, 74.0, signal=(signal, 4.5)))
+    assert entries["stop_line_m"] == pytest.approx(16.0, rel=1e-5)
+    assert entries["signal_s"] == pytest.approx(4.5, rel=1e-5)
+    for each in ("signal_green", "signal_yellow", "signal_red", "give_way", "stop_sign"):
+        assert entries[each] == (1.0 if each == name else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("control", "name"),
+    [
+        (Control.STOP, "stop_sign"),
+        (Control.ALL_WAY_STOP, "stop_sign"),
+        (Control.GIVE_WAY, "give_way"),
+        (Control.NONE, ""),
+    ],
+)
+def test_observation__of_a_sign(moment: Moment, merge: OpenScene, control: Control, name: str) -> None:
+    world = world_of(merge, control)
+    entries = seen(at(moment, world, 74.0))
+    for each in ("signal_green", "signal_yellow", "signal_red", "give_way", "stop_sign"):
+        assert entries[each] == (1.0 if each == name else 0.0)
+    beyond = seen(at(moment, world, 91.0))
+    assert beyond["stop_line_m"] > 1e6, "no line ahead"
+    assert beyond["stop_sign"] == beyond["give_way"] == 0.0
+
+
+@pytest.mark.parametrize(("yields", "priority"), [(True, 1.0), (False, -1.0)])
+def test_observation__of_a_crossing_car(moment: Moment, merge: OpenScene, yields: bool, priority: float) -> None:
+    # the ego's front is 24.5 m before the zone at 10 m/s: 2.45 s; the other arrives after 3 s at 8 m/s
+    q = at(moment, crossed(merge, yields=yields), 74.0, others=[from_the_south(3.0, 8.0)])
+    entries = seen(q)
+    expected = {
+        "own_to_conflict_m": 24.5,
+        "other_to_conflict_m": 24.0,
+        "arrives_later_s": 0.55,
+        "has_priority": priority,
+        "left_mps": 8.0,
+        "ahead_mps": -10.0,
+    }
+    for name, value in expected.items():
+        assert entries[f"other0_{name}"] == pytest.approx(value, rel=1e-4), name
+
+
+def test_observation__a_car_in_conflict_is_more_urgent_than_nearer_ones(moment: Moment, merge: OpenScene) -> None:
+    # by distance over 10 m/s: 2.4, 2.7, 3.0 and 3.4 s; the crossing car is 54 m away, in conflict within 2.5 s
+    queue = [{"x_m": 71.7 - back, "y_m": -4.8, "speed_mps": 0.0} for back in (24.0, 27.0, 30.0, 34.0)]
+    others = [*queue, from_the_south(2.4, 18.0)]
+    crossing = seen(at(moment, crossed(merge), 74.0, others=others))
+    assert [crossing[f"other{k}_has_priority"] for k in range(4)] == [0.0, 1.0, 0.0, 0.0]
+    assert crossing["other1_left_mps"] == pytest.approx(18.0, rel=1e-4)
+
+
+# --- the side of the road --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("marks_m", "offset_m", "wrong"),
+    [
+        ((1.6, -np.inf), 1.5, 0.0),  # traffic keeps to the right: oncoming lanes are on the left
+        ((1.6, -np.inf), 1.7, 1.0),
+        ((1.6, -np.inf), -30.0, 0.0),
+        ((np.inf, -1.6), -1.5, 0.0),  # traffic keeps to the left
+        ((np.inf, -1.6), -1.7, 1.0),
+        ((np.inf, -1.6), 30.0, 0.0),
+        ((np.inf, -np.inf), 30.0, 0.0),  # a one-way road
+    ],
+)
+def test_wrong_way__is_beyond_the_mark_to_the_oncoming_lanes(
+    moment: Moment, merge: OpenScene, marks_m: tuple[float, float], offset_m: float, wrong: float
+) -> None:
+    road = merge.world.road
+    left, right = (np.full(len(road.routes.x_m), mark) for mark in marks_m)
+    world = replace(merge.world, road=replace(road, routes=road.routes._replace(own_left_m=left, own_right_m=right)))
+    q = moment(world, [{"x_m": 60.0, "y_m": -1.6 + offset_m}, FAR])
+    assert q.wrong_way[0].tolist() == [wrong, 0.0]
+    assert value_of(q, "wrong_way", None) == pytest.approx(-0.1 * wrong)
+
+
+# --- time since a signal changed -------------------------------------------------------------------------------------
+
+
+def test_since_change__counts_up_until_the_signal_changes() -> None:
+    red, green = int(Signal.RED), int(Signal.GREEN)
+    before, now = np.array([[red, red, green]]), np.array([[red, green, green]])
+    assert since_change_s(before, now, np.array([[4.0, 7.0, 0.0]]), 0.1)[0] == pytest.approx([4.1, 0.0, 0.1])
