@@ -26,7 +26,8 @@ CAR_LENGTH_M, CAR_WIDTH_M = 4.6, 1.8
 _APART_M = 1.2  # between the surface of a level and what remains of another one: wider than a slit
 _SLIVER_M = 0.02  # thinner gaps are rounding errors
 _SPARE_M = 0.05  # around a car that follows a lane
-_STEP_M, _FINE = 0.5, 8  # between two places of it, and how many times finer where it touches an outline
+_STEP_M = 0.5  # between two places of it
+_TURN_RAD, _FINE = 0.1, 8  # where it turns by more from place to place, places are so many times finer
 _SMOOTH_M = 0.01
 
 
@@ -104,31 +105,41 @@ def with_swept_paths(area: BaseGeometry, paths: Sequence[FloatArray]) -> BaseGeo
     owner = np.repeat(np.arange(len(paths)), [len(each) for each in cars])
     row = np.concatenate([np.arange(len(each)) for each in cars])
     swept = []
-    for k in np.unique(owner[touching]):
-        rows = row[touching[owner[touching] == k]]
-        fine = _cars(paths[k], _FINE)
-        for place in np.unique(rows):  # from the place before the one that touches to the place after it
-            near = fine[max(place - 1, 0) * _FINE : (place + 1) * _FINE + 1]
-            swept += [shapely.convex_hull(shapely.multipolygons(pair)) for pair in pairwise(near)]
+    for k in np.unique(touching):
+        path, place = cars[owner[k]], row[k]
+        near = path[max(place - 1, 0) : place + 2]
+        swept += [shapely.convex_hull(shapely.multipolygons(pair)) for pair in pairwise(near)]
     return without_slits(joined([area, shapely.union_all(swept)])) if swept else area
 
 
-def _cars(points: FloatArray, times_finer: int = 1) -> NDArray[np.object_]:
-    """Outlines of cars whose centres lie on a line [n, 2] every `_STEP_M`, and that end before its ends."""
+def _cars(points: FloatArray) -> NDArray[np.object_]:
+    """Outlines of cars whose centres lie on a line [n, 2], and that end before its ends."""
     line = shapely.LineString(points)
-    margin_m = 0.5 * CAR_LENGTH_M + 3.0 * _SPARE_M
-    stations = np.arange(margin_m, line.length - margin_m, _STEP_M / times_finer)
-    ahead, behind, centre = (
-        shapely.get_coordinates(shapely.line_interpolate_point(line, np.clip(stations + d, 0.0, line.length)))
-        for d in (_STEP_M, -_STEP_M, 0.0)
-    )
-    along = (ahead - behind) / np.maximum(np.hypot(*(ahead - behind).T), 1e-9)[:, None]
+    margin_m = 0.5 * CAR_LENGTH_M + 1.4 * _SPARE_M  # the ends of some lanes are walls
+    stations = np.arange(margin_m, line.length - margin_m, _STEP_M)
+    if not len(stations):
+        return np.empty(0, dtype=object)
+    along = _directions(line, stations)
+    turns = (along[1:] * along[:-1]).sum(1) < np.cos(_TURN_RAD)
+    finer = stations[:-1][turns][:, None] + np.linspace(0.0, _STEP_M, _FINE, endpoint=False)
+    stations = np.unique(np.concatenate((stations, finer.ravel())))
+    along = _directions(line, stations)
     across = np.stack((-along[:, 1], along[:, 0]), axis=1)
+    centre = shapely.get_coordinates(shapely.line_interpolate_point(line, stations))
     half_length_m, half_width_m = 0.5 * CAR_LENGTH_M + _SPARE_M, 0.5 * CAR_WIDTH_M + _SPARE_M
     corners = [
         centre + a * half_length_m * along + b * half_width_m * across for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))
     ]
     return np.asarray(shapely.polygons(np.stack(corners, axis=1)), dtype=object).reshape(-1)
+
+
+def _directions(line: shapely.LineString, stations: FloatArray) -> FloatArray:
+    """[N, 2] unit vectors along a line, over `_STEP_M` before and after each station."""
+    ahead, behind = (
+        shapely.get_coordinates(shapely.line_interpolate_point(line, np.clip(stations + d, 0.0, line.length)))
+        for d in (_STEP_M, -_STEP_M)
+    )
+    return np.asarray((ahead - behind) / np.maximum(np.hypot(*(ahead - behind).T), 1e-9)[:, None])
 
 
 def curve_between(before: FloatArray, after: FloatArray) -> FloatArray:
