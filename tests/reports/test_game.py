@@ -246,7 +246,8 @@ def test_words__with_one_side_only_nothing_is_decided():
 @pytest.mark.parametrize("verdict", list(GapVerdict))
 def test_words__state_a_gain_only_where_it_is_distinguishable_from_0(verdict):
     row = gaps([EGO, NON_EGO], table(arm("pair", ego_failed=[0, 0])), 0.01)
-    row = row.assign(verdict=verdict.value, gap_share=0.1, gap=1.0, p_holm=0.2)
+    reason = "the speedy driver can't drive this scene" if verdict is GapVerdict.NOT_ANSWERED else ""
+    row = row.assign(verdict=verdict.value, gap_share=0.1, gap=1.0, p_holm=0.2, reason=reason)
     ((_, answer),) = gap_verdicts(row)
     assert ("could still gain" in answer.sentence) == (verdict is GapVerdict.DISTINGUISHABLE)
     assert (answer.label == "no") == (verdict is GapVerdict.DISTINGUISHABLE)

@@ -25,11 +25,11 @@ from harness.reports.wording import (
     too_few,
     verdicts,
 )
+from tests.support.incompetent import cannot_drive
 from tests.support.pages import (
     Page,
     blank_figures,
     campaign,
-    cannot_drive,
     recomputed,
     recordings,
     rendered,
