@@ -40,8 +40,8 @@ def net_file(folder: Path) -> Path:
 
 def test_show__lists_the_lanes_of_a_net_and_of_its_scene(lines_of: Run) -> None:
     lines = lines_of("scene", "show", net_file(MERGE))
-    assert lines[0].split() == ["lane", "length", "m", "limit", "m/s", "width", "m", "for", "from", "to"]
-    assert lines[1].split() == ["approach_0", "100.0", "13.89", "3.2", "all", "start", "taper"]
+    assert lines[0].split() == ["lane", "length", "m", "limit", "m/s", "width", "m", "for", "from", "to", "leads", "to"]
+    assert lines[1].split() == ["approach_0", "100.0", "13.89", "3.2", "all", "start", "taper", "s", "exit"]
     assert [line.split()[0] for line in lines[1:]] == ["approach_0", "approach_1", "exit_0"]
     assert lines_of("scene", "show", MERGE) == lines
     assert lines_of("scene", "show", MERGE / "scene.toml") == lines
@@ -56,7 +56,8 @@ def test_show__of_a_compressed_net(tmp_path: Path, lines_of: Run) -> None:
 def test_show__says_how_many_lanes_are_left_out(generate_net: Callable[..., Path], lines_of: Run) -> None:
     net = generate_net("--grid", "--grid.number", "3")
     lines = lines_of("scene", "show", net, "--rows", "5")
-    assert len(lines) == 7
+    lanes = [line for line in lines[1:-1] if not line.startswith(" ")]  # a lane may lead to several edges
+    assert len(lanes) == 5
     assert lines[-1].startswith("19 more lanes are not listed")
 
 

@@ -42,7 +42,7 @@ from harness.reports.persona.profile import (
     wants,
 )
 from harness.reports.persona.terminal import show
-from harness.reports.persona.worth import EXAMPLES, LIMITED
+from harness.reports.persona.worth import EXAMPLES, FROM, LIMITED
 from tests.support.bicycle import advance, state_of
 from tests.support.chromium import launched, opener
 from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY, harness
@@ -82,7 +82,7 @@ def test_profile__shows_every_key_of_a_persona() -> None:
 
 
 def test_profile__has_a_moment_for_every_term() -> None:
-    assert {*EXAMPLES, *LIMITED} == set(TERMS)
+    assert {*EXAMPLES, *LIMITED, *FROM} == set(TERMS)
     terms = {group: {} for group in GROUPS}
     for name, term in TERMS.items():
         terms[term.group][name] = {"weight": 2.0, term.parameter: 1.0} if term.parameter else 2.0
@@ -96,6 +96,9 @@ def test_profile__has_a_moment_for_every_term() -> None:
         "time_gap": (-0.5, "per second at 0.5 s"),
         "time_to_collision": (-0.5, "per second at 0.5 s"),
         "speed_over_limit": (-0.1, "per second at 10 % over"),
+        "red_light": (-1.0, "at 1 s"),
+        "stop_sign": (-1.0, "at 1 m/s"),
+        "wrong_way": (-1.0, "per second on the wrong side"),
         "yield": (-0.5, "at 0.5 s"),
         "gap": (-0.5, "per second at 0.5 s"),
         "goal": (1.0, "once"),
