@@ -27,7 +27,7 @@ _APART_M = 1.2  # between the surface of a level and what remains of another one
 _SLIVER_M = 0.02  # thinner gaps are rounding errors
 _SPARE_M = 0.05  # around a car that follows a lane
 _STEP_M = 0.5  # between two places of it
-_TURN_RAD, _FINE = 0.1, 8  # where it turns by more from place to place, places are so many times finer
+_TURN_RAD, _FINE = 0.02, 8  # where it turns by more from place to place, places are so many times finer
 _SMOOTH_M = 0.01
 
 
@@ -116,12 +116,12 @@ def _cars(points: FloatArray) -> NDArray[np.object_]:
     """Outlines of cars whose centres lie on a line [n, 2], and that end before its ends."""
     line = shapely.LineString(points)
     margin_m = 0.5 * CAR_LENGTH_M + 1.4 * _SPARE_M  # the ends of some lanes are walls
-    stations = np.arange(margin_m, line.length - margin_m, _STEP_M)
-    if not len(stations):
+    if line.length <= 2.0 * margin_m:
         return np.empty(0, dtype=object)
+    stations = np.append(np.arange(margin_m, line.length - margin_m, _STEP_M), line.length - margin_m)
     along = _directions(line, stations)
     turns = (along[1:] * along[:-1]).sum(1) < np.cos(_TURN_RAD)
-    finer = stations[:-1][turns][:, None] + np.linspace(0.0, _STEP_M, _FINE, endpoint=False)
+    finer = np.linspace(stations[:-1][turns], stations[1:][turns], _FINE, endpoint=False)
     stations = np.unique(np.concatenate((stations, finer.ravel())))
     along = _directions(line, stations)
     across = np.stack((-along[:, 1], along[:, 0]), axis=1)
