@@ -57,8 +57,7 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
     | 35 | stop_line_m, distance of the front bumper to the next stop line | x/(|x| + 20 m) |
     | 36-40 | at that line: give_way, stop_sign, signal_green, signal_yellow, signal_red | 1 |
     | 41 | signal_s, time since the signal changed | x/(|x| + 5 s) |
-    | 42 | leader_seen (0 or 1): there is a vehicle ahead on the route | 1 |
-    | 43, 44 | leader_gap_m, leader_mps (relative) | x/(|x| + 20 m), + 10 m/s |
+    | 42-44 | leader_seen (0 or 1), leader_gap_m, leader_mps (relative), ahead | 1, x/(|x| + 20 m), + 10 m/s |
     | 45-57 | other0, the most urgent road user: seen (0 or 1), ahead_m, left_m | 1, x/(|x| + 20 m), + 8 m |
     |  | ahead_mps (relative), left_mps (absolute) | x/(|x| + 10 m/s), + 5 m/s |
     |  | turned_sin, turned_cos (its heading), length_m, width_m | 1, 1, 20 m, 4 m |
@@ -183,7 +182,7 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
         self.action_spaces = {agent: _action_space() for agent in ROLES}
 
     def observation_space(self, agent: str) -> gymnasium.spaces.Box:
-        """An agent's observation space, Box(-1, 1, (46,), float32)."""
+        """An agent's observation space, Box(-1, 1, (97,), float32)."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> gymnasium.spaces.Box:
