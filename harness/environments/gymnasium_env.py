@@ -41,7 +41,7 @@ Info: TypeAlias = dict[str, Any]
 class DrivingEnv(gymnasium.Env[Any, Any]):
     """One player's game on a scene with SUMO traffic. Also `gymnasium.make("harness/Ego-v0")`, `"harness/NonEgo-v0"`.
 
-    Observation: Box(-1, 1, (96,), float32), in the player's frame; `harness.game.observation_layout` names its entries.
+    Observation: Box(-1, 1, (97,), float32), in the player's frame; `harness.game.observation_layout` names its entries.
     An entry x is divided by its scale and clipped to [-1, 1], or compressed:
 
     | entries | quantity | scale |
@@ -57,13 +57,13 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
     | 35 | stop_line_m, distance of the front bumper to the next stop line | x/(|x| + 20 m) |
     | 36-40 | at that line: give_way, stop_sign, signal_green, signal_yellow, signal_red | 1 |
     | 41 | signal_s, time since the signal changed | x/(|x| + 5 s) |
-    | 42, 43 | leader_gap_m, leader_mps (relative), of the vehicle ahead on the route | x/(|x| + 20 m), + 10 m/s |
-    | 44-56 | other0, the most urgent road user: seen (0 or 1), ahead_m, left_m | 1, x/(|x| + 20 m), + 8 m |
+    | 42-44 | leader_seen (0 or 1), leader_gap_m, leader_mps (relative), ahead | 1, x/(|x| + 20 m), + 10 m/s |
+    | 45-57 | other0, the most urgent road user: seen (0 or 1), ahead_m, left_m | 1, x/(|x| + 20 m), + 8 m |
     |  | ahead_mps (relative), left_mps (absolute) | x/(|x| + 10 m/s), + 5 m/s |
     |  | turned_sin, turned_cos (its heading), length_m, width_m | 1, 1, 20 m, 4 m |
     |  | own_to_conflict_m, other_to_conflict_m, to the place where the two ways meet | x/(|x| + 20 m) |
     |  | arrives_later_s than the player, has_priority (1, -1, 0 without a conflict) | x/(|x| + 3 s), 1 |
-    | 57-69, 70-82, 83-95 | other1 to other3, the next most urgent; zeros if there are fewer | as other0 |
+    | 58-70, 71-83, 84-96 | other1 to other3, the next most urgent; zeros if there are fewer | as other0 |
 
     Action: Box(-1, 1, (2,), float32): pedals (-1 full brake, 0 coast, 1 full throttle) and wheel (0 follows the route;
     -1 and 1 add the largest angle to the right and to the left; the largest useful angle depends on the speed).
@@ -182,7 +182,7 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
         self.action_spaces = {agent: _action_space() for agent in ROLES}
 
     def observation_space(self, agent: str) -> gymnasium.spaces.Box:
-        """An agent's observation space, Box(-1, 1, (46,), float32)."""
+        """An agent's observation space, Box(-1, 1, (97,), float32)."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> gymnasium.spaces.Box:

@@ -30,7 +30,7 @@ from harness.game.route_coordinates import half_extents_m, place_along_route, ro
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
 _COUNT = len(AHEAD_M)
-_PATH_LEFT, _STOP_LINE, _LEADER = (LAYOUT.index(name) for name in ("path_left_m", "stop_line_m", "leader_gap_m"))
+_PATH_LEFT, _STOP_LINE, _LEADER = (LAYOUT.index(name) for name in ("path_left_m", "stop_line_m", "leader_seen"))
 _TURNED, _BEND, _LEFT, _RIGHT = (
     LAYOUT.index(f"{name}@0m") for name in ("path_turned_rad", "path_bend_per_m", "free_left_m", "free_right_m")
 )
@@ -145,7 +145,8 @@ def _observe(
                         own_s = max(meetings.own_m[g, p, b], 0.0) / max(speed, _LEAST_MPS)
                         other_s = max(meetings.other_m[g, p, b], 0.0) / max(body_speed_mps[g, b], _LEAST_MPS)
                         urgency_s[b] = min(urgency_s[b], max(own_s, other_s))
-            view[_LEADER], view[_LEADER + 1] = max(leader_m, 0.0), leader_mps
+            if leader_m < np.inf:  # else zeros: a learner that is always alone must not learn from its absence
+                view[_LEADER], view[_LEADER + 1], view[_LEADER + 2] = 1.0, max(leader_m, 0.0), leader_mps
             last_seen, last_s = -1, -1.0  # the body of the previous entry
             for k in range(OTHERS):  # the most urgent first; missing bodies stay zeros
                 b = _next_urgent(seen, urgency_s, last_seen, last_s)

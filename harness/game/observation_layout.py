@@ -52,6 +52,7 @@ _OWN: dict[str, Scale] = {
     "signal_yellow": _ONE,
     "signal_red": _ONE,
     "signal_s": Scale(5.0, compressed=True),  # since the signal changed
+    "leader_seen": _ONE,
     "leader_gap_m": Scale(20.0, compressed=True),
     "leader_mps": Scale(10.0, compressed=True),  # relative to the own speed
 }

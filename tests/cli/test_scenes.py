@@ -41,7 +41,7 @@ def net_file(folder: Path) -> Path:
 def test_show__lists_the_lanes_of_a_net_and_of_its_scene(lines_of: Run) -> None:
     lines = lines_of("scene", "show", net_file(MERGE))
     assert lines[0].split() == ["lane", "length", "m", "limit", "m/s", "width", "m", "for", "from", "to", "leads", "to"]
-    assert lines[1].split() == ["approach_0", "100.0", "13.89", "3.2", "all", "start", "taper", "s", "exit"]
+    assert lines[1].split() == ["approach_0", "100.0", "13.89", "3.2", "all", "start", "taper"]
     assert [line.split()[0] for line in lines[1:]] == ["approach_0", "approach_1", "exit_0"]
     assert lines_of("scene", "show", MERGE) == lines
     assert lines_of("scene", "show", MERGE / "scene.toml") == lines

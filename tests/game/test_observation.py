@@ -39,8 +39,8 @@ def car(x: float, y: float = -1.6, **more: Any) -> dict[str, Any]:
 
 def test_layout__names_every_entry_once() -> None:
     assert len(set(LAYOUT)) == len(LAYOUT) == SIZE
-    assert SIZE == 96
-    assert OF_OTHERS.sum() == OTHERS * 13 + 2  # and the leader
+    assert SIZE == 97
+    assert OF_OTHERS.sum() == OTHERS * 13 + 3  # and the leader
 
 
 def test_observation__of_a_car_on_the_merge_road(moment: Moment, world: World) -> None:
@@ -74,7 +74,8 @@ def test_observation__of_a_car_on_the_merge_road(moment: Moment, world: World) -
         "signal_green": 0.0,
         "signal_yellow": 0.0,
         "signal_red": 0.0,
-        "leader_gap_m": 1.0,  # none: the other car is in the other lane
+        "leader_seen": 0.0,
+        "leader_gap_m": 0.0,  # none: the other car is in the other lane
         "leader_mps": 0.0,
         "other0_ahead_m": 24.0 / (24.0 + 20.0),
         "other0_left_m": 3.2 / (3.2 + 8.0),

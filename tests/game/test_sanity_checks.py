@@ -27,6 +27,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.environments.gymnasium_env import DrivingEnv
+from harness.environments.sumo_players import read_sumo_players
 from harness.errors import StageFailed, UsageError
 from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
 from harness.game.arrays import FloatArray, IntArray
@@ -250,14 +251,12 @@ def test_motion__a_car_that_the_harness_moves_follows_its_speed_to_a_millimetre(
 
 @pytest.mark.parametrize("name", ["x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"])
 def test_motion__that_is_not_finite_is_named(name: str, merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    read_sumo_players = Arena._read_sumo_players
+    def lose(state: State, *arguments: Any) -> None:
+        read_sumo_players(state, *arguments)
+        if state.step[0] + 1 == STEP:
+            getattr(state, name)[0, NON_EGO] = np.nan
 
-    def lose(arena: Arena, *arguments: Any) -> None:
-        read_sumo_players(arena, *arguments)
-        if arena.state.step[0] + 1 == STEP:
-            getattr(arena.state, name)[0, NON_EGO] = np.nan
-
-    monkeypatch.setattr(Arena, "_read_sumo_players", lose)
+    monkeypatch.setattr("harness.environments.arena.read_sumo_players", lose)
     (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
     assert f"the motion of non_ego is not finite in step {STEP}: " in game.record["error"]
 
@@ -422,6 +421,8 @@ def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(name: s
         "leader_gap_m": q.leader_gap_m,
         "time_to_collision_s": q.time_to_collision_s,
         "payoff": np.zeros_like(q.state.x_m),
+        "passed_red_s": q.passed_red_s,
+        "wrong_way": q.wrong_way,
     }
     assert not any(np.isnan(each).any() for each in series.values())
     for outcome in (Outcome.GOAL, Outcome.RAIL):
