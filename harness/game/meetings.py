@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,8 +42,9 @@ class Meetings(NamedTuple):
     must_yield: BoolArray  # the player, to the body
 
     @classmethod
+    @lru_cache(maxsize=64)
     def none(cls, shape: tuple[int, ...]) -> Meetings:
-        """No conflict with any of the bodies, [G, P, B]."""
+        """No conflict with any of the bodies, [G, P, B]. The same arrays for equal shapes: they are only read."""
         return cls.of(np.full(shape, -1), np.full((5, *shape), np.inf), np.zeros(shape, dtype=bool))
 
     @classmethod

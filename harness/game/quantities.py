@@ -131,7 +131,7 @@ class Quantities:
     def permitted_mps(self) -> FloatArray:
         """Speed that the limits, signals, signs and right of way permit."""
         right_of_way, routes = self.world.right_of_way, self.world.road.routes
-        approach_mps = routes.approach_mps[routes.rows(self.state.station_m)] * self.state.limit_share[:, None]
+        approach_mps = routes.approach_mps[self._rows] * self.state.limit_share[:, None]
         return permitted_mps(
             *(self.front_m, self.state.speed_mps, approach_mps, self.next_stop_line, self.state.signals),
             *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),
@@ -146,8 +146,12 @@ class Quantities:
     def wrong_way(self) -> FloatArray:
         """1 where the player is among oncoming lanes, else 0."""
         routes = self.world.road.routes
-        rows = routes.rows(self.state.station_m)
-        return wrong_way(self.lateral_offset_m, rows, routes.own_left_m, routes.own_right_m)
+        return wrong_way(self.lateral_offset_m, self._rows, routes.own_left_m, routes.own_right_m)
+
+    @cached_property
+    def _rows(self) -> IntArray:
+        """Rows of the table of routes at the players."""
+        return self.world.road.routes.rows(self.state.station_m)
 
     # --- other bodies --------------------------------------------------------------------------------------------
 

@@ -209,7 +209,8 @@ def stopped(stage: Mapping[str, Any]) -> str:
 
 def stopped_at(steps: float, reason: str) -> str:
     """Where a learning curve ends."""
-    end = {"converged": "stopped early", "budget": "budget used"}.get(reason, reason)
+    reasons = {"converged": "stopped early", "budget": "budget used", DID_NOT_LEARN: DID_NOT_LEARN}
+    end = reasons.get(reason, "stopped")  # a figure draws no text that a run folder brings
     return f"{end}: {steps_text(steps)}"
 
 

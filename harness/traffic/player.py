@@ -55,7 +55,9 @@ def open_player(
     route_edges = edges[first:]
     if goal not in route_edges:
         key, each = document.goal_of(player)
-        message = f"edge {each.edge!r} is not on the route of vehicle {vehicle.name!r}, after its start"
+        message = (
+            f"edge {each.edge!r} is not on the route of vehicle {vehicle.name!r} in {routes.path.name}, after its start"
+        )
         names = ", ".join(edge.getID() for edge in route_edges[-3:])
         raise UsageError.of(
             file, f"{key}.edge", message, f"choose one of its edges (it ends with {names}), or give [{role}.goal]"

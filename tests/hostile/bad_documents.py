@@ -247,7 +247,7 @@ SCENES = [
         ("a negative speed", "speed_mps = [11.0, 14.0]", "speed_mps = [-11.0, 14.0]", ("ego", "negative")),
         ("no start", "position_m = [30.0, 45.0]", "", ("ego",)),
         ("two starts", "position_m = [30.0, 45.0]", "position_m = [30.0, 45.0]\nbeside_ego_m = [0.0, 1.0]", ("ego",)),
-        ("no goal", '[goal]\nedge = "exit"\nposition_m = 45.0', "", ("goal: is missing",)),
+        ("no goal", '[goal]\nedge = "exit"\nposition_m = 45.0', "", ("ego has no goal", "[goal]")),
         ("a car without wheels", "[non_ego]", "[ego.actuators]\nwheelbase_m = 0.0\n[non_ego]", ("ego.actuators.wheelbase_m",)),
         ("a time limit of a year", "time_limit_s = 25.0", "time_limit_s = 3e7", ("time_limit_s",)),
         ("a list of nets", 'net = "merge.net.xml"', 'net = ["merge.net.xml"]', ("net",)),

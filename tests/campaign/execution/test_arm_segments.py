@@ -151,7 +151,7 @@ from harness.environments.rollout import Game
 from harness.campaign.execution.crash_retries import FIRST
 from harness.evaluation.trace_file import SCHEMA
 folder, episodes = Path(sys.argv[1]), int(sys.argv[2])
-texts = {"player": "ego", "vehicle_type": "car", "outcome": ""}
+texts = {"player": "ego", "vehicle_type": "car", "outcome": "", "signals": ""}
 def game(episode):
     columns = {name: [texts.get(name, 0.5)] * 2000 for name in SCHEMA.names}
     columns |= {"episode": [episode] * 2000, "step": list(range(2000)), "lapsed": [False] * 2000}
