@@ -37,7 +37,7 @@ def xml_attacks(file: str, root: str, schema: str) -> list[Bad]:
         for way, inside in (("two roots", ""), ("an entity that nobody declared", "&x;"), ("a tag that is not closed", "<edge>"))
     ]
     inside = {
-        "an include": ('<include href="/etc/passwd"/>', "include"),
+        "an include": ('<include href="/etc/hostname"/>', "include"),
         "an inclusion of XML's own": ('<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="/etc/passwd" parse="text"/>', "include"),
         "a detector that writes": ('<inductionLoop id="d" lane="exit_0" pos="1" freq="1" file="/tmp/owned.xml"/>', "inductionLoop"),
         "another detector that writes": ('<e2Detector id="d" lane="exit_0" pos="1" length="5" freq="1" file="../owned.xml"/>', "e2Detector"),
