@@ -72,7 +72,7 @@ def write_replay(
         )
         moments = [*(contact.time_s for contact in touches), float(trace["time_s"].max())]
         halts_s = sorted({shown_at(moment, step_length_s) for moment in moments})
-        write_xml(view_settings(view, halts_s, lanes), partial / "view.xml")
+        write_xml(view_settings(view, halts_s, lanes, signals=_has_signals(trace)), partial / "view.xml")
         # one step after the one that shows the last sample: without an end SUMO would never stop
         write_xml(_configuration(title, halts_s[-1] + step_length_s, step_length_s), partial / "scene.sumocfg")
         shutil.rmtree(folder, ignore_errors=True)
@@ -154,3 +154,8 @@ def _text(root: ElementTree.Element, name: str, text: str, x_m: float, y_m: floa
     """SUMO-GUI has no text element, but it shows the type of an (invisible) point of interest."""
     place = {"x": f"{x_m:.2f}", "y": f"{y_m:.2f}", "layer": "200"}
     ElementTree.SubElement(root, "poi", {"id": name, "type": text, "color": "0,0,0,0"} | place)
+
+
+def _has_signals(trace: pd.DataFrame) -> bool:
+    """Whether the game was recorded with traffic lights."""
+    return "signals" in trace and bool((trace["signals"] != "").any())

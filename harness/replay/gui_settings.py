@@ -60,8 +60,13 @@ def _closest_approach(trace: pd.DataFrame) -> np.ndarray:
     return pairs.loc[distance.idxmin(), ["x_m", "y_m"]].to_numpy(float)
 
 
-def view_settings(view: Viewport, halts_s: Sequence[float], lanes: Lanes) -> ElementTree.Element:
-    """SUMO-GUI's settings file. It halts at these times of its own clock, and continues with "play"."""
+def view_settings(
+    view: Viewport, halts_s: Sequence[float], lanes: Lanes, *, signals: bool = False
+) -> ElementTree.Element:
+    """SUMO-GUI's settings file. It halts at these times of its own clock, and continues with "play".
+
+    With `signals`, the state of the traffic lights is drawn at the ends of the lanes.
+    """
     left, bottom, right, top = lanes.bounds()
     net = (right - left + 2 * _NET_MARGIN_M, top - bottom + 2 * _NET_MARGIN_M)
     whole = min(_CANVAS_PX[0] / net[0], _CANVAS_PX[1] / net[1])  # pixels per metre at zoom 100
@@ -70,7 +75,7 @@ def view_settings(view: Viewport, halts_s: Sequence[float], lanes: Lanes) -> Ele
     root = ElementTree.Element("viewsettings")
     scheme = ElementTree.SubElement(root, "scheme", name="real world")
     ElementTree.SubElement(scheme, "background", backgroundColor=_GROUND)
-    for surface, entry, options in (("edges", "road", {"showLinkRules": "0"}), ("junctions", "", {})):
+    for surface, entry, options in (("edges", "road", {"showLinkRules": str(int(signals))}), ("junctions", "", {})):
         element = ElementTree.SubElement(scheme, surface, options)
         colours = ElementTree.SubElement(element, "colorScheme", name="uniform")
         ElementTree.SubElement(colours, "entry", color=_ASPHALT, name=entry)
