@@ -3,7 +3,7 @@
 A person that wrecks itself on the empty road and an ego that fails against everybody answer no research question. So
 every question names the least share of goals of its players alone (`AloneBound`, from the campaign's table
 `[competence]`). The share is measured in the arms in which they are assessed alone, by the point estimate: goals per
-game that could be played.
+game that could be played. A goal of an ego after a red light does not count.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ class Goals:
     goals: int
     games: int
     """Games that could be played."""
+    on_red: int = 0
+    """Games in which an ego reached its goal, but passed a red light: they are no goals."""
 
     @property
     def share(self) -> float:
@@ -43,16 +45,23 @@ class Goals:
         counts = (
             f"{self.goals} of {self.games} games ({int(self.share * 1000) / 10:g} %)"  # rounded down: below stays below
         )
-        return f"alone it reaches its goal in {counts}, below {round(least_share * 100, 10):g} %"
+        red = f", and in {self.on_red} more after passing a red light" if self.on_red else ""
+        return f"alone it reaches its goal in {counts}{red}, below {round(least_share * 100, 10):g} %"
 
 
 def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -> Goals:
-    """The goals of a player in an arm's rows of episodes.csv; None: the arm has no row."""
+    """The goals of a player in an arm's rows of episodes.csv; None: the arm has no row.
+
+    An ego that passes a red light can't drive the scene. Persons may: some are made for it.
+    """
     if games is None:
         return Goals(goals=0, games=0)
     outcome = games[f"{player}_outcome"].fillna("")
     played = (games["error"].fillna("") == "") & ~outcome.isin(["", "error"])
-    return Goals(goals=int((played & (outcome == "goal")).sum()), games=int(played.sum()))
+    reached = played & (outcome == "goal")
+    counted = player == "ego" and "ego_red_lights" in games  # runs of earlier versions have no such column
+    on_red = reached & (games["ego_red_lights"].fillna(0.0) > 0.0) if counted else reached & False
+    return Goals(goals=int((reached & ~on_red).sum()), games=int(played.sum()), on_red=int(on_red.sum()))
 
 
 @dataclass(frozen=True, kw_only=True)

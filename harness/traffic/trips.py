@@ -11,8 +11,6 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-import os
-import subprocess
 import tempfile
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -20,7 +18,6 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import platformdirs
-import sumo
 from sumolib.net import Net
 
 from harness.errors import Problem, UsageError, collect
@@ -28,6 +25,7 @@ from harness.files import write_atomically
 from harness.traffic import network
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.stops import placed
+from harness.traffic.sumo_program import run_program
 from harness.traffic.xml_file import parse_xml
 
 PATIENCE_S, PATIENCE_S_PER_BYTE = 60.0, 4e-6  # time limit: a constant, and a part per byte of the net
@@ -139,7 +137,7 @@ def _run_duarouter(net_file: Path, route_path: Path, queries: Sequence[_Query]) 
         ElementTree.ElementTree(root).write(trips, encoding="utf-8", xml_declaration=True)
         options = ["--net-file", str(net_file), "--route-files", str(trips), "--output-file", str(found)]
         options += ["--ignore-errors", "--no-warnings", "--no-step-log", "--xml-validation", "never"]
-        run = _run(options, folder, PATIENCE_S + PATIENCE_S_PER_BYTE * net_file.stat().st_size)
+        run = run_program("duarouter", options, folder, PATIENCE_S + PATIENCE_S_PER_BYTE * net_file.stat().st_size)
         if run is None or run.returncode or not found.exists():
             said = run.stderr.strip()[-300:] if run else "no answer in time"
             raise UsageError.of(
@@ -151,21 +149,3 @@ def _run_duarouter(net_file: Path, route_path: Path, queries: Sequence[_Query]) 
             if route is not None:
                 edges[int(vehicle.get("id", "0"))] = route.get("edges", "").split()
     return edges
-
-
-def _run(options: Sequence[str], folder: str, patience_s: float) -> subprocess.CompletedProcess[str] | None:
-    program = os.path.join(sumo.SUMO_HOME, "bin", "duarouter")
-    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    try:
-        return subprocess.run(
-            [program, *options],
-            cwd=folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=patience_s,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return None

@@ -13,7 +13,6 @@ import importlib.metadata
 import json
 import logging
 import os
-import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,7 +23,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import platformdirs
-import sumo
 
 from harness.config.scene import Scene
 from harness.errors import SimulationError, UsageError
@@ -36,6 +34,7 @@ from harness.traffic.angles import heading_rad_of
 from harness.traffic.route_file import Departure, Motion, RouteFile
 from harness.traffic.route_writing import vehicle_element
 from harness.traffic.stops import Stop
+from harness.traffic.sumo_program import run_program
 from harness.traffic.xml_file import parse_xml
 
 SNAPSHOTS = 20
@@ -142,21 +141,9 @@ def _run(
 
 
 def _run_sumo(options: Sequence[str], folder: Path) -> None:
-    program = Path(sumo.SUMO_HOME) / "bin" / "sumo"
-    environment = {**os.environ, "SUMO_HOME": sumo.SUMO_HOME}
-    try:
-        run = subprocess.run(
-            [program, *options],
-            cwd=folder,
-            env=environment,
-            capture_output=True,
-            text=True,
-            errors="replace",
-            timeout=_PATIENCE_S,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        raise SimulationError(f"SUMO did not finish the warm-up within {_PATIENCE_S:.0f} s") from None
+    run = run_program("sumo", options, folder, _PATIENCE_S)
+    if run is None:
+        raise SimulationError(f"SUMO did not finish the warm-up within {_PATIENCE_S:.0f} s")
     if run.returncode:
         raise SimulationError(f"SUMO failed in the warm-up: {run.stderr.strip()[-300:]}")
 

@@ -71,6 +71,15 @@ def test_goals__are_counted_over_the_games_that_could_be_played() -> None:
     assert goals_alone(None, "ego") == Goals(goals=0, games=0)
 
 
+def test_goals__of_an_ego_on_red_do_not_count() -> None:
+    games = arm("naive_alone", ego=["goal", "goal", "goal", "rail"]).assign(ego_red_lights=[0.0, 1.0, None, 2.0])
+    goals = goals_alone(games, "ego")
+    assert goals == Goals(goals=2, games=4, on_red=1)
+    assert goals.below(0.97) == (
+        "alone it reaches its goal in 2 of 4 games (50 %), and in 1 more after passing a red light, below 97 %"
+    )
+
+
 @pytest.mark.parametrize(("reached", "enough"), [(97, True), (96, False), (100, True), (0, False)])
 def test_goals__suffice_from_the_bound_on(reached: int, enough: bool) -> None:
     assert Goals(goals=reached, games=100).suffice(0.97) == enough

@@ -74,7 +74,7 @@ def test_routes__are_found_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     def fail(*_: object) -> None:
         raise AssertionError("duarouter runs again")
 
-    monkeypatch.setattr(trips, "_run", fail)
+    monkeypatch.setattr(trips, "run_program", fail)
     net = tmp_path / "a" / "n.net.xml"
     monkeypatch.setattr(
         Path, "read_bytes", lambda path, read=Path.read_bytes: read(net if path.name == net.name else path)
