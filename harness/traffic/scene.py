@@ -186,9 +186,10 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
 
 
 def _edges_of_players(document: Scene, net: Net, routes: RouteFile) -> list[Edge]:
-    """The edges of the players' routes; those of invalid routes are left out."""
+    """The edges of the players' routes, each once; those of invalid routes are left out."""
     vehicles = [routes.vehicles[player.vehicle] for player in document.players if player.vehicle in routes.vehicles]
-    return [edge for each in vehicles for edge in collect([], partial(edges_of, each, net, routes)) or []]
+    found = [collect([], partial(edges_of, each, net, routes)) or [] for each in vehicles]
+    return list(dict.fromkeys(edge for edges in found for edge in edges))
 
 
 def _conditions(document: Scene) -> Conditions:

@@ -230,7 +230,7 @@ def test_route__an_unknown_edge_is_named(folder: Path) -> None:
 def test_route__must_reach_the_goal(folder: Path) -> None:
     own_route(folder, "approach")
     expected = (
-        "edge 'exit' is not on the route of vehicle 'ego', after its start "
+        "edge 'exit' is not on the route of vehicle 'ego' in merge.rou.xml, after its start "
         "(choose one of its edges (it ends with approach), or give [ego.goal])"
     )
     assert only(folder) == ("scene.toml", "goal.edge", expected)

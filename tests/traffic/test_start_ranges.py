@@ -233,7 +233,7 @@ def test_goals__one_for_both_may_stand_beside_none(write: Write) -> None:
         ),
         (
             {"goals": ('{ edge = "cn", position_m = 40.0 }', GOALS[1])},
-            r"ego.goal.edge: edge 'cn' is not on the route of vehicle 'ego', after its start "
+            r"ego.goal.edge: edge 'cn' is not on the route of vehicle 'ego' in \S+, after its start "
             r"\(choose one of its edges \(it ends with wc, ce\), or give \[ego.goal\]\)",
         ),
         (

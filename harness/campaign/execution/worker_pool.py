@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 from collections.abc import Sequence
 from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
 from types import TracebackType
 
 from harness.campaign.execution.crash_retries import Attempt
@@ -21,6 +21,8 @@ from harness.campaign.execution.stage_events import Event, Work
 from harness.campaign.execution.worker_process import start_process
 from harness.campaign.plan.stages import Stage
 
+_END_S = 5.0
+
 
 def cores() -> int:
     """Cores this process may use."""
@@ -29,7 +31,7 @@ def cores() -> int:
 
 @dataclass
 class _Worker:
-    process: BaseProcess
+    process: subprocess.Popen[bytes]
     connection: Connection
     stage: Stage | None = None
 
@@ -63,9 +65,8 @@ class WorkerPool:
     def next_events(self) -> Sequence[Event]:
         """Wait for the busy workers: at most one event of each."""
         busy = [worker for worker in self._workers if worker.stage]
-        ready = wait([*(w.connection for w in busy), *(w.process.sentinel for w in busy)])
-        reported = [w for w in busy if w.connection in ready or w.process.sentinel in ready]
-        return [event for worker in reported if (event := self._event_of(worker)) is not None]
+        ready = wait([worker.connection for worker in busy])
+        return [self._event_of(worker) for worker in busy if worker.connection in ready]
 
     def __enter__(self) -> WorkerPool:
         try:
@@ -81,11 +82,11 @@ class WorkerPool:
     ) -> None:
         self._end()
 
-    def _event_of(self, worker: _Worker) -> Event | None:
+    def _event_of(self, worker: _Worker) -> Event:
         event = _receive(worker)
-        if event is not None and event.kind == "crashed":
+        if event.kind == "crashed":
             self._replace(worker)
-        if event is not None and event.kind in ("crashed", "done", "failed"):
+        if event.kind in ("crashed", "done", "failed"):
             worker.stage = None
         return event
 
@@ -93,7 +94,7 @@ class WorkerPool:
         return _Worker(*start_process(self._work, self._context))
 
     def _replace(self, worker: _Worker) -> None:
-        worker.connection.close()
+        _wait_for(worker)
         fresh = self._spawn()
         worker.process, worker.connection = fresh.process, fresh.connection
 
@@ -101,28 +102,34 @@ class WorkerPool:
         for worker in self._workers:
             worker.process.terminate()
         for worker in self._workers:
-            worker.process.join(5.0)
-            if worker.process.is_alive():
-                worker.process.kill()
-            worker.connection.close()
+            _wait_for(worker)
 
 
-def _receive(worker: _Worker) -> Event | None:
+def _receive(worker: _Worker) -> Event:
     """The next event of a worker; its crash, if it ended without one."""
     assert worker.stage is not None
     try:
-        if worker.connection.poll():
-            event: Event = worker.connection.recv()
-            return event
-    except (EOFError, OSError):
-        pass
-    worker.process.join(5.0)
-    if worker.process.is_alive():
-        return None
-    return Event(kind="crashed", stage=worker.stage.id, message=f"the worker died of {_cause(worker.process.exitcode)}")
+        event: Event = worker.connection.recv()
+    except (EOFError, OSError):  # it closed the connection, so it is ending
+        cause = _cause(_wait_for(worker))
+        return Event(kind="crashed", stage=worker.stage.id, message=f"the worker died of {cause}")
+    return event
 
 
-def _cause(exitcode: int | None) -> str:
-    if exitcode is not None and exitcode < 0:
+def _wait_for(worker: _Worker) -> int:
+    """Wait for a worker that is ending; its exit code."""
+    try:
+        worker.process.wait(_END_S)
+    except subprocess.TimeoutExpired:
+        worker.process.kill()
+        worker.process.wait()
+    worker.connection.close()
+    if worker.process.stdin is not None:
+        worker.process.stdin.close()
+    return worker.process.returncode
+
+
+def _cause(exitcode: int) -> str:
+    if exitcode < 0:
         return signal.Signals(-exitcode).name
     return f"exit code {exitcode}"

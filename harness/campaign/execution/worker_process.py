@@ -5,17 +5,18 @@ Workers ignore Ctrl-C, which the parent handles, and end when the parent ends, h
 
 from __future__ import annotations
 
-import multiprocessing
+import json
 import os
 import signal
+import socket
+import subprocess
+import sys
 import tempfile
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from harness.campaign.execution.run_context import RunContext
@@ -25,17 +26,25 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.files import make_folder
 
 _TERMINATING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
-_CONTEXT = multiprocessing.get_context("spawn")
+_PROGRAM = "import json, sys; sys.path[:] = json.loads(sys.argv[2]); from {0} import serve; serve(int(sys.argv[1]))"
 
 
-def start_process(work: Work, context: RunContext) -> tuple[BaseProcess, Connection]:
-    """Start a worker. It receives (stage, attempt) and sends events until the connection is closed."""
-    ours, theirs = _CONTEXT.Pipe()
-    process = _CONTEXT.Process(target=_work, args=(theirs, work, context), daemon=True)
-    with _signals_delayed():
-        process.start()
-    theirs.close()
-    return process, ours
+def start_process(work: Work, context: RunContext) -> tuple[subprocess.Popen[bytes], Connection]:
+    """Start a worker. It receives (stage, attempt) and sends events until the connection is closed.
+
+    Its standard input stays open as long as this process lives. `multiprocessing` starts no worker here: its child
+    prints a traceback if the parent is killed before it has sent what the child needs.
+    """
+    ours, theirs = socket.socketpair()
+    program = _PROGRAM.format(__name__)
+    path = json.dumps([os.path.abspath(each) for each in sys.path])
+    arguments = [sys.executable, "-c", program, str(theirs.fileno()), path]
+    with theirs, _signals_delayed():
+        process = subprocess.Popen(arguments, stdin=subprocess.PIPE, pass_fds=(theirs.fileno(),))
+    connection = Connection(ours.detach())
+    with suppress(OSError):  # it died: the pool finds that out
+        connection.send((work, context))
+    return process, connection
 
 
 @contextmanager
@@ -45,7 +54,6 @@ def _signals_delayed() -> Iterator[None]:
         yield
         return
     received: list[int] = []
-    resource_tracker.ensure_running()  # starting it would undo the mask
     before = {each: signal.signal(each, lambda number, frame: received.append(number)) for each in _TERMINATING}
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which the process inherits
     try:
@@ -58,10 +66,14 @@ def _signals_delayed() -> Iterator[None]:
         signal.raise_signal(number)
 
 
-def _work(connection: Connection, work: Work, context: RunContext) -> None:
+def serve(descriptor: int) -> None:
+    """Carry out the stages that a connection asks for. What a worker's process runs."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    os.set_inheritable(descriptor, False)
+    threading.Thread(target=_end_with_parent, args=(_taken_input(),), daemon=True).start()
+    connection = Connection(descriptor)
     try:
+        work, context = connection.recv()
         while True:
             stage, attempt = connection.recv()
             connection.send(
@@ -94,8 +106,15 @@ def put_scratch_into(run: Path) -> None:
     tempfile.tempdir = None
 
 
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+def _taken_input() -> int:
+    """The standard input as another descriptor: the worker's own programs read nothing."""
+    taken = os.dup(0)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    return taken
+
+
+def _end_with_parent(its_input: int) -> None:
+    os.read(its_input, 1)  # nothing is ever written: it returns when the parent has ended
+    os._exit(1)
