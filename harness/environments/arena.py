@@ -105,6 +105,7 @@ class Arena:
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._limits = PlayersLimits(games, players, self.world.steps)
+        self._road_steering_rad: FloatArray = np.zeros((games, players))
         self._all_games = np.arange(games)
         self.reading: Reading | None = None
         self.signal_texts = [""] * games
@@ -130,7 +131,9 @@ class Arena:
             for member, seat in enumerate(seats):
                 if seat.driver is not None:
                     seat.driver.reset(games if len(seats) == 1 else games[self._member[games, player] == member])
-        observation = self.observation[games] = observe(self._first_quantities(games))
+        quantities = self._first_quantities(games)
+        observation = self.observation[games] = observe(quantities)
+        self._road_steering_rad[games] = quantities.road_steering_rad
         check_observation(observation, games, self.state.step)
 
     def reload(self, seed: int) -> None:
@@ -195,11 +198,7 @@ class Arena:
                     )
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)
-        world = self.world
-        road_steering = world.road.routes.road_steering_rad(
-            state.station_m, state.speed_mps, world.actuators.wheelbase_m
-        )
-        acceleration, steering = requests(chosen, state.speed_mps, road_steering, world.actuators)
+        acceleration, steering = requests(chosen, state.speed_mps, self._road_steering_rad, self.world.actuators)
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
         state.lapsed = release_controls(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
@@ -235,7 +234,7 @@ class Arena:
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
         if not ended.any():
-            self.observation = observe(quantities)
+            self._observe(quantities)
             return
         for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
             if reached == _GOAL:
@@ -252,7 +251,11 @@ class Arena:
             advanced_m=quantities.advanced_m,
             lateral_offset_m=quantities.lateral_offset_m,
         )
-        self.observation = observe(after)
+        self._observe(after)
+
+    def _observe(self, quantities: Quantities) -> None:
+        """Observe, and keep what the next decisions need: the steering that follows the road."""
+        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state

@@ -19,7 +19,7 @@ from harness.game.meetings import Meetings, entered_before_s, least_gap_s, meeti
 from harness.game.road import Along
 from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
 from harness.game.state import Bodies, Outcome, State
-from harness.game.traffic_rules import next_stop_lines, passed_stop_lines, permitted_mps, wrong_way
+from harness.game.traffic_rules import Rules, rules
 from harness.game.world import World
 
 SIGHT_M = 60.0  # a body farther ahead than this is not a leader
@@ -62,12 +62,16 @@ class Quantities:
         return self.state.speed_mps
 
     @cached_property
-    def _along(self) -> Along:
-        return self.world.road.routes.along(self.state.station_m, self.lateral_offset_m)
+    def along(self) -> Along:
+        """The route at the players."""
+        state, world = self.state, self.world
+        shares, wheelbase_m = state.limit_share, world.actuators.wheelbase_m
+        where = (state.station_m, self.lateral_offset_m, state.speed_mps)
+        return world.road.routes.along(*where, limit_share=shares, wheelbase_m=wheelbase_m)
 
-    @cached_property
+    @property
     def speed_limit_mps(self) -> FloatArray:
-        return self._along.speed_limit_mps * self.state.limit_share[:, None]
+        return self.along.speed_limit_mps
 
     @cached_property
     def speed_over_limit(self) -> FloatArray:
@@ -77,23 +81,27 @@ class Quantities:
     @property
     def lane_offset_m(self) -> FloatArray:
         """Distance from the centre of the nearest lane."""
-        return self._along.lane_offset_m
+        return self.along.lane_offset_m
 
-    @cached_property
+    @property
     def lane_end_m(self) -> FloatArray:
         """Distance to the end of the player's lane; inf if the lane does not end."""
-        return np.maximum(self._along.lane_end_m - self.state.station_m, 0.0)
+        return self.along.lane_end_m
 
-    @cached_property
+    @property
     def goal_m(self) -> FloatArray:
         """Distance to the goal along the route; 0 or less after the goal."""
-        return self.world.road.routes.goal_m - self.state.station_m
+        return self.along.goal_m
 
-    @cached_property
+    @property
+    def wrong_way(self) -> FloatArray:
+        """1 where the player is among oncoming lanes, else 0."""
+        return self.along.wrong_way
+
+    @property
     def road_steering_rad(self) -> FloatArray:
         """The steering angle that follows the route."""
-        state, wheelbase_m = self.state, self.world.actuators.wheelbase_m
-        return self.world.road.routes.road_steering_rad(state.station_m, state.speed_mps, wheelbase_m)
+        return self.along.road_steering_rad
 
     @cached_property
     def lateral_acceleration_mps2(self) -> FloatArray:
@@ -107,51 +115,37 @@ class Quantities:
         return self.state.station_m + 0.5 * self.world.length_m
 
     @cached_property
-    def next_stop_line(self) -> IntArray:
-        """Row of the next stop line; -1 without one."""
-        lines = self.world.right_of_way.stop_lines
-        return next_stop_lines(self.front_m, lines.player, lines.station_m)
-
-    @cached_property
-    def _passed(self) -> tuple[FloatArray, FloatArray]:
-        state, lines = self.state, tuple(self.world.right_of_way.stop_lines)
-        return passed_stop_lines(self.front_m, self.advanced_m, state.speed_mps, state.signals, state.signal_s, lines)
+    def rules(self) -> Rules:
+        """What signals, signs and right of way ask of the players, and what they did."""
+        state, tables = self.state, self.world.right_of_way
+        next_line, numbers = rules(
+            *(state.station_m, self.advanced_m, state.speed_mps, self.along.approach_mps, self.world.length_m),
+            *(state.signals, state.signal_s),
+            (tuple(tables.stop_lines), tuple(tables.conflicts), tuple(self.meetings)),
+        )
+        return Rules(next_line, *numbers)
 
     @property
     def passed_red_s(self) -> FloatArray:
         """Seconds since the signal became red, if the player passed its stop line in this step; else -1."""
-        return self._passed[0]
+        return self.rules.passed_red_s
 
     @property
     def passed_stop_sign_mps(self) -> FloatArray:
         """Speed at which the player passed a stop sign in this step; else -1."""
-        return self._passed[1]
+        return self.rules.passed_stop_sign_mps
 
-    @cached_property
+    @property
     def permitted_mps(self) -> FloatArray:
         """Speed that the limits, signals, signs and right of way permit."""
-        right_of_way, routes = self.world.right_of_way, self.world.road.routes
-        approach_mps = routes.approach_mps[self._rows] * self.state.limit_share[:, None]
-        return permitted_mps(
-            *(self.front_m, self.state.speed_mps, approach_mps, self.next_stop_line, self.state.signals),
-            *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),
-        )
+        return self.rules.permitted_mps
 
     @cached_property
     def speed_over_permitted(self) -> FloatArray:
-        """Excess over the permitted speed as a share of the limit; negative below it."""
-        return (self.state.speed_mps - self.permitted_mps) / self.speed_limit_mps
-
-    @cached_property
-    def wrong_way(self) -> FloatArray:
-        """1 where the player is among oncoming lanes, else 0."""
-        routes = self.world.road.routes
-        return wrong_way(self.lateral_offset_m, self._rows, routes.own_left_m, routes.own_right_m)
-
-    @cached_property
-    def _rows(self) -> IntArray:
-        """Rows of the table of routes at the players."""
-        return self.world.road.routes.rows(self.state.station_m)
+        """Excess over the permitted speed as a share of the limit; negative below it, but 0 while the player waits."""
+        speed_mps, asked = self.state.speed_mps, self.rules
+        over_mps = np.maximum(speed_mps - asked.permitted_mps, 0.0) + np.minimum(speed_mps - asked.due_mps, 0.0)
+        return over_mps / self.speed_limit_mps
 
     # --- other bodies --------------------------------------------------------------------------------------------
 

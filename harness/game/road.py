@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,11 +47,15 @@ class Route:
 
 
 class Along(NamedTuple):
-    """The route's properties at the players, [G, P]."""
+    """The route at the players, [G, P]."""
 
     speed_limit_mps: FloatArray
+    approach_mps: FloatArray  # speed at which comfortable braking keeps to the limits ahead
     lane_offset_m: FloatArray  # distance to the centre of the nearest lane
-    lane_end_m: FloatArray  # station where that lane ends; inf if it does not
+    lane_end_m: FloatArray  # distance to the end of that lane; inf if it does not end
+    goal_m: FloatArray  # distance to the goal; 0 or less after it
+    wrong_way: FloatArray  # 1 for a centre among oncoming lanes, else 0
+    road_steering_rad: FloatArray  # the steering angle that follows the route
 
 
 class Routes(NamedTuple):
@@ -119,18 +123,18 @@ class Routes(NamedTuple):
         lines = (self.x_m, self.y_m, self.cos, self.sin, self.curvature_per_m)
         return _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
 
-    def road_steering_rad(self, station_m: FloatArray, speed_mps: FloatArray, wheelbase_m: FloatArray) -> FloatArray:
-        """[G, P] steering angle (rad) with which cars follow the routes at stations and speeds [G, P].
-
-        The angle is that of the bend at the rear axle, which has no slip, in `PREVIEW_S`, for wheelbases [P]. With the
-        bend at the centre, a car would leave a quarter circle by two metres.
-        """
-        return _road_steering_rad(station_m, speed_mps, wheelbase_m, self.bend_per_m, self.first_row, self.last_row)
-
-    def along(self, station_m: FloatArray, offset_m: FloatArray) -> Along:
-        """The routes' properties at stations and lateral offsets [G, P]."""
-        lanes = (self.lane_offset_m, self.lane_end_m)
-        return Along(*_along(station_m, offset_m, self.speed_limit_mps, *lanes, self.first_row, self.last_row))
+    def along(
+        self,
+        station_m: FloatArray,
+        offset_m: FloatArray,
+        speed_mps: FloatArray,
+        *,
+        limit_share: FloatArray,
+        wheelbase_m: FloatArray,
+    ) -> Along:
+        """The routes at players with stations, lateral offsets and speeds [G, P], factors on the speed limits [G] and
+        wheelbases [P]."""
+        return Along(*_along(station_m, offset_m, speed_mps, limit_share, wheelbase_m, tuple(self)))
 
 
 @compiled
@@ -146,23 +150,6 @@ def row_at(station_m: float, first_row: int, last_row: int) -> int:
     """The row of a route nearest to a station; the first row for NaN."""
     rows = (station_m + MARGIN_M) / SPACING_M
     return first_row + int(min(np.rint(rows), last_row - first_row)) if rows > 0.0 else first_row
-
-
-@compiled
-def _road_steering_rad(
-    station_m: FloatArray,
-    speed_mps: FloatArray,
-    wheelbase_m: FloatArray,
-    bend_per_m: FloatArray,
-    first_row: IntArray,
-    last_row: IntArray,
-) -> FloatArray:
-    steering = np.empty(station_m.shape)
-    for g, p in np.ndindex(station_m.shape):
-        rear_axle_m = station_m[g, p] - 0.5 * wheelbase_m[p] + PREVIEW_S * speed_mps[g, p]
-        row = row_at(rear_axle_m, first_row[p], last_row[p])
-        steering[g, p] = steering_of_bend_rad(bend_per_m[row], wheelbase_m[p])
-    return steering
 
 
 @compiled
@@ -206,22 +193,40 @@ def _locate(
 def _along(
     station_m: FloatArray,
     offset_m: FloatArray,
-    speed_limit_mps: FloatArray,
-    lane_offset_m: FloatArray,
-    lane_end_m: FloatArray,
-    first_row: IntArray,
-    last_row: IntArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    limit, nearest, ends = np.empty(offset_m.shape), np.empty(offset_m.shape), np.empty(offset_m.shape)
-    for g, p in np.ndindex(offset_m.shape):
-        row = row_at(station_m[g, p], first_row[p], last_row[p])
-        limit[g, p] = speed_limit_mps[row]
-        nearest[g, p], ends[g, p] = lane_at(row, offset_m[g, p], lane_offset_m, lane_end_m)
-    return limit, nearest, ends
+    speed_mps: FloatArray,
+    limit_share: FloatArray,
+    wheelbase_m: FloatArray,
+    table: tuple[Any, ...],
+) -> FloatArray:
+    """[7, G, P] the columns of `Along`.
+
+    A car follows the road by the bend at its rear axle, which has no slip, in `PREVIEW_S`. With the bend at the centre,
+    it would leave a quarter circle by two metres.
+    """
+    routes = Routes(*table)
+    along = np.empty((7, *station_m.shape))
+    for g, p in np.ndindex(station_m.shape):
+        station, offset, first, last = station_m[g, p], offset_m[g, p], routes.first_row[p], routes.last_row[p]
+        row = row_at(station, first, last)
+        lane_offset, lane_end = _lane_at(row, offset, routes.lane_offset_m, routes.lane_end_m)
+        beside = offset > routes.own_left_m[row] or offset < routes.own_right_m[row]
+        rear_axle = row_at(station - 0.5 * wheelbase_m[p] + PREVIEW_S * speed_mps[g, p], first, last)
+        columns = (
+            routes.speed_limit_mps[row] * limit_share[g],
+            routes.approach_mps[row] * limit_share[g],
+            lane_offset,
+            np.maximum(lane_end - station, 0.0),
+            routes.goal_m[p] - station,
+            1.0 if beside else 0.0,
+            steering_of_bend_rad(routes.bend_per_m[rear_axle], wheelbase_m[p]),
+        )
+        for k, value in enumerate(columns):
+            along[k, g, p] = value
+    return along
 
 
 @compiled
-def lane_at(row: int, offset_m: float, lane_offset_m: FloatArray, lane_end_m: FloatArray) -> tuple[float, float]:
+def _lane_at(row: int, offset_m: float, lane_offset_m: FloatArray, lane_end_m: FloatArray) -> tuple[float, float]:
     """Distance (m) to the centre of the nearest lane, and the station where that lane ends."""
     nearest, ends = np.inf, np.inf
     for lane in range(lane_offset_m.shape[1]):

@@ -34,6 +34,7 @@ from harness.training.callbacks import CurveRecorder, DeviationBound
 from harness.training.checkpoint import Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import has_converged, still_fails
+from harness.training.narrowing import Narrowing
 from harness.training.torch_without_compiler import leave_out_compiler
 
 _GAE_LAMBDA = 0.95
@@ -82,7 +83,8 @@ def train(
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     on_start: Callable[[int], None] = lambda segment: None,
 ) -> Trained:
-    """Train until convergence or the end of the budget. Training continues from `checkpoint` if it has this `key`.
+    """Train until convergence or the end of the budget; the last part is that of `Narrowing`. Training continues from
+    `checkpoint` if it has this `key`.
 
     `card` is the metadata of the policy. `on_progress` gets the number of finished steps and their total after each
     rollout, `on_start` the number of each segment before it starts.
@@ -107,12 +109,19 @@ def train(
 def _stop_reason(spec: TrainingSpec, progress: Progress) -> str | None:
     """The reason to stop, or None. It is checked before each segment, so that a training continued from a finished
     training's checkpoint stops as well."""
+    if progress.steps < Narrowing.of(spec.settings, progress.converged_at).end:
+        return None
+    return "budget" if progress.converged_at is None else "converged"
+
+
+def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
+    """The steps of a training that has just converged."""
     settings = spec.settings
+    if not settings.early_convergence or progress.steps >= Narrowing.of(settings, None).start:
+        return None
     attentive = ceil(_attentive_steps(spec) / settings.segment_steps)
     fails = still_fails(progress.alone_games, progress.alone_failures)
-    if settings.early_convergence and not fails and has_converged(progress.segment_payoffs[attentive:]):
-        return "converged"
-    return "budget" if progress.steps >= settings.steps else None
+    return progress.steps if not fails and has_converged(progress.segment_payoffs[attentive:]) else None
 
 
 def _environment(spec: TrainingSpec) -> ArenaVecEnv:
@@ -211,7 +220,8 @@ def _segment(
     set_random_seed(seed_of(*parts, "learner") % 2**32)
     environment.sample_from(_start_distribution(spec, progress.steps), *parts)
     environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
-    steps = min(spec.settings.segment_steps, spec.settings.steps - progress.steps)
+    narrowing = Narrowing.of(spec.settings, progress.converged_at)
+    steps = min(spec.settings.segment_steps, narrowing.end - progress.steps)
     curve = CurveRecorder(
         environment,
         progress,
@@ -222,7 +232,7 @@ def _segment(
     model.num_timesteps = progress.steps
     model._last_obs = None  # SB3 then resets the games
     try:
-        bound = DeviationBound(spec.settings.max_deviation)
+        bound = DeviationBound(narrowing.largest_deviation)
         model.learn(steps, callback=[curve, bound], reset_num_timesteps=False)
     except FloatingPointError as error:
         raise FloatingPointError(f"{error}, after {model.num_timesteps} steps") from error
@@ -232,11 +242,13 @@ def _segment(
     payoffs = [game.payoff for game in curve.games]
     alone = [game.outcome is not Outcome.GOAL for game in curve.games if game.alone]
     mean = float(np.mean(payoffs)) if payoffs else float("-inf")
-    return Progress(
+    after = Progress(
         segments=progress.segments + 1,
         steps=model.num_timesteps,
         segment_payoffs=[*progress.segment_payoffs, mean],
         curve=curve.windows,
         alone_games=[*progress.alone_games, len(alone)],
         alone_failures=[*progress.alone_failures, sum(alone)],
+        converged_at=progress.converged_at,
     )
+    return after if after.converged_at is not None else replace(after, converged_at=_converged_at(spec, after))

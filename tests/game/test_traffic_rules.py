@@ -65,9 +65,9 @@ def test_next_stop_line__is_the_first_that_the_front_has_not_passed(moment: Mome
     lines = [(0, 40.0, Control.NONE, -1), (0, LINE_M, Control.STOP, -1), (1, 60.0, Control.STOP, -1)]
     world = replace(merge.world, right_of_way=NO_JUNCTIONS._replace(stop_lines=StopLines.of(lines)))
     expected = [(39.9, 0), (40.0, 0), (40.1, 1), (90.0, 1), (90.1, -1)]
-    found = [int(at(moment, world, front_m).next_stop_line[0, 0]) for front_m, _ in expected]
+    found = [int(at(moment, world, front_m).rules.next_line[0, 0]) for front_m, _ in expected]
     assert found == [line for _, line in expected]
-    assert at(moment, world, 39.9).next_stop_line[0, 1] == -1, "the other player is past its only line"
+    assert at(moment, world, 39.9).rules.next_line[0, 1] == -1, "the other player is past its only line"
 
 
 @pytest.mark.parametrize(

@@ -242,8 +242,7 @@ def _goals_alone(stage: AssessmentStage, episodes: Path) -> dict[str, int]:
     from harness.evaluation.competence import goals_alone
     from harness.evaluation.tables import read_csv
 
-    found = goals_alone(read_csv(episodes), "ego" if stage.ego is not None else "non_ego")
-    return {"goals": found.goals, "played": found.games} | ({"on_red": found.on_red} if found.on_red else {})
+    return goals_alone(read_csv(episodes), "ego" if stage.ego is not None else "non_ego").record()
 
 
 def _versions_since(checkpoint: Path, also: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, str]]:
