@@ -35,6 +35,7 @@ from harness.training.checkpoint import Progress, policy_of, put_policy, read_ch
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import has_converged, still_fails
 from harness.training.narrowing import Narrowing
+from harness.training.torch_without_compiler import leave_out_compiler
 
 _GAE_LAMBDA = 0.95
 _ALGORITHMS: dict[str, type[PPO]] = {"compiled": CompiledPPO, "stable_baselines3": PPO}
@@ -173,6 +174,7 @@ def _attentive_steps(spec: TrainingSpec) -> float:
 def _learner(spec: TrainingSpec, environment: ArenaVecEnv, tensorboard: Path | None) -> PPO:
     settings = spec.settings
     set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
+    leave_out_compiler()
     model = _ALGORITHMS[settings.learner](
         "MlpPolicy",
         environment,
