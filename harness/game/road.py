@@ -121,7 +121,8 @@ class Routes(NamedTuple):
     def locate(self, x_m: FloatArray, y_m: FloatArray, station_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Stations and lateral offsets (m, left positive) [G, P] of points [G, P], given their previous stations."""
         lines = (self.x_m, self.y_m, self.cos, self.sin, self.curvature_per_m)
-        return _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
+        stations, offsets = _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
+        return stations, offsets
 
     def along(
         self,
@@ -171,22 +172,23 @@ def _locate(
     curvature_per_m: FloatArray,
     first_row: IntArray,
     last_row: IntArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Newton's method on the distance to the line.
+) -> FloatArray:
+    """[2, G, P] stations and lateral offsets, by Newton's method on the distance to the line.
 
     A metre of travel on the inside of a curve is more than a metre of the line, on the outside less.
     """
-    stations, offsets = station_m.copy(), np.empty_like(station_m)
+    places = np.empty((2, *station_m.shape))
     for g, p in np.ndindex(x_m.shape):
+        station, offset = station_m[g, p], 0.0
         for _ in range(3):
-            row = row_at(stations[g, p], first_row[p], last_row[p])
+            row = row_at(station, first_row[p], last_row[p])
             dx, dy = x_m[g, p] - line_x_m[row], y_m[g, p] - line_y_m[row]
             offset = dy * line_cos[row] - dx * line_sin[row]
             stretch = max(1.0 - curvature_per_m[row] * offset, _LEAST_STRETCH)
             along = (dx * line_cos[row] + dy * line_sin[row]) / stretch
-            stations[g, p] = (row - first_row[p]) * SPACING_M - MARGIN_M + along
-            offsets[g, p] = offset
-    return stations, offsets
+            station = (row - first_row[p]) * SPACING_M - MARGIN_M + along
+        places[0, g, p], places[1, g, p] = station, offset
+    return places
 
 
 @compiled

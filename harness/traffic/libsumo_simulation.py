@@ -35,7 +35,7 @@ from harness.traffic.insertion import Insertion
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.signals import Signals
-from harness.traffic.simulation import Reading, SignalsAtReset
+from harness.traffic.simulation import NO_SIGNALS, Reading, SignalsAtReset
 from harness.traffic.speed_limits import SpeedLimits
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.traffic.warm_up import clear_of_players
@@ -157,7 +157,7 @@ class LibsumoSimulation:
             self._background.reset(game, clear_of_players(departures, start, self._scene.world.length_m))
             if self._speed_limits is not None:
                 self._speed_limits.reset(game, start.limit_share)
-            return self._signals.reset(game, start.signal_place if self._signals else 0.0)
+            return self._signals.reset(game, start.signal_place) if self._signals else NO_SIGNALS
 
     def halt(self, game: int, player: int) -> None:
         """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
@@ -190,7 +190,7 @@ class LibsumoSimulation:
         with self._sumo_call("step"):
             targets = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._move_options))
             deque(map(_libsumo.vehicle_moveToXY, self._placed, *targets), maxlen=0)  # faster than a loop
-            libsumo.simulationStep()
+            _libsumo.simulation_step()
             self._background.advance()
             players = self._read_players()
             if players is not None:

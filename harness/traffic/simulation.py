@@ -47,6 +47,9 @@ class SignalsAtReset(NamedTuple):
     text: str
 
 
+NO_SIGNALS = SignalsAtReset(np.zeros(0, dtype=np.int8), np.zeros(0), "")
+
+
 class Simulation(Protocol):
     """A SUMO simulation of G games. Every method but `close` raises SimulationError if SUMO refuses or has died."""
 
