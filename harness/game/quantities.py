@@ -179,7 +179,7 @@ class Quantities:
         """Each player's conflict with each body at a junction."""
         state, bodies, tables = self.state, self.bodies, self.world.right_of_way
         if not len(tables.conflicts.player):
-            return Meetings.none(self.visible.shape)
+            return Meetings.none((*state.present.shape, bodies.present.shape[1]))
         columns = meetings(
             *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
             (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -66,10 +66,10 @@ class Routes(NamedTuple):
 
     x_m: FloatArray
     y_m: FloatArray
-    heading_rad: FloatArray
     cos: FloatArray
     sin: FloatArray
     curvature_per_m: FloatArray
+    heading_rad: FloatArray
     bend_per_m: FloatArray  # curvature, smoothed over `_BEND_M`
     bend_ahead_per_m: (
         FloatArray  # [N, K] the tightest bend in each section between `AHEAD_M`, and from the last for 30 m
@@ -99,16 +99,18 @@ class Routes(NamedTuple):
             return np.concatenate(parts)
 
         columns = {each.name: column(each.name) for each in fields(Route) if each.name not in ("length_m", "goal_m")}
+        columns |= {
+            "cos": np.cos(columns["heading_rad"]),
+            "sin": np.sin(columns["heading_rad"]),
+            "curvature_per_m": np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
+            "bend_ahead_per_m": np.concatenate([_bend_ahead_per_m(route.heading_rad) for route in routes]),
+            "approach_mps": np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
+            "bend_per_m": np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
+        }
         rows = np.array([len(route.x_m) for route in routes])
         first = np.cumsum(rows) - rows
         return cls(
-            **columns,
-            cos=np.cos(columns["heading_rad"]),
-            sin=np.sin(columns["heading_rad"]),
-            curvature_per_m=np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
-            bend_ahead_per_m=np.concatenate([_bend_ahead_per_m(route.heading_rad) for route in routes]),
-            approach_mps=np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
-            bend_per_m=np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
+            **_side_by_side(columns),
             first_row=first,
             last_row=first + rows - 1,
             goal_m=np.array([route.goal_m for route in routes]),
@@ -236,6 +238,16 @@ def _lane_at(row: int, offset_m: float, lane_offset_m: FloatArray, lane_end_m: F
         if distance < nearest:  # false for NaN: a lane that does not exist here
             nearest, ends = distance, lane_end_m[row, lane]
     return nearest, ends
+
+
+def _side_by_side(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The columns as views of one array, in which the values of a station are neighbours: reading several of them loads
+    few lines of memory."""
+    ordered = {name: columns[name] for name in Routes._fields if name in columns}
+    table = np.concatenate([column.reshape(len(column), -1) for column in ordered.values()], axis=1)
+    widths = [column.size // len(column) for column in ordered.values()]
+    parts = np.split(table, np.cumsum(widths)[:-1], axis=1)
+    return {name: part[:, 0] if columns[name].ndim == 1 else part for name, part in zip(ordered, parts, strict=True)}
 
 
 def _curvature_per_m(heading_rad: FloatArray) -> FloatArray:
