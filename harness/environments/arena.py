@@ -222,7 +222,7 @@ class Arena:
             for member, seat in enumerate(seats):
                 if seat.payoff is not None:
                     paid = drove[:, player] if len(seats) == 1 else self._drove_as(drove, player, member)
-                    payoff[:, player] = np.where(paid, seat.payoff.total(quantities, player), payoff[:, player])
+                    payoff[paid, player] = seat.payoff.total(quantities, player)[paid]
         return payoff
 
     def _drove_as(self, drove: BoolArray, player: int, member: int) -> BoolArray:
@@ -291,7 +291,7 @@ class Arena:
             world=self.world,
             state=state,
             bodies=self._bodies(state, games),
-            advanced_m=np.zeros_like(offset),
+            advanced_m=np.zeros(offset.shape),
             lateral_offset_m=offset,
         )
 
