@@ -23,7 +23,8 @@ from harness.config.persona import Persona
 from harness.drivers.mixture import Mixture, Player, mixture_of
 from harness.drivers.policy_file import Policy
 from harness.environments.arena import Arena, Seat
-from harness.environments.vector_env import ArenaVecEnv
+from harness.environments.joined_vec_env import JoinedVecEnv
+from harness.environments.vector_env import ArenaVecEnv, GamesVecEnv
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution
 from harness.game.observation_layout import OF_OTHERS
@@ -37,6 +38,16 @@ from harness.training.early_stopping import has_converged, still_fails
 
 _GAE_LAMBDA = 0.95
 _ALGORITHMS: dict[str, type[PPO]] = {"compiled": CompiledPPO, "stable_baselines3": PPO}
+
+
+@dataclass(frozen=True, kw_only=True)
+class LearningPlace:
+    """A place of the scene in which the learner drives in a part of the games, and who drives in the others."""
+
+    learner: int
+    """The player."""
+    drivers: tuple[Mixture | None, ...]
+    """[P]; None: the learner's own place, or no one drives there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +68,9 @@ class TrainingSpec:
     settings: Training
     parts: tuple[str | int, ...]
     """They name the random numbers of the training."""
+    places: tuple[LearningPlace, ...] = ()
+    """With several people: each has an equal part of the games, and `opponent` is not used. Left out: the place of
+    `learner`, beside `opponent`."""
     as_it_drives: bool = False
     """Train with all human factors of the persona, as in assessment: a best response is computed under the limits under
     which it is assessed."""
@@ -114,54 +128,87 @@ def _stop_reason(spec: TrainingSpec, progress: Progress) -> str | None:
     return "budget" if progress.steps >= settings.steps else None
 
 
-def _environment(spec: TrainingSpec) -> ArenaVecEnv:
-    opponent = _opponent(spec)
+def _environment(spec: TrainingSpec) -> GamesVecEnv:
+    places, games = _places(spec), spec.settings.games
+    environments: list[ArenaVecEnv] = []
+    try:
+        for number, place in enumerate(places):
+            own_games = games // len(places) + (number < games % len(places))
+            environments.append(_environment_of(spec, place, own_games, parts=_parts_of(spec, place, *spec.parts)))
+    except BaseException:
+        for each in environments:
+            each.close()
+        raise
+    return environments[0] if len(environments) == 1 else JoinedVecEnv(environments)
+
+
+def _environment_of(spec: TrainingSpec, place: LearningPlace, games: int, parts: tuple[str | int, ...]) -> ArenaVecEnv:
     empty = [Seat(None)]  # of a player that is in no game
-    seats = [[Seat(each.driver) for each in opponent.members] if opponent is not None else empty] * 2
-    seats[spec.learner] = [Seat(None, spec.personas[spec.learner].payoff)]
-    seed = seed_of(*spec.parts, "sumo") % 2**31
-    arena = Arena(spec.scene, spec.settings.games, seats, seed=seed)
+    seats = [
+        [Seat(each.driver) for each in driver.members] if driver is not None else empty for driver in place.drivers
+    ]
+    seats[place.learner] = [Seat(None, spec.personas[spec.learner].payoff)]
+    arena = Arena(spec.scene, games, seats, seed=seed_of(*spec.parts, "sumo") % 2**31)
     scale = spec.settings.payoff_scale
-    return ArenaVecEnv(arena, spec.learner, _start_distribution(spec, 0), *spec.parts, payoff_scale=scale)
+    return ArenaVecEnv(arena, place.learner, _start_distribution(spec, place, 0), *parts, payoff_scale=scale)
 
 
-def _start_distribution(spec: TrainingSpec, steps: int) -> StartDistribution:
-    """The start distribution of the games, `steps` after the start of the training."""
-    present = [0.0 if spec.opponent is None else 1.0 - spec.alone_share] * 2
-    present[spec.learner] = 1.0
-    opponent_factors, opponent_shares = _opponent_factors(spec)
-    human_factors, shares = [opponent_factors, opponent_factors], [opponent_shares, opponent_shares]
+def _places(spec: TrainingSpec) -> tuple[LearningPlace, ...]:
+    if spec.places:
+        return spec.places
+    drivers: list[Mixture | None] = [None, None]
+    if spec.opponent is not None:
+        drivers[1 - spec.learner] = mixture_of(spec.opponent, spec.personas[1 - spec.learner])
+    return (LearningPlace(learner=spec.learner, drivers=tuple(drivers)),)
+
+
+def _parts_of(spec: TrainingSpec, place: LearningPlace, *parts: str | int) -> tuple[str | int, ...]:
+    """The parts that name the random numbers of the games in a place."""
+    return (*parts, "place", place.learner) if spec.places else parts
+
+
+def _sample(spec: TrainingSpec, environment: GamesVecEnv, steps: int, *parts: str | int) -> None:
+    """Draw the next games from these parts, `steps` after the start of the training."""
+    environments = environment.environments if isinstance(environment, JoinedVecEnv) else (environment,)
+    for place, each in zip(_places(spec), environments, strict=True):
+        assert isinstance(each, ArenaVecEnv)
+        each.sample_from(_start_distribution(spec, place, steps), *_parts_of(spec, place, *parts))
+
+
+def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) -> StartDistribution:
+    """The start distribution of the games in a place, `steps` after the start of the training."""
+    players, alone = len(place.drivers), not any(place.drivers)
+    present = [0.0 if alone else 1.0 - spec.alone_share] * players
+    present[place.learner] = 1.0
+    human_factors, shares = _factors_beside(spec, place)
     # A learner that overlooks a vehicle without harm learns nothing from it. So it trains with blind-spot checks and
     # without looked-but-failed-to-see errors; its persona's own values apply when it drives. Its other limits
     # (reaction, sight, controls) apply from the start of the training.
     own = spec.personas[spec.learner].human_factors
     own_factors = own if spec.as_it_drives else own.with_open_eyes
-    human_factors[spec.learner], shares[spec.learner] = [own_factors], [1.0]
+    human_factors[place.learner], shares[place.learner] = [own_factors], [1.0]
     if steps < _attentive_steps(spec):
         human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
     return spec.scene.start_distribution(human_factors, present, shares, spec.settings.along_route_share)
 
 
-def _opponent(spec: TrainingSpec) -> Mixture | None:
-    return mixture_of(spec.opponent, spec.personas[1 - spec.learner]) if spec.opponent is not None else None
-
-
-def _opponent_factors(spec: TrainingSpec) -> tuple[list[HumanFactors], list[float]]:
-    """Human factors and shares of the opponent's members; those of the persona if the learner is alone."""
-    opponent = _opponent(spec)
-    if opponent is None:
-        return [spec.personas[1 - spec.learner].human_factors], [1.0]
-    return opponent.human_factors, opponent.shares
+def _factors_beside(spec: TrainingSpec, place: LearningPlace) -> tuple[list[list[HumanFactors]], list[list[float]]]:
+    """Human factors and shares [P] of the drivers' members; those of the other persona where no one drives."""
+    absent = [spec.personas[1 - spec.learner].human_factors]
+    factors = [absent if driver is None else driver.human_factors for driver in place.drivers]
+    return factors, [[1.0] if driver is None else driver.shares for driver in place.drivers]
 
 
 def _attentive_steps(spec: TrainingSpec) -> float:
     """Steps at the start of the training without lapses of attention; 0 if no persona has lapses."""
-    human_factors, _ = _opponent_factors(spec)
-    lapses = any(each.attention is not None for each in (spec.personas[spec.learner].human_factors, *human_factors))
+    place = _places(spec)[0]
+    beside, _ = _factors_beside(spec, place)
+    beside[place.learner] = [spec.personas[spec.learner].human_factors]
+    lapses = any(each.attention is not None for of_player in beside for each in of_player)
     return spec.attentive_share * spec.settings.steps if lapses else 0.0
 
 
-def _learner(spec: TrainingSpec, environment: ArenaVecEnv, tensorboard: Path | None) -> PPO:
+def _learner(spec: TrainingSpec, environment: GamesVecEnv, tensorboard: Path | None) -> PPO:
     settings = spec.settings
     set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
     model = _ALGORITHMS[settings.learner](
@@ -200,15 +247,15 @@ def _zero_other_weights(model: PPO) -> None:
 def _segment(
     spec: TrainingSpec,
     model: PPO,
-    environment: ArenaVecEnv,
+    environment: GamesVecEnv,
     *,
     progress: Progress,
     on_progress: Callable[[int, int], None],
 ) -> Progress:
     parts = (*spec.parts, "segment", progress.segments)
     set_random_seed(seed_of(*parts, "learner") % 2**32)
-    environment.sample_from(_start_distribution(spec, progress.steps), *parts)
-    environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
+    _sample(spec, environment, progress.steps, *parts)
+    environment.reload(seed_of(*parts, "sumo") % 2**31)
     steps = min(spec.settings.segment_steps, spec.settings.steps - progress.steps)
     curve = CurveRecorder(
         environment,
