@@ -60,6 +60,12 @@ class Training(Document):
     max_deviation: float = Field(0.5, gt=0.0, le=2.0)
     """Upper bound of that standard deviation. Without it, the entropy term raises the standard deviation without limit
     once little is left to learn."""
+    final_deviation: float = Field(0.1, gt=0.0, le=2.0)
+    """Upper bound at the end of a training. A player that drives by the mean action meets other situations than one
+    that explores; with a narrow deviation, the last updates are made where it drives."""
+    narrowing_share: float = Field(0.1, ge=0.0, le=1.0)
+    """Share of the budget in which the upper bound falls from `max_deviation` to `final_deviation`: the last part of
+    the training, before its budget ends or after it has converged."""
     payoff_scale: float = Field(0.1, gt=0.0, le=1000.0)
     """Factor of the payoffs that PPO receives; tables show the payoffs without it. The gradients of actor and critic
     are clipped together: with large payoffs, the errors of the critic would leave little of the step to the actor."""
@@ -79,6 +85,10 @@ class Training(Document):
         if self.initial_deviation > self.max_deviation:
             raise ValueError(
                 f"initial_deviation ({self.initial_deviation:g}) must not exceed max_deviation ({self.max_deviation:g})"
+            )
+        if self.final_deviation > self.max_deviation:
+            raise ValueError(
+                f"final_deviation ({self.final_deviation:g}) must not exceed max_deviation ({self.max_deviation:g})"
             )
         if self.minibatch > self.buffer:
             raise ValueError(f"minibatch ({self.minibatch}) must not exceed buffer ({self.buffer})")

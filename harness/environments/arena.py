@@ -42,7 +42,7 @@ from harness.game.traffic_rules import since_change_s
 from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.simulation import Reading
+from harness.traffic.simulation import Reading, with_game
 
 _RUNNING, _GOAL = (
     int(Outcome.RUNNING),
@@ -119,10 +119,12 @@ class Arena:
         """Reset games, each to its `InitialState` and with its departures of background traffic, and observe."""
         for game, start in starts.items():
             self._place(game, start)
-            signals = self.simulation.reset(game, start, list((departures or {}).get(game, [])))
-            self.state.signals[game], self.state.signal_s[game] = signals.states, signals.since_s
-            self.signal_texts[game] = signals.text
-            if self.reading is not None:
+            at_reset = self.simulation.reset(game, start, list((departures or {}).get(game, [])))
+            self.state.signals[game], self.state.signal_s[game] = at_reset.states, at_reset.since_s
+            self.signal_texts[game] = at_reset.text
+            if at_reset.background is not None:
+                self.reading = with_game(self.reading, self.games, game, at_reset.background)
+            elif self.reading is not None:
                 self.reading.present[game] = False
         games = np.array(sorted(starts), dtype=np.int64)
         for player, seats in enumerate(self.seats):

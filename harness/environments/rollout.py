@@ -124,6 +124,7 @@ def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode
     arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
     trace = _Trace(arm, arena, episode)
     trace.add_players(arena.state.present[0])
+    trace.add_background()
     steps: list[Step] = []
     while arena.state.running.any():
         present = arena.state.present[0].copy()

@@ -3,7 +3,7 @@
 A person that wrecks itself on the empty road and an ego that fails against everybody answer no research question. So
 every question names the least share of goals of its players alone (`AloneBound`, from the campaign's table
 `[competence]`). The share is measured in the arms in which they are assessed alone, by the point estimate: goals per
-game that could be played. A goal of an ego after a red light does not count.
+game that could be played. A goal of an ego that passed a red light, or drove among oncoming lanes, does not count.
 """
 
 from __future__ import annotations
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 DID_NOT_LEARN = "did not learn"
 """How a training ended whose player misses its bound alone, whatever stopped it."""
+RULES: Mapping[str, str] = {"on_red": "passing a red light", "wrong_way": "driving among oncoming lanes"}
+"""The rules that an ego must keep, by the key of the games in which it broke them, with their words."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,6 +32,19 @@ class Goals:
     """Games that could be played."""
     on_red: int = 0
     """Games in which an ego reached its goal, but passed a red light: they are no goals."""
+    wrong_way: int = 0
+    """Further games in which it reached its goal, but drove among oncoming lanes: no goals either."""
+
+    @classmethod
+    def recorded(cls, entry: Mapping[str, Any]) -> Goals:
+        """The goals that an entry of a manifest records."""
+        against_rules = {rule: entry.get(rule, 0) for rule in RULES}
+        return cls(goals=entry["goals"], games=entry["played"], **against_rules)
+
+    def record(self) -> dict[str, int]:
+        """The keys of a manifest's entry; without those of rules that were not broken."""
+        against_rules = {rule: count for rule in RULES if (count := getattr(self, rule))}
+        return {"goals": self.goals, "played": self.games} | against_rules
 
     @property
     def share(self) -> float:
@@ -45,23 +60,37 @@ class Goals:
         counts = (
             f"{self.goals} of {self.games} games ({int(self.share * 1000) / 10:g} %)"  # rounded down: below stays below
         )
-        red = f", and in {self.on_red} more after passing a red light" if self.on_red else ""
-        return f"alone it reaches its goal in {counts}{red}, below {round(least_share * 100, 10):g} %"
+        broken = [
+            f", and in {getattr(self, rule)} more after {words}" for rule, words in RULES.items() if getattr(self, rule)
+        ]
+        return f"alone it reaches its goal in {counts}{''.join(broken)}, below {round(least_share * 100, 10):g} %"
 
 
 def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -> Goals:
     """The goals of a player in an arm's rows of episodes.csv; None: the arm has no row.
 
-    An ego that passes a red light can't drive the scene. Persons may: some are made for it.
+    Several people drive one at a time, and their games count together.
+    An ego that breaks one of `RULES` can't drive the scene. Persons may: some are made for it.
     """
+    from harness.evaluation.manoeuvres.thresholds import WRONG_WAY_LEAST_S
+    from harness.evaluation.people import outcomes_of_people
+
     if games is None:
         return Goals(goals=0, games=0)
-    outcome = games[f"{player}_outcome"].fillna("")
+    outcome = games["ego_outcome"].fillna("") if player == "ego" else outcomes_of_people(games)
     played = (games["error"].fillna("") == "") & ~outcome.isin(["", "error"])
     reached = played & (outcome == "goal")
-    counted = player == "ego" and "ego_red_lights" in games  # runs of earlier versions have no such column
-    on_red = reached & (games["ego_red_lights"].fillna(0.0) > 0.0) if counted else reached & False
-    return Goals(goals=int((reached & ~on_red).sum()), games=int(played.sum()), on_red=int(on_red.sum()))
+    on_red = reached & _at_least(games, "ego_red_lights", 1.0) & (player == "ego")
+    wrong_way = reached & ~on_red & _at_least(games, "ego_wrong_way_s", WRONG_WAY_LEAST_S) & (player == "ego")
+    goals = reached & ~on_red & ~wrong_way
+    return Goals(
+        goals=int(goals.sum()), games=int(played.sum()), on_red=int(on_red.sum()), wrong_way=int(wrong_way.sum())
+    )
+
+
+def _at_least(games: pd.DataFrame, column: str, least: float) -> Any:
+    """Which games have at least this in a column; none, in runs of earlier versions without the column."""
+    return games[column].fillna(0.0) >= least if column in games else False
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -58,10 +58,16 @@ def of_people(games: pd.DataFrame, cell: str) -> pd.DataFrame:
 
 def judged_outcomes(games: pd.DataFrame) -> pd.Series:
     """The outcome of the judged player of each game: the ego, or the person that drives where there is no ego."""
-    found = games["ego_outcome"].fillna("")
-    for _, outcomes in of_people(games, "outcome").items():
-        found = found.where(found != "", outcomes.fillna(""))
-    return found
+    ego = games["ego_outcome"].fillna("")
+    return ego.where(ego != "", outcomes_of_people(games))
+
+
+def outcomes_of_people(games: pd.DataFrame) -> pd.Series:
+    """The outcome of the first person that took part in each game; empty without one."""
+    first, *others = (outcomes.fillna("") for _, outcomes in of_people(games, "outcome").items())
+    for each in others:
+        first = first.where(first != "", each)
+    return first
 
 
 def judged(game: Mapping[str, Any]) -> tuple[str, str]:

@@ -128,8 +128,7 @@ class Quantities:
         return self._passed[1]
 
     @cached_property
-    def permitted_mps(self) -> FloatArray:
-        """Speed that the limits, signals, signs and right of way permit."""
+    def _permitted(self) -> tuple[FloatArray, BoolArray]:
         right_of_way, routes = self.world.right_of_way, self.world.road.routes
         approach_mps = routes.approach_mps[self._rows] * self.state.limit_share[:, None]
         return permitted_mps(
@@ -137,10 +136,17 @@ class Quantities:
             *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),
         )
 
+    @property
+    def permitted_mps(self) -> FloatArray:
+        """Speed that the limits, signals, signs and right of way permit."""
+        return self._permitted[0]
+
     @cached_property
     def speed_over_permitted(self) -> FloatArray:
-        """Excess over the permitted speed as a share of the limit; negative below it."""
-        return (self.state.speed_mps - self.permitted_mps) / self.speed_limit_mps
+        """Excess over the permitted speed as a share of the limit; negative below it, but 0 while the player waits."""
+        permitted_mps, waits = self._permitted
+        over = (self.state.speed_mps - permitted_mps) / self.speed_limit_mps
+        return np.where(waits, np.maximum(over, 0.0), over)
 
     @cached_property
     def wrong_way(self) -> FloatArray:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.meetings import Meetings
 from harness.game.right_of_way import Conflicts, Control, Signal, StopLines
@@ -17,6 +17,7 @@ from harness.game.road import COMFORTABLE_MPS2
 
 AMBER_MPS2 = 3.0  # yellow means stop, unless it takes more braking than this (ITE: 10 ft/s2)
 YIELDS_WITHIN_S = 4.0  # a body with priority that arrives sooner is waited for
+WAITS_WITHIN_M = 10.0  # of a line: a car that stands there, or moves up to it, is not late
 ROLLING_MPS = 0.5  # speed at a stop sign that the rules take for a stop
 
 
@@ -67,11 +68,11 @@ def permitted_mps(
     table: tuple[Any, ...],
     conflict_table: tuple[Any, ...],
     meeting_table: tuple[Any, ...],
-) -> FloatArray:
+) -> tuple[FloatArray, BoolArray]:
     """The speed (m/s) that limits, signals, signs and right of way permit: that of comfortable braking to a lower limit
-    ahead, and to a stop line where one has to stop or to wait."""
+    ahead, and to a stop line where one has to stop or to wait. And whether it has to wait, at that line."""
     lines, conflicts, meetings = StopLines(*table), Conflicts(*conflict_table), Meetings(*meeting_table)
-    permitted = approach_mps.copy()
+    permitted, waits = approach_mps.copy(), np.zeros(front_m.shape, dtype=np.bool_)
     for g, p in np.ndindex(front_m.shape):
         line = next_line[g, p]
         if line >= 0:
@@ -81,6 +82,7 @@ def permitted_mps(
             signal = signals[g, link] if link >= 0 else 0  # off
             amber = signal == Signal.YELLOW and speed_mps[g, p] ** 2 <= 2.0 * AMBER_MPS2 * room_m
             if signal == Signal.RED or amber:
+                waits[g, p] = room_m < WAITS_WITHIN_M
                 permitted[g, p] = min(permitted[g, p], np.sqrt(stopping2))
             elif control == Control.STOP or control == Control.ALL_WAY_STOP:
                 permitted[g, p] = min(permitted[g, p], np.sqrt(stopping2 + ROLLING_MPS**2))
@@ -91,8 +93,9 @@ def permitted_mps(
                 if room_m < 0.0:  # inside the junction: before the zone
                     room_m = meetings.own_m[g, p, b]
                 if room_m >= 0.0:
+                    waits[g, p] |= room_m < WAITS_WITHIN_M
                     permitted[g, p] = min(permitted[g, p], np.sqrt(2.0 * COMFORTABLE_MPS2 * room_m))
-    return permitted
+    return permitted, waits
 
 
 @compiled

@@ -7,6 +7,7 @@ player is therefore read again only when it may have come near, at the top speed
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import astuple
 from typing import Any
 
 import libsumo
@@ -90,8 +91,11 @@ class BackgroundTraffic:
         self._table = _Table(len(prefixes))
         self._empty_reading = self._reading(np.zeros(0, dtype=np.int64), np.zeros((4, 0)))
 
-    def reset(self, game: int, departures: Sequence[Departure]) -> None:
-        """Reset a game: remove its vehicles, and insert the departures of the next game at their times."""
+    def reset(self, game: int, departures: Sequence[Departure]) -> Reading | None:
+        """Reset a game: remove its vehicles, and insert the departures of the next game at their times.
+
+        Returns the vehicles of a warm-up, which are on the road at once, [1, M]; None without any.
+        """
         if self._table.count[game]:
             for sumo_name in self._table.sumo_name[game, : self._table.count[game]].tolist():
                 if self._places.pop(sumo_name, None) is not None:
@@ -103,6 +107,7 @@ class BackgroundTraffic:
         if departures:
             self._waiting[game] = list(reversed(departures))
             self._depart(game)
+        return _warmed_up(departures)
 
     def advance(self) -> None:
         """Process a step of SUMO: arrivals, vehicles that entered the traffic, and departures that are due."""
@@ -179,6 +184,17 @@ class BackgroundTraffic:
         names, types = (_in_rows(words, places, index) for words in (table.name, table.kind))
         x_m, y_m, heading_rad, speed_mps, length_m, width_m = columns
         return Reading(names, types, x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
+
+
+def _warmed_up(departures: Sequence[Departure]) -> Reading | None:
+    """The vehicles of a warm-up among the departures of a game, [1, M]; None without any."""
+    vehicles = [(each, each.motion) for each in departures if each.motion is not None]
+    if not vehicles:
+        return None
+    names, types = np.array([(each.name, each.vehicle_type) for each, _ in vehicles], dtype=object).T[:, None]
+    front_x, front_y, heading, speed, length, width = np.array([astuple(motion) for _, motion in vehicles]).T[:, None]
+    x, y = front_x - 0.5 * length * np.cos(heading), front_y - 0.5 * length * np.sin(heading)
+    return Reading(names, types, x, y, heading, speed, length, width, np.ones((1, len(vehicles)), dtype=bool))
 
 
 def _in_rows(words: NDArray[np.object_], places: IntArray, index: IntArray) -> NDArray[np.object_]:

@@ -34,7 +34,7 @@ from harness.traffic.insertion import Insertion
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.signals import Signals
-from harness.traffic.simulation import Reading, SignalsAtReset
+from harness.traffic.simulation import AtReset, Reading
 from harness.traffic.speed_limits import SpeedLimits
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.traffic.warm_up import clear_of_players
@@ -143,7 +143,7 @@ class LibsumoSimulation:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._load([*self._options, "--seed", str(seed)], libsumo.load)
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> SignalsAtReset:
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
         """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
         tile = self._tiles[game]
         with self._sumo_call(f"reset game {game}"):
@@ -153,10 +153,11 @@ class LibsumoSimulation:
                 self._remove_vehicle(game, player)
             for player in sorted(taking_part - staying):
                 self._add_player(game, player, start)
-            self._background.reset(game, clear_of_players(departures, start, self._scene.world.length_m))
+            background = self._background.reset(game, clear_of_players(departures, start, self._scene.world.length_m))
             if self._speed_limits is not None:
                 self._speed_limits.reset(game, start.limit_share)
-            return self._signals.reset(game, start.signal_place if self._signals else 0.0)
+            at_reset = self._signals.reset(game, start.signal_place if self._signals else 0.0)
+            return at_reset if background is None else at_reset._replace(background=background)
 
     def halt(self, game: int, player: int) -> None:
         """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""

@@ -117,6 +117,6 @@ def _problem(complaint: str, file: Path, about_net: bool) -> Problem:
     place = _PLACE.search(complaint)
     key = f"line {place[1]}, column {place[2]}" if place and about_net else ""
     lines = [line.strip().removeprefix("Error: ") for line in complaint.splitlines()]
-    message = "; ".join(line for line in lines if line and not line.startswith(("In file", "At line")))
+    message = "; ".join(dict.fromkeys(line for line in lines if line and not line.startswith(("In file", "At line"))))
     remedy = "build it with netconvert or netedit" if about_net else "correct it as SUMO's message says"
     return Problem(str(file), key, f"SUMO can't load it: {message[:_LONGEST_MESSAGE]}", remedy)

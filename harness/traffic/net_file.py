@@ -24,6 +24,7 @@ _FARTHEST_M = 2e7  # from the origin of any map projection
 _WIDEST_M = 100_000.0
 _MOST_CELLS, _CELL_M = 4e6, 20.0  # of the grid of rails
 _MOST_LANES = 63
+_MOST_LINKS = 10_000  # of a traffic light
 
 
 def check_net(path: Path) -> None:
@@ -34,7 +35,7 @@ def check_net(path: Path) -> None:
     unknown = list(problems_in(path, root, kinds("net_file.xsd"), "netType"))
     if unknown:
         raise UsageError(unknown)
-    faults = chain(_number_faults(root), _reference_faults(root))
+    faults = chain(_number_faults(root), _reference_faults(root), _signal_faults(root))
     problems = [Problem(str(path), key, message, _REMEDY) for key, message in islice(faults, _MOST_PROBLEMS)]
     if problems:
         raise UsageError(problems)
@@ -109,6 +110,31 @@ def _reference_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
     for first in following:
         if first.startswith(":") and _returns(first, following):
             yield f"lane {first}", "leads back to itself inside a junction"
+
+
+def _signal_faults(root: ElementTree.Element) -> Iterator[tuple[str, str]]:
+    """Key and message of each traffic light without a programme, or with phases that leave out a link."""
+    shortest: dict[str, int] = {}  # number of states in the shortest phase, by light
+    for logic in root.findall("tlLogic"):
+        name, phases = logic.get("id", ""), logic.findall("phase")
+        if not sum(number_of(phase.get("duration", "")) for phase in phases) > 0.0:
+            yield f"tlLogic {name}", "its phases have no duration"
+        lengths = (len(phase.get("state", "")) for phase in phases)
+        shortest[name] = min([*lengths, shortest.get(name, _MOST_LINKS)])
+    rails = {each.get("id") for each in root.findall("junction") if each.get("type", "").startswith("rail")}
+    named: set[str] = set()
+    for link in root.findall("connection"):
+        light, index = link.get("tl", ""), number_of(link.get("linkIndex", "0"))
+        if not light or light in rails or light in named:  # SUMO makes the programmes of rail signals
+            continue
+        if light not in shortest:
+            named.add(light)
+            found = f"; {nearest(light, shortest)}" if shortest else ""
+            yield f"tlLogic {light}", f"the traffic light of a connection has no programme{found}"
+        elif not index < shortest[light]:
+            named.add(light)
+            message = f"a connection has link {index:g}, a phase has {shortest[light]} states"
+            yield f"tlLogic {light}", message
 
 
 def _returns(first: str, following: dict[str, list[str]]) -> bool:

@@ -173,6 +173,9 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         time_limit_s=document.time_limit_s,
         right_of_way=right_of_way(net, [[net.getEdge(name) for name in player.edges] for player in players]),
     )
+    if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:
+        message, remedy = "no player's route passes a traffic light", "leave it out, or choose other routes"
+        raise UsageError.of(document_file, "varies.signal_place", message, remedy)
     scene = OpenScene(
         folder=folder,
         document=document,

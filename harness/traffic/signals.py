@@ -10,7 +10,7 @@ from libsumo import _libsumo  # the same functions without Python wrappers, for 
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.right_of_way import SIGNALS, Signal
-from harness.traffic.simulation import SignalsAtReset
+from harness.traffic.simulation import AtReset
 
 _CODE = np.full(256, int(Signal.OFF), dtype=np.int8)  # by character; 'o' and 'O' are off
 for _letter, _state in SIGNALS.items():
@@ -50,7 +50,7 @@ class Signals:
         states = map(libsumo.trafficlight.getRedYellowGreenState, self._names[game])
         return " ".join(f"{name}={state}" for name, state in zip(self._lights, states, strict=True))
 
-    def reset(self, game: int, share: float) -> SignalsAtReset:
+    def reset(self, game: int, share: float) -> AtReset:
         """Set the lights of a game to a place, from 0 to 1, in their cycles."""
         for name in self._names[game]:
             logic = self._programme(name)
@@ -63,7 +63,7 @@ class Signals:
         since_s = np.zeros(self._count)
         for (columns, links), name in zip(self._links, self._names[game], strict=True):
             since_s[columns] = self._since_change_s(name, links, share)
-        return SignalsAtReset(self._of(game), since_s, self._text(game))
+        return AtReset(self._of(game), since_s, self._text(game))
 
     def _of(self, game: int) -> IntArray:
         row = np.zeros(self._count, dtype=np.int8)

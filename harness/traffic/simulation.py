@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -39,12 +39,32 @@ class Reading:
     are recorded."""
 
 
-class SignalsAtReset(NamedTuple):
-    """The signals of a game after a reset: states of links [L], seconds since they changed [L], and the text."""
+class AtReset(NamedTuple):
+    """A game after a reset: states of signal links [L], seconds since they changed [L], the text of its lights, and the
+    background vehicles on the road [1, M] (None: there are none)."""
 
     states: IntArray
     since_s: FloatArray
     text: str
+    background: Reading | None = None
+
+
+_OF_VEHICLES = ("names", "types", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m", "present")
+
+
+def with_game(reading: Reading | None, games: int, game: int, background: Reading) -> Reading:
+    """A reading of `games` games in which one game has the background vehicles [1, M] of `background`; None: empty."""
+    most = background.present.shape[1]
+    columns = {}
+    for name in _OF_VEHICLES:
+        row = getattr(background, name)
+        column = row[:, :0].repeat(games, axis=0) if reading is None else getattr(reading, name)
+        nothing = None if row.dtype == object else 0
+        more = np.full((games, max(most - column.shape[1], 0)), nothing, dtype=row.dtype)
+        columns[name] = np.concatenate((column, more), axis=1)
+        columns[name][game] = nothing
+        columns[name][game, :most] = row[0]
+    return Reading(**columns) if reading is None else replace(reading, **columns)
 
 
 class Simulation(Protocol):
@@ -53,10 +73,10 @@ class Simulation(Protocol):
     def reload(self, seed: int) -> None:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> SignalsAtReset:
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
         """Clear a game's tile and place its players at their start. Background vehicles depart at their times.
 
-        Traffic lights are set to their place in the cycle.
+        Traffic lights are set to their place in the cycle. Vehicles of a warm-up are on the road at once.
         """
         ...
 

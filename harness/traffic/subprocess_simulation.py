@@ -25,7 +25,7 @@ from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.simulation import Reading, SignalsAtReset
+from harness.traffic.simulation import AtReset, Reading
 
 _LENGTH = struct.Struct("<Q")
 _PATIENCE_S = 10.0  # time limit for a child to end
@@ -53,10 +53,10 @@ class SubprocessSimulation:
         """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._call("reload", seed)
 
-    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> SignalsAtReset:
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
         """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
-        signals: SignalsAtReset = self._call("reset", game, start, departures)
-        return signals
+        at_reset: AtReset = self._call("reset", game, start, departures)
+        return at_reset
 
     def halt(self, game: int, player: int) -> None:
         """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""

@@ -18,11 +18,14 @@ CURVE_WINDOW_STEPS = 16_384
 
 class DeviationBound(BaseCallback):
     """Bounds the standard deviation of actions. Actions are clipped at ±1: beyond the bound the entropy term of PPO
-    still rewards a larger deviation, which is no exploration any more, but full throttle and full brake in turn."""
+    still rewards a larger deviation, which is no exploration any more, but full throttle and full brake in turn.
 
-    def __init__(self, largest: float) -> None:
+    `largest` is the bound after so many steps of the training.
+    """
+
+    def __init__(self, largest: Callable[[int], float]) -> None:
         super().__init__()
-        self._largest_log = float(np.log(largest))
+        self._largest = largest
 
     def _on_step(self) -> bool:
         return True
@@ -36,7 +39,7 @@ class DeviationBound(BaseCallback):
     def _bound(self) -> None:
         deviation: Any = self.model.policy.log_std
         with torch.no_grad():
-            deviation.clamp_(max=self._largest_log)
+            deviation.clamp_(max=float(np.log(self._largest(self.num_timesteps))))
 
 
 class CurveRecorder(BaseCallback):

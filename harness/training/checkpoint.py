@@ -50,6 +50,8 @@ class Progress:
     """Games of each segment without another player."""
     alone_failures: list[int]
     """Those of them that did not end at the goal."""
+    converged_at: int | None = None
+    """Steps after which the curve had converged; None: it had not."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,9 +129,10 @@ def _progress(text: str) -> Progress:
         curve=curve,
         alone_games=stored["alone_games"],
         alone_failures=stored["alone_failures"],
+        converged_at=stored["converged_at"],
     )
     counts = [progress.segments, progress.steps, *(count for each in curve for count in (each.steps, each.games))]
-    counts += [*progress.alone_games, *progress.alone_failures]
+    counts += [*progress.alone_games, *progress.alone_failures, progress.converged_at or 0]
     numbers = [
         *progress.segment_payoffs,
         *(number for each in curve for number in (each.mean_payoff, each.failure_rate, each.mean_duration_s)),

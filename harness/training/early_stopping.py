@@ -18,7 +18,8 @@ MOST_FAILURES = 0.5
 RULE = (
     f"stop when the mean payoff of the latest {LATEST} segments is above that of the {LATEST} before by no more than "
     f"{TOLERANCE:.0%} of the span between the worst and the best segment so far, leaving out segments before attention "
-    f"lapses; not while more than {MOST_FAILURES:.0%} of the games without another player fail in the latest {LATEST}"
+    f"lapses; not while more than {MOST_FAILURES:.0%} of the games without another player fail in the latest {LATEST}; "
+    "then train on while the deviation of the actions becomes narrow"
 )
 
 

@@ -80,6 +80,19 @@ def test_goals__of_an_ego_on_red_do_not_count() -> None:
     )
 
 
+def test_goals__of_an_ego_among_oncoming_lanes_do_not_count() -> None:
+    games = arm("naive_alone", ego=["goal", "goal", "goal", "rail"]).assign(
+        ego_red_lights=[0.0, 1.0, 0.0, 0.0], ego_wrong_way_s=[0.9, 3.0, 1.0, 8.0]
+    )
+    goals = goals_alone(games, "ego")
+    assert goals == Goals(goals=1, games=4, on_red=1, wrong_way=1)
+    assert goals.below(0.97) == (
+        "alone it reaches its goal in 1 of 4 games (25 %), and in 1 more after passing a red light, "
+        "and in 1 more after driving among oncoming lanes, below 97 %"
+    )
+    assert Goals.recorded(goals.record()) == goals
+
+
 @pytest.mark.parametrize(("reached", "enough"), [(97, True), (96, False), (100, True), (0, False)])
 def test_goals__suffice_from_the_bound_on(reached: int, enough: bool) -> None:
     assert Goals(goals=reached, games=100).suffice(0.97) == enough

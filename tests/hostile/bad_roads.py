@@ -76,6 +76,7 @@ def xml_attacks(file: str, root: str, schema: str) -> list[Bad]:
 NUMBERS = {"nan": "nan", "inf": "inf", "-inf": "-inf", "1e308": "huge", "-1": "negative", "0": "zero", "": "empty", "ten": "text", "1,0": "a comma", "0x10": "hexadecimal", "1_0": "underscores", "１０": "wide digits", "1e999": "beyond floating point", "9" * 400: "of 400 digits"}
 LANE, EDGE = '<lane id="approach_1" index="1" speed="13.89" length="100.00" shape="0.00,-1.60 100.00,-1.60"/>', '<edge id="exit" from="taper" to="finish" priority="-1">'
 LINK = '<connection from="approach" to="exit" fromLane="1" toLane="0" via=":taper_0_0" dir="s" state="M"/>'
+LIT = LINK.replace("dir=", 'tl="taper" linkIndex="2" dir=')
 INNER = '<connection from=":taper_0" to="exit" fromLane="0" toLane="0" dir="s" state="M"/>'
 
 
@@ -84,6 +85,12 @@ def lane_numbers(name: str, old: str) -> list[Bad]:
         Bad(f"merge.net.xml: a lane's {name} is {way}", edit(NET, LANE, LANE.replace(f'{name}="{old}"', f'{name}="{value}"')), ("merge.net.xml", f"lane approach_1.{name}"))
         for value, way in NUMBERS.items()
     ]
+
+
+def light(name: str, *phases: tuple[str, str]) -> str:
+    """The programme of a traffic light, with phases of a duration and a state."""
+    inside = "".join(f'<phase duration="{duration}" state="{state}"/>' for duration, state in phases)
+    return f'<tlLogic id="{name}" type="static" programID="0" offset="0">{inside}</tlLogic>'
 
 
 NETS = [
@@ -134,6 +141,16 @@ NETS = [
             ("a country", LANE, LANE.replace("100.00,-1.60", "100.00,15000000.00"), ("too large",)),
             ("a light that runs a program", "<junction id=\"finish\"", '<tlLogic id="taper" type="hilvl" programID="0" offset="0"/><junction id="finish"', ()),
             ("a light that writes", "<junction id=\"finish\"", '<tlLogic id="t" type="actuated" programID="0" offset="0"><param key="file" value="/tmp/owned.xml"/></tlLogic><junction id="finish"', ("files",)),
+        )
+    ),
+    *(
+        Bad(f"merge.net.xml: {way}", several(edit(NET, LINK, LIT), edit(NET, '<junction id="finish"', logic + '<junction id="finish"')), ("merge.net.xml: tlLogic taper", *words))
+        for way, logic, words in (
+            ("a light without a programme", "", ("has no programme",)),
+            ("a light whose programme is misspelt", light("tapper", ("30", "GGG")), ("has no programme", "did you mean 'tapper'")),
+            ("a light without phases", light("taper"), ("no duration",)),
+            ("a light whose phases take no time", light("taper", ("0", "GGG"), ("0", "rrr")), ("no duration",)),
+            ("a light with a phase that leaves out a link", light("taper", ("30", "GGG"), ("30", "rr")), ("link 2", "2 states")),
         )
     ),
     Bad("merge.net.xml: no way on to the goal", edit(NET, LINK, ""), ("merge.rou.xml", "vehicle ego", "no connection")),

@@ -12,13 +12,16 @@ import pytest
 
 from harness.environments.arena import Arena, Seat
 from harness.errors import SimulationError, UsageError
+from harness.game.arrays import FloatArray
+from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.seeding import generator_of
 from harness.traffic import warm_up
 from harness.traffic.load_check import check_loads
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene, open_scene
 from harness.traffic.warm_up import CLEAR_AROUND_M, clear_of_players
-from tests.support.scenes import build_scene, drawn
+from tests.support.rollouts import Steady, arm, play, trace
+from tests.support.scenes import build_scene, drawn, placed
 
 FLOW = """
     <flow id="right" type="van" begin="0" period="4" departSpeed="max" departLane="0"><route edges="road"/></flow>
@@ -108,6 +111,56 @@ def test_arena__has_the_vehicles_where_the_warm_up_left_them(scene: OpenScene, g
                     assert moved == pytest.approx(each.motion.speed_mps * scene.world.step_s, abs=0.12)
     finally:
         arena.close()
+
+
+def test_first_observation__shows_the_vehicles_of_the_warm_up(scene: OpenScene) -> None:
+    van = next(each for each in on_road(scene.departures(generator_of("b"))) if each.lane == "road_0")
+    assert van.motion is not None
+    start = placed(scene, (van.motion.x_m - 40.0, van.motion.y_m, 0.0, 10.0), None)
+    arena = Arena(scene, 1, [Seat(_Still()), Seat(_Still())])
+    try:
+        arena.reset({0: start}, {0: [van]})
+        seen = dict(zip(LAYOUT, in_units(arena.observation[0, 0], 0.5), strict=True))
+    finally:
+        arena.close()
+    assert seen["other0_ahead_m"] == pytest.approx(40.0 - 3.0, abs=1e-3)  # to the middle of the van
+    assert seen["leader_gap_m"] == pytest.approx(40.0 - 6.0 - 2.3, abs=1e-3)
+    assert seen["leader_mps"] == pytest.approx(van.motion.speed_mps - 10.0, abs=1e-3)
+
+
+def test_first_observation__is_the_same_in_a_game_among_others(scene: OpenScene) -> None:
+    starts, departures = [drawn(scene, k) for k in range(3)], [scene.departures(generator_of(k)) for k in range(3)]
+
+    def first_observations(games: Sequence[int], *, recorded: bool, again: int) -> FloatArray:
+        arena = Arena(scene, len(games), [Seat(_Still()), Seat(_Still())], recorded=recorded)
+        try:
+            arena.reset(
+                {k: starts[game] for k, game in enumerate(games)}, {k: departures[game] for k, game in enumerate(games)}
+            )
+            for _ in range(5):
+                arena.step()
+            arena.reset({again: starts[games[again]]}, {again: departures[games[again]]})
+            return arena.observation[again]
+        finally:
+            arena.close()
+
+    alone, among = (
+        first_observations([1], recorded=True, again=0),
+        first_observations([0, 1, 2], recorded=False, again=1),
+    )
+    assert alone[:, LAYOUT.index("other1_seen")].any()  # a vehicle, beside the other player
+    np.testing.assert_array_equal(alone, among)
+
+
+def test_trace__has_the_vehicles_from_the_first_sample_on(scene: OpenScene) -> None:
+    (game,) = play(arm(scene, Steady(), Steady()), 1)
+    frame = trace(game)
+    first, second = (frame[(frame["step"] == k) & frame["player"].str.endswith(".warm")] for k in (0, 1))
+    assert len(first) > 3
+    assert first["player"].tolist() == second["player"].tolist()
+    assert first["vehicle_type"].tolist() == second["vehicle_type"].tolist()
+    moved_m = second["x_m"].to_numpy() - first["x_m"].to_numpy()
+    np.testing.assert_allclose(moved_m, second["speed_mps"] * scene.world.step_s, atol=0.01)
 
 
 class _Still:

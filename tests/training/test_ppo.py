@@ -28,7 +28,8 @@ from harness.game.quantities import Quantities
 from harness.game.state import EGO, NON_EGO
 from harness.traffic.scene import OpenScene
 from harness.training.checkpoint import Progress
-from harness.training.ppo import Trained, TrainingSpec, train
+from harness.training.ppo import Trained, train
+from harness.training.training_games import TrainingSpec
 from tests.support.tiny import DISTRACTED, settings
 from tests.support.trainings import in_one_go, naive_ego
 
@@ -107,7 +108,8 @@ def test_train__a_continued_converged_training_stays_converged(
     monkeypatch.setattr(harness.training.ppo, "has_converged", lambda payoffs: len(payoffs) >= 2)
     monkeypatch.setattr(harness.training.ppo, "still_fails", lambda games, failures: False)
     converged = in_one_go(alone, tmp_path)
-    assert (converged.stopped, converged.progress.steps) == ("converged", 2048)
+    assert (converged.stopped, converged.progress.converged_at) == ("converged", 2048)
+    assert converged.progress.steps == 2048 + 512  # a tenth of the budget more, in whole rollouts
     assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), converged, tmp_path)
     patient = replace(alone, settings=settings(steps=3072, early_convergence=False))
     trained = train(patient, checkpoint=tmp_path / "patient.safetensors", key="key", card={})
@@ -287,13 +289,20 @@ def test_train__the_learner_checks_its_blind_spot_and_the_opponent_does_not(
 
 def test_train__the_deviation_of_actions_is_bounded(alone: TrainingSpec, tmp_path: Path) -> None:
     def deviations(bound: float) -> np.ndarray:
-        rewarded = settings(steps=1024, learning_rate=0.01, entropy_coefficient=1.0, max_deviation=bound)
+        rewarded = settings(
+            steps=1024, learning_rate=0.01, entropy_coefficient=1.0, max_deviation=bound, final_deviation=bound
+        )
         folder = tmp_path / f"{bound}"
         folder.mkdir()
         return np.exp(in_one_go(replace(alone, settings=rewarded), folder).policy.tensors["log_deviation"])
 
     assert (deviations(2.0) > 0.55).all()  # the entropy term raises it from 0.5
     assert (deviations(0.5) <= 0.5 + 1e-6).all()
+
+
+def test_train__the_deviation_of_actions_ends_narrow(alone: TrainingSpec, tmp_path: Path) -> None:
+    narrow = replace(alone, settings=settings(steps=2048, final_deviation=0.2, narrowing_share=0.5))
+    assert (np.exp(in_one_go(narrow, tmp_path).policy.tensors["log_deviation"]) <= 0.2 + 1e-6).all()
 
 
 def test_train__ppo_sees_scaled_payoffs_and_the_curve_does_not(

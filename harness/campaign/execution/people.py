@@ -11,7 +11,7 @@ from harness.game.state import EGO
 
 if TYPE_CHECKING:
     from harness.campaign.execution.player_factory import PlayerFactory
-    from harness.training.ppo import LearningPlace
+    from harness.training.training_games import LearningPlace
 
 
 def people_of(planned: PlannedDriver | None, players: PlayerFactory, people: int) -> tuple[Mixture | None, ...]:
@@ -29,7 +29,7 @@ def learning_places(stage: TrainingStage, players: PlayerFactory, people: int) -
 
     Raises as `PlayerFactory.player` does.
     """
-    from harness.training.ppo import LearningPlace
+    from harness.training.training_games import LearningPlace
 
     if stage.learner == EGO:
         return (LearningPlace(learner=EGO, drivers=(None, *people_of(stage.opponent, players, people))),)

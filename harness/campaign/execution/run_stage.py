@@ -113,7 +113,8 @@ def _train(stage: TrainingStage, run: StageRun) -> Made:
 
     from harness.evaluation.tables import TRAINING_COLUMNS, typed, write_csv
     from harness.training.early_stopping import RULE  # torch is slow to import, and assessment does without
-    from harness.training.ppo import TrainingSpec, train
+    from harness.training.ppo import train
+    from harness.training.training_games import TrainingSpec
 
     context, folder = run.context, run.folder
     settings = training_settings(context.document, stage)
@@ -267,8 +268,7 @@ def _goals_alone(stage: AssessmentStage, episodes: Path) -> dict[str, int]:
     from harness.evaluation.competence import goals_alone
     from harness.evaluation.tables import read_csv
 
-    found = goals_alone(read_csv(episodes), "ego" if stage.ego is not None else "non_ego")
-    return {"goals": found.goals, "played": found.games} | ({"on_red": found.on_red} if found.on_red else {})
+    return goals_alone(read_csv(episodes), "ego" if stage.ego is not None else "non_ego").record()
 
 
 def _versions_since(checkpoint: Path, also: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, str]]:

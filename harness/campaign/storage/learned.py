@@ -40,9 +40,7 @@ def judged(
         alone = goals.get(stage_id(bound.arm, stage.seed)) if bound is not None else None
         if bound is None or alone is None or not alone.games:
             continue
-        found[stage.id] |= {"goals": alone.goals, "played": alone.games, "goal_share_asked": bound.goal_share}
-        if alone.on_red:
-            found[stage.id]["on_red"] = alone.on_red
+        found[stage.id] |= alone.record() | {"goal_share_asked": bound.goal_share}
         if not alone.suffice(bound.goal_share):
             found[stage.id]["stopped"] = DID_NOT_LEARN
     return found
@@ -51,7 +49,7 @@ def judged(
 def recorded_goals(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Goals]:
     """The goals of the arms that their entries in a manifest record, by id."""
     return {
-        name: _goals_of(entry)
+        name: Goals.recorded(entry)
         for name, entry in entries.items()
         if entry["kind"] == "assessment" and entry.get("goals") is not None and entry.get("played") is not None
     }
@@ -60,11 +58,7 @@ def recorded_goals(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Goals]
 def did_not_learn(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """The trainings that made no player that can drive, by id, each with its share of goals and the bound."""
     return {
-        name: _goals_of(entry).below(entry["goal_share_asked"])
+        name: Goals.recorded(entry).below(entry["goal_share_asked"])
         for name, entry in entries.items()
         if entry.get("stopped") == DID_NOT_LEARN and None not in (entry.get(key) for key in _JUDGEMENT)
     }
-
-
-def _goals_of(entry: Mapping[str, Any]) -> Goals:
-    return Goals(goals=entry["goals"], games=entry["played"], on_red=entry.get("on_red", 0))
