@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.people import judged, judged_outcomes
+from harness.evaluation.people import COLLIDED_WITH, judged, judged_outcomes
 from harness.reports import page_wording
 from harness.reports.numbers import MISSING, number
 from harness.reports.player_data import key
@@ -92,12 +92,22 @@ def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: C
     return Replay(
         name=name,
         game=f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
-        outcome=f"{name.replace('non_ego', 'non-ego').replace('_', ' ')}: {outcome}",
+        outcome=f"{_in_words(name)}: {outcome}{_with(game)}",
         min_ttc=number(game["ego_min_ttc_s"], 2),
         command=f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
         scene=_scene(name),
         watch=_key(game) if _key(game) in embedded else "",
     )
+
+
+def _in_words(name: str) -> str:
+    return name.replace("non_ego", "non-ego").replace("_", " ")
+
+
+def _with(game: Mapping[Any, Any]) -> str:
+    """What the ego collided with, where a table of several people has it."""
+    other = game.get(COLLIDED_WITH, "")
+    return f" with {_in_words(other) if other != 'background' else 'background traffic'}" if other else ""
 
 
 def _scene(name: str) -> str:
