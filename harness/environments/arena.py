@@ -106,6 +106,7 @@ class Arena:
         self._lapsed = np.zeros((games, players, self.world.steps), dtype=bool)
         self._lapsed_steering_rad = np.zeros((games, players, self.world.steps))
         self._limits = PlayersLimits(games, players, self.world.steps)
+        self._road_steering_rad: FloatArray = np.zeros((games, players))
         self._all_games = np.arange(games)
         self.reading: Reading | None = None
         self.signal_texts = [""] * games
@@ -131,7 +132,9 @@ class Arena:
             for member, seat in enumerate(seats):
                 if seat.driver is not None:
                     seat.driver.reset(games if len(seats) == 1 else games[self._member[games, player] == member])
-        observation = self.observation[games] = observe(self._first_quantities(games))
+        quantities = self._first_quantities(games)
+        observation = self.observation[games] = observe(quantities)
+        self._road_steering_rad[games] = quantities.road_steering_rad
         check_observation(observation, games, self.state.step)
 
     def reload(self, seed: int) -> None:
@@ -196,11 +199,7 @@ class Arena:
                     )
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)
-        world = self.world
-        road_steering = world.road.routes.road_steering_rad(
-            state.station_m, state.speed_mps, world.actuators.wheelbase_m
-        )
-        acceleration, steering = requests(chosen, state.speed_mps, road_steering, world.actuators)
+        acceleration, steering = requests(chosen, state.speed_mps, self._road_steering_rad, self.world.actuators)
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
         state.lapsed = release_controls(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
@@ -224,7 +223,7 @@ class Arena:
             for member, seat in enumerate(seats):
                 if seat.payoff is not None:
                     paid = drove[:, player] if len(seats) == 1 else self._drove_as(drove, player, member)
-                    payoff[:, player] = np.where(paid, seat.payoff.total(quantities, player), payoff[:, player])
+                    payoff[paid, player] = seat.payoff.total(quantities, player)[paid]
         return payoff
 
     def _drove_as(self, drove: BoolArray, player: int, member: int) -> BoolArray:
@@ -236,7 +235,7 @@ class Arena:
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
         if not ended.any():
-            self.observation = observe(quantities)
+            self._observe(quantities)
             return
         for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
             if reached == _GOAL:
@@ -253,7 +252,11 @@ class Arena:
             advanced_m=quantities.advanced_m,
             lateral_offset_m=quantities.lateral_offset_m,
         )
-        self.observation = observe(after)
+        self._observe(after)
+
+    def _observe(self, quantities: Quantities) -> None:
+        """Observe, and keep what the next decisions need: the steering that follows the road."""
+        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
@@ -289,7 +292,7 @@ class Arena:
             world=self.world,
             state=state,
             bodies=self._bodies(state, games),
-            advanced_m=np.zeros_like(offset),
+            advanced_m=np.zeros(offset.shape),
             lateral_offset_m=offset,
         )
 

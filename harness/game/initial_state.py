@@ -174,6 +174,11 @@ class StartDistribution:
     conditions: Conditions
     along_route_share: float = 0.0
 
+    @cached_property
+    def no_lapses(self) -> Lapses:
+        """The lapses of a driver without any: the same arrays in every game, since they are only read."""
+        return Lapses.none(self.steps)
+
 
 def draw_initial_state(start_distribution: StartDistribution, *parts: str | int) -> InitialState:
     """Draw the initial state of one game, with seeds hashed from the named parts."""
@@ -252,7 +257,7 @@ def _lapses(
     attention: Attention | None, start_distribution: StartDistribution, player: int, delay_steps: int, *parts: str | int
 ) -> Lapses:
     if attention is None:
-        return Lapses.none(start_distribution.steps)
+        return start_distribution.no_lapses
     lapses = draw_lapses(
         attention, start_distribution.steps, start_distribution.step_s, generator_of(*parts, "attention", player)
     )

@@ -25,7 +25,7 @@ from harness.game.meetings import Meetings
 from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, LAYOUT, OTHERS, SCALE, SIZE
 from harness.game.quantities import Quantities
 from harness.game.right_of_way import Control, Signal, StopLines
-from harness.game.road import AHEAD_M, Routes, lane_at, row_at
+from harness.game.road import AHEAD_M, Along, Routes, row_at
 from harness.game.route_coordinates import half_extents_m, place_along_route, row_ahead
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
@@ -46,13 +46,13 @@ def observe(q: Quantities) -> FloatArray:
     state, bodies, actuators = q.state, q.bodies, q.world.actuators
     return _observe(
         *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
-        *(state.station_m, q.lateral_offset_m, state.present, q.road_steering_rad, q.speed_limit_mps),
+        *(state.station_m, q.lateral_offset_m, state.present),
         (state.unseen_behind_m, state.sight_m, state.distance_error, state.closing_error_per_s),
         *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
         bodies.present,
         *(actuators.max_steering_rad, q.world.length_m, q.world.width_m, state.signal_s),
-        *(q.next_stop_line, state.signals),
-        (tuple(q.world.road.routes), tuple(q.world.right_of_way.stop_lines), tuple(q.meetings)),
+        *(q.rules.next_line, q.rules.posted_mps, state.signals),
+        (tuple(q.world.road.routes), tuple(q.along), tuple(q.world.right_of_way.stop_lines), tuple(q.meetings)),
     )
 
 
@@ -67,8 +67,6 @@ def _observe(
     station_m: FloatArray,
     offset_m: FloatArray,
     present: BoolArray,
-    road_steering_rad: FloatArray,
-    speed_limit_mps: FloatArray,
     sight: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     body_x_m: FloatArray,
     body_y_m: FloatArray,
@@ -81,12 +79,14 @@ def _observe(
     length_m: FloatArray,
     width_m: FloatArray,
     signal_s: FloatArray,
-    next_stop_line: IntArray,
+    next_line: IntArray,
+    posted_mps: FloatArray,
     signals: IntArray,
-    tables: tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]],
+    tables: tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]],
 ) -> FloatArray:
     """One compiled pass: for the few games of a reset, several calls would cost more than their work."""
-    routes, stop_lines, meetings = Routes(*tables[0]), StopLines(*tables[1]), Meetings(*tables[2])
+    routes, here = Routes(*tables[0]), Along(*tables[1])
+    stop_lines, meetings = StopLines(*tables[2]), Meetings(*tables[3])
     unseen_behind_m, sight_m, distance_error, closing_error_per_s = sight
     observation = np.zeros((*present.shape, SIZE), dtype=np.float32)
     view = np.empty(SIZE)
@@ -98,16 +98,14 @@ def _observe(
             first, last = routes.first_row[p], routes.last_row[p]
             station, offset, heading, speed = station_m[g, p], offset_m[g, p], heading_rad[g, p], speed_mps[g, p]
             row = row_at(station, first, last)
-            _, lane_end = lane_at(row, offset, routes.lane_offset_m, routes.lane_end_m)
             view[:] = 0.0
-            view[0], view[1] = speed, speed_limit_mps[g, p]
-            view[2] = speed / speed_limit_mps[g, p] - 1.0
-            view[3] = acceleration_mps2[g, p]
-            view[4] = steering_rad[g, p] / max_steering_rad[p]
-            view[5] = road_steering_rad[g, p] / max_steering_rad[p]
-            view[6] = np.maximum(lane_end - station, 0.0)
-            view[7] = routes.goal_m[p] - station
-            view[8], view[9] = routes.own_left_m[row] - offset, routes.own_right_m[row] - offset
+            view[0], view[1] = speed, here.speed_limit_mps[g, p]
+            view[2] = speed / here.speed_limit_mps[g, p] - 1.0
+            view[3], view[4] = speed - posted_mps[g, p], acceleration_mps2[g, p]
+            view[5] = steering_rad[g, p] / max_steering_rad[p]
+            view[6] = here.road_steering_rad[g, p] / max_steering_rad[p]
+            view[7], view[8] = here.lane_end_m[g, p], here.goal_m[g, p]
+            view[9], view[10] = routes.own_left_m[row] - offset, routes.own_right_m[row] - offset
             view[_PATH_LEFT] = -offset
             for k in range(_COUNT):
                 ahead = row_ahead(row, BEHIND + k, first, last)
@@ -117,7 +115,7 @@ def _observe(
                 view[_LEFT + k] = routes.left_edge_m[ahead] - offset
                 view[_RIGHT + k] = routes.right_edge_m[ahead] - offset
             front_m = station + 0.5 * length_m[p]
-            _see_stop_line(view, next_stop_line[g, p], front_m, stop_lines, signals[g], signal_s[g])
+            _see_stop_line(view, next_line[g, p], front_m, stop_lines, signals[g], signal_s[g])
             leader_m, leader_mps = np.inf, 0.0
             cosine, sine = np.cos(heading), np.sin(heading)
             for b in range(bodies):

@@ -33,6 +33,7 @@ _OWN: dict[str, Scale] = {
     "speed_mps": _SPEED,
     "speed_limit_mps": _SPEED,
     "speed_over_limit": _ONE,
+    "over_posted_mps": Scale(5.0, compressed=True),  # speed over what limits ahead, signals and signs permit
     "acceleration_mps2": Scale(10.0),
     "steering_rad": _ONE,  # of the largest steering angle
     "road_steering_rad": _ONE,

@@ -19,7 +19,7 @@ from harness.game.meetings import Meetings, entered_before_s, least_gap_s, meeti
 from harness.game.road import Along
 from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
 from harness.game.state import Bodies, Outcome, State
-from harness.game.traffic_rules import next_stop_lines, passed_stop_lines, permitted_mps, wrong_way
+from harness.game.traffic_rules import Rules, rules
 from harness.game.world import World
 
 SIGHT_M = 60.0  # a body farther ahead than this is not a leader
@@ -62,12 +62,16 @@ class Quantities:
         return self.state.speed_mps
 
     @cached_property
-    def _along(self) -> Along:
-        return self.world.road.routes.along(self.state.station_m, self.lateral_offset_m)
+    def along(self) -> Along:
+        """The route at the players."""
+        state, world = self.state, self.world
+        shares, wheelbase_m = state.limit_share, world.actuators.wheelbase_m
+        where = (state.station_m, self.lateral_offset_m, state.speed_mps)
+        return world.road.routes.along(*where, limit_share=shares, wheelbase_m=wheelbase_m)
 
-    @cached_property
+    @property
     def speed_limit_mps(self) -> FloatArray:
-        return self._along.speed_limit_mps * self.state.limit_share[:, None]
+        return self.along.speed_limit_mps
 
     @cached_property
     def speed_over_limit(self) -> FloatArray:
@@ -77,23 +81,27 @@ class Quantities:
     @property
     def lane_offset_m(self) -> FloatArray:
         """Distance from the centre of the nearest lane."""
-        return self._along.lane_offset_m
+        return self.along.lane_offset_m
 
-    @cached_property
+    @property
     def lane_end_m(self) -> FloatArray:
         """Distance to the end of the player's lane; inf if the lane does not end."""
-        return np.maximum(self._along.lane_end_m - self.state.station_m, 0.0)
+        return self.along.lane_end_m
 
-    @cached_property
+    @property
     def goal_m(self) -> FloatArray:
         """Distance to the goal along the route; 0 or less after the goal."""
-        return self.world.road.routes.goal_m - self.state.station_m
+        return self.along.goal_m
 
-    @cached_property
+    @property
+    def wrong_way(self) -> FloatArray:
+        """1 where the player is among oncoming lanes, else 0."""
+        return self.along.wrong_way
+
+    @property
     def road_steering_rad(self) -> FloatArray:
         """The steering angle that follows the route."""
-        state, wheelbase_m = self.state, self.world.actuators.wheelbase_m
-        return self.world.road.routes.road_steering_rad(state.station_m, state.speed_mps, wheelbase_m)
+        return self.along.road_steering_rad
 
     @cached_property
     def lateral_acceleration_mps2(self) -> FloatArray:
@@ -107,57 +115,37 @@ class Quantities:
         return self.state.station_m + 0.5 * self.world.length_m
 
     @cached_property
-    def next_stop_line(self) -> IntArray:
-        """Row of the next stop line; -1 without one."""
-        lines = self.world.right_of_way.stop_lines
-        return next_stop_lines(self.front_m, lines.player, lines.station_m)
-
-    @cached_property
-    def _passed(self) -> tuple[FloatArray, FloatArray]:
-        state, lines = self.state, tuple(self.world.right_of_way.stop_lines)
-        return passed_stop_lines(self.front_m, self.advanced_m, state.speed_mps, state.signals, state.signal_s, lines)
+    def rules(self) -> Rules:
+        """What signals, signs and right of way ask of the players, and what they did."""
+        state, tables = self.state, self.world.right_of_way
+        next_line, numbers = rules(
+            *(state.station_m, self.advanced_m, state.speed_mps, self.along.approach_mps, self.world.length_m),
+            *(state.signals, state.signal_s),
+            (tuple(tables.stop_lines), tuple(tables.conflicts), tuple(self.meetings)),
+        )
+        return Rules(next_line, *numbers)
 
     @property
     def passed_red_s(self) -> FloatArray:
         """Seconds since the signal became red, if the player passed its stop line in this step; else -1."""
-        return self._passed[0]
+        return self.rules.passed_red_s
 
     @property
     def passed_stop_sign_mps(self) -> FloatArray:
         """Speed at which the player passed a stop sign in this step; else -1."""
-        return self._passed[1]
-
-    @cached_property
-    def _permitted(self) -> tuple[FloatArray, BoolArray]:
-        right_of_way, routes = self.world.right_of_way, self.world.road.routes
-        approach_mps = routes.approach_mps[self._rows] * self.state.limit_share[:, None]
-        return permitted_mps(
-            *(self.front_m, self.state.speed_mps, approach_mps, self.next_stop_line, self.state.signals),
-            *(tuple(right_of_way.stop_lines), tuple(right_of_way.conflicts), tuple(self.meetings)),
-        )
+        return self.rules.passed_stop_sign_mps
 
     @property
     def permitted_mps(self) -> FloatArray:
         """Speed that the limits, signals, signs and right of way permit."""
-        return self._permitted[0]
+        return self.rules.permitted_mps
 
     @cached_property
     def speed_over_permitted(self) -> FloatArray:
         """Excess over the permitted speed as a share of the limit; negative below it, but 0 while the player waits."""
-        permitted_mps, waits = self._permitted
-        over = (self.state.speed_mps - permitted_mps) / self.speed_limit_mps
-        return np.where(waits, np.maximum(over, 0.0), over)
-
-    @cached_property
-    def wrong_way(self) -> FloatArray:
-        """1 where the player is among oncoming lanes, else 0."""
-        routes = self.world.road.routes
-        return wrong_way(self.lateral_offset_m, self._rows, routes.own_left_m, routes.own_right_m)
-
-    @cached_property
-    def _rows(self) -> IntArray:
-        """Rows of the table of routes at the players."""
-        return self.world.road.routes.rows(self.state.station_m)
+        speed_mps, asked = self.state.speed_mps, self.rules
+        over_mps = np.maximum(speed_mps - asked.permitted_mps, 0.0) + np.minimum(speed_mps - asked.due_mps, 0.0)
+        return over_mps / self.speed_limit_mps
 
     # --- other bodies --------------------------------------------------------------------------------------------
 
@@ -193,7 +181,7 @@ class Quantities:
         """Each player's conflict with each body at a junction."""
         state, bodies, tables = self.state, self.bodies, self.world.right_of_way
         if not len(tables.conflicts.player):
-            return Meetings.none(self.visible.shape)
+            return Meetings.none((*state.present.shape, bodies.present.shape[1]))
         columns = meetings(
             *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
             (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),
@@ -224,12 +212,13 @@ class Quantities:
     @cached_property
     def _boxes(self) -> Box:
         """The bodies' boxes, [G, B]."""
-        return Box(*(getattr(self.bodies, name) for name in Box._fields))
+        bodies = self.bodies
+        return Box(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
 
     @cached_property
     def vehicle_clearance_m(self) -> FloatArray:
         """Distance to the nearest other body: 0 at contact, at most `REACH_M`."""
-        return _vehicle_clearance_m(self._cars, self._boxes, self.state.present, self.bodies.present)
+        return distance_to_nearest_box(self._cars, self._boxes, self.visible, REACH_M)
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
@@ -294,8 +283,3 @@ def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
     for g, p, b in np.ndindex(visible.shape):
         visible[g, p, b] = players[g, p] and bodies[g, b] and p != b
     return visible
-
-
-@compiled
-def _vehicle_clearance_m(cars: Box, boxes: Box, players: BoolArray, bodies: BoolArray) -> FloatArray:
-    return distance_to_nearest_box(cars, boxes, _visible(players, bodies), REACH_M)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,11 +47,15 @@ class Route:
 
 
 class Along(NamedTuple):
-    """The route's properties at the players, [G, P]."""
+    """The route at the players, [G, P]."""
 
     speed_limit_mps: FloatArray
+    approach_mps: FloatArray  # speed at which comfortable braking keeps to the limits ahead
     lane_offset_m: FloatArray  # distance to the centre of the nearest lane
-    lane_end_m: FloatArray  # station where that lane ends; inf if it does not
+    lane_end_m: FloatArray  # distance to the end of that lane; inf if it does not end
+    goal_m: FloatArray  # distance to the goal; 0 or less after it
+    wrong_way: FloatArray  # 1 for a centre among oncoming lanes, else 0
+    road_steering_rad: FloatArray  # the steering angle that follows the route
 
 
 class Routes(NamedTuple):
@@ -62,10 +66,10 @@ class Routes(NamedTuple):
 
     x_m: FloatArray
     y_m: FloatArray
-    heading_rad: FloatArray
     cos: FloatArray
     sin: FloatArray
     curvature_per_m: FloatArray
+    heading_rad: FloatArray
     bend_per_m: FloatArray  # curvature, smoothed over `_BEND_M`
     bend_ahead_per_m: (
         FloatArray  # [N, K] the tightest bend in each section between `AHEAD_M`, and from the last for 30 m
@@ -95,16 +99,18 @@ class Routes(NamedTuple):
             return np.concatenate(parts)
 
         columns = {each.name: column(each.name) for each in fields(Route) if each.name not in ("length_m", "goal_m")}
+        columns |= {
+            "cos": np.cos(columns["heading_rad"]),
+            "sin": np.sin(columns["heading_rad"]),
+            "curvature_per_m": np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
+            "bend_ahead_per_m": np.concatenate([_bend_ahead_per_m(route.heading_rad) for route in routes]),
+            "approach_mps": np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
+            "bend_per_m": np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
+        }
         rows = np.array([len(route.x_m) for route in routes])
         first = np.cumsum(rows) - rows
         return cls(
-            **columns,
-            cos=np.cos(columns["heading_rad"]),
-            sin=np.sin(columns["heading_rad"]),
-            curvature_per_m=np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
-            bend_ahead_per_m=np.concatenate([_bend_ahead_per_m(route.heading_rad) for route in routes]),
-            approach_mps=np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
-            bend_per_m=np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
+            **_side_by_side(columns),
             first_row=first,
             last_row=first + rows - 1,
             goal_m=np.array([route.goal_m for route in routes]),
@@ -117,20 +123,21 @@ class Routes(NamedTuple):
     def locate(self, x_m: FloatArray, y_m: FloatArray, station_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Stations and lateral offsets (m, left positive) [G, P] of points [G, P], given their previous stations."""
         lines = (self.x_m, self.y_m, self.cos, self.sin, self.curvature_per_m)
-        return _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
+        stations, offsets = _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
+        return stations, offsets
 
-    def road_steering_rad(self, station_m: FloatArray, speed_mps: FloatArray, wheelbase_m: FloatArray) -> FloatArray:
-        """[G, P] steering angle (rad) with which cars follow the routes at stations and speeds [G, P].
-
-        The angle is that of the bend at the rear axle, which has no slip, in `PREVIEW_S`, for wheelbases [P]. With the
-        bend at the centre, a car would leave a quarter circle by two metres.
-        """
-        return _road_steering_rad(station_m, speed_mps, wheelbase_m, self.bend_per_m, self.first_row, self.last_row)
-
-    def along(self, station_m: FloatArray, offset_m: FloatArray) -> Along:
-        """The routes' properties at stations and lateral offsets [G, P]."""
-        lanes = (self.lane_offset_m, self.lane_end_m)
-        return Along(*_along(station_m, offset_m, self.speed_limit_mps, *lanes, self.first_row, self.last_row))
+    def along(
+        self,
+        station_m: FloatArray,
+        offset_m: FloatArray,
+        speed_mps: FloatArray,
+        *,
+        limit_share: FloatArray,
+        wheelbase_m: FloatArray,
+    ) -> Along:
+        """The routes at players with stations, lateral offsets and speeds [G, P], factors on the speed limits [G] and
+        wheelbases [P]."""
+        return Along(*_along(station_m, offset_m, speed_mps, limit_share, wheelbase_m, tuple(self)))
 
 
 @compiled
@@ -146,23 +153,6 @@ def row_at(station_m: float, first_row: int, last_row: int) -> int:
     """The row of a route nearest to a station; the first row for NaN."""
     rows = (station_m + MARGIN_M) / SPACING_M
     return first_row + int(min(np.rint(rows), last_row - first_row)) if rows > 0.0 else first_row
-
-
-@compiled
-def _road_steering_rad(
-    station_m: FloatArray,
-    speed_mps: FloatArray,
-    wheelbase_m: FloatArray,
-    bend_per_m: FloatArray,
-    first_row: IntArray,
-    last_row: IntArray,
-) -> FloatArray:
-    steering = np.empty(station_m.shape)
-    for g, p in np.ndindex(station_m.shape):
-        rear_axle_m = station_m[g, p] - 0.5 * wheelbase_m[p] + PREVIEW_S * speed_mps[g, p]
-        row = row_at(rear_axle_m, first_row[p], last_row[p])
-        steering[g, p] = steering_of_bend_rad(bend_per_m[row], wheelbase_m[p])
-    return steering
 
 
 @compiled
@@ -184,44 +174,63 @@ def _locate(
     curvature_per_m: FloatArray,
     first_row: IntArray,
     last_row: IntArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Newton's method on the distance to the line.
+) -> FloatArray:
+    """[2, G, P] stations and lateral offsets, by Newton's method on the distance to the line.
 
     A metre of travel on the inside of a curve is more than a metre of the line, on the outside less.
     """
-    stations, offsets = station_m.copy(), np.empty_like(station_m)
+    places = np.empty((2, *station_m.shape))
     for g, p in np.ndindex(x_m.shape):
+        station, offset = station_m[g, p], 0.0
         for _ in range(3):
-            row = row_at(stations[g, p], first_row[p], last_row[p])
+            row = row_at(station, first_row[p], last_row[p])
             dx, dy = x_m[g, p] - line_x_m[row], y_m[g, p] - line_y_m[row]
             offset = dy * line_cos[row] - dx * line_sin[row]
             stretch = max(1.0 - curvature_per_m[row] * offset, _LEAST_STRETCH)
             along = (dx * line_cos[row] + dy * line_sin[row]) / stretch
-            stations[g, p] = (row - first_row[p]) * SPACING_M - MARGIN_M + along
-            offsets[g, p] = offset
-    return stations, offsets
+            station = (row - first_row[p]) * SPACING_M - MARGIN_M + along
+        places[0, g, p], places[1, g, p] = station, offset
+    return places
 
 
 @compiled
 def _along(
     station_m: FloatArray,
     offset_m: FloatArray,
-    speed_limit_mps: FloatArray,
-    lane_offset_m: FloatArray,
-    lane_end_m: FloatArray,
-    first_row: IntArray,
-    last_row: IntArray,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    limit, nearest, ends = np.empty(offset_m.shape), np.empty(offset_m.shape), np.empty(offset_m.shape)
-    for g, p in np.ndindex(offset_m.shape):
-        row = row_at(station_m[g, p], first_row[p], last_row[p])
-        limit[g, p] = speed_limit_mps[row]
-        nearest[g, p], ends[g, p] = lane_at(row, offset_m[g, p], lane_offset_m, lane_end_m)
-    return limit, nearest, ends
+    speed_mps: FloatArray,
+    limit_share: FloatArray,
+    wheelbase_m: FloatArray,
+    table: tuple[Any, ...],
+) -> FloatArray:
+    """[7, G, P] the columns of `Along`.
+
+    A car follows the road by the bend at its rear axle, which has no slip, in `PREVIEW_S`. With the bend at the centre,
+    it would leave a quarter circle by two metres.
+    """
+    routes = Routes(*table)
+    along = np.empty((7, *station_m.shape))
+    for g, p in np.ndindex(station_m.shape):
+        station, offset, first, last = station_m[g, p], offset_m[g, p], routes.first_row[p], routes.last_row[p]
+        row = row_at(station, first, last)
+        lane_offset, lane_end = _lane_at(row, offset, routes.lane_offset_m, routes.lane_end_m)
+        beside = offset > routes.own_left_m[row] or offset < routes.own_right_m[row]
+        rear_axle = row_at(station - 0.5 * wheelbase_m[p] + PREVIEW_S * speed_mps[g, p], first, last)
+        columns = (
+            routes.speed_limit_mps[row] * limit_share[g],
+            routes.approach_mps[row] * limit_share[g],
+            lane_offset,
+            np.maximum(lane_end - station, 0.0),
+            routes.goal_m[p] - station,
+            1.0 if beside else 0.0,
+            steering_of_bend_rad(routes.bend_per_m[rear_axle], wheelbase_m[p]),
+        )
+        for k, value in enumerate(columns):
+            along[k, g, p] = value
+    return along
 
 
 @compiled
-def lane_at(row: int, offset_m: float, lane_offset_m: FloatArray, lane_end_m: FloatArray) -> tuple[float, float]:
+def _lane_at(row: int, offset_m: float, lane_offset_m: FloatArray, lane_end_m: FloatArray) -> tuple[float, float]:
     """Distance (m) to the centre of the nearest lane, and the station where that lane ends."""
     nearest, ends = np.inf, np.inf
     for lane in range(lane_offset_m.shape[1]):
@@ -229,6 +238,16 @@ def lane_at(row: int, offset_m: float, lane_offset_m: FloatArray, lane_end_m: Fl
         if distance < nearest:  # false for NaN: a lane that does not exist here
             nearest, ends = distance, lane_end_m[row, lane]
     return nearest, ends
+
+
+def _side_by_side(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The columns as views of one array, in which the values of a station are neighbours: reading several of them loads
+    few lines of memory."""
+    ordered = {name: columns[name] for name in Routes._fields if name in columns}
+    table = np.concatenate([column.reshape(len(column), -1) for column in ordered.values()], axis=1)
+    widths = [column.size // len(column) for column in ordered.values()]
+    parts = np.split(table, np.cumsum(widths)[:-1], axis=1)
+    return {name: part[:, 0] if columns[name].ndim == 1 else part for name, part in zip(ordered, parts, strict=True)}
 
 
 def _curvature_per_m(heading_rad: FloatArray) -> FloatArray:

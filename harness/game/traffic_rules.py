@@ -1,15 +1,15 @@
-"""Signals, signs and sides of the road: what the rules ask of each player, and what it did. Arrays are [G, P].
+"""Signals, signs and right of way: what the rules ask of each player, and what it did.
 
 A player passes a stop line in the step in which its front bumper does.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.meetings import Meetings
 from harness.game.right_of_way import Conflicts, Control, Signal, StopLines
@@ -19,93 +19,88 @@ AMBER_MPS2 = 3.0  # yellow means stop, unless it takes more braking than this (I
 YIELDS_WITHIN_S = 4.0  # a body with priority that arrives sooner is waited for
 WAITS_WITHIN_M = 10.0  # of a line: a car that stands there, or moves up to it, is not late
 ROLLING_MPS = 0.5  # speed at a stop sign that the rules take for a stop
+# plain integers: compiled code can't convert a member
+_OFF, _YELLOW, _RED = int(Signal.OFF), int(Signal.YELLOW), int(Signal.RED)
+_STOP, _ALL_WAY_STOP = int(Control.STOP), int(Control.ALL_WAY_STOP)
+
+
+class Rules(NamedTuple):
+    """The rules at the players, [G, P]."""
+
+    next_line: IntArray  # row of the next stop line; -1 without one
+    permitted_mps: FloatArray  # speed that the limits, signals, signs and right of way permit
+    due_mps: FloatArray  # speed below which the player is late: the permitted one, or 0 where it waits
+    posted_mps: FloatArray  # speed that the limits, signals and signs permit
+    passed_red_s: FloatArray  # seconds since a signal became red whose line was passed in this step; else -1
+    passed_stop_sign_mps: FloatArray  # speed at which a stop sign was passed in this step; else -1
 
 
 @compiled
-def next_stop_lines(front_m: FloatArray, player: IntArray, station_m: FloatArray) -> IntArray:
-    """The first stop line of each player that its front at `front_m` has not passed; -1 without one."""
-    lines = np.full(front_m.shape, -1)
-    for g, p in np.ndindex(front_m.shape):
-        for line in range(len(player)):
-            if player[line] == p and station_m[line] >= front_m[g, p]:
-                lines[g, p] = line
-                break
-    return lines
-
-
-@compiled
-def passed_stop_lines(
-    front_m: FloatArray,
+def rules(
+    station_m: FloatArray,
     advanced_m: FloatArray,
     speed_mps: FloatArray,
+    approach_mps: FloatArray,
+    length_m: FloatArray,
     signals: IntArray,
     signal_s: FloatArray,
-    table: tuple[Any, ...],
-) -> tuple[FloatArray, FloatArray]:
-    """Seconds since the signal became red, for players that passed its stop line on red in this step; and the speed
-    (m/s) of players that passed a stop sign. -1 for all others."""
-    lines = StopLines(*table)
-    red_s, stop_mps = np.full(front_m.shape, -1.0), np.full(front_m.shape, -1.0)
-    for g, p in np.ndindex(front_m.shape):
-        for line in range(len(lines.player)):
-            passed = front_m[g, p] - advanced_m[g, p] <= lines.station_m[line] < front_m[g, p]
-            if lines.player[line] == p and passed:
-                link, control = lines.link[line], lines.control[line]
-                if link >= 0 and signals[g, link] == Signal.RED:
-                    red_s[g, p] = signal_s[g, link]
-                if control == Control.STOP or control == Control.ALL_WAY_STOP:
-                    stop_mps[g, p] = speed_mps[g, p]
-    return red_s, stop_mps
+    tables: tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]],
+) -> tuple[IntArray, FloatArray]:
+    """The columns of `Rules`: the next line [G, P], and the numbers [5, G, P] in their order.
 
-
-@compiled
-def permitted_mps(
-    front_m: FloatArray,
-    speed_mps: FloatArray,
-    approach_mps: FloatArray,
-    next_line: IntArray,
-    signals: IntArray,
-    table: tuple[Any, ...],
-    conflict_table: tuple[Any, ...],
-    meeting_table: tuple[Any, ...],
-) -> tuple[FloatArray, BoolArray]:
-    """The speed (m/s) that limits, signals, signs and right of way permit: that of comfortable braking to a lower limit
-    ahead, and to a stop line where one has to stop or to wait. And whether it has to wait, at that line."""
-    lines, conflicts, meetings = StopLines(*table), Conflicts(*conflict_table), Meetings(*meeting_table)
-    permitted, waits = approach_mps.copy(), np.zeros(front_m.shape, dtype=np.bool_)
-    for g, p in np.ndindex(front_m.shape):
-        line = next_line[g, p]
-        if line >= 0:
-            room_m = max(lines.station_m[line] - front_m[g, p], 0.0)
-            stopping2 = 2.0 * COMFORTABLE_MPS2 * room_m
-            control, link = lines.control[line], lines.link[line]
-            signal = signals[g, link] if link >= 0 else 0  # off
-            amber = signal == Signal.YELLOW and speed_mps[g, p] ** 2 <= 2.0 * AMBER_MPS2 * room_m
-            if signal == Signal.RED or amber:
-                waits[g, p] = room_m < WAITS_WITHIN_M
-                permitted[g, p] = min(permitted[g, p], np.sqrt(stopping2))
-            elif control == Control.STOP or control == Control.ALL_WAY_STOP:
-                permitted[g, p] = min(permitted[g, p], np.sqrt(stopping2 + ROLLING_MPS**2))
+    Players are given by station, way in this step, speed and speed for the limits ahead [G, P], and length [P];
+    `signals` and `signal_s` [G, L] are the states of links. `tables` are stop lines, conflicts and meetings.
+    """
+    lines, conflicts, meetings = StopLines(*tables[0]), Conflicts(*tables[1]), Meetings(*tables[2])
+    next_line, numbers = np.full(station_m.shape, -1), np.full((5, *station_m.shape), -1.0)
+    for g, p in np.ndindex(station_m.shape):
+        front_m, speed, permitted_mps = station_m[g, p] + 0.5 * length_m[p], speed_mps[g, p], approach_mps[g, p]
+        waits = False
+        for line in range(len(lines.player)):  # sorted by player and station
+            if lines.player[line] != p:
+                continue
+            control, link, place_m = lines.control[line], lines.link[line], lines.station_m[line]
+            signal = signals[g, link] if link >= 0 else _OFF
+            if place_m >= front_m:
+                next_line[g, p] = line
+                stopping_mps = _speed_before_line(place_m - front_m, speed, control, signal)
+                waits = stopping_mps < _braking_mps(WAITS_WITHIN_M) and control not in (_STOP, _ALL_WAY_STOP)
+                permitted_mps = min(permitted_mps, stopping_mps)
+                break
+            if front_m - advanced_m[g, p] <= place_m:  # passed in this step
+                if signal == _RED:
+                    numbers[3, g, p] = signal_s[g, link]
+                if control in (_STOP, _ALL_WAY_STOP):
+                    numbers[4, g, p] = speed
+        numbers[2, g, p] = permitted_mps
         for b in range(meetings.conflict.shape[2]):
             conflict = meetings.conflict[g, p, b]
             if conflict >= 0 and meetings.must_yield[g, p, b] and meetings.other_s[g, p, b] < YIELDS_WITHIN_S:
-                room_m = conflicts.stop_m[conflict] - front_m[g, p]
+                room_m = conflicts.stop_m[conflict] - front_m
                 if room_m < 0.0:  # inside the junction: before the zone
                     room_m = meetings.own_m[g, p, b]
                 if room_m >= 0.0:
-                    waits[g, p] |= room_m < WAITS_WITHIN_M
-                    permitted[g, p] = min(permitted[g, p], np.sqrt(2.0 * COMFORTABLE_MPS2 * room_m))
-    return permitted, waits
+                    waits = waits or room_m < WAITS_WITHIN_M
+                    permitted_mps = min(permitted_mps, _braking_mps(room_m))
+        numbers[0, g, p], numbers[1, g, p] = permitted_mps, 0.0 if waits else permitted_mps
+    return next_line, numbers
 
 
 @compiled
-def wrong_way(offset_m: FloatArray, row: IntArray, own_left_m: FloatArray, own_right_m: FloatArray) -> FloatArray:
-    """1 for players whose centre is among oncoming lanes, else 0."""
-    wrong = np.zeros(offset_m.shape)
-    for g, p in np.ndindex(offset_m.shape):
-        beside = offset_m[g, p] > own_left_m[row[g, p]] or offset_m[g, p] < own_right_m[row[g, p]]
-        wrong[g, p] = 1.0 if beside else 0.0
-    return wrong
+def _speed_before_line(room_m: float, speed_mps: float, control: int, signal: int) -> float:
+    """The speed (m/s) that signal and sign of a stop line permit at a distance before it, to a car at a speed."""
+    amber = signal == _YELLOW and speed_mps**2 <= 2.0 * AMBER_MPS2 * room_m
+    if signal == _RED or amber:
+        return _braking_mps(room_m)
+    if control in (_STOP, _ALL_WAY_STOP):
+        return np.sqrt(2.0 * COMFORTABLE_MPS2 * room_m + ROLLING_MPS**2)
+    return np.inf
+
+
+@compiled
+def _braking_mps(room_m: float) -> float:
+    """The speed (m/s) from which comfortable braking ends within a distance."""
+    return np.sqrt(2.0 * COMFORTABLE_MPS2 * room_m)
 
 
 @compiled

@@ -77,12 +77,14 @@ class OpenScene:
 
     def departures(self, generator: np.random.Generator) -> list[Departure]:
         """The background vehicles that depart during a game. What is random about them is drawn from the generator."""
+        if not self.has_background_traffic:
+            return []
         players = {player.vehicle for player in self.document.players}
         begin_s, end_s = self.document.game_window_s
         varied = self.document.varies.traffic_density
         density = 1.0 if varied is None else between(varied, generator.random())
         on_road: tuple[Departure, ...] = ()
-        if self.document.warm_up_s and self.has_background_traffic:
+        if self.document.warm_up_s:
             snapshot = self.warm_up[generator.integers(len(self.warm_up))]
             density, on_road = snapshot.density, snapshot.vehicles
         return [*on_road, *self.routes.departures(players, end_s, generator, begin_s, density)]

@@ -28,6 +28,7 @@ from harness.training.checkpoint import Progress, policy_of, put_policy, read_ch
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import has_converged, still_fails
 from harness.training.narrowing import Narrowing
+from harness.training.torch_without_compiler import leave_out_compiler
 from harness.training.training_games import TrainingSpec, attentive_steps, open_games, sample
 
 _GAE_LAMBDA = 0.95
@@ -97,6 +98,7 @@ def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
 def _learner(spec: TrainingSpec, environment: GamesVecEnv, tensorboard: Path | None) -> PPO:
     settings = spec.settings
     set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
+    leave_out_compiler()
     model = _ALGORITHMS[settings.learner](
         "MlpPolicy",
         environment,

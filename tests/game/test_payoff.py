@@ -130,7 +130,7 @@ def test_progress__is_paid_per_100_m_whatever_the_step(moment: Moment, world: Wo
 
 @pytest.mark.parametrize(("since_s", "value"), [(-1.0, 0.0), (0.0, 0.0), (1.9, 0.0), (2.0, -1.0), (30.0, -1.0)])
 def test_red_light__counts_once_from_its_time_on(moment: Moment, world: World, since_s: float, value: float) -> None:
-    q = with_quantity(moment(world, [car(50.0), FAR]), "_passed", (np.array([[since_s, -1.0]]), NO_LINE))
+    q = with_rule(moment(world, [car(50.0), FAR]), passed_red_s=np.array([[since_s, -1.0]]))
     assert value_of(q, "red_light", 2.0, weight=5.0) == 5.0 * value
 
 
@@ -141,7 +141,7 @@ def test_red_light__not_passed_costs_nothing(moment: Moment, world: World, after
 
 @pytest.mark.parametrize(("speed_mps", "value"), [(-1.0, 0.0), (0.0, 0.0), (2.9, 0.0), (3.0, -1.0), (12.0, -1.0)])
 def test_stop_sign__counts_once_from_its_speed_on(moment: Moment, world: World, speed_mps: float, value: float) -> None:
-    q = with_quantity(moment(world, [car(50.0), FAR]), "_passed", (NO_LINE, np.array([[speed_mps, -1.0]])))
+    q = with_rule(moment(world, [car(50.0), FAR]), passed_stop_sign_mps=np.array([[speed_mps, -1.0]]))
     assert value_of(q, "stop_sign", 3.0, weight=5.0) == 5.0 * value
 
 
@@ -159,7 +159,9 @@ def test_gap__is_paid_per_second_and_by_its_nearness(moment: Moment, world: Worl
         assert value_of(q, "gap", 3.0) == pytest.approx(0.1 * rate)
 
 
-NO_LINE = np.full((1, 2), -1.0)
+def with_rule(q: Quantities, **values: Any) -> Quantities:
+    """The quantities, with values of their rules given."""
+    return with_quantity(q, "rules", q.rules._replace(**values))
 
 
 def with_quantity(q: Quantities, name: str, value: Any) -> Quantities:

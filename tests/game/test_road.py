@@ -84,6 +84,15 @@ def test_rows__stay_within_a_players_own_route() -> None:
 # --- the wheel that follows the road ---------------------------------------------------------------------------------
 
 
+def road_steering_rad(
+    routes: Routes, station_m: FloatArray, speed_mps: FloatArray, wheelbase_m: FloatArray
+) -> FloatArray:
+    """The steering angles that follow the routes, [G, P], of cars on their lines."""
+    on_line, limits = np.zeros_like(station_m), np.ones(len(station_m))
+    along = routes.along(station_m, on_line, speed_mps, limit_share=limits, wheelbase_m=wheelbase_m)
+    return along.road_steering_rad
+
+
 @pytest.mark.parametrize("radius", [15.0, -15.0, 25.0, -60.0])
 @pytest.mark.parametrize("speed", [4.0, 8.0])
 def test_road_steering__a_wheel_of_0_follows_a_quarter_circle(radius: float, speed: float) -> None:
@@ -94,7 +103,7 @@ def test_road_steering__a_wheel_of_0_follows_a_quarter_circle(radius: float, spe
     state.station_m, offset = routes.locate(state.x_m, state.y_m, np.full((1, 1), -10.0))
     offsets = []
     while state.station_m[0, 0] < abs(radius) * np.pi / 2.0 + 5.0:
-        bend = routes.road_steering_rad(state.station_m, state.speed_mps, car.wheelbase_m)
+        bend = road_steering_rad(routes, state.station_m, state.speed_mps, car.wheelbase_m)
         acceleration, steering = requests(np.zeros((1, 1, 2)), state.speed_mps, bend, car)
         advance(state, float(acceleration[0, 0]), float(steering[0, 0]), car)
         state.station_m, offset = routes.locate(state.x_m, state.y_m, state.station_m)
@@ -116,7 +125,7 @@ def test_road_steering__a_wheel_of_0_follows_a_quarter_circle(radius: float, spe
 )
 def test_road_steering__is_that_of_the_bend_at_the_rear_axle(station: float, speed: float, bend: float) -> None:
     routes = Routes.of([arc(20.0)])
-    found = routes.road_steering_rad(np.array([[station]]), np.array([[speed]]), np.array([2.7]))
+    found = road_steering_rad(routes, np.array([[station]]), np.array([[speed]]), np.array([2.7]))
     # a bend of 20 m: tan = 2.7 / 20 / sqrt(1 - (2.7 / 20 / 2)^2)
     turn = bend * 2.7 / 20.0
     assert found[0, 0] == pytest.approx(np.arctan(turn / np.sqrt(1.0 - 0.25 * turn**2)), abs=1e-9)
