@@ -16,6 +16,7 @@ from typing import Any
 from pydantic import ConfigDict
 
 from harness.campaign.plan.name_checks import check_names
+from harness.campaign.plan.people_checks import check_people
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.strategy_drivers import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
@@ -84,6 +85,7 @@ def open_campaign(
     ego_persona, *personas = (persona for persona in found.personas if persona is not None)
     names = [persona.name for persona in personas]
     tunable = _is_tunable(found.ego_driver)
+    check_people(file, document, len(found.scene.world.roles) - 1)
     check_names(file, document, names, tunable)
     _check_stage_names(file, document, names, tunable)
     files = [file]

@@ -9,6 +9,7 @@ from harness.game.arrays import FloatArray
 from harness.game.bicycle import Actuators
 from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Road
+from harness.game.state import roles_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +23,11 @@ class World:
     step_s: float
     time_limit_s: float
     right_of_way: RightOfWay = NO_JUNCTIONS
+
+    @cached_property
+    def roles(self) -> tuple[str, ...]:
+        """The players' names, as `roles_of`."""
+        return roles_of(len(self.length_m))
 
     @cached_property
     def steps(self) -> int:

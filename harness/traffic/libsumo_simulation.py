@@ -27,7 +27,6 @@ from libsumo import _libsumo  # the same functions without Python wrappers, for 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
-from harness.game.state import ROLES
 from harness.traffic.angles import compass_deg_of, heading_rad_of
 from harness.traffic.background_traffic import BackgroundTraffic
 from harness.traffic.insertion import Insertion
@@ -224,7 +223,7 @@ class LibsumoSimulation:
         self._release()
 
     def _name(self, game: int, player: int) -> str:
-        return self._tiles[game].prefix + ROLES[player]
+        return self._tiles[game].prefix + self._scene.world.roles[player]
 
     def _add_player(self, game: int, player: int, start: InitialState) -> None:
         tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
