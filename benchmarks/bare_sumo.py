@@ -19,7 +19,6 @@ import traci
 from sumolib.miscutils import getFreeSocketPort
 
 from benchmarks.games import CoastingGames
-from harness.game.state import ROLES
 from harness.traffic.scene import OpenScene
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 
@@ -46,7 +45,7 @@ def _step_and_read(coasting: CoastingGames, reset_ended: bool) -> list[Placement
     return [
         (tile_prefix(game, games) + role, x[game][player], y[game][player], angle[game][player])
         for game in range(games)
-        for player, role in enumerate(ROLES)
+        for player, role in enumerate(arena.world.roles)
     ]
 
 
@@ -73,7 +72,7 @@ def start_bare_sumo(scene: OpenScene, games: int, by_socket: bool = False) -> It
             *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
         ]
         with _behind_socket(options) if by_socket else _in_process(options) as api:
-            for game, (player, role) in itertools.product(range(games), enumerate(ROLES)):
+            for game, (player, role) in itertools.product(range(games), enumerate(scene.world.roles)):
                 prefix = tile_prefix(game, games)
                 api.route.add(f"{prefix}route {role}", [prefix + edge for edge in scene.edges[player]])
                 lane = (scene.document.players[player].lane or "_0").rsplit("_", 1)[1]

@@ -29,7 +29,8 @@ from harness.environments.gymnasium_env import DrivingEnv
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.game.arrays import FloatArray
 from harness.game.state import EGO
-from harness.training.ppo import TrainingSpec, train
+from harness.training.ppo import train
+from harness.training.training_games import TrainingSpec
 
 _ENDLESS = 1_000_000_000
 _WARM_UP_UPDATES = 3

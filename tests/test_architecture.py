@@ -33,7 +33,7 @@ ROOMS: dict[str, set[str]] = {
     "drivers": GROUND,
     "evaluation": {"errors", "files", "game"},
     "environments": GROUND | {"traffic", "drivers", "evaluation"},
-    "replay": {"errors", "game", "traffic"},
+    "replay": {"errors", "game", "traffic", "evaluation"},
     "reports": GROUND | {"evaluation"},
     "training": GROUND | {"traffic", "drivers", "environments"},
     "campaign.plan": {"errors", "game", "config", "evaluation"},

@@ -32,7 +32,7 @@ class RecordedGame:
             name: (each.length_m, each.width_m) for name, each in types_of_vehicles(trace, scene.route_files).items()
         }
         quantities = quantities_of(trace, scene.world, sizes_m)
-        return cls(quantities=quantities, drove=drove_in(trace)[:, NON_EGO])
+        return cls(quantities=quantities, drove=drove_in(trace, scene.world.roles)[:, NON_EGO])
 
     @property
     def world(self) -> World:

@@ -30,7 +30,7 @@ def cost_table(campaigns: Sequence[Path], root: Path) -> str:
     ]
     core_h = wall_h = 0.0
     for path in campaigns:
-        campaign = open_campaign(path)
+        campaign = open_campaign(path, policies_exist=False)  # an earlier step may make them
         stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         seconds = {stage.id: _seconds(campaign, stage, steps_per_s, arm_s) for stage in stages}
         timed = [TimedStage(id=each.id, seed=each.seed, needs=each.needs, seconds=seconds[each.id]) for each in stages]

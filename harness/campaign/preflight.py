@@ -16,6 +16,7 @@ from typing import Any
 from pydantic import ConfigDict
 
 from harness.campaign.plan.name_checks import check_names
+from harness.campaign.plan.people_checks import check_people
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.strategy_drivers import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
@@ -64,11 +65,14 @@ class OpenCampaign:
         return self.hashes[_relative(self.file, path)]
 
 
-def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> OpenCampaign:
+def open_campaign(
+    file: Path, quick: bool = False, allow_code: bool = False, policies_exist: bool = True
+) -> OpenCampaign:
     """Read a campaign and everything it names. Raises UsageError with every problem found.
 
     `quick` shortens trainings and searches; a campaign without any is the same with it. `allow_code` permits an
     external driver that is code from a file to run (`drivers.external` says why a document can't give this permission).
+    Without `policies_exist`, the policies that the campaign plays are left unread: another campaign is to make them.
     """
     problems: list[Problem] = []
     document = collect(problems, lambda: read_document(file, Campaign))
@@ -81,10 +85,11 @@ def open_campaign(file: Path, quick: bool = False, allow_code: bool = False) -> 
     ego_persona, *personas = (persona for persona in found.personas if persona is not None)
     names = [persona.name for persona in personas]
     tunable = _is_tunable(found.ego_driver)
+    check_people(file, document, len(found.scene.world.roles) - 1)
     check_names(file, document, names, tunable)
     _check_stage_names(file, document, names, tunable)
     files = [file]
-    if found.policies is not None:
+    if found.policies is not None and policies_exist:
         files += check_policies(file, document, ego_persona, personas, found.policies)
     files += found.files()
     quick = quick and (found.policies is None or tunable)

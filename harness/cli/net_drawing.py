@@ -9,7 +9,6 @@ import numpy as np
 from harness.cli.net_tables import conflict_words
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
-from harness.game.state import ROLES
 from harness.reports.net_page import Drawing, DrawnShape
 from harness.traffic.net_conflicts import ListedConflict
 from harness.traffic.net_listing import ListedJunction, ListedLane
@@ -77,7 +76,7 @@ def _routes_and_goals(scene: OpenScene) -> Iterator[DrawnShape]:
         goal = int(routes.rows(np.array([routes.goal_m]))[0, player])
         place = np.array([routes.x_m[goal], routes.y_m[goal]])
         across = 3.0 * np.array([-routes.sin[goal], routes.cos[goal]])
-        name = ROLES[player]
+        name = scene.world.roles[player]
         begin = int(routes.rows(np.zeros((1, len(routes.goal_m))))[0, player]) - rows.start
         way = line[begin : goal - rows.start + 1]
         yield DrawnShape(points=way, kind=f"route {_kind(player)}", text=f"route of {name}: {' '.join(edges)}")
@@ -92,5 +91,5 @@ def _starts(scene: OpenScene, number: int) -> Iterator[DrawnShape]:
         state = draw_initial_state(distribution, "drawing", k)
         for player in range(players):
             point = np.array([[state.x_m[player], state.y_m[player]]])
-            text = f"start of {ROLES[player]}, {state.speed_mps[player]:.1f} m/s"
+            text = f"start of {scene.world.roles[player]}, {state.speed_mps[player]:.1f} m/s"
             yield DrawnShape(points=point, kind=f"start {_kind(player)}", text=text)

@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from harness.game.state import ROLES
-
 if TYPE_CHECKING:
     from harness.campaign.plan.stages import Stage
     from harness.campaign.preflight import OpenCampaign
@@ -93,7 +91,7 @@ def in_order(file: Path) -> str:
 
 def scene_lines(scene: OpenScene) -> Iterator[str]:
     """What a checked scene is: its players with their routes, and whether there is other traffic."""
-    for role, player, edges in zip(ROLES, scene.document.players, scene.edges, strict=False):
+    for role, player, edges in zip(scene.world.roles, scene.document.players, scene.edges, strict=True):
         goal = scene.document.goal_of(player)[1]
         yield f"{role}: vehicle {player.vehicle}, {len(edges)} edges, goal {goal.position_m:g} m along {goal.edge}"
     yield "with background traffic" if scene.has_background_traffic else "without background traffic"

@@ -10,6 +10,7 @@ from pydantic import Field, field_validator, model_validator
 
 from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
+from harness.game.state import MOST_PEOPLE
 
 LEARNED, SUMO = "learned", "sumo"  # drivers of an ego that have a name
 TRAINING_TABLES = ("training", "non_ego_training", "retraining")
@@ -128,6 +129,15 @@ class Population(Document):
     """Share of the games of each persona, by name. Shares are relative: 1 and 3 are a quarter and three quarters."""
 
 
+class Crowd(Document):
+    """The people of a scene with several, each with a persona of its own."""
+
+    name: Name
+    """The name of the crowd in stages, arms and tables."""
+    personas: list[Name] = Field(min_length=2, max_length=MOST_PEOPLE)
+    """The name of a persona for each person of the scene, in the order of its `[[non_ego]]`. Names may repeat."""
+
+
 class Rounds(Document):
     """Iterated best response: non-ego and ego are trained against each other in turn."""
 
@@ -219,6 +229,8 @@ class Campaign(Document):
     reconfiguration: Reconfiguration = Reconfiguration()
     population: list[Population] = Field([], max_length=50)
     """Mixtures of personas. The ego meets a population like a persona, and is retrained against it."""
+    crowd: list[Crowd] = Field([], max_length=50)
+    """Mixed people of a scene with several. The ego meets a crowd like a persona, and is retrained against it."""
     rounds: Rounds = Rounds()
     best_response: BestResponse | None = None
     crossplay: CrossPlay | None = None
@@ -256,6 +268,11 @@ class Campaign(Document):
         return given if self.best_response is None else [name for name in given if name == "retraining"]
 
     @property
+    def mixed_people(self) -> list[str]:
+        """The names of populations and crowds."""
+        return [*(each.name for each in self.population), *(each.name for each in self.crowd)]
+
+    @property
     def stops_early(self) -> bool:
         """Whether rounds may end before the last one."""
         return self.best_response is not None and self.rounds.stop_early is not False
@@ -264,6 +281,7 @@ class Campaign(Document):
         """The document as the manifest records it: every key with its value. Keys about training and tuning are left
         out where they have no effect."""
         unused: dict[str, Any] = {"reconfiguration": True} if self.ego.driver in (LEARNED, SUMO) else {}
+        unused |= {} if self.crowd else {"crowd": True}
         if self.policies is None:
             return self.model_dump(mode="json", exclude=unused)
         unused["retraining"] = {"alone_share", "warm_start"} if self.retraining.against else True

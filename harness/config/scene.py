@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
-from harness.config.toml_reading import Document
+from harness.config.toml_reading import TABLE, TABLES, Document, Mistakes
+from harness.game.state import MOST_PEOPLE, roles_of
 
 
 def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
@@ -91,6 +92,25 @@ class Player(Document):
         return self
 
 
+def _one_to_four(people: tuple[Player, ...]) -> tuple[Player, ...]:
+    if not 1 <= len(people) <= MOST_PEOPLE:
+        message = f"{len(people)} people; a scene has one to {MOST_PEOPLE}"
+        raise Mistakes([("", message, "leave some out" if people else "add [[non_ego]]")])
+    return people
+
+
+def _one_alone(people: Player | tuple[Player, ...]) -> Player | tuple[Player, ...]:
+    """One `[[non_ego]]` is the same as `[non_ego]`."""
+    return people[0] if isinstance(people, tuple) and len(people) == 1 else people
+
+
+NonEgos = Annotated[
+    Annotated[Player, Tag(TABLE)] | Annotated[tuple[Player, ...], AfterValidator(_one_to_four), Tag(TABLES)],
+    Discriminator(lambda value: TABLES if isinstance(value, list | tuple) else TABLE),
+    AfterValidator(_one_alone),
+]
+
+
 class Varies(Document):
     """What differs from game to game: ranges from which each game draws by its seed."""
 
@@ -140,26 +160,51 @@ class Scene(Document):
     goal: Goal | None = None
     """The destination of every player that has none of its own."""
     ego: Player
-    non_ego: Player
+    non_ego: NonEgos
+    """The person that the ego meets, or `[[non_ego]]` for each of several: up to four, named `non_ego_1`, `non_ego_2`
+    and so on."""
 
     @model_validator(mode="after")
     def _players_fit(self) -> Scene:
         for name in ("beside_ego_m", "arrival_after_ego_s"):
             if getattr(self.ego, name) is not None:
                 raise ValueError(f"ego.{name}: the ego can't start relative to itself; give ego.position_m")
-        if self.non_ego.beside_ego_m is not None and self.ego.position_m is None:
-            raise ValueError("non_ego.beside_ego_m needs ego.position_m, along the ego's lane")
-        for role, player in zip(("ego", "non_ego"), self.players, strict=True):
+        for role, player in zip(self.roles, self.players, strict=True):
+            if player.beside_ego_m is not None and self.ego.position_m is None:
+                raise ValueError(f"{role}.beside_ego_m needs ego.position_m, along the ego's lane")
             if self.goal is None and player.goal is None:
                 raise ValueError(f"{role} has no goal: give [goal] for all players, or [{role}.goal]")
         if self.goal is not None and all(player.goal is not None for player in self.players):
             raise ValueError("every player has a goal of its own: leave out [goal]")
         return self
 
+    @classmethod
+    def named_location(cls, location: list[Any]) -> list[Any]:
+        """Places among several people are their names."""
+        match location:
+            case ["non_ego", int(place), *rest]:
+                return [f"non_ego_{place + 1}", *rest]
+            case _:
+                return location
+
     @property
-    def players(self) -> tuple[Player, Player]:
-        """Ego and non-ego, in the order of the player axis of arrays."""
-        return self.ego, self.non_ego
+    def people(self) -> tuple[Player, ...]:
+        """The non-egos."""
+        return self.non_ego if isinstance(self.non_ego, tuple) else (self.non_ego,)
+
+    @property
+    def players(self) -> tuple[Player, ...]:
+        """Ego and non-egos, in the order of the player axis of arrays."""
+        return self.ego, *self.people
+
+    @property
+    def roles(self) -> tuple[str, ...]:
+        """The players' names, in that order."""
+        return roles_of(len(self.players))
+
+    def player(self, role: str) -> Player:
+        """The player of a name."""
+        return self.players[self.roles.index(role)]
 
     @property
     def files(self) -> tuple[str, ...]:
@@ -182,7 +227,8 @@ class Scene(Document):
         if player.goal is None:
             assert self.goal is not None, "each player has a goal"
             return "goal", self.goal
-        return ("ego.goal" if player is self.ego else "non_ego.goal"), player.goal
+        roles = (role for role, each in zip(self.roles, self.players, strict=True) if each is player)
+        return f"{next(roles)}.goal", player.goal
 
 
 SCENE_FILE = "scene.toml"

@@ -40,6 +40,11 @@ class Document(BaseModel):
         return {field.serialization_alias: name for name, field in fields if field.serialization_alias is not None}
 
     @classmethod
+    def named_location(cls, location: list[Any]) -> list[Any]:
+        """A location in the document, keys and places in lists, as messages name it."""
+        return location
+
+    @classmethod
     def from_record(cls, record: object) -> Self:
         """A document as a run folder records it; earlier names of keys are read as the present ones.
 
@@ -65,7 +70,7 @@ _MOST_BYTES, _MOST_MISTAKES = 1_000_000, 100
 _NAMES_SHOWN, _COMPARED_CHARACTERS = 40, 200
 _QUOTED = re.compile(r""""[^"\n]*"|'[^'\n]*'""")
 _ENDLESS_KEY = re.compile(r"(?<![\w.-])(?:[\w-]+[ \t]*\.[ \t]*){50}")
-NUMBER, TABLE = "<number>", "<table>"  # tags of a union's members; not part of any key
+NUMBER, TABLE, TABLES = "<number>", "<table>", "<tables>"  # tags of a union's members; not part of any key
 _NESTED_TOO_DEEP = ("tables are nested too deeply", "use a few levels of tables at most")
 
 D = TypeVar("D", bound=Document)
@@ -116,8 +121,9 @@ def nearest(word: str, words: Iterable[str]) -> str:
 
 
 def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Problem]:
-    location = [part for part in error["loc"] if part not in ("function-after", "[key]", NUMBER, TABLE)]
-    key = ".".join(f"[{part}]" if isinstance(part, int) else str(part) for part in location).replace(".[", "[")
+    location = [part for part in error["loc"] if part not in ("function-after", "[key]", NUMBER, TABLE, TABLES)]
+    named = model.named_location(location) if issubclass(model, Document) else location
+    key = ".".join(f"[{part}]" if isinstance(part, int) else str(part) for part in named).replace(".[", "[")
     cause = error.get("ctx", {}).get("error")
     if error["type"] == "extra_forbidden":
         yield _unknown_key(path, key, str(location[-1]), _model_at(model, location[:-1]))
@@ -125,7 +131,7 @@ def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Proble
         yield Problem(str(path), key, "is missing", "add it")
     elif isinstance(cause, Mistakes):
         for below, message, remedy in cause.mistakes:
-            yield Problem(str(path), f"{key}.{below}" if key else below, message, remedy)
+            yield Problem(str(path), ".".join(filter(None, (key, below))), message, remedy)
     elif cause is not None:
         yield Problem(str(path), key, str(cause))
     else:

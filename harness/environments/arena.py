@@ -88,6 +88,7 @@ class Arena:
         only those near a player; this costs time. Raises SimulationError if SUMO can't load the scene.
         """
         self.scene, self.world, self.games = scene, scene.world, games
+        self._roles = scene.world.roles
         self.seats = tuple((each,) if isinstance(each, Seat) else tuple(each) for each in seats)
         first_drivers = [of_player[0].driver for of_player in self.seats]
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
@@ -194,7 +195,7 @@ class Arena:
                     noise = self._noise[games, player, now[games]]
                     decided = seat.driver.decide(games, self.observation[games, player], noise)
                     chosen[games, player] = checked_decisions(
-                        decided, seat.driver, player=player, games=games, steps=state.step
+                        decided, seat.driver, role=self._roles[player], games=games, steps=state.step
                     )
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)
@@ -222,7 +223,7 @@ class Arena:
             for member, seat in enumerate(seats):
                 if seat.payoff is not None:
                     paid = drove[:, player] if len(seats) == 1 else self._drove_as(drove, player, member)
-                    payoff[:, player] = np.where(paid, seat.payoff.total(quantities, player), payoff[:, player])
+                    payoff[paid, player] = seat.payoff.total(quantities, player)[paid]
         return payoff
 
     def _drove_as(self, drove: BoolArray, player: int, member: int) -> BoolArray:
@@ -291,7 +292,7 @@ class Arena:
             world=self.world,
             state=state,
             bodies=self._bodies(state, games),
-            advanced_m=np.zeros_like(offset),
+            advanced_m=np.zeros(offset.shape),
             lateral_offset_m=offset,
         )
 

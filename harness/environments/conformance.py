@@ -158,7 +158,7 @@ def check_named(written: str, scene: Path, games: int, *, allow_code: bool) -> F
 
 
 def check_conformance(driver: Driver, scene: OpenScene, games: int) -> Findings:
-    """Play `games` games with a driver as the ego and SUMO's driver as the non-ego, and check the driver.
+    """Play `games` games with a driver as the ego and SUMO's driver as every non-ego, and check the driver.
 
     Raises SimulationError if SUMO fails; an exception of the driver is a violation.
     """
@@ -178,9 +178,10 @@ def check_conformance(driver: Driver, scene: OpenScene, games: int) -> Findings:
 
 
 def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, activity: str) -> list[_PlayedGame]:
-    start_distribution = scene.start_distribution([HumanFactors(), HumanFactors()], [1.0, 1.0])
+    players = len(scene.world.roles)
+    start_distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
     checked, played, outcomes = _CheckedDriver(driver, findings.seconds), list[_PlayedGame](), list[str]()
-    arena = Arena(scene, 1, [Seat(checked), Seat(SumoDriver())])
+    arena = Arena(scene, 1, [Seat(checked), *[Seat(SumoDriver())] * (players - 1)])
     try:
         for game in range(games):
             parts = ("check-driver", game)

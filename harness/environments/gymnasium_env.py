@@ -1,4 +1,4 @@
-"""A Gymnasium environment for one player, and a PettingZoo environment for both.
+"""A Gymnasium environment for one player, and a PettingZoo environment for all.
 
 Each environment has its own arena with one game. A process may contain any number of environments: the first runs SUMO
 in the process itself, each further one in a process of its own (`harness.traffic.open_simulation`).
@@ -20,50 +20,48 @@ from harness.config.toml_reading import nearest, read_document
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import ACTIONS, read_policy
 from harness.drivers.sumo import SumoDriver
-from harness.environments.arena import Arena, Seat, Step
+from harness.environments.arena import Seat
+from harness.environments.single_game import Info, SingleGame
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
-from harness.game.initial_state import draw_initial_state
-from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
-from harness.game.seeding import generator_of
-from harness.game.state import ROLES, Outcome
 from harness.traffic.scene import OpenScene, open_scene
 
 SCENE, PERSONA = "networks/merge", "personas/careful.toml"
 _CHECKOUT = Path(__file__).resolve().parents[2]
 
 Place: TypeAlias = str | Path
-Info: TypeAlias = dict[str, Any]
 
 
 class DrivingEnv(gymnasium.Env[Any, Any]):
     """One player's game on a scene with SUMO traffic. Also `gymnasium.make("harness/Ego-v0")`, `"harness/NonEgo-v0"`.
 
-    Observation: Box(-1, 1, (97,), float32), in the player's frame; `harness.game.observation_layout` names its entries.
+    Observation: Box(-1, 1, (98,), float32), in the player's frame; `harness.game.observation_layout` names its entries.
     An entry x is divided by its scale and clipped to [-1, 1], or compressed:
 
     | entries | quantity | scale |
     | --- | --- | --- |
     | 0, 1 | speed_mps, speed_limit_mps | 30 m/s |
-    | 2, 3 | speed_over_limit, as a share of the limit; acceleration_mps2 | 1, 10 m/s2 |
-    | 4, 5 | steering_rad, road_steering_rad (the angle that follows the route) | the car's lock |
-    | 6, 7 | lane_end_m, goal_m, distance to the end of the player's lane and to the goal | 100 m, 200 m |
-    | 8-10 | own_side_left_m, own_side_right_m (marks to oncoming lanes), path_left_m (the route's line) | 8 m |
-    | 11-16 | path_turned_rad, the route's heading 0, 5, 10, 20, 30, 50 m ahead | x/(|x| + 0.5 rad) |
-    | 17-22 | path_bend_per_m, the tightest bend from there on to the next | x/(|x| + 0.1/m) |
-    | 23-28, 29-34 | free_left_m, free_right_m, to the nearest surface on that side (right negative), there | 8 m |
-    | 35 | stop_line_m, distance of the front bumper to the next stop line | x/(|x| + 20 m) |
-    | 36-40 | at that line: give_way, stop_sign, signal_green, signal_yellow, signal_red | 1 |
-    | 41 | signal_s, time since the signal changed | x/(|x| + 5 s) |
-    | 42-44 | leader_seen (0 or 1), leader_gap_m, leader_mps (relative), ahead | 1, x/(|x| + 20 m), + 10 m/s |
-    | 45-57 | other0, the most urgent road user: seen (0 or 1), ahead_m, left_m | 1, x/(|x| + 20 m), + 8 m |
+    | 2 | speed_over_limit, as a share of the limit | 1 |
+    | 3 | over_posted_mps, speed over what limits ahead, signals and signs permit | x/(|x| + 5 m/s) |
+    | 4 | acceleration_mps2 | 10 m/s2 |
+    | 5, 6 | steering_rad, road_steering_rad (the angle that follows the route) | the car's lock |
+    | 7, 8 | lane_end_m, goal_m, distance to the end of the player's lane and to the goal | 100 m, 200 m |
+    | 9-11 | own_side_left_m, own_side_right_m (marks to oncoming lanes), path_left_m (the route's line) | 8 m |
+    | 12-17 | path_turned_rad, the route's heading 0, 5, 10, 20, 30, 50 m ahead | x/(|x| + 0.5 rad) |
+    | 18-23 | path_bend_per_m, the tightest bend from there on to the next | x/(|x| + 0.1/m) |
+    | 24-29, 30-35 | free_left_m, free_right_m, to the nearest surface on that side (right negative), there | 8 m |
+    | 36 | stop_line_m, distance of the front bumper to the next stop line | x/(|x| + 20 m) |
+    | 37-41 | at that line: give_way, stop_sign, signal_green, signal_yellow, signal_red | 1 |
+    | 42 | signal_s, time since the signal changed | x/(|x| + 5 s) |
+    | 43-45 | leader_seen (0 or 1), leader_gap_m, leader_mps (relative), ahead | 1, x/(|x| + 20 m), + 10 m/s |
+    | 46-58 | other0, the most urgent road user: seen (0 or 1), ahead_m, left_m | 1, x/(|x| + 20 m), + 8 m |
     |  | ahead_mps (relative), left_mps (absolute) | x/(|x| + 10 m/s), + 5 m/s |
     |  | turned_sin, turned_cos (its heading), length_m, width_m | 1, 1, 20 m, 4 m |
     |  | own_to_conflict_m, other_to_conflict_m, to the place where the two ways meet | x/(|x| + 20 m) |
     |  | arrives_later_s than the player, has_priority (1, -1, 0 without a conflict) | x/(|x| + 3 s), 1 |
-    | 58-70, 71-83, 84-96 | other1 to other3, the next most urgent; zeros if there are fewer | as other0 |
+    | 59-71, 72-84, 85-97 | other1 to other3, the next most urgent; zeros if there are fewer | as other0 |
 
     Action: Box(-1, 1, (2,), float32): pedals (-1 full brake, 0 coast, 1 full throttle) and wheel (0 follows the route;
     -1 and 1 add the largest angle to the right and to the left; the largest useful angle depends on the speed).
@@ -93,17 +91,19 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
     ) -> None:
         """Open the scene and load SUMO.
 
-        `player` ("ego" or "non_ego") is the learner; it has the payoff and the human factors of `persona`. `other` is
-        the driver of the other player: None (the player is alone), "sumo", or the folder of a policy, which has the
-        human factors of `other_persona`. Paths are relative to the working directory or, if they do not exist there,
-        to the harness's checkout. Raises UsageError for arguments that are wrong and files that can't be read,
-        SimulationError if SUMO fails.
+        `player` (a name of the scene: "ego" or "non_ego", with several people "non_ego_1" and so on) is the learner; it
+        has the payoff and the human factors of `persona`. `other` is the driver of every other player: None (the player
+        is alone), "sumo", or the folder of a policy, which has the human factors of `other_persona`. Paths are relative
+        to the working directory or, if they do not exist there, to the harness's checkout. Raises UsageError for
+        arguments that are wrong and files that can't be read, SimulationError if SUMO fails.
         """
-        if player not in ROLES:
-            raise UsageError.of("DrivingEnv", "player", f"there is no player {player!r}", nearest(player, ROLES))
+        opened = scene if isinstance(scene, OpenScene) else open_scene(_resolve(scene))
+        roles = opened.world.roles
+        if player not in roles:
+            raise UsageError.of("DrivingEnv", "player", f"there is no player {player!r}", nearest(player, roles))
         if other in (None, "sumo") and other_persona is not None:
             raise UsageError.of("DrivingEnv", "other_persona", "only a policy has a persona", "leave it out")
-        self._player = ROLES.index(player)
+        self._player = roles.index(player)
         own = _read_persona(persona)
         opponent_persona = _read_persona(other_persona or PERSONA)
         if other is None or other == "sumo":
@@ -112,10 +112,11 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
             sampled = opponent_persona.decisions == "sampled"
             opponent = Seat(LearnedDriver(read_policy(_resolve(other)), sampled))
         opponent_factors = opponent_persona.human_factors if other_persona else HumanFactors()
-        seats, human_factors, present = [opponent] * 2, [opponent_factors] * 2, [1.0] * 2
+        players, there = len(roles), float(other is not None)
+        seats, human_factors, present = [opponent] * players, [opponent_factors] * players, [there] * players
         seats[self._player], human_factors[self._player] = Seat(None, own.payoff), own.human_factors
-        present[1 - self._player] = float(other is not None)
-        self._game = _Game(scene, seats, human_factors, present)
+        present[self._player] = 1.0
+        self._game = SingleGame(opened, seats, human_factors, present)
         self._running = False
         self.render_mode = render_mode
         self.observation_space = _observation_space()
@@ -151,14 +152,14 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
 
 
 class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
-    """The two players' game with the agents "ego" and "non_ego".
+    """The players' game with the agents "ego" and "non_ego"; with several people "non_ego_1", "non_ego_2" and so on.
 
     Observation, action, end and info of each agent: as in `DrivingEnv`, in dictionaries by agent.
 
     Reward: float per agent, the step's payoff to the agent's own persona.
 
     End of an agent: it is removed from `agents`. At its goal it leaves the scene; after a crash it stays as an
-    obstacle. The other agent continues until its own end.
+    obstacle. The other agents continue until their own ends.
     """
 
     metadata: dict[str, Any] = {"name": "driving_v0", "render_modes": []}  # noqa: RUF012 - declared so by PettingZoo
@@ -167,22 +168,30 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
         self,
         scene: Place | OpenScene = SCENE,
         ego_persona: Place = PERSONA,
-        non_ego_persona: Place = PERSONA,
+        non_ego_persona: Place | Sequence[Place] = PERSONA,
         render_mode: None = None,
     ) -> None:
-        """Open the scene and load SUMO. Paths and errors are those of `DrivingEnv`."""
-        personas = [_read_persona(ego_persona), _read_persona(non_ego_persona)]
+        """Open the scene and load SUMO. `non_ego_persona` is one persona for all people of the scene, or one for each.
+        Paths and errors are those of `DrivingEnv`."""
+        opened = scene if isinstance(scene, OpenScene) else open_scene(_resolve(scene))
+        self._roles = opened.world.roles
+        people = len(self._roles) - 1
+        written = [non_ego_persona] * people if isinstance(non_ego_persona, str | Path) else list(non_ego_persona)
+        if len(written) != people:
+            message, remedy = f"{len(written)} personas for {people} people", "give one for each, or one for all"
+            raise UsageError.of("ParallelDrivingEnv", "non_ego_persona", message, remedy)
+        personas = [_read_persona(each) for each in (ego_persona, *written)]
         seats = [Seat(None, each.payoff) for each in personas]
-        self._game = _Game(scene, seats, [each.human_factors for each in personas], [1.0, 1.0])
+        self._game = SingleGame(opened, seats, [each.human_factors for each in personas], [1.0] * len(personas))
         self._generator: np.random.Generator | None = None
         self.render_mode = render_mode
-        self.possible_agents = list(ROLES)
+        self.possible_agents = list(self._roles)
         self.agents: list[str] = []
-        self.observation_spaces = {agent: _observation_space() for agent in ROLES}
-        self.action_spaces = {agent: _action_space() for agent in ROLES}
+        self.observation_spaces = {agent: _observation_space() for agent in self._roles}
+        self.action_spaces = {agent: _action_space() for agent in self._roles}
 
     def observation_space(self, agent: str) -> gymnasium.spaces.Box:
-        """An agent's observation space, Box(-1, 1, (97,), float32)."""
+        """An agent's observation space, Box(-1, 1, (98,), float32)."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> gymnasium.spaces.Box:
@@ -196,11 +205,10 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
         if seed is not None or self._generator is None:
             self._generator, _ = seeding.np_random(seed)
         self._game.reset(self._generator)
-        self.agents = list(ROLES)
-        players = range(len(ROLES))
+        self.agents = list(self._roles)
         return (
-            {ROLES[k]: self._game.observation(k) for k in players},
-            {ROLES[k]: self._game.info(k) for k in players},
+            {agent: self._game.observation(player) for player, agent in enumerate(self._roles)},
+            {agent: self._game.info(player) for player, agent in enumerate(self._roles)},
         )
 
     def step(
@@ -210,7 +218,7 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
         `DrivingEnv.step`."""
         if not self.agents:
             return {}, {}, {}, {}, {}
-        players = {agent: ROLES.index(agent) for agent in self.agents}
+        players = {agent: self._roles.index(agent) for agent in self.agents}
         step = self._game.play({player: actions[agent] for agent, player in players.items()})
         ended = {agent: self._game.ended(player) for agent, player in players.items()}
         self.agents = [agent for agent in self.agents if not any(ended[agent])]
@@ -226,60 +234,6 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
         """Close the SUMO simulation. The environment can't be used afterwards."""
         self.agents = []
         self._game.arena.close()
-
-
-class _Game:
-    """An arena with one game, which is reset from a random generator."""
-
-    def __init__(
-        self,
-        scene: Place | OpenScene,
-        seats: Sequence[Seat],
-        human_factors: Sequence[HumanFactors],
-        present: Sequence[float],
-    ) -> None:
-        self._scene = scene if isinstance(scene, OpenScene) else open_scene(_resolve(scene))
-        self._start_distribution = self._scene.start_distribution(human_factors, present)
-        self.arena = Arena(self._scene, 1, seats)
-
-    def reset(self, generator: np.random.Generator) -> None:
-        parts = ("environment", int(generator.integers(2**63 - 1)))
-        start = draw_initial_state(self._start_distribution, *parts)
-        self.arena.reload(start.seed)
-        self.arena.reset({0: start}, {0: self._scene.departures(generator_of(*parts, "others"))})
-
-    def play(self, actions: Mapping[int, FloatArray]) -> Step:
-        array = np.zeros((1, len(ROLES), ACTIONS))
-        for player, action in actions.items():
-            array[0, player] = action
-        if not np.isfinite(array).all():
-            raise ValueError(f"an action is not finite: {dict(actions)}")
-        return self.arena.step(array)
-
-    def ended(self, player: int) -> tuple[bool, bool]:
-        """Whether the player's game was terminated, and whether it was truncated."""
-        outcome = self.arena.state.outcome[0, player]
-        return bool(outcome not in (Outcome.RUNNING, Outcome.TIMEOUT)), bool(outcome == Outcome.TIMEOUT)
-
-    def observation(self, player: int, step: Step | None = None) -> FloatArray:
-        """The player's observation [SIZE]; in its last step, the one before it was removed or stopped."""
-        if step is not None and any(self.ended(player)):
-            return observe(step.quantities)[0, player]
-        return self.arena.observation[0, player].copy()
-
-    def info(self, player: int, step: Step | None = None) -> Info:
-        state = self.arena.state if step is None else step.quantities.state
-        station_m = float(state.station_m[0, player])
-        payoff = self.arena.seats[player][0].payoff
-        terms = {} if step is None or payoff is None else payoff.evaluate(step.quantities, player)
-        return {
-            "outcome": Outcome(int(state.outcome[0, player])).word,
-            "terms": {name: float(share[0]) + 0.0 for name, share in terms.items()},
-            "station_m": station_m,
-            "goal_m": float(self.arena.world.road.routes.goal_m[player]) - station_m,
-            "speed_mps": float(state.speed_mps[0, player]),
-            "time_s": float(state.step[0]) * self.arena.world.step_s,
-        }
 
 
 def _observation_space() -> gymnasium.spaces.Box:

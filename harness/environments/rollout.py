@@ -7,7 +7,7 @@ every arm.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -18,27 +18,39 @@ from harness.config.persona import Persona
 from harness.drivers.mixture import Player, mixture_of
 from harness.environments.arena import Arena, Seat, Step
 from harness.evaluation.encounters import Encounter, encounters_of
-from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
+from harness.evaluation.metrics import OF_EGO, PlayerSeries
+from harness.evaluation.people import COLLIDED_WITH, of_person
 from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.geometry import Box, box_distance
 from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
-from harness.game.state import EGO, NON_EGO, ROLES, Outcome
+from harness.game.state import EGO, ROLES, Outcome
 from harness.traffic.scene import OpenScene
-
-_NOT_MEASURED = np.full((1, len(ROLES)), np.nan)  # [G, P] of one game
 
 
 @dataclass(frozen=True, kw_only=True)
 class Arm:
-    """A pairing to assess. A driver of None: the player does not take part. A mixture: one of its members per game."""
+    """A pairing to assess. A driver of None: the player does not take part. A mixture: one of its members per game.
+
+    Several people without an ego drive one at a time: in episode k, person k modulo their number (`present_in`).
+    """
 
     name: str
     scene: OpenScene
-    drivers: tuple[Player, Player]
-    personas: tuple[Persona, Persona]
+    drivers: tuple[Player, ...]
+    """[P], ego first."""
+    personas: tuple[Persona, ...]
     """Of the drivers; a member of a mixture has a persona of its own."""
     seed: int
+
+    def present_in(self, episode: int) -> list[bool]:
+        """[P] which players take part in an episode."""
+        present = [driver is not None for driver in self.drivers]
+        if present[EGO] or sum(present) < 2:
+            return present
+        people = [player for player, there in enumerate(present) if there]
+        return [player == people[episode % len(people)] for player in range(len(present))]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,9 +77,8 @@ def assess(
     players = [
         mixture_of(each or _AbsentDriver(), persona) for each, persona in zip(arm.drivers, arm.personas, strict=True)
     ]
-    present = [0.0 if driver is None else 1.0 for driver in arm.drivers]
     start_distribution = arm.scene.start_distribution(
-        [each.human_factors for each in players], present, [each.shares for each in players]
+        [each.human_factors for each in players], [1.0] * len(players), [each.shares for each in players]
     )
     seats = [[Seat(member.driver, member.persona.payoff) for member in each.members] for each in players]
     arena = Arena(arm.scene, 1, seats, recorded=True)
@@ -107,7 +118,8 @@ def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
 
 def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode: int) -> Game:
     parts = parts_of(arm.seed, episode)
-    start = draw_initial_state(start_distribution, *parts)
+    present = [float(each) for each in arm.present_in(episode)]
+    start = draw_initial_state(replace(start_distribution, present_share=present), *parts)
     arena.reload(start.seed)
     arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
     trace = _Trace(arm, arena, episode)
@@ -128,11 +140,11 @@ def _encounters(arm: Arm, trace: Mapping[str, Sequence[Any]]) -> tuple[tuple[Enc
     """The encounters at junctions of each player in one game."""
     world = arm.scene.world
     if not len(world.right_of_way.conflicts.player):
-        return ((),) * len(ROLES)
+        return ((),) * len(arm.drivers)
     frame = pd.DataFrame(trace)
     types_m = {name: (kind.length_m, kind.width_m) for name, kind in arm.scene.routes.types.items()}
-    quantities, drove = quantities_of(frame, world, sizes_by_name(frame, types_m)), drove_in(frame)
-    return tuple(tuple(encounters_of(quantities, player, drove[:, player])) for player in range(len(ROLES)))
+    quantities, drove = quantities_of(frame, world, sizes_by_name(frame, types_m)), drove_in(frame, world.roles)
+    return tuple(tuple(encounters_of(quantities, player, drove[:, player])) for player in range(len(arm.drivers)))
 
 
 def _record(
@@ -140,14 +152,28 @@ def _record(
 ) -> dict[str, Any]:
     outcomes = [Outcome(int(outcome)) for outcome in arena.state.outcome[0]]
     record: dict[str, Any] = {"episode": episode, "duration_s": len(steps) * arm.scene.world.step_s, "error": ""}
-    for player, metrics in ((EGO, OF_EGO), (NON_EGO, OF_NON_EGO)):
-        takes_part = arm.drivers[player] is not None
-        record[f"{ROLES[player]}_outcome"] = outcomes[player].word if takes_part else ""
-        series = _series_of(arm, steps, player, outcomes[player], encounters[player]) if takes_part else None
-        for name, metric in metrics.items():
+    present = arm.present_in(episode)
+    for player, role in enumerate(arm.scene.world.roles):
+        record[f"{role}_outcome"] = outcomes[player].word if present[player] else ""
+        series = _series_of(arm, steps, player, outcomes[player], encounters[player]) if present[player] else None
+        for name, metric in (OF_EGO if player == EGO else of_person(role)).items():
             record[name] = metric(series) if series is not None else None
-    record["ego_failed"] = int(outcomes[EGO] is not Outcome.GOAL) if arm.drivers[EGO] is not None else None
+    record["ego_failed"] = int(outcomes[EGO] is not Outcome.GOAL) if present[EGO] else None
+    if len(present) > len(ROLES):
+        record[COLLIDED_WITH] = _collided_with(steps) if outcomes[EGO] is Outcome.COLLISION else ""
     return record
+
+
+def _collided_with(steps: Sequence[Step]) -> str:
+    """The name of the road user that the ego collided with: a person's, or `background`."""
+    quantities = next(step.quantities for step in reversed(steps) if step.drove[0, EGO])
+    bodies, roles = quantities.bodies, quantities.world.roles
+    boxes = [
+        Box(*(float(getattr(bodies, name)[0, body]) for name in Box._fields)) for body in range(bodies.x_m.shape[1])
+    ]
+    others = [body for body in np.flatnonzero(bodies.present[0]).tolist() if body != EGO]
+    nearest = min(others, key=lambda body: box_distance(boxes[EGO], boxes[body]))
+    return roles[nearest] if nearest < len(roles) else "background"
 
 
 def _series_of(
@@ -156,6 +182,7 @@ def _series_of(
     driver = arm.drivers[player]
     steers = driver is not None and driver.takes_over  # SUMO's cars change lanes without a steering angle
     drove = [step for step in steps if step.drove[0, player]]
+    not_measured = np.full((1, len(arm.drivers)), np.nan)
 
     def series(value: Callable[[Step], FloatArray]) -> FloatArray:
         return np.array([value(step)[0, player] for step in drove], dtype=float)
@@ -166,7 +193,7 @@ def _series_of(
         speed_mps=series(lambda step: step.quantities.state.speed_mps),
         acceleration_mps2=series(lambda step: step.quantities.state.acceleration_mps2),
         lateral_acceleration_mps2=series(
-            lambda step: step.quantities.lateral_acceleration_mps2 if steers else _NOT_MEASURED
+            lambda step: step.quantities.lateral_acceleration_mps2 if steers else not_measured
         ),
         leader_gap_m=series(lambda step: step.quantities.leader_gap_m),
         time_to_collision_s=series(lambda step: step.quantities.time_to_collision_s),
@@ -178,12 +205,9 @@ def _series_of(
 
 
 def _failed(arm: Arm, episode: int, error: str) -> dict[str, Any]:
-    return {
-        "episode": episode,
-        "ego_outcome": Outcome.ERROR.word if arm.drivers[EGO] is not None else "",
-        "non_ego_outcome": Outcome.ERROR.word if arm.drivers[NON_EGO] is not None else "",
-        "error": error,
-    }
+    present = zip(arm.scene.world.roles, arm.present_in(episode), strict=True)
+    outcomes = {f"{role}_outcome": Outcome.ERROR.word if there else "" for role, there in present}
+    return {"episode": episode, **outcomes, "error": error}
 
 
 class _Trace:
@@ -198,7 +222,7 @@ class _Trace:
         state = step.quantities.state if step is not None else self._arena.state
         for player in np.flatnonzero(present):
             self._add(
-                ROLES[player],
+                self._arm.scene.world.roles[player],
                 self._arm.scene.vehicle(int(player)).vehicle_type,
                 *(float(getattr(state, name)[0, player]) for name in _MOTION),
                 bool(state.lapsed[0, player]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -33,10 +34,43 @@ class Finished:
     """Whether no other player took part."""
 
 
-class ArenaVecEnv(VecEnv):
+class GamesVecEnv(VecEnv):
+    """Games of one learner, as Stable-Baselines3's `VecEnv`."""
+
+    render_mode = None
+
+    @abstractmethod
+    def take_finished(self) -> list[Finished]:
+        """The games that ended since the last call, removed from the list."""
+
+    @abstractmethod
+    def reload(self, seed: int) -> None:
+        """Reload SUMO with a seed."""
+
+    # --- methods of VecEnv without a meaning for games ----------------------------------------------
+
+    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
+        """The attribute, once for each game in `indices`."""
+        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
+        """Raises AttributeError: games have no attributes of their own."""
+        raise AttributeError(f"the games share all attributes; {attr_name!r} can't be set for some of them")
+
+    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
+        """Call a method once for each game in `indices`."""
+        method: Callable[..., Any] = getattr(self, method_name)
+        return [method(*args, **kwargs) for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
+        """False for each game: games are not wrapped."""
+        return [False for _ in self._get_indices(indices)]
+
+
+class ArenaVecEnv(GamesVecEnv):
     """G games of one learner, as Stable-Baselines3's `VecEnv`. A game ends when the learner's part in it ends.
 
-    Observation: Box(-1, 1, (97,), float32) per game, [G, 97]; entries as in
+    Observation: Box(-1, 1, (98,), float32) per game, [G, 97]; entries as in
     `harness.environments.gymnasium_env.DrivingEnv`.
 
     Action: Box(-1, 1, (2,), float32) per game, [G, 2]: pedals and wheel.
@@ -48,8 +82,6 @@ class ArenaVecEnv(VecEnv):
 
     Each game is drawn from `parts`, the number of its tile, and the count of that tile's games.
     """
-
-    render_mode = None
 
     def __init__(
         self,
@@ -102,6 +134,10 @@ class ArenaVecEnv(VecEnv):
         finished, self._finished = self._finished, []
         return finished
 
+    def reload(self, seed: int) -> None:
+        """Reload SUMO with a seed."""
+        self.arena.reload(seed)
+
     def close(self) -> None:
         """Close the SUMO simulation."""
         self.arena.close()
@@ -119,22 +155,3 @@ class ArenaVecEnv(VecEnv):
             )
         )
         self._payoff[game] = 0.0
-
-    # --- methods of VecEnv without a meaning for an arena ----------------------------------------------
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """The attribute, once for each game in `indices`."""
-        return [getattr(self, attr_name) for _ in self._get_indices(indices)]
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Raises AttributeError: games have no attributes of their own."""
-        raise AttributeError(f"the games of an arena share all attributes; {attr_name!r} can't be set for some of them")
-
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Call a method once for each game in `indices`."""
-        method: Callable[..., Any] = getattr(self, method_name)
-        return [method(*args, **kwargs) for _ in self._get_indices(indices)]
-
-    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """False for each game: games are not wrapped."""
-        return [False for _ in self._get_indices(indices)]

@@ -69,13 +69,15 @@ class Goals:
 def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -> Goals:
     """The goals of a player in an arm's rows of episodes.csv; None: the arm has no row.
 
+    Several people drive one at a time, and their games count together.
     An ego that breaks one of `RULES` can't drive the scene. Persons may: some are made for it.
     """
     from harness.evaluation.manoeuvres.thresholds import WRONG_WAY_LEAST_S
+    from harness.evaluation.people import outcomes_of_people
 
     if games is None:
         return Goals(goals=0, games=0)
-    outcome = games[f"{player}_outcome"].fillna("")
+    outcome = games["ego_outcome"].fillna("") if player == "ego" else outcomes_of_people(games)
     played = (games["error"].fillna("") == "") & ~outcome.isin(["", "error"])
     reached = played & (outcome == "goal")
     on_red = reached & _at_least(games, "ego_red_lights", 1.0) & (player == "ego")

@@ -7,6 +7,7 @@ import pandas as pd
 from scipy import stats
 
 from harness.evaluation.comparison import CONFIDENCE, mean_interval
+from harness.evaluation.people import of_people
 from harness.evaluation.tables import SUMMARY_COLUMNS, typed
 
 
@@ -16,7 +17,9 @@ def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
     `episodes` counts all games of the arm and `errors` those that could not be played. Every other column is
     over the games that were played and in which the quantity was measured; it is empty without such games.
     Rates have 95 % Clopper-Pearson intervals, the mean speed a 95 % t interval (empty without spread); the
-    other columns are means over games (min_ttc_s: the mean of each game's minimum).
+    other columns are means over games (min_ttc_s: the mean of each game's minimum). With several people, the columns of
+    the non-ego are over the people of all games; their goals in one game depend on each other, so that their rate has
+    no interval, but in an arm in which they drive one at a time.
     """
     episodes = typed(episodes)
     rows = [
@@ -30,7 +33,8 @@ def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
 def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict[str, object]:
     played = games[(games["ego_outcome"] != "error") & (games["error"] == "")]
     with_ego = played[played["ego_failed"].notna()]
-    non_ego_outcomes = played.loc[played["non_ego_outcome"] != "", "non_ego_outcome"]
+    outcomes = of_people(played, "outcome")
+    people = outcomes.to_numpy()[(outcomes != "").to_numpy()]
     speeds = played["ego_mean_speed_mps"].dropna()
     speed_low, speed_high = mean_interval(speeds.to_numpy())
 
@@ -55,10 +59,20 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
         "max_deceleration_mps2": played["ego_max_deceleration_mps2"].mean(),
         "max_lateral_acceleration_mps2": played["ego_max_lateral_acceleration_mps2"].mean(),
         "ego_payoff": played["ego_payoff"].mean(),
-        **_rate("non_ego_goal_rate", int((non_ego_outcomes == "goal").sum()), len(non_ego_outcomes)),
-        "non_ego_mean_speed_mps": played["non_ego_mean_speed_mps"].mean(),
-        "non_ego_payoff": played["non_ego_payoff"].mean(),
+        **_goal_rate(int((people == "goal").sum()), len(people), games=int((outcomes != "").any(axis=1).sum())),
+        "non_ego_mean_speed_mps": _mean(of_people(played, "mean_speed_mps")),
+        "non_ego_payoff": _mean(of_people(played, "payoff")),
     }
+
+
+def _mean(cells: pd.DataFrame) -> float:
+    return float(pd.Series(cells.to_numpy(dtype=np.float64).ravel()).mean())
+
+
+def _goal_rate(goals: int, people: int, games: int) -> dict[str, float]:
+    """The share of the people of all games that reached their goals; its interval, if each game had one person."""
+    rate = _rate("non_ego_goal_rate", goals, people)
+    return rate if people == games else dict.fromkeys(rate, np.nan) | {"non_ego_goal_rate": rate["non_ego_goal_rate"]}
 
 
 def _rate(column: str, successes: int, games: int) -> dict[str, float]:

@@ -20,6 +20,7 @@ import pandas as pd
 from harness.errors import UsageError
 from harness.evaluation.comparison import COMPARISON_COLUMNS
 from harness.evaluation.game_theory.columns import GAME_TABLES
+from harness.evaluation.people import columns_for, people_in
 from harness.files import content_of, replace_durably, scratch_beside, write_atomically
 
 EPISODE_COLUMNS = {
@@ -50,7 +51,8 @@ EPISODE_COLUMNS = {
     "duration_s": "float64",
     "error": "object",
 }
-"""Columns of `episodes.csv` in order, each with its pandas dtype (Int64: whole numbers or empty)."""
+"""Columns of `episodes.csv` in order, each with its pandas dtype (Int64: whole numbers or empty). With several people,
+those of the non-ego occur for each of them (`people.columns_for`)."""
 
 RECONFIGURATION_COLUMNS = {
     "stage": "object",
@@ -170,7 +172,8 @@ def typed(frame: pd.DataFrame) -> pd.DataFrame:
 
 def _columns_of(names: Iterable[str]) -> Mapping[str, str]:
     names = list(names)
-    for columns in TABLES.values():
+    episodes = columns_for(len(people_in(names)), EPISODE_COLUMNS)
+    for columns in (episodes, *TABLES.values()):
         if sorted(names) == sorted(columns):
             return columns
     nearest, columns = max(TABLES.items(), key=lambda table: len(set(names) & set(table[1])))

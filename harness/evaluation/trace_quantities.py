@@ -18,7 +18,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.quantities import Quantities
 from harness.game.right_of_way import SIGNALS, Signal
 from harness.game.road import MARGIN_M, SPACING_M, Routes
-from harness.game.state import ROLES, Bodies, State
+from harness.game.state import Bodies, State
 from harness.game.world import World
 
 
@@ -33,7 +33,7 @@ class Series:
 def series_of(trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]]) -> Series:
     """The series of one game's trace. `sizes_m` are length and width of each road user in it, by its name."""
     quantities = quantities_of(trace, world, sizes_m)
-    drove = drove_in(trace)
+    drove = drove_in(trace, world.roles)
     return Series(
         leader_gap_m=np.where(drove, quantities.leader_gap_m, np.nan),
         time_to_collision_s=np.where(drove, quantities.time_to_collision_s, np.nan),
@@ -59,8 +59,9 @@ def quantities_of(
     The position along the route is located separately in each step: on a route that crosses itself, a player on the
     crossing may be located on the other branch.
     """
-    names = [*ROLES, *sorted(set(trace["player"]) - set(ROLES))]
-    players, places = len(ROLES), _places(trace, names)
+    roles = world.roles
+    names = [*roles, *sorted(set(trace["player"]) - set(roles))]
+    players, places = len(roles), _places(trace, names)
     present = _filled(places, np.ones(len(trace), dtype=bool))
     motion = {name: _filled(places, trace[name].to_numpy()) for name in _MOTION}
     sizes = np.array([sizes_m.get(name, (0.0, 0.0)) for name in names])
@@ -104,12 +105,12 @@ def _states_of(text: str, links: tuple[tuple[str, int], ...]) -> tuple[int, ...]
     return tuple(int(SIGNALS.get(letter, Signal.OFF)) for letter in letters)
 
 
-def drove_in(trace: pd.DataFrame) -> BoolArray:
-    """[T, P] whether each player was driving: it was present, and its game had not ended in an earlier step."""
-    places = _places(trace, ROLES)
+def drove_in(trace: pd.DataFrame, roles: Sequence[str]) -> BoolArray:
+    """[T, P] whether each player (`roles` [P]) was driving: present, and its game had not ended in an earlier step."""
+    places = _places(trace, roles)
     there = _filled(places, np.ones(len(trace), dtype=bool))
     running = _filled(places, (trace["outcome"] == "").to_numpy())
-    return there & np.concatenate((np.ones((1, len(ROLES)), dtype=bool), running[:-1]))
+    return there & np.concatenate((np.ones((1, len(roles)), dtype=bool), running[:-1]))
 
 
 _USUAL_SIZE_M = (5.0, 1.8)  # of SUMO's default vehicle type
@@ -117,7 +118,7 @@ _MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steer
 _Places = tuple[tuple[int, int], BoolArray, IntArray, IntArray]
 
 
-def _places(trace: pd.DataFrame, names: list[str] | tuple[str, ...]) -> _Places:
+def _places(trace: pd.DataFrame, names: Sequence[str]) -> _Places:
     """The shape [T, names] of a trace, which of its rows are of `names`, and the step and column of each of those."""
     column = trace["player"].map({name: place for place, name in enumerate(names)})
     known = column.notna().to_numpy()

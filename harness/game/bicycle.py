@@ -48,21 +48,21 @@ def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArra
 @compiled
 def requests(
     action: FloatArray, speed_mps: FloatArray, road_steering_rad: FloatArray, actuators: Actuators
-) -> tuple[FloatArray, FloatArray]:
-    """The accelerations (m/s^2) and steering angles (rad), [G, P], that actions request of the cars.
+) -> FloatArray:
+    """[2, G, P] the accelerations (m/s^2) and steering angles (rad) that actions request of the cars.
 
     action [G, P, 2] in [-1, 1]: the pedals (-1 full brake, 0 coast, 1 full throttle) and the wheel. A wheel of 0
     follows the road (road_steering_rad [G, P]); -1 and 1 add the largest useful angle to the right and left at speeds
     [G, P]; progressive from the centre.
     """
-    acceleration, steering = np.empty(speed_mps.shape), steering_range_rad(speed_mps, actuators)
+    requested, range_rad = np.empty((2, *speed_mps.shape)), steering_range_rad(speed_mps, actuators)
     for g, p in np.ndindex(speed_mps.shape):
         pedals, wheel = _clamped(action[g, p, 0], 1.0), _clamped(action[g, p, 1], 1.0)
         strongest = actuators.max_acceleration_mps2[p] if pedals >= 0.0 else actuators.max_braking_mps2[p]
-        acceleration[g, p] = pedals * strongest
-        turned = steering[g, p] * wheel * (WHEEL_CENTRE + (1.0 - WHEEL_CENTRE) * wheel**2)
-        steering[g, p] = _clamped(road_steering_rad[g, p] + turned, actuators.max_steering_rad[p])
-    return acceleration, steering
+        requested[0, g, p] = pedals * strongest
+        turned = range_rad[g, p] * wheel * (WHEEL_CENTRE + (1.0 - WHEEL_CENTRE) * wheel**2)
+        requested[1, g, p] = _clamped(road_steering_rad[g, p] + turned, actuators.max_steering_rad[p])
+    return requested
 
 
 def actions(

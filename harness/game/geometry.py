@@ -180,12 +180,17 @@ def time_to_first_contact(
 
 @compiled
 def distance_to_nearest_segment(own: Box, segments: FloatArray, rows: IntArray, limit_m: float) -> FloatArray:
-    """[N, P] distance (m) to the nearest of the segments [S, 2, 2] listed in rows [N, P, K], at most `limit_m`."""
+    """[N, P] distance (m) to the nearest of the segments [S, 2, 2] listed in rows [N, P, K], at most `limit_m`.
+
+    A list ends at its first negative row.
+    """
     nearest_m = np.full(own.x_m.shape, limit_m)
     for n, p in np.ndindex(own.x_m.shape):
         box = _own(own, n, p)
         cosine, sine = cos(box.heading_rad), sin(box.heading_rad)
         for k in range(rows.shape[2]):
+            if rows[n, p, k] < 0:
+                break
             distance = _box_segment_distance(box, cosine, sine, segments[rows[n, p, k]], nearest_m[n, p])
             nearest_m[n, p] = min(nearest_m[n, p], distance)
     return nearest_m

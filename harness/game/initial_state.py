@@ -156,6 +156,8 @@ class Conditions:
 class StartDistribution:
     """The distribution of initial states: start ranges [P], lengths [P] and probabilities of taking part [P].
 
+    Players that do not take part in every game take part in the same games, as far as their probabilities are equal.
+
     A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
 
     In `along_route_share` of the games, the players start anywhere along their `routes` instead, up to their goals.
@@ -172,6 +174,11 @@ class StartDistribution:
     conditions: Conditions
     along_route_share: float = 0.0
 
+    @cached_property
+    def no_lapses(self) -> Lapses:
+        """The lapses of a driver without any: the same arrays in every game, since they are only read."""
+        return Lapses.none(self.steps)
+
 
 def draw_initial_state(start_distribution: StartDistribution, *parts: str | int) -> InitialState:
     """Draw the initial state of one game, with seeds hashed from the named parts."""
@@ -184,7 +191,7 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
         ego_mps, ego_m = poses[0][-2:] if poses else (speed, 0.0)
         position = place.position_m(share, speed, ego_m, ego_mps)
         poses.append((*place.pose(position, length), speed, position))
-    present = [next(draws) < share for share in start_distribution.present_share]
+    present = _present([next(draws) for _ in players], start_distribution.present_share)
     member = [
         0 if len(shares) == 1 else draw_member(shares, player, *parts)
         for player, shares in enumerate(start_distribution.shares)
@@ -229,6 +236,12 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
     )
 
 
+def _present(draws: Sequence[float], shares: Sequence[float]) -> list[bool]:
+    """Which players take part: players with shares below 1 are absent together, by the draw of the first of them."""
+    deciding = next((draw for draw, share in zip(draws, shares, strict=True) if share < 1.0), 0.0)
+    return [deciding < share for share in shares]
+
+
 def _varied(bounds: tuple[float, float], name: str, *parts: str | int) -> float:
     """A condition of one game, drawn from a generator of its own; without a range, nothing is drawn."""
     return bounds[0] if bounds[0] == bounds[1] else between(bounds, generator_of(*parts, name).random())
@@ -244,7 +257,7 @@ def _lapses(
     attention: Attention | None, start_distribution: StartDistribution, player: int, delay_steps: int, *parts: str | int
 ) -> Lapses:
     if attention is None:
-        return Lapses.none(start_distribution.steps)
+        return start_distribution.no_lapses
     lapses = draw_lapses(
         attention, start_distribution.steps, start_distribution.step_s, generator_of(*parts, "attention", player)
     )

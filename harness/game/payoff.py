@@ -44,19 +44,19 @@ class Payoff:
 
     def evaluate(self, q: Quantities, player: int) -> dict[str, FloatArray]:
         """The weighted value [G] of each term in this step, by name; the sum is the step's payoff."""
-        values, _ = self._term_values(q, player)
+        values = self._term_values(q, player)[:-1]
         fuzzy = self._fuzzy_values(q, player)
         return dict(zip((*(each.name for each in self.terms), *self.fuzzy), (*values, *fuzzy), strict=True))
 
     def total(self, q: Quantities, player: int) -> FloatArray:
         """[G] one player's payoff of the step."""
-        _, total = self._term_values(q, player)
+        total: FloatArray = self._term_values(q, player)[-1]
         for value in self._fuzzy_values(q, player):
             total += value
         return total
 
-    def _term_values(self, q: Quantities, player: int) -> tuple[FloatArray, FloatArray]:
-        """[T, G] weighted values of the terms without the fuzzy ones, and [G] their sum."""
+    def _term_values(self, q: Quantities, player: int) -> FloatArray:
+        """[T + 1, G] weighted values of the terms without the fuzzy ones, and their sum."""
         quantities = np.empty((len(self._quantities), len(q.state.step)))
         for row, quantity in enumerate(self._quantities):
             quantities[row] = quantity(q)[:, player]
@@ -101,16 +101,16 @@ def _term_values(
     weight: FloatArray,
     per_second: BoolArray,
     step_s: float,
-) -> tuple[FloatArray, FloatArray]:
-    """[T, G] weighted values of T terms of quantities [Q, G], and [G] their sum, added in the order of the terms."""
-    values, total = np.empty((len(form), quantities.shape[1])), np.zeros(quantities.shape[1])
+) -> FloatArray:
+    """[T + 1, G] weighted values of T terms of quantities [Q, G], and their sum, added in the order of the terms."""
+    values = np.zeros((len(form) + 1, quantities.shape[1]))
     for term in range(len(form)):
         scale = weight[term] * (step_s if per_second[term] else 1.0)
         for g in range(quantities.shape[1]):
             value = scale * _unweighted(quantities[row[term], g], form[term], parameter[term])
             values[term, g] = value
-            total[g] += value
-    return values, total
+            values[-1, g] += value
+    return values
 
 
 @compiled

@@ -181,7 +181,7 @@ class Quantities:
         """Each player's conflict with each body at a junction."""
         state, bodies, tables = self.state, self.bodies, self.world.right_of_way
         if not len(tables.conflicts.player):
-            return Meetings.none(self.visible.shape)
+            return Meetings.none((*state.present.shape, bodies.present.shape[1]))
         columns = meetings(
             *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
             (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),
@@ -212,12 +212,13 @@ class Quantities:
     @cached_property
     def _boxes(self) -> Box:
         """The bodies' boxes, [G, B]."""
-        return Box(*(getattr(self.bodies, name) for name in Box._fields))
+        bodies = self.bodies
+        return Box(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
 
     @cached_property
     def vehicle_clearance_m(self) -> FloatArray:
         """Distance to the nearest other body: 0 at contact, at most `REACH_M`."""
-        return _vehicle_clearance_m(self._cars, self._boxes, self.state.present, self.bodies.present)
+        return distance_to_nearest_box(self._cars, self._boxes, self.visible, REACH_M)
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
@@ -282,8 +283,3 @@ def _visible(players: BoolArray, bodies: BoolArray) -> BoolArray:
     for g, p, b in np.ndindex(visible.shape):
         visible[g, p, b] = players[g, p] and bodies[g, b] and p != b
     return visible
-
-
-@compiled
-def _vehicle_clearance_m(cars: Box, boxes: Box, players: BoolArray, bodies: BoolArray) -> FloatArray:
-    return distance_to_nearest_box(cars, boxes, _visible(players, bodies), REACH_M)

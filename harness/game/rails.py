@@ -18,9 +18,9 @@ _FAR_AWAY_M = 1e6
 class Rails:
     """The edges of the drivable area as line segments, with a grid for spatial look-up."""
 
-    segments: FloatArray  # [S, 2, 2]; the last one is far away and pads the cells
+    segments: FloatArray  # [S, 2, 2]; the last one is far away: that of a row of -1
     origin_m: FloatArray  # [2]
-    cells: IntArray  # [X, Y, K] rows of `segments` within reach of each cell
+    cells: IntArray  # [X, Y, K] rows of `segments` within reach of each cell, then -1
 
     @classmethod
     def of(cls, segments: FloatArray, reach_m: float) -> Rails:
@@ -28,7 +28,7 @@ class Rails:
         segments = np.asarray(segments, dtype=float).reshape(-1, 2, 2)
         padded = np.concatenate((segments, np.full((1, 2, 2), _FAR_AWAY_M)))
         if not len(segments):
-            return cls(segments=padded, origin_m=np.zeros(2), cells=np.zeros((1, 1, 1), dtype=np.int64))
+            return cls(segments=padded, origin_m=np.zeros(2), cells=np.full((1, 1, 1), -1))
         low = segments.min((0, 1)) - reach_m
         counts = ((segments.max((0, 1)) + reach_m - low) // _CELL_M).astype(int) + 1
         rows_of: dict[tuple[int, ...], list[int]] = {}
@@ -37,13 +37,13 @@ class Rails:
         for row, (begin, end) in enumerate(zip(first, last, strict=True)):
             for cell in np.ndindex(*(end - begin)):
                 rows_of.setdefault((begin[0] + cell[0], begin[1] + cell[1]), []).append(row)
-        cells = np.full((*counts, max(map(len, rows_of.values()))), len(segments), dtype=np.int64)
+        cells = np.full((*counts, max(map(len, rows_of.values()))), -1)
         for place, rows in rows_of.items():
             cells[place][: len(rows)] = rows
         return cls(segments=padded, origin_m=low, cells=cells)
 
     def near(self, x_m: FloatArray, y_m: FloatArray) -> IntArray:
-        """[G, P, K] rows of `segments` within reach of points [G, P]."""
+        """[G, P, K] rows of `segments` within reach of points [G, P], then -1."""
         return _cells_at(x_m, y_m, self.origin_m, self.cells)
 
     def distance_m(self, cars: Box, limit_m: float) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -66,10 +66,10 @@ class Routes(NamedTuple):
 
     x_m: FloatArray
     y_m: FloatArray
-    heading_rad: FloatArray
     cos: FloatArray
     sin: FloatArray
     curvature_per_m: FloatArray
+    heading_rad: FloatArray
     bend_per_m: FloatArray  # curvature, smoothed over `_BEND_M`
     bend_ahead_per_m: (
         FloatArray  # [N, K] the tightest bend in each section between `AHEAD_M`, and from the last for 30 m
@@ -99,16 +99,18 @@ class Routes(NamedTuple):
             return np.concatenate(parts)
 
         columns = {each.name: column(each.name) for each in fields(Route) if each.name not in ("length_m", "goal_m")}
+        columns |= {
+            "cos": np.cos(columns["heading_rad"]),
+            "sin": np.sin(columns["heading_rad"]),
+            "curvature_per_m": np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
+            "bend_ahead_per_m": np.concatenate([_bend_ahead_per_m(route.heading_rad) for route in routes]),
+            "approach_mps": np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
+            "bend_per_m": np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
+        }
         rows = np.array([len(route.x_m) for route in routes])
         first = np.cumsum(rows) - rows
         return cls(
-            **columns,
-            cos=np.cos(columns["heading_rad"]),
-            sin=np.sin(columns["heading_rad"]),
-            curvature_per_m=np.concatenate([_curvature_per_m(route.heading_rad) for route in routes]),
-            bend_ahead_per_m=np.concatenate([_bend_ahead_per_m(route.heading_rad) for route in routes]),
-            approach_mps=np.concatenate([_approach_mps(route.speed_limit_mps) for route in routes]),
-            bend_per_m=np.concatenate([_bend_per_m(route.heading_rad) for route in routes]),
+            **_side_by_side(columns),
             first_row=first,
             last_row=first + rows - 1,
             goal_m=np.array([route.goal_m for route in routes]),
@@ -121,7 +123,8 @@ class Routes(NamedTuple):
     def locate(self, x_m: FloatArray, y_m: FloatArray, station_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Stations and lateral offsets (m, left positive) [G, P] of points [G, P], given their previous stations."""
         lines = (self.x_m, self.y_m, self.cos, self.sin, self.curvature_per_m)
-        return _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
+        stations, offsets = _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
+        return stations, offsets
 
     def along(
         self,
@@ -171,22 +174,23 @@ def _locate(
     curvature_per_m: FloatArray,
     first_row: IntArray,
     last_row: IntArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Newton's method on the distance to the line.
+) -> FloatArray:
+    """[2, G, P] stations and lateral offsets, by Newton's method on the distance to the line.
 
     A metre of travel on the inside of a curve is more than a metre of the line, on the outside less.
     """
-    stations, offsets = station_m.copy(), np.empty_like(station_m)
+    places = np.empty((2, *station_m.shape))
     for g, p in np.ndindex(x_m.shape):
+        station, offset = station_m[g, p], 0.0
         for _ in range(3):
-            row = row_at(stations[g, p], first_row[p], last_row[p])
+            row = row_at(station, first_row[p], last_row[p])
             dx, dy = x_m[g, p] - line_x_m[row], y_m[g, p] - line_y_m[row]
             offset = dy * line_cos[row] - dx * line_sin[row]
             stretch = max(1.0 - curvature_per_m[row] * offset, _LEAST_STRETCH)
             along = (dx * line_cos[row] + dy * line_sin[row]) / stretch
-            stations[g, p] = (row - first_row[p]) * SPACING_M - MARGIN_M + along
-            offsets[g, p] = offset
-    return stations, offsets
+            station = (row - first_row[p]) * SPACING_M - MARGIN_M + along
+        places[0, g, p], places[1, g, p] = station, offset
+    return places
 
 
 @compiled
@@ -234,6 +238,16 @@ def _lane_at(row: int, offset_m: float, lane_offset_m: FloatArray, lane_end_m: F
         if distance < nearest:  # false for NaN: a lane that does not exist here
             nearest, ends = distance, lane_end_m[row, lane]
     return nearest, ends
+
+
+def _side_by_side(columns: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """The columns as views of one array, in which the values of a station are neighbours: reading several of them loads
+    few lines of memory."""
+    ordered = {name: columns[name] for name in Routes._fields if name in columns}
+    table = np.concatenate([column.reshape(len(column), -1) for column in ordered.values()], axis=1)
+    widths = [column.size // len(column) for column in ordered.values()]
+    parts = np.split(table, np.cumsum(widths)[:-1], axis=1)
+    return {name: part[:, 0] if columns[name].ndim == 1 else part for name, part in zip(ordered, parts, strict=True)}
 
 
 def _curvature_per_m(heading_rad: FloatArray) -> FloatArray:

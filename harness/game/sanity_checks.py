@@ -27,7 +27,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.observation_layout import LAYOUT
 from harness.game.quantities import Quantities
-from harness.game.state import ROLES, State
+from harness.game.state import State, roles_of
 
 ROUNDING_M = 1e-3  # rounding of positions in network coordinates, which may be millions of metres
 LANE_CHANGE_M = 6.0  # width of a wide lane, plus the swing of a car's centre
@@ -44,12 +44,13 @@ def slack_m(taken_over: BoolArray) -> FloatArray:
     return np.where(taken_over, ROUNDING_M, LANE_CHANGE_M)
 
 
-def checked_decisions(decided: Any, driver: object, player: int, games: IntArray, steps: IntArray) -> FloatArray:
-    """The decisions of a player's driver for games [N], as an array [N, 2]; `steps` [G] are the steps played so far.
+def checked_decisions(decided: Any, driver: object, role: str, games: IntArray, steps: IntArray) -> FloatArray:
+    """The decisions of the driver of a player, named `role`, for games [N], as an array [N, 2].
 
+    `steps` [G] are the steps played so far.
     Raises ImpossibleNumber unless the decisions are N pairs of numbers from -1 to 1.
     """
-    subject = f"the driver of {ROLES[player]}, {type(driver).__name__},"
+    subject = f"the driver of {role}, {type(driver).__name__},"
     try:
         actions = np.asarray(decided, dtype=float)
     except (TypeError, ValueError):
@@ -84,17 +85,17 @@ def check_step(before: State, q: Quantities, drove: BoolArray, payoff: FloatArra
     )
     if fault == _NO_FAULT:
         return
-    here, where = (game, player), _where(game, now.step)
+    here, role, where = (game, player), world.roles[player], _where(game, now.step)
     if fault == _BACKGROUND:
         raise ImpossibleNumber(f"a background vehicle has no finite position, heading or speed {where}")
     if fault == _PAYOFF:
-        raise ImpossibleNumber(f"the payoff of {ROLES[player]} is {payoff[here]} {where}")
+        raise ImpossibleNumber(f"the payoff of {role} is {payoff[here]} {where}")
     if fault == _MOTION:
         motion = f"x {now.x_m[here]} m, y {now.y_m[here]} m, heading {now.heading_rad[here]}, {now.speed_mps[here]} m/s"
-        raise ImpossibleNumber(f"the motion of {ROLES[player]} is not finite {where}: {motion}")
+        raise ImpossibleNumber(f"the motion of {role} is not finite {where}: {motion}")
     moved = np.hypot(now.x_m[here] - before.x_m[here], now.y_m[here] - before.y_m[here])
     speed = max(before.speed_mps[here], now.speed_mps[here])
-    raise ImpossibleNumber(f"{ROLES[player]} moved {moved:.2f} m {where}, in {world.step_s:g} s at {speed:.2f} m/s")
+    raise ImpossibleNumber(f"{role} moved {moved:.2f} m {where}, in {world.step_s:g} s at {speed:.2f} m/s")
 
 
 def check_observation(observation: FloatArray, games: IntArray, steps: IntArray) -> None:
@@ -105,7 +106,9 @@ def check_observation(observation: FloatArray, games: IntArray, steps: IntArray)
     if _outside(observation):
         n, player, entry = np.argwhere(~(np.abs(observation) <= 1.0))[0].tolist()
         value, where = observation[n, player, entry], _where(games[n], steps)
-        raise ImpossibleNumber(f"{ROLES[player]} sees {LAYOUT[entry]} as {value} {where}, not from -1 to 1")
+        raise ImpossibleNumber(
+            f"{roles_of(observation.shape[1])[player]} sees {LAYOUT[entry]} as {value} {where}, not from -1 to 1"
+        )
 
 
 def _where(game: int, steps: IntArray) -> str:

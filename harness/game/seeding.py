@@ -9,7 +9,7 @@ import numpy as np
 
 def seed_of(*parts: str | int) -> int:
     """A 63-bit seed hashed from named parts, such as ("assessment", 1, "episode", 7)."""
-    text = "\x1f".join(f"{'str' if isinstance(part, str) else 'int'}:{part}" for part in parts)  # NumPy ints too
+    text = "\x1f".join([f"{'str' if isinstance(part, str) else 'int'}:{part}" for part in parts])  # NumPy ints too
     return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8], "little") >> 1
 
 

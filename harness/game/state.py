@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,16 @@ from harness.game.jit import compiled
 
 EGO, NON_EGO = 0, 1
 ROLES = ("ego", "non_ego")
+"""The two kinds of player."""
+MOST_PEOPLE = 4
+"""Non-egos of a game."""
+
+
+@cache
+def roles_of(players: int) -> tuple[str, ...]:
+    """The names of the players [P] of a game in every file: `ego` and `non_ego`; with several non-egos `ego`,
+    `non_ego_1`, `non_ego_2` and so on."""
+    return ROLES if players == len(ROLES) else ("ego", *(f"non_ego_{place}" for place in range(1, players)))
 
 
 class Outcome(IntEnum):

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import Actuators
 from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Road
+from harness.game.state import roles_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,7 +24,12 @@ class World:
     time_limit_s: float
     right_of_way: RightOfWay = NO_JUNCTIONS
 
-    @property
+    @cached_property
+    def roles(self) -> tuple[str, ...]:
+        """The players' names, as `roles_of`."""
+        return roles_of(len(self.length_m))
+
+    @cached_property
     def steps(self) -> int:
         """Steps until the time limit."""
         return round(self.time_limit_s / self.step_s)

@@ -29,6 +29,7 @@ def contacts(trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], rails: Sequ
     """Every contact of one game, in order of time; a collision of two players is one contact."""
     hit = trace[trace["outcome"].isin(["collision", "rail"])].sort_values("step", kind="stable")
     hit = hit.drop_duplicates("player")
+    several = trace["player"].str.fullmatch(r"non_ego_\d").any()
     touches = []
     for (step, outcome), rows in hit.groupby(["step", "outcome"]):
         frame = trace[trace["step"] == step]
@@ -40,9 +41,16 @@ def contacts(trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], rails: Sequ
             against = [shapely.LineString(rail) for rail in rails]
         place = _touching_point(bodies[first], against)
         time_s = float(rows["time_s"].iloc[0])
-        label = f"{outcome} at {time_s:.1f} s"
+        label = f"{outcome}{_players_in_it(rows['player'], several)} at {time_s:.1f} s"
         touches.append(Contact(time_s=time_s, x_m=place.x, y_m=place.y, label=label))
     return touches
+
+
+def _players_in_it(players: pd.Series, several: bool) -> str:
+    """Which players touch something, in a game with several people."""
+    if not several:
+        return ""
+    return " of " + " and ".join(name.replace("non_ego", "non-ego").replace("_", " ") for name in sorted(players))
 
 
 def _box(row: Any, drawn: DrawnVehicle) -> shapely.Polygon:

@@ -154,7 +154,7 @@ def _captioned(file: Path, text: str, font: ImageFont.FreeTypeFont | ImageFont.I
 
 
 def _centres(trace: pd.DataFrame) -> FloatArray:
-    """[T + 1, 2] the centre of the view: the ego; where it is absent, the non-ego; else the nearest known centre."""
+    """[T + 1, 2] the centre of the view: the ego; where it is absent, a non-ego; else the nearest known centre."""
     centres = np.full((int(trace["step"].max()) + 1, 2), np.nan)
     for player in reversed(list(PLAYER_COLOURS)):
         rows = trace[trace["player"] == player]

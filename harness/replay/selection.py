@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pandas as pd
 
+from harness.evaluation.people import judged_outcomes
+
 MOST_FAILURES_PER_ARM = 100  # and training seed: a replay folder contains a copy of the scene
 SAMPLE_PER_ARM = 2  # games without a failure, per arm and training seed, for comparison
 _FAILURES = ("collision", "rail", "timeout")  # worst first
@@ -46,7 +48,5 @@ def worst_first(episodes: pd.DataFrame) -> pd.DataFrame:
 
 def _severity(episodes: pd.DataFrame) -> pd.Series:
     """Rank of each game's outcome for the judged player: 0 is a collision."""
-    ego = episodes["ego_outcome"].fillna("")
-    outcome = ego.where(ego != "", episodes["non_ego_outcome"].fillna(""))
     ranks = {name: rank for rank, name in enumerate(_FAILURES)} | {"error": _UNPLAYED}
-    return outcome.map(lambda name: ranks.get(name, _NO_FAILURE))
+    return judged_outcomes(episodes).map(lambda name: ranks.get(name, _NO_FAILURE))

@@ -11,7 +11,14 @@ import pandas as pd
 
 from harness.traffic.xml_file import parse_xml
 
-PLAYER_COLOURS = {"ego": "31,119,255", "non_ego": "255,127,14"}  # blue and orange, as in the paper's figure 2
+PLAYER_COLOURS = {
+    "ego": "31,119,255",  # blue and orange, as in the paper's figure 2
+    "non_ego": "255,127,14",
+    "non_ego_1": "255,127,14",
+    "non_ego_2": "214,39,40",
+    "non_ego_3": "148,103,189",
+    "non_ego_4": "140,86,75",
+}
 _BACKGROUND_COLOUR = "190,190,190"
 
 # Length and width (m) of a vType without them: the defaults of SUMO 1.28 for its vehicle classes.

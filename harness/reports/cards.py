@@ -159,8 +159,7 @@ def _facts(persona: str, change: Change | None, found: Results) -> list[tuple[st
         several = len(found.seeds) > 1
         facts.append((page_wording.BY_DRIVER, [page_wording.by_driver(row, several) for row in by_driver]))
     else:
-        reached = {seed: page_wording.reaches_goal(row) for seed, row in found.of(persona_alone(persona).name).items()}
-        facts.append((page_wording.PERSONA_ALONE, page_wording.by_seed(reached)))
+        facts.append((page_wording.PERSONA_ALONE, _alone(persona, found)))
     if change is not None:
         arm = Arm(ego=change.ego(against=persona)).name
         alone = page_wording.counts(found.of(arm), f"the {change.made} ego")
@@ -168,6 +167,16 @@ def _facts(persona: str, change: Change | None, found: Results) -> list[tuple[st
     if any(failures(row) for row in found.of(NAIVE_ALONE.name).values()):
         facts.append((page_wording.CAUTION, [page_wording.FAILS_ALONE]))
     return [(title, lines or [page_wording.NOT_PLAYED]) for title, lines in facts]
+
+
+def _alone(persona: str, found: Results) -> list[str]:
+    """How often a persona reaches its goal alone; of a crowd, each of its personas."""
+    lines: list[str] = []
+    for member in dict.fromkeys(found.crowds.get(persona, [persona])):
+        reached = {seed: page_wording.reaches_goal(row) for seed, row in found.of(persona_alone(member).name).items()}
+        named = f"{member}: " if persona in found.crowds else ""
+        lines += [f"{named}{line}" for line in page_wording.by_seed(reached)]
+    return lines
 
 
 def _ordinary_driver(persona: str, found: Results) -> list[str]:

@@ -71,7 +71,7 @@ def failures_by_pair(manoeuvres: pd.DataFrame, episodes: pd.DataFrame) -> tuple[
             episode=game.episode,
             outcome=game.ego_outcome,
             time_s=max(begin_s - RUN_UP_S, 0.0),
-            text="; ".join(each.text for each in named if each.text),
+            text="; ".join(_text(each) for each in named if each.text),
         )
         grouped.setdefault((_name(pair.non_ego), _name(pair.ego)), []).append(failure)
     rows = [
@@ -86,6 +86,12 @@ def failures_by_pair(manoeuvres: pd.DataFrame, episodes: pd.DataFrame) -> tuple[
     unnamed = (NONE_NAMED, NONE_NAMED)
     rows.sort(key=lambda row: ((row.non_ego, row.ego) == unnamed, -len(row.games), row.non_ego, row.ego))
     return arms, rows
+
+
+def _text(manoeuvre: Manoeuvre) -> str:
+    """What it was; of several people, which one it was."""
+    place = manoeuvre.player.removeprefix("non_ego_")
+    return f"non-ego {place} {manoeuvre.text}" if place.isdecimal() else manoeuvre.text
 
 
 def _name(manoeuvre: Manoeuvre | None) -> str:

@@ -101,7 +101,8 @@ const OUTCOMES = { goal: "goal reached", rail: "rail contact", collision: "colli
 
 function nameOf(game, track) {
   if (track.name === "ego") return "ego";
-  return game.persona || "non-ego";
+  const place = track.name.match(/\d+$/)?.[0];  // among several people
+  return (game.persona || "non-ego") + (place ? ` ${place}` : "");
 }
 
 /** A game in words. */

@@ -9,6 +9,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.people import COLLIDED_WITH, judged, judged_outcomes
 from harness.reports import page_wording
 from harness.reports.numbers import MISSING, number
 from harness.reports.player_data import key
@@ -33,8 +34,7 @@ class Replay:
 
 def failures(episodes: pd.DataFrame, among: Sequence[str] | None = None) -> int:
     """How many games the judged player failed; only those with a replay named in `among`, if it is given."""
-    ego = episodes["ego_outcome"]
-    failed = episodes[ego.where(ego != "", episodes["non_ego_outcome"]).isin(FAILURES)]
+    failed = episodes[judged_outcomes(episodes).isin(FAILURES)]
     if among is None:
         return len(failed)
     return len({_name(game) for game in failed[["arm", "seed", "episode"]].to_dict("records")} & set(among))
@@ -63,7 +63,7 @@ def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tu
     if not games:
         return None
     game = min(games, key=_worst)
-    outcome, ttc = game["ego_outcome"] or game["non_ego_outcome"], game["ego_min_ttc_s"]
+    (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
     return _key(game), page_wording.worst_game(game["episode"], outcome, ttc)
 
 
@@ -81,23 +81,33 @@ def _key(game: Mapping[Any, Any]) -> str:
 
 
 def _worst(game: Mapping[Any, Any]) -> tuple[Any, ...]:
-    outcome, ttc = game["ego_outcome"] or game["non_ego_outcome"], game["ego_min_ttc_s"]
+    (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
     severity = FAILURES.index(outcome) if outcome in FAILURES else len(FAILURES) + (outcome == "error")
     return severity, ttc if ttc == ttc else float("inf"), game["arm"], game["seed"], game["episode"]
 
 
 def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: Container[str]) -> Replay:
     arm, seed, episode = game["arm"], game["seed"], game["episode"]
-    judged = "ego" if game["ego_outcome"] else "non-ego"
+    name, outcome = judged(game)
     return Replay(
         name=name,
         game=f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
-        outcome=f"{judged}: {game['ego_outcome'] or game['non_ego_outcome']}",
+        outcome=f"{_in_words(name)}: {outcome}{_with(game)}",
         min_ttc=number(game["ego_min_ttc_s"], 2),
         command=f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
         scene=_scene(name),
         watch=_key(game) if _key(game) in embedded else "",
     )
+
+
+def _in_words(name: str) -> str:
+    return name.replace("non_ego", "non-ego").replace("_", " ")
+
+
+def _with(game: Mapping[Any, Any]) -> str:
+    """What the ego collided with, where a table of several people has it."""
+    other = game.get(COLLIDED_WITH, "")
+    return f" with {_in_words(other) if other != 'background' else 'background traffic'}" if other else ""
 
 
 def _scene(name: str) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from harness.evaluation.people import people_in
 from harness.evaluation.strategies import ReconfiguredEgo
 from harness.reports import wording
 from harness.reports.run_tables import RunTables
@@ -31,6 +32,10 @@ class Results:
     """Ids of the stages of the campaign, whether they are done or not."""
     is_reconfigured: bool
     """Whether round 2 searches the parameters of an external ego."""
+    people: int
+    """Non-egos of the scene."""
+    crowds: Mapping[str, Sequence[str]]
+    """The personas of each crowd, in the order of the scene's people."""
     by_driver: Sequence[Row]
     """Rows of `populations`: each arm against a population, by the persona that drove."""
 
@@ -60,7 +65,14 @@ class Results:
             arms=self.arms,
             significance=self.significance,
             change=self.change,
+            who=self._who(persona),
         )
+
+    def _who(self, persona: str) -> str:
+        """What the ego meets, if it is not one driver with a persona."""
+        if persona in self.crowds:
+            return f"the crowd {persona}"
+        return f"the group of {self.people} {persona} drivers" if self.people > 1 else ""
 
     def _rows(self, question: str, persona: str) -> list[Row]:
         return [row for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)]
@@ -79,6 +91,8 @@ def results(tables: RunTables) -> Results:
         significance=manifest.get("campaign", {}).get("assessment", {}).get("significance"),
         planned=tables.stages,
         is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),
+        people=len(people_in(tables.episodes.columns)),
+        crowds={each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())},
         by_driver=tables.populations.to_dict("records"),
     )
 

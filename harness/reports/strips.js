@@ -98,7 +98,7 @@ class Strips {
       for (const mark of this.game.marks) {
         if (mark.player !== track.name) continue;
         const [from, to] = [this.x(mark.from), Math.max(this.x(mark.until), this.x(mark.from) + 3)];
-        context.fillStyle = palette[COLOURS[track.name]];
+        context.fillStyle = colourOf(track);
         context.globalAlpha = 0.35;
         context.fillRect(from, y - 6, to - from, 12);
         context.globalAlpha = 1;
@@ -134,7 +134,7 @@ class Strips {
     context.textBaseline = "alphabetic";
     context.fillText(`${name} (${unit})`, LEFT + 2, top - 3);
     for (const track of [...this.game.players].reverse()) {
-      context.strokeStyle = palette[COLOURS[track.name]];
+      context.strokeStyle = colourOf(track);
       context.lineWidth = 1.8;
       context.lineJoin = "round";
       context.beginPath();
@@ -194,7 +194,7 @@ class Strips {
       this.game.players.forEach((track, place) => {
         const value = valueAt(this.game, track, column, time) * factor;
         if (Number.isNaN(value)) return;
-        context.fillStyle = palette[COLOURS[track.name]];
+        context.fillStyle = colourOf(track);
         context.beginPath();
         context.arc(x, this.y(row, value), 3.2, 0, 7);
         context.fill();

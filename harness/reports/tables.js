@@ -64,7 +64,7 @@ function filters(table, rows) {
     }
     count.textContent = `${shown} of ${rows.length} games`;
   };
-  for (const name of ["arm", "ego_outcome", "non_ego_outcome"]) {
+  for (const name of columns.filter(each => each === "arm" || each.endsWith("ego_outcome") || /^non_ego_\d_outcome$/.test(each))) {
     const place = columns.indexOf(name);
     const values = [...new Set(rows.map(row => exactOf(row.cells[place])))];
     if (values.length < 2 || values.length > MOST_CHOICES) continue;
@@ -73,7 +73,7 @@ function filters(table, rows) {
     select.dataset.filter = name;
     select.addEventListener("change", apply);
     tests.push(row => select.value === "-1" || exactOf(row.cells[place]) === values[select.value]);
-    bar.append(make("label", { text: `${name.replace("non_ego", "non-ego").replace("_", " ")} ` }, select));
+    bar.append(make("label", { text: `${name.replace("non_ego", "non-ego").replaceAll("_", " ")} ` }, select));
   }
   const search = make("input", { type: "search", size: "14", "data-filter": "text" });
   const texts = new Map();

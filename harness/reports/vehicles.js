@@ -1,6 +1,5 @@
 // The moving parts of the road: cars as oriented boxes with heading, trails, lapses and contacts.
 
-const COLOURS = { ego: "ego", non_ego: "non-ego" };
 const TRAIL_S = 4, GHOSTS_S = 1, BURST_S = 0.35;
 
 /** Draw a game at a time, from bottom to top: trails, background traffic, players, contacts. */
@@ -22,11 +21,15 @@ function drawGame(context, camera, ratio, game, time, labels) {
   if (labels) drawLabels(context, camera, game, time);
 }
 
+function colourOf(track) {
+  return palette[track.name === "ego" ? "ego" : "non-ego"];
+}
+
 /** The look of a player's car: brake lights, front wheels, a contact, a lapse. */
 function lookOf(game, track, step, time) {
   const hit = ["collision", "rail"].includes(track.outcome) && time >= track.ended * game.step - 1e-6;
   return {
-    colour: palette[COLOURS[track.name]],
+    colour: colourOf(track),
     brakes: track.acceleration[step] < -0.5,
     wheels: track.steering[step],
     lapsed: track.lapsed[step] > 0,
@@ -106,7 +109,7 @@ function drawTrail(context, camera, game, track, time) {
   const from = Math.max(0, Math.floor(now - TRAIL_S / game.step)), thin = 1 / camera.scale;
   const pose = poseAt(game, track, time);
   for (const lapsed of [true, false]) {
-    context.strokeStyle = lapsed ? palette.lapse : palette[COLOURS[track.name]];
+    context.strokeStyle = lapsed ? palette.lapse : colourOf(track);
     context.lineWidth = lapsed ? Math.max(0.55, 4 * thin) : Math.max(0.16, 1.5 * thin);
     for (let step = from; step < now; step++) {
       if (lapsed && !track.lapsed[step + 1]) continue;

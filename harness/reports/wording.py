@@ -93,29 +93,29 @@ def verdicts(
     arms: Mapping[tuple[str, int], Row],
     significance: float | None,
     change: Change = RETRAINED,
+    who: str = "",
 ) -> Conclusion:
     """Answer `question` for the training seeds it is asked of, by `rows`: its comparisons of this persona.
 
-    `arms` are the rows of `summary` by arm and seed, `change` is the treatment of round 2. A seed without rows is not
-    answered yet.
+    `arms` are the rows of `summary` by arm and seed, `change` is the treatment of round 2, `who` is what the ego meets,
+    if it is not one driver with the persona. A seed without rows is not answered yet.
     """
+    who = who or f"the {persona} driver"
     answers = [
-        _answer(question, persona, seed, [row for row in rows if row["seed"] == seed], arms, significance, change)
+        _answer(question, persona, who, seed, [row for row in rows if row["seed"] == seed], arms, significance, change)
         for seed in seeds
     ]
     if not answers:
         sentence = NO_ROUND_2 if question == "RQ2" else NOT_COMPARED
         return Conclusion(question=question, label=NOT_ASKED, tone="open", sentence=sentence, speed="", per_seed=())
-    return (
-        Conclusion.of_one(question, answers[0]) if len(answers) == 1 else _of_seeds(question, persona, answers, change)
-    )
+    return Conclusion.of_one(question, answers[0]) if len(answers) == 1 else _of_seeds(question, who, answers, change)
 
 
-def _of_seeds(question: str, persona: str, answers: Sequence[Answer], change: Change) -> Conclusion:
+def _of_seeds(question: str, who: str, answers: Sequence[Answer], change: Change) -> Conclusion:
     yes, seeds = sum(answer.yes for answer in answers), len(answers)
     finding = {
-        "RQ1": f"the {persona} driver makes the naive ego fail significantly more often than it does alone",
-        "RQ2": f"{change.doing} makes the ego fail significantly less often against the {persona} driver",
+        "RQ1": f"{who} makes the naive ego fail significantly more often than it does alone",
+        "RQ2": f"{change.doing} makes the ego fail significantly less often against {who}",
     }[question]
     label = f"yes in {yes} of {seeds} seeds" if yes else f"not shown in any of {seeds} seeds"
     sentence = f"In {yes} of {seeds} training seeds {finding} (after Holm's correction)."
@@ -137,6 +137,7 @@ def _of_seeds(question: str, persona: str, answers: Sequence[Answer], change: Ch
 def _answer(
     question: str,
     persona: str,
+    who: str,
     seed: int,
     rows: Sequence[Row],
     arms: Mapping[tuple[str, int], Row],
@@ -156,7 +157,7 @@ def _answer(
         return Answer(
             seed=seed, yes=False, label=LABELS[verdict], tone="open", sentence=as_sentence(failure["reason"]), speed=""
         )
-    sentence = _failure_sentence(question, persona, verdict, failure, before, after, change)
+    sentence = _failure_sentence(question, who, verdict, failure, before, after, change)
     if verdict is Verdict.ALL_EQUAL and significance is not None:
         sentence += _beside_significance(failure["mcnemar_p"], significance)
     speed_sentence = ""
@@ -193,17 +194,17 @@ def _beside_significance(p: float, significance: float) -> str:
 
 
 def _failure_sentence(
-    question: str, persona: str, verdict: Verdict, row: Row, before: Row, after: Row, change: Change
+    question: str, who: str, verdict: Verdict, row: Row, before: Row, after: Row, change: Change
 ) -> str:
     was, now, tests, pairs = failures_of(before), failures_of(after), p_values(row), row["pairs"]
     if question == "RQ1":
-        claim = f"The {persona} driver makes the naive ego fail in {now} games instead of {was}"
-        counts = f"The naive ego fails in {now} games against the {persona} driver and in {was} alone"
+        claim = f"{who[:1].upper()}{who[1:]} makes the naive ego fail in {now} games instead of {was}"
+        counts = f"The naive ego fails in {now} games against {who} and in {was} alone"
         direction = "more often"
     else:
-        claim = f"{change.doing.capitalize()} reduces the ego's failures against the {persona} driver "
+        claim = f"{change.doing.capitalize()} reduces the ego's failures against {who} "
         claim += f"from {was} games to {now}"
-        counts = f"Against the {persona} driver the {change.made} ego fails in {now} games, the naive ego in {was}"
+        counts = f"Against {who} the {change.made} ego fails in {now} games, the naive ego in {was}"
         direction = "less often"
     return {
         Verdict.SIGNIFICANT: f"{claim} ({tests}).",

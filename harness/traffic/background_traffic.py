@@ -12,6 +12,7 @@ from typing import Any
 
 import libsumo
 import numpy as np
+from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
 from numpy.typing import NDArray
 
 from harness.errors import SimulationError
@@ -113,13 +114,13 @@ class BackgroundTraffic:
         """Process a step of SUMO: arrivals, vehicles that entered the traffic, and departures that are due."""
         self._step += 1
         due = self._table.due
-        for name in libsumo.simulation.getArrivedIDList():
+        for name in _libsumo.simulation_getArrivedIDList():
             place = self._places.pop(name, None)
             if place is None:
                 raise SimulationError(f"SUMO removed player {name!r} from the traffic")
             due[place] = _NEVER
         if self._places:
-            for name in libsumo.simulation.getDepartedIDList():
+            for name in _libsumo.simulation_getDepartedIDList():
                 if name in self._places:
                     due[self._places[name]] = self._step
                     if name in self._beside:
@@ -145,7 +146,7 @@ class BackgroundTraffic:
 
     def _sumo_has_all(self, players_present: BoolArray) -> bool:
         """Whether SUMO has as many vehicles as were inserted and have neither arrived nor been removed."""
-        return libsumo.simulation.getMinExpectedNumber() == len(self._places) + np.count_nonzero(players_present)
+        return _libsumo.simulation_getMinExpectedNumber() == len(self._places) + np.count_nonzero(players_present)
 
     def _depart(self, game: int) -> None:
         now = (self._step - self._first_step[game]) * self._step_s + 1e-9

@@ -55,13 +55,20 @@ def background_departures(
 
 
 def check_departures(
-    players: set[str], net: Net, routes: RouteFile, window_s: tuple[float, float] = _ALL_THE_TIME_S
+    players: set[str],
+    net: Net,
+    routes: RouteFile,
+    window_s: tuple[float, float] = _ALL_THE_TIME_S,
+    roles: Sequence[str] = ROLES,
 ) -> None:
-    """Raise UsageError for background vehicles in a time of the file that SUMO would refuse during a game."""
+    """Raise UsageError for background vehicles in a time of the file that SUMO would refuse during a game.
+
+    `players` are the ids of the players' vehicles in the route file, `roles` their names in the game.
+    """
     problems: list[Problem] = []
     for departure in background_departures(routes, players, window_s):
         where = (str(routes.path), f"vehicle {departure.name}")
-        if departure.name in ROLES and players <= routes.vehicles.keys():
+        if departure.name in roles and players <= routes.vehicles.keys():
             problems.append(Problem(*where, "has the name of a player, but is not the player's vehicle", "rename it"))
         edges = collect(problems, partial(edges_of, departure, net, routes))
         if edges:

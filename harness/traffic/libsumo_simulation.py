@@ -15,8 +15,7 @@ from __future__ import annotations
 import tempfile
 import weakref
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import repeat
 from pathlib import Path
@@ -28,14 +27,13 @@ from libsumo import _libsumo  # the same functions without Python wrappers, for 
 from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
-from harness.game.state import ROLES
 from harness.traffic.angles import compass_deg_of, heading_rad_of
 from harness.traffic.background_traffic import BackgroundTraffic
 from harness.traffic.insertion import Insertion
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.signals import Signals
-from harness.traffic.simulation import AtReset, Reading
+from harness.traffic.simulation import NO_SIGNALS, AtReset, Reading
 from harness.traffic.speed_limits import SpeedLimits
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.traffic.warm_up import clear_of_players
@@ -49,6 +47,21 @@ _NO_ACTIONS_S = 1e6  # an action step longer than any game: disables SUMO's driv
 _LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
 _ANY_SPEED = 100.0  # a speed factor: other vehicles see at most the speed limit times this
 _FAILURES = (libsumo.TraCIException, libsumo.FatalTraCIError)
+
+
+class _SumoCall:
+    """A block of calls: libsumo's errors in it become a SimulationError that names the action."""
+
+    def __init__(self, release: weakref.finalize[..., LibsumoSimulation], action: str) -> None:
+        self._release, self._action = release, action
+
+    def __enter__(self) -> None:
+        if not self._release.alive:
+            raise SimulationError(f"SUMO can't {self._action}: this simulation was closed")
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, _FAILURES):
+            raise SimulationError(f"SUMO could not {self._action}: {error}") from error
 
 
 @dataclass(kw_only=True)
@@ -116,7 +129,7 @@ class LibsumoSimulation:
         return any(kind.lane_changes == "SL2015" for kind in kinds)
 
     def _load(self, options: list[str], load: Callable[[list[str]], object]) -> None:
-        with self._sumo_call(f"load scene {self._scene.document.name!r}"):
+        with _SumoCall(self._release, f"load scene {self._scene.document.name!r}"):
             load(options)
         self._tiles = [
             _Tile(prefix=tile_prefix(game, self._games), offset_m=float(self._offsets[game]))
@@ -147,7 +160,7 @@ class LibsumoSimulation:
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
         """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
         tile = self._tiles[game]
-        with self._sumo_call(f"reset game {game}"):
+        with _SumoCall(self._release, f"reset game {game}"):
             taking_part = {player for player, present in enumerate(start.present.tolist()) if present}
             staying = tile.inside & taking_part if self._players_only else set()
             for player in tile.inside - staying:
@@ -157,7 +170,7 @@ class LibsumoSimulation:
             background = self._background.reset(game, clear_of_players(departures, start, self._scene.world.length_m))
             if self._speed_limits is not None:
                 self._speed_limits.reset(game, start.limit_share)
-            at_reset = self._signals.reset(game, start.signal_place if self._signals else 0.0)
+            at_reset = self._signals.reset(game, start.signal_place) if self._signals else NO_SIGNALS
             return at_reset if background is None else at_reset._replace(background=background)
 
     def halt(self, game: int, player: int) -> None:
@@ -171,7 +184,7 @@ class LibsumoSimulation:
     def remove(self, game: int, player: int) -> None:
         """Remove a player from the traffic. If SUMO drives no vehicle, it stays in place until the next reset."""
         if not self._players_only:
-            with self._sumo_call(f"remove a player from game {game}"):
+            with _SumoCall(self._release, f"remove a player from game {game}"):
                 self._remove_vehicle(game, player)
 
     def _remove_vehicle(self, game: int, player: int) -> None:
@@ -188,10 +201,10 @@ class LibsumoSimulation:
         front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel()[seats].tolist()
         front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel()[seats].tolist()
         angle = compass_deg_of(heading_rad).ravel()[seats].tolist()
-        with self._sumo_call("step"):
+        with _SumoCall(self._release, "step"):
             targets = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._move_options))
             deque(map(_libsumo.vehicle_moveToXY, self._placed, *targets), maxlen=0)  # faster than a loop
-            libsumo.simulationStep()
+            _libsumo.simulation_step()
             self._background.advance()
             players = self._read_players()
             if players is not None:
@@ -209,18 +222,8 @@ class LibsumoSimulation:
         """Release libsumo. A second call has no effect."""
         self._release()
 
-    @contextmanager
-    def _sumo_call(self, action: str) -> Iterator[None]:
-        """Turn libsumo's errors in the block into a SimulationError that names the action."""
-        if not self._release.alive:
-            raise SimulationError(f"SUMO can't {action}: this simulation was closed")
-        try:
-            yield
-        except _FAILURES as error:
-            raise SimulationError(f"SUMO could not {action}: {error}") from error
-
     def _name(self, game: int, player: int) -> str:
-        return self._tiles[game].prefix + ROLES[player]
+        return self._tiles[game].prefix + self._scene.world.roles[player]
 
     def _add_player(self, game: int, player: int, start: InitialState) -> None:
         tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])

@@ -34,11 +34,11 @@ class OpenPlayer:
 def open_player(
     role: str, *, file: Path, document: Scene, net: Net, area: BaseGeometry, routes: RouteFile
 ) -> OpenPlayer:
-    """The player with a role ("ego" or "non_ego") of a scene document, which was read from `file`.
+    """The player of a name (`Scene.roles`) of a scene document, which was read from `file`.
 
     `area` is the net's drivable area. Raises UsageError with every problem found.
     """
-    player: Player = getattr(document, role)
+    player: Player = document.player(role)
     problems: list[Problem] = []
     lane = player.lane and collect(problems, lambda: network.find_lane(net, file, f"{role}.lane", str(player.lane)))
     goal = collect(problems, lambda: _goal(file, document, player, net))

@@ -23,7 +23,6 @@ from harness.game.initial_state import Conditions, StartDistribution, StartRange
 from harness.game.quantities import REACH_M
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
-from harness.game.state import ROLES
 from harness.game.world import World
 from harness.traffic import network
 from harness.traffic.departures import background_departures, check_departures, edges_of
@@ -32,6 +31,7 @@ from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_reading import read_route_file
+from harness.traffic.start_overlaps import check_starts
 from harness.traffic.start_ranges import start_range
 from harness.traffic.trips import with_routes
 from harness.traffic.warm_up import Snapshot, snapshots
@@ -77,12 +77,14 @@ class OpenScene:
 
     def departures(self, generator: np.random.Generator) -> list[Departure]:
         """The background vehicles that depart during a game. What is random about them is drawn from the generator."""
+        if not self.has_background_traffic:
+            return []
         players = {player.vehicle for player in self.document.players}
         begin_s, end_s = self.document.game_window_s
         varied = self.document.varies.traffic_density
         density = 1.0 if varied is None else between(varied, generator.random())
         on_road: tuple[Departure, ...] = ()
-        if self.document.warm_up_s and self.has_background_traffic:
+        if self.document.warm_up_s:
             snapshot = self.warm_up[generator.integers(len(self.warm_up))]
             density, on_road = snapshot.density, snapshot.vehicles
         return [*on_road, *self.routes.departures(players, end_s, generator, begin_s, density)]
@@ -148,16 +150,16 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     own = _edges_of_players(document, net, routes)
     area = network.drivable_area(net, own)
     open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
-    opened = [collect(problems, partial(open_one, role)) for role in ROLES]
+    opened = [collect(problems, partial(open_one, role)) for role in document.roles]
     vehicles = {player.vehicle for player in document.players}
-    collect(problems, lambda: check_departures(vehicles, net, routes, document.traffic_window_s))
+    collect(problems, lambda: check_departures(vehicles, net, routes, document.traffic_window_s, document.roles))
     players = [player for player in opened if player is not None]
-    if problems or len(players) < len(ROLES):
+    if problems or len(players) < len(opened):
         raise UsageError(problems)
     start_of = partial(start_range, file=document_file, document=document, net=net, ego_route=players[0].route)
     starts = [
         collect(problems, partial(start_of, role, route=player.route))
-        for role, player in zip(ROLES, players, strict=True)
+        for role, player in zip(document.roles, players, strict=True)
     ]
     places = tuple(start for start in starts if start is not None)
     if problems:
@@ -176,7 +178,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:
         message, remedy = "no player's route passes a traffic light", "leave it out, or choose other routes"
         raise UsageError.of(document_file, "varies.signal_place", message, remedy)
-    return OpenScene(
+    scene = OpenScene(
         folder=folder,
         document=document,
         world=world,
@@ -186,6 +188,9 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         rail_lines=tuple(lines),
         junctions=network.junctions_near(net, [*own, *_background_edges(vehicles, net, routes)]),
     )
+    factors, present = [HumanFactors()] * len(places), [1.0] * len(places)
+    check_starts(document_file, scene.start_distribution(factors, present), world)
+    return scene
 
 
 def _edges_of_players(document: Scene, net: Net, routes: RouteFile) -> list[Edge]:

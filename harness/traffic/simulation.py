@@ -49,6 +49,7 @@ class AtReset(NamedTuple):
     background: Reading | None = None
 
 
+NO_SIGNALS = AtReset(np.zeros(0, dtype=np.int8), np.zeros(0), "")
 _OF_VEHICLES = ("names", "types", "x_m", "y_m", "heading_rad", "speed_mps", "length_m", "width_m", "present")
 
 

@@ -44,7 +44,7 @@ def meeting(ego: Route, other: Route) -> Meeting | None:
 
 def start_range(role: str, *, file: Path, document: Scene, net: Net, route: Route, ego_route: Route) -> StartRange:
     """The range of a player's start. `route` begins at the edge of its start. Raises UsageError if it is impossible."""
-    player: Player = getattr(document, role)
+    player: Player = document.player(role)
     if player.lane is not None:
         lane = network.find_lane(net, file, f"{role}.lane", player.lane)
         return _on_lane(role, file=file, document=document, net=net, lane=lane, route=route)
@@ -66,7 +66,7 @@ def _points(route: Route) -> FloatArray:
 
 
 def _on_lane(role: str, *, file: Path, document: Scene, net: Net, lane: Lane, route: Route) -> StartRange:
-    player: Player = getattr(document, role)
+    player: Player = document.player(role)
     place: OnLine | BesideEgo
     if player.beside_ego_m is not None:
         reach, name = _beside_ego(role, file=file, document=document, lane=lane, net=net), "beside_ego_m"
@@ -97,13 +97,14 @@ def _beside_ego(role: str, *, file: Path, document: Scene, lane: Lane, net: Net)
     if ego_lane.getEdge() is not lane.getEdge():
         message = "needs both to start on the same edge"
         raise UsageError.of(file, f"{role}.beside_ego_m", message, "give position_m instead")
-    beside_ego_m = getattr(document, role).beside_ego_m
+    beside_ego_m = document.player(role).beside_ego_m
+    assert beside_ego_m is not None, "the start is of this kind"
     return ego_m[0] + beside_ego_m[0], ego_m[1] + beside_ego_m[1]
 
 
 def _arrival(role: str, *, file: Path, document: Scene, route: Route, ego_route: Route) -> ArrivesAfterEgo:
     """The start of a player that is timed by its arrival at the place where its route meets the ego's."""
-    player: Player = getattr(document, role)
+    player: Player = document.player(role)
     key, ego = f"{role}.arrival_after_ego_s", document.ego
     ego_m = ego.position_m or ego.route_m
     assert player.arrival_after_ego_s is not None, "the start is of this kind"

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
-from harness.environments.vector_env import ArenaVecEnv, Finished
+from harness.environments.vector_env import Finished, GamesVecEnv
 from harness.game.state import Outcome
 from harness.training.checkpoint import CurvePoint, Progress
 
@@ -47,7 +47,7 @@ class CurveRecorder(BaseCallback):
 
     def __init__(
         self,
-        environment: ArenaVecEnv,
+        environment: GamesVecEnv,
         progress: Progress,
         *,
         steps: int,

@@ -35,13 +35,14 @@ class PairedRollouts:
         scene: OpenScene,
         *,
         personas: tuple[Persona, Persona],
-        opponent: Driver | Mixture,
+        opponent: Driver | Mixture | tuple[Mixture, ...],
         games: int,
         at_once: int,
         alone_share: float,
         parts: Sequence[str | int],
     ) -> None:
-        """Load SUMO. `alone_share` is the share of games without the opponent; `parts` name the random numbers.
+        """Load SUMO. `alone_share` is the share of games without the opponent; `parts` name the random numbers. With
+        several people, `opponent` has a mixture for each.
 
         Raises SimulationError if SUMO can't load the scene.
         """
@@ -49,10 +50,12 @@ class PairedRollouts:
         self._loads = ceil(games / at_once)
         self._tiles = ceil(games / self._loads)
         self._ego = _CurrentDriver()
-        non_ego, ego = mixture_of(opponent, personas[NON_EGO]), personas[EGO]
-        human_factors, shares = [[ego.human_factors], non_ego.human_factors], [[1.0], non_ego.shares]
-        self._start_distribution = scene.start_distribution(human_factors, [1.0, 1.0 - alone_share], shares)
-        seats = [[Seat(self._ego, ego.payoff)], [Seat(member.driver) for member in non_ego.members]]
+        people = opponent if isinstance(opponent, tuple) else (mixture_of(opponent, personas[NON_EGO]),)
+        ego = personas[EGO]
+        human_factors = [[ego.human_factors], *(each.human_factors for each in people)]
+        shares, present = [[1.0], *(each.shares for each in people)], [1.0, *[1.0 - alone_share] * len(people)]
+        self._start_distribution = scene.start_distribution(human_factors, present, shares)
+        seats = [[Seat(self._ego, ego.payoff)], *([Seat(member.driver) for member in each.members] for each in people)]
         self._arena = Arena(scene, self._tiles, seats)
 
     def play(self, driver: Driver) -> RolloutTotals:

@@ -40,7 +40,8 @@ class Search:
     scene: OpenScene
     driver: ExternalDriver
     personas: tuple[Persona, Persona]  # of the ego's seat and of the non-ego's
-    opponent: Driver | Mixture
+    opponent: Driver | Mixture | tuple[Mixture, ...]
+    """With several people, a mixture for each."""
     settings: Reconfiguration
     parts: tuple[str | int, ...]
     """They name the random numbers of the search."""

@@ -18,50 +18,21 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 
-from harness.config.campaign import Training
-from harness.config.persona import Persona
-from harness.drivers.mixture import Mixture, Player, mixture_of
 from harness.drivers.policy_file import Policy
-from harness.environments.arena import Arena, Seat
-from harness.environments.vector_env import ArenaVecEnv
-from harness.game.attention import HumanFactors
-from harness.game.initial_state import StartDistribution
+from harness.environments.vector_env import GamesVecEnv
 from harness.game.observation_layout import OF_OTHERS
 from harness.game.seeding import seed_of
 from harness.game.state import Outcome
-from harness.traffic.scene import OpenScene
 from harness.training.callbacks import CurveRecorder, DeviationBound
 from harness.training.checkpoint import Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import has_converged, still_fails
 from harness.training.narrowing import Narrowing
 from harness.training.torch_without_compiler import leave_out_compiler
+from harness.training.training_games import TrainingSpec, attentive_steps, open_games, sample
 
 _GAE_LAMBDA = 0.95
 _ALGORITHMS: dict[str, type[PPO]] = {"compiled": CompiledPPO, "stable_baselines3": PPO}
-
-
-@dataclass(frozen=True, kw_only=True)
-class TrainingSpec:
-    """The inputs of a training: learner, personas (payoff and human factors), opponent, initial policy, settings."""
-
-    scene: OpenScene
-    learner: int
-    personas: tuple[Persona, Persona]  # of the ego's seat and of the non-ego's
-    opponent: Player
-    """The driver of the other player; None: the learner is alone in every game."""
-    alone_share: float
-    """Share of the games without the opponent."""
-    attentive_share: float
-    """Share of the budget, from its start, without lapses of attention."""
-    initial: Policy | None
-    """The policy that training starts from; None: random parameters."""
-    settings: Training
-    parts: tuple[str | int, ...]
-    """They name the random numbers of the training."""
-    as_it_drives: bool = False
-    """Train with all human factors of the persona, as in assessment: a best response is computed under the limits under
-    which it is assessed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +63,7 @@ def train(
     SimulationError if SUMO fails, ValueError if the initial policy does not fit the network.
     """
     torch.set_num_threads(1)
-    environment = _environment(spec)
+    environment = open_games(spec)
     try:
         model = _learner(spec, environment, tensorboard)
         new = Progress(segments=0, steps=0, segment_payoffs=[], curve=[], alone_games=[], alone_failures=[])
@@ -119,59 +90,12 @@ def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
     settings = spec.settings
     if not settings.early_convergence or progress.steps >= Narrowing.of(settings, None).start:
         return None
-    attentive = ceil(_attentive_steps(spec) / settings.segment_steps)
+    attentive = ceil(attentive_steps(spec) / settings.segment_steps)
     fails = still_fails(progress.alone_games, progress.alone_failures)
     return progress.steps if not fails and has_converged(progress.segment_payoffs[attentive:]) else None
 
 
-def _environment(spec: TrainingSpec) -> ArenaVecEnv:
-    opponent = _opponent(spec)
-    empty = [Seat(None)]  # of a player that is in no game
-    seats = [[Seat(each.driver) for each in opponent.members] if opponent is not None else empty] * 2
-    seats[spec.learner] = [Seat(None, spec.personas[spec.learner].payoff)]
-    seed = seed_of(*spec.parts, "sumo") % 2**31
-    arena = Arena(spec.scene, spec.settings.games, seats, seed=seed)
-    scale = spec.settings.payoff_scale
-    return ArenaVecEnv(arena, spec.learner, _start_distribution(spec, 0), *spec.parts, payoff_scale=scale)
-
-
-def _start_distribution(spec: TrainingSpec, steps: int) -> StartDistribution:
-    """The start distribution of the games, `steps` after the start of the training."""
-    present = [0.0 if spec.opponent is None else 1.0 - spec.alone_share] * 2
-    present[spec.learner] = 1.0
-    opponent_factors, opponent_shares = _opponent_factors(spec)
-    human_factors, shares = [opponent_factors, opponent_factors], [opponent_shares, opponent_shares]
-    # A learner that overlooks a vehicle without harm learns nothing from it. So it trains with blind-spot checks and
-    # without looked-but-failed-to-see errors; its persona's own values apply when it drives. Its other limits
-    # (reaction, sight, controls) apply from the start of the training.
-    own = spec.personas[spec.learner].human_factors
-    own_factors = own if spec.as_it_drives else own.with_open_eyes
-    human_factors[spec.learner], shares[spec.learner] = [own_factors], [1.0]
-    if steps < _attentive_steps(spec):
-        human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
-    return spec.scene.start_distribution(human_factors, present, shares, spec.settings.along_route_share)
-
-
-def _opponent(spec: TrainingSpec) -> Mixture | None:
-    return mixture_of(spec.opponent, spec.personas[1 - spec.learner]) if spec.opponent is not None else None
-
-
-def _opponent_factors(spec: TrainingSpec) -> tuple[list[HumanFactors], list[float]]:
-    """Human factors and shares of the opponent's members; those of the persona if the learner is alone."""
-    opponent = _opponent(spec)
-    if opponent is None:
-        return [spec.personas[1 - spec.learner].human_factors], [1.0]
-    return opponent.human_factors, opponent.shares
-
-
-def _attentive_steps(spec: TrainingSpec) -> float:
-    """Steps at the start of the training without lapses of attention; 0 if no persona has lapses."""
-    human_factors, _ = _opponent_factors(spec)
-    lapses = any(each.attention is not None for each in (spec.personas[spec.learner].human_factors, *human_factors))
-    return spec.attentive_share * spec.settings.steps if lapses else 0.0
-
-
-def _learner(spec: TrainingSpec, environment: ArenaVecEnv, tensorboard: Path | None) -> PPO:
+def _learner(spec: TrainingSpec, environment: GamesVecEnv, tensorboard: Path | None) -> PPO:
     settings = spec.settings
     set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
     leave_out_compiler()
@@ -211,15 +135,15 @@ def _zero_other_weights(model: PPO) -> None:
 def _segment(
     spec: TrainingSpec,
     model: PPO,
-    environment: ArenaVecEnv,
+    environment: GamesVecEnv,
     *,
     progress: Progress,
     on_progress: Callable[[int, int], None],
 ) -> Progress:
     parts = (*spec.parts, "segment", progress.segments)
     set_random_seed(seed_of(*parts, "learner") % 2**32)
-    environment.sample_from(_start_distribution(spec, progress.steps), *parts)
-    environment.arena.reload(seed_of(*parts, "sumo") % 2**31)
+    sample(spec, environment, progress.steps, *parts)
+    environment.reload(seed_of(*parts, "sumo") % 2**31)
     narrowing = Narrowing.of(spec.settings, progress.converged_at)
     steps = min(spec.settings.segment_steps, narrowing.end - progress.steps)
     curve = CurveRecorder(

@@ -46,7 +46,8 @@ from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.state import EGO, ROLES
 from harness.traffic.scene import OpenScene, open_scene
-from harness.training.ppo import TrainingSpec, train
+from harness.training.ppo import train
+from harness.training.training_games import TrainingSpec
 from tests.support.scenes import build_scene
 from tests.support.shared import built_once
 from tests.support.tiny import finished, settings

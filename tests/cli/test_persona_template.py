@@ -22,7 +22,8 @@ from harness.errors import UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
-from harness.training.ppo import TrainingSpec, train
+from harness.training.ppo import train
+from harness.training.training_games import TrainingSpec
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, settings, write_campaign
 

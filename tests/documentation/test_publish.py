@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import shutil
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -111,3 +112,16 @@ def test_cost__counts_trainings_steps_and_arms_of_the_plan() -> None:
     hours = float(cells[" core-hours "])
     assert 0.05 < hours < 1.0
     assert float(total.split("|")[5]) == hours
+
+
+def test_cost__of_a_campaign_whose_policies_an_earlier_step_makes(tmp_path: Path) -> None:
+    shutil.copytree(REPOSITORY / "networks" / "merge", tmp_path / "networks" / "merge")
+    shutil.copytree(REPOSITORY / "personas", tmp_path / "personas")
+    demo = tmp_path / "campaigns" / "merge-demo.toml"
+    demo.parent.mkdir()
+    shutil.copyfile(REPOSITORY / "campaigns" / "merge-demo.toml", demo)
+    (tmp_path / "benchmarks").mkdir()
+    shutil.copyfile(REPOSITORY / "benchmarks" / "results.json", tmp_path / "benchmarks" / "results.json")
+    (tmp_path / "policies" / "merge").mkdir(parents=True)  # empty: they are of an older version, or not made yet
+    cells = script("cost").cost_table([demo], tmp_path).splitlines()[2].split("|")
+    assert [cells[1].strip(), cells[4].strip()] == ["campaigns/merge-demo.toml", "10"]

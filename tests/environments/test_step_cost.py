@@ -48,10 +48,10 @@ READS_PER_VEHICLE = ("getPosition", "getAngle", "getSpeed")
 LIBSUMO_CALLS_PER_RESET = 0  # without background traffic, players stay in SUMO from game to game
 LIBSUMO_CALLS_PER_RESET_IN_TRAFFIC = 44  # of a running game: 8 to remove and add both players, 6 per vehicle
 READS_PER_FAR_VEHICLE = 0.2  # a step
-PYTHON_CALLS_PER_STEP = 158  # of all games together; 44 of them for the rules at junctions
+PYTHON_CALLS_PER_STEP = 110  # of all games together
 PYTHON_CALLS_PER_GAME = 0  # per game; placements are calls into the extension module
 PYTHON_CALLS_PER_VEHICLE = 0.5
-PYTHON_CALLS_PER_RESET = 130
+PYTHON_CALLS_PER_RESET = 88
 BLOCKS_NOT_RELEASED = 350  # after 500 steps: one block per step would be 500; 50 to 200 vary from run to run
 
 FEW, MANY = 4, 16  # games

@@ -20,7 +20,7 @@ from harness.evaluation.metrics import PlayerSeries, accepted_gap_s, min_pet_s, 
 from harness.evaluation.trace_quantities import drove_in, quantities_of
 from harness.game.arrays import FloatArray
 from harness.game.right_of_way import Control
-from harness.game.state import Outcome
+from harness.game.state import ROLES, Outcome
 from harness.game.world import World
 from harness.traffic.scene import OpenScene
 from tests.support.conflicts import CROSSING, with_conflicts
@@ -69,7 +69,7 @@ def trace_of(*cars: pd.DataFrame) -> pd.DataFrame:
 
 def met(world: World, *cars: pd.DataFrame) -> list[Encounter]:
     trace = trace_of(*cars)
-    return encounters_of(quantities_of(trace, world, SIZE), 0, drove_in(trace)[:, 0])
+    return encounters_of(quantities_of(trace, world, SIZE), 0, drove_in(trace, ROLES)[:, 0])
 
 
 def named(world: World, *cars: pd.DataFrame) -> list[Manoeuvre]:

@@ -46,7 +46,7 @@ def test_series__what_is_after_the_end_is_not_driven(merge):
     trace = drawn(
         ego=([20.0, 21.0, 22.0], 10.0, -1.6, {1: "rail", 2: "rail"}), non_ego=([40.0, 41.0], 10.0, -4.8, {1: "goal"})
     )
-    assert drove_in(trace).tolist() == [[True, True], [True, True], [False, False]]
+    assert drove_in(trace, ROLES).tolist() == [[True, True], [True, True], [False, False]]
     assert np.isnan(series_of(trace, merge.world, SIZES_M).leader_gap_m[2]).all()
 
 

@@ -237,6 +237,14 @@ def test_permitted__waits_for_a_car_with_priority(
     assert q.permitted_mps[0, 0] == pytest.approx(permitted_mps)
 
 
+def test_posted__knows_signals_and_signs_and_no_other_cars(moment: Moment, merge: OpenScene, light: World) -> None:
+    q = at(moment, crossed(merge), 74.0, others=[from_the_south(3.9)])
+    assert (q.rules.permitted_mps[0, 0], q.rules.posted_mps[0, 0]) == (pytest.approx(8.0), pytest.approx(LIMIT_MPS))
+    q = at(moment, light, 74.0, speed_mps=11.0, signal=(Signal.RED, 1.0))
+    over = in_units(observe(q)[0, 0], q.world.actuators.max_steering_rad[0])[LAYOUT.index("over_posted_mps")]
+    assert over == pytest.approx(3.0, abs=1e-5)  # 11 m/s; 8 m/s are permitted
+
+
 def test_permitted__does_not_wait_for_a_car_that_must_yield(moment: Moment, merge: OpenScene) -> None:
     q = at(moment, crossed(merge, yields=False), 74.0, others=[from_the_south(2.0)])
     assert q.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
@@ -245,6 +253,27 @@ def test_permitted__does_not_wait_for_a_car_that_must_yield(moment: Moment, merg
 def test_permitted__does_not_wait_for_a_car_that_stands(moment: Moment, merge: OpenScene) -> None:
     q = at(moment, crossed(merge), 74.0, others=[{**from_the_south(2.0), "speed_mps": 0.0}])
     assert q.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
+
+
+@pytest.mark.parametrize(
+    ("front_m", "speed_mps", "over_mps"),
+    [
+        (74.0, 0.0, -8.0),  # 16 m before the line: late
+        (80.1, 0.0, 0.0),  # within 10 m: it waits
+        (80.1, 6.0, 0.0),  # or moves up: sqrt(2 * 2 * 9.9) = 6.3
+        (89.0, 2.5, 0.5),
+    ],
+)
+def test_speed_over_permitted__a_car_that_waits_is_not_late(
+    moment: Moment, light: World, front_m: float, speed_mps: float, over_mps: float
+) -> None:
+    q = at(moment, light, front_m, speed_mps=speed_mps, signal=(Signal.RED, 1.0))
+    assert q.speed_over_permitted[0, 0] * LIMIT_MPS == pytest.approx(over_mps)
+
+
+def test_speed_over_permitted__before_a_stop_sign_nothing_is_waited_for(moment: Moment, merge: OpenScene) -> None:
+    q = at(moment, world_of(merge, Control.STOP), 89.0, speed_mps=0.0)
+    assert q.speed_over_permitted[0, 0] * LIMIT_MPS == pytest.approx(-np.sqrt(4.25))  # 2 * 2 * 1 + 0.5^2
 
 
 def test_speed_over_permitted__is_a_share_of_the_limit(moment: Moment, light: World) -> None:

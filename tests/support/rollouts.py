@@ -32,7 +32,7 @@ class Steady:
 def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: int = 1) -> Arm:
     """An arm in which a careful ego meets a driver of the persona."""
     careful, other = (read_document(file, Persona) for file in (CAREFUL, persona))
-    return Arm(name="naive_vs_someone", scene=merge, drivers=drivers, personas=(careful, other), seed=seed)  # type: ignore[arg-type]
+    return Arm(name="naive_vs_someone", scene=merge, drivers=drivers, personas=(careful, other), seed=seed)
 
 
 def play(assessed: Arm, episodes: int = 3) -> list[Game]:

@@ -20,6 +20,13 @@ from tests.support.stations import nearest_station_m
 STRAIGHT_NODES = '<node id="a" x="0" y="0"/><node id="b" x="300" y="0"/>'
 STRAIGHT_EDGES = '<edge id="road" from="a" to="b" numLanes="2" speed="13.89" spreadType="right"/>'
 STRAIGHT = {"ego": ("road", "road_0"), "non_ego": ("road", "road_1"), "goal": "road"}
+THREE_PEOPLE = {
+    "ego": ("road", "road_0"),
+    "non_ego_1": ("road", "road_1"),
+    "non_ego_2": ("road", "road_0", "[60.0, 70.0]"),
+    "non_ego_3": ("road", "road_1", "[60.0, 70.0]"),
+    "goal": "road",
+}
 RIGHT_Y, LEFT_Y = -4.8, -1.6  # centre lines of its lanes
 
 CROSSING_NODES = "".join(
@@ -55,7 +62,10 @@ def build_scene(
     goal_m: float = 250.0,
     time_limit_s: float = 20.0,
 ) -> OpenScene:
-    """Write a scene's folder with a net built by netconvert, and open it."""
+    """Write a scene's folder with a net built by netconvert, and open it.
+
+    `places` are the players' edges, lanes and, if not 30 to 40 m, ranges of their starts; and the edge of the goal.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "n.nod.xml").write_text(f"<nodes>{nodes}</nodes>")
     (folder / "n.edg.xml").write_text(f"<edges>{edges}</edges>")
@@ -64,29 +74,37 @@ def build_scene(
     subprocess.run(
         [program, "-n", "n.nod.xml", "-e", "n.edg.xml", "-o", "n.net.xml"], cwd=folder, check=True, capture_output=True
     )
-    ego, non_ego = places["ego"], places["non_ego"]
-    (folder / "n.rou.xml").write_text(
-        f"""<routes>{cars}
-    <vehicle id="ego" type="ego_car" depart="0"><route edges="{ego[0]}"/></vehicle>
-    <vehicle id="non_ego" type="person_car" depart="0"><route edges="{non_ego[0]}"/></vehicle>
-    {others}</routes>"""
+    players = {name: place for name, place in places.items() if name != "goal"}
+    vehicles = "".join(
+        f"""<vehicle id="{name}" type="{"ego" if name == "ego" else "person"}_car" depart="0">
+        <route edges="{place[0]}"/></vehicle>"""
+        for name, place in players.items()
     )
+    (folder / "n.rou.xml").write_text(f"<routes>{cars}{vehicles}{others}</routes>")
+    starts = {
+        name: f"""{{ vehicle = "{name}", lane = "{place[1]}", position_m = {[*place, "[30.0, 40.0]"][2]}, """
+        "speed_mps = [8.0, 12.0] }"
+        for name, place in players.items()
+    }
+    people = [start for name, start in starts.items() if name != "ego"]
     (folder / "scene.toml").write_text(
         f"""name = "small"
 net = "n.net.xml"
 routes = "n.rou.xml"
 time_limit_s = {time_limit_s}
 goal = {{ edge = "{places["goal"]}", position_m = {goal_m} }}
-ego = {{ vehicle = "ego", lane = "{ego[1]}", position_m = [30.0, 40.0], speed_mps = [8.0, 12.0] }}
-non_ego = {{ vehicle = "non_ego", lane = "{non_ego[1]}", position_m = [30.0, 40.0], speed_mps = [8.0, 12.0] }}
+ego = {starts["ego"]}
+non_ego = {people[0] if "non_ego" in players else f"[{', '.join(people)}]"}
 """
     )
     return open_scene(folder)
 
 
-def drawn(scene: OpenScene, *parts: str | int, present: Sequence[float] = (1.0, 1.0)) -> InitialState:
+def drawn(scene: OpenScene, *parts: str | int, present: Sequence[float] | None = None) -> InitialState:
     """An initial state drawn from named parts."""
-    return draw_initial_state(scene.start_distribution([HumanFactors(), HumanFactors()], present), *parts)
+    players = len(scene.world.roles)
+    starts = scene.start_distribution([HumanFactors()] * players, present or [1.0] * players)
+    return draw_initial_state(starts, *parts)
 
 
 def placed(scene: OpenScene, *poses: tuple[float, float, float, float] | None) -> InitialState:

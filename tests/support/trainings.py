@@ -9,7 +9,8 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
-from harness.training.ppo import Trained, TrainingSpec, train
+from harness.training.ppo import Trained, train
+from harness.training.training_games import TrainingSpec
 from tests.support.tiny import CAREFUL, SPEEDY, settings
 
 

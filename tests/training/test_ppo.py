@@ -28,7 +28,8 @@ from harness.game.quantities import Quantities
 from harness.game.state import EGO, NON_EGO
 from harness.traffic.scene import OpenScene
 from harness.training.checkpoint import Progress
-from harness.training.ppo import Trained, TrainingSpec, train
+from harness.training.ppo import Trained, train
+from harness.training.training_games import TrainingSpec
 from tests.support.tiny import DISTRACTED, settings
 from tests.support.trainings import in_one_go, naive_ego
 

@@ -13,6 +13,7 @@ from typing import Any
 from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.planned_drivers import (
     BestOf,
+    Crowd,
     EquilibriumMixture,
     External,
     Mixture,
@@ -128,6 +129,8 @@ def _driver(driver: PlannedDriver | None) -> dict[str, Any] | None:
         case Mixture(members=members, shares=shares):
             several = {"kind": "mixture", "stage": "", "persona": "", "members": [_driver(each) for each in members]}
             return several | {"shares": list(shares)}
+        case Crowd(members=members):
+            return {"kind": "crowd", "stage": "", "persona": "", "members": [_driver(each) for each in members]}
         case EquilibriumMixture(members=members, arms=arms):
             several = {"kind": "mixture", "stage": "", "persona": "", "members": [_driver(each) for each in members]}
             return several | {"weighed_by": [list(row) for row in arms]}

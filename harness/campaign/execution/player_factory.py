@@ -10,6 +10,7 @@ import numpy as np
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.planned_drivers import (
     BestOf,
+    Crowd,
     EquilibriumMixture,
     External,
     Mixture,
@@ -64,7 +65,8 @@ class PlayerFactory:
     scene: OpenScene
 
     def player(self, planned: PlannedDriver | None) -> Player:
-        """The player of a planned driver; None for none. Not for `BestOf`, which has to be chosen first.
+        """The player of a planned driver; None for none. Not for `BestOf`, which has to be chosen first, and not for
+        `Crowd`, which is several players (`people.people_of`).
 
         Raises UsageError where a policy can't be read, DriverError where a driver can't be made, StageFailed where the
         arms that weigh a mixture have no equilibrium.
@@ -78,6 +80,8 @@ class PlayerFactory:
                 return self._mixture(members, equilibrium_of(planned, self.folder))
             case BestOf():
                 raise TypeError("choose the best with `choose` first")
+            case Crowd():
+                raise TypeError("a crowd is several players")
             case _:
                 return self._driver(planned)
 

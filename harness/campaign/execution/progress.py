@@ -5,7 +5,9 @@ A stage's line appears when the stage starts. Until its own work starts, it says
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
+from datetime import timedelta
 
 from rich.console import Console
 from rich.progress import (
@@ -25,6 +27,8 @@ from harness.campaign.execution.stage_events import Event
 from harness.campaign.plan.stages import Stage
 
 STARTING = "starting"
+LINE_EVERY_S = 60.0
+"""Where there are no bars, each running stage has a line so often."""
 
 
 class _Rate(ProgressColumn):
@@ -36,10 +40,12 @@ class _Rate(ProgressColumn):
 
 
 class StageProgress:
-    """Shows the events of a run; on a terminal as bars, elsewhere as lines."""
+    """Shows the events of a run; on a terminal as bars, elsewhere as lines. `clock` gives seconds."""
 
-    def __init__(self, stages: Sequence[Stage], finished: int, console: Console) -> None:
-        self._console = console
+    def __init__(
+        self, stages: Sequence[Stage], finished: int, console: Console, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._console, self._clock = console, clock
         self._units = {stage.id: stage.unit for stage in stages}
         self.bars = Progress(
             TextColumn("{task.description}"),
@@ -52,11 +58,13 @@ class StageProgress:
             console=console,
             disable=not console.is_terminal,
             transient=True,
+            get_time=clock,
         )
         self._whole = self.bars.add_task("campaign", total=len(stages), completed=finished, unit="stages")
         self._rows: dict[str, TaskID] = {}
         self._preparing: dict[str, str] = {}
         """What each running stage is waiting for, if its own work has not started."""
+        self._line_due_s: dict[str, float] = {}
 
     def __enter__(self) -> StageProgress:
         self.bars.start()
@@ -71,6 +79,7 @@ class StageProgress:
             self._show_progress(event)
         if event.kind == "started":
             self._preparing[event.stage] = STARTING
+            self._line_due_s[event.stage] = self._clock() + LINE_EVERY_S
             self._rows[event.stage] = self.bars.add_task(event.stage, total=None, unit=STARTING)
         if event.kind in ("done", "failed", "crashed", "skipped") and event.stage in self._rows:
             self.bars.remove_task(self._rows.pop(event.stage))
@@ -93,6 +102,10 @@ class StageProgress:
             if event.message and not self._console.is_terminal:
                 self._console.print(f"waiting  {event.stage}: {event.message}", highlight=False, markup=False)
         self.bars.update(row, completed=event.done, total=event.total or None)
+        if not self._console.is_terminal and event.total and self._clock() >= self._line_due_s[event.stage]:
+            self._line_due_s[event.stage] = self._clock() + LINE_EVERY_S
+            task = next(each for each in self.bars.tasks if each.id == row)
+            self._console.print(_running_line(event, unit, task), highlight=False, markup=False)
 
     def _line(self, event: Event) -> str:
         match event.kind:
@@ -104,6 +117,12 @@ class StageProgress:
                 return _done_line(event)
             case _:
                 return f"{event.kind:8s} {event.stage}: {event.message}"
+
+
+def _running_line(event: Event, unit: str, task: Task) -> str:
+    left_s = task.time_remaining
+    left = f", {timedelta(seconds=round(left_s))} left" if left_s is not None else ""
+    return f"running  {event.stage}: {event.done:,} of {event.total:,} {unit}{left}"
 
 
 def _done_line(event: Event) -> str:

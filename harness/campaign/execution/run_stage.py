@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from harness.campaign.execution.crash_retries import FIRST, Attempt, OnProgress, OnStart
 from harness.campaign.execution.equilibrium_stop import equilibrium_before
+from harness.campaign.execution.people import learning_places, people_of
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.planned_drivers import BestOf, description, persona_of
@@ -27,11 +28,12 @@ from harness.drivers.mixture import Player
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
 from harness.files import make_folder, write_atomically
-from harness.game.state import EGO, NON_EGO, ROLES
+from harness.game.state import ROLES
 from harness.traffic.scene import OpenScene, open_scene
 
 if TYPE_CHECKING:
     from harness.campaign.execution.player_factory import PlayerFactory
+    from harness.environments.rollout import Arm
 
 _LOGGER = logging.getLogger("harness.preparation")
 
@@ -49,6 +51,11 @@ class StageRun:
     on_progress: OnProgress
     on_start: OnStart
     attempt: Attempt
+
+    @property
+    def people(self) -> int:
+        """The number of people of the scene."""
+        return len(self.scene.world.roles) - 1
 
     @property
     def players(self) -> PlayerFactory:
@@ -106,15 +113,18 @@ def _train(stage: TrainingStage, run: StageRun) -> Made:
 
     from harness.evaluation.tables import TRAINING_COLUMNS, typed, write_csv
     from harness.training.early_stopping import RULE  # torch is slow to import, and assessment does without
-    from harness.training.ppo import TrainingSpec, train
+    from harness.training.ppo import train
+    from harness.training.training_games import TrainingSpec
 
     context, folder = run.context, run.folder
     settings = training_settings(context.document, stage)
+    several = run.people > 1
     spec = TrainingSpec(
         scene=run.scene,
         learner=stage.learner,
         personas=(context.ego_persona, context.opponent_persona(stage.persona)),
-        opponent=run.players.player(stage.opponent),
+        opponent=None if several else run.players.player(stage.opponent),
+        places=learning_places(stage, run.players, run.people) if several else (),
         alone_share=stage.alone_share,
         attentive_share=stage.attentive_share,
         initial=read_policy(run.players.policy_folder(stage.initial)) if stage.initial is not None else None,
@@ -174,13 +184,12 @@ def _search(stage: SearchStage, run: StageRun) -> Made:
     from harness.training.parameter_search import Search, version_of_search
 
     context, folder = run.context, run.folder
-    opponent = run.players.player(stage.opponent)
-    assert opponent is not None
+    people = people_of(stage.opponent, run.players, run.people)
     search = Search(
         scene=run.scene,
         driver=context.external_driver(),
         personas=(context.ego_persona, context.opponent_persona(stage.persona)),
-        opponent=opponent,
+        opponent=tuple(each for each in people if each is not None),
         settings=context.document.reconfiguration,
         parts=("reconfiguration", stage.seed, stage.name),
     )
@@ -204,9 +213,28 @@ def _search(stage: SearchStage, run: StageRun) -> Made:
 def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     from harness.campaign.execution.arm_segments import join_segments, play_segments, segments_of
     from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES
-    from harness.environments.rollout import Arm  # the parent process plays nothing and does without
 
     context, folder = run.context, run.folder
+    if run.people > 1:
+        arm, choice = _arm_of_several(stage, run), dict[str, Any]()
+    else:
+        arm, choice = _arm_of_two(stage, run)
+    segments = segments_of(folder.segments(stage.id), context.document.assessment.episodes)
+    labels = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
+    errors = play_segments(arm, segments, labels, run.attempt, run.on_start, run.on_progress)
+    work = folder.work(stage.id)
+    files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
+    join_segments(segments, *files)
+    episodes = segments[-1].episodes.stop
+    facts = {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}
+    return facts | _goals_alone(stage, work / EPISODES), files
+
+
+def _arm_of_two(stage: AssessmentStage, run: StageRun) -> tuple[Arm, dict[str, Any]]:
+    """The arm, and which driver was chosen for a best response."""
+    from harness.environments.rollout import Arm  # the parent process plays nothing and does without
+
+    context = run.context
     non_ego_persona = persona_of(stage.non_ego) if stage.non_ego is not None else ""
     personas = (context.ego_persona, context.persona(non_ego_persona))
     drivers: list[Player] = []
@@ -221,18 +249,16 @@ def _assess(stage: AssessmentStage, run: StageRun) -> Made:
             }
         else:
             drivers.append(run.players.player(planned))
-    arm = Arm(
-        name=stage.name, scene=run.scene, drivers=(drivers[EGO], drivers[NON_EGO]), personas=personas, seed=stage.seed
-    )
-    segments = segments_of(folder.segments(stage.id), context.document.assessment.episodes)
-    labels = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
-    errors = play_segments(arm, segments, labels, run.attempt, run.on_start, run.on_progress)
-    work = folder.work(stage.id)
-    files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
-    join_segments(segments, *files)
-    episodes = segments[-1].episodes.stop
-    facts = {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}
-    return facts | _goals_alone(stage, work / EPISODES), files
+    arm = Arm(name=stage.name, scene=run.scene, drivers=tuple(drivers), personas=personas, seed=stage.seed)
+    return arm, choice
+
+
+def _arm_of_several(stage: AssessmentStage, run: StageRun) -> Arm:
+    from harness.environments.rollout import Arm
+
+    drivers = (run.players.player(stage.ego), *people_of(stage.non_ego, run.players, run.people))
+    personas = (run.context.ego_persona,) * len(drivers)  # each driver of a person brings its own
+    return Arm(name=stage.name, scene=run.scene, drivers=drivers, personas=personas, seed=stage.seed)
 
 
 def _goals_alone(stage: AssessmentStage, episodes: Path) -> dict[str, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from harness.campaign.plan.planned_drivers import members_of, persona_of
+from harness.campaign.plan.planned_drivers import Crowd, members_of, persona_of
 from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign, Training
 
@@ -18,7 +18,7 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})
     personas = len({persona_of(each) for each in members_of(stage.opponent)})
-    if personas <= 1:
+    if personas <= 1 or isinstance(stage.opponent, Crowd):  # a crowd is met as a whole in every game
         return settings
     more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
     return settings.model_copy(update=more)

@@ -26,9 +26,9 @@ from harness.evaluation.strategies import (
 def alone_bounds(campaign: Campaign, *arms: Arm) -> tuple[AloneBound, ...]:
     """What the players of these arms have to achieve alone, each once.
 
-    A population stands for its members. SUMO's own driver as non-ego and the further egos of a cross-play have no arm
-    alone, and nothing is asked of them. A best response is a change of a player's strategy: its arm asks what the pair
-    asks.
+    A population or crowd stands for its members. SUMO's own driver as non-ego and the further egos of a cross-play have
+    no arm alone, and nothing is asked of them. A best response is a change of a player's strategy: its arm asks what
+    the pair asks.
     """
     found = [
         bound
@@ -59,6 +59,7 @@ def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
             return
         case PersonaNonEgo(persona=persona):
             members = {each.name: list(each.shares) for each in campaign.population}
+            members |= {each.name: list(dict.fromkeys(each.personas)) for each in campaign.crowd}
             non_egos = [PersonaNonEgo(persona=each) for each in members[persona]] if persona in members else [strategy]
             for non_ego in non_egos:
                 arm, share = Arm(non_ego=non_ego).name, asked.non_ego_goal_share

@@ -26,16 +26,22 @@ def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable
     def wrong(key: str, message: str, remedy: str) -> None:
         problems.append(Problem(str(file), key, message, remedy))
 
+    populations = [each.name for each in document.population]
     for k, each in enumerate(document.population):
         for name in each.shares:
             if name not in personas:
                 wrong(f"population[{k}].shares", f"there is no persona {name!r}", nearest(name, personas))
-        if each.name in personas or each.name in [other.name for other in document.population[:k]]:
-            wrong(
-                f"population[{k}].name",
-                f"{each.name!r} is the name of a persona or of another population",
-                "give it another name",
-            )
+        if each.name in personas or each.name in populations[:k]:
+            message = f"{each.name!r} is the name of a persona or of another population"
+            wrong(f"population[{k}].name", message, "give it another name")
+    crowds = [each.name for each in document.crowd]
+    for k, crowd in enumerate(document.crowd):
+        for name in dict.fromkeys(crowd.personas):
+            if name not in personas:
+                wrong(f"crowd[{k}].personas", f"there is no persona {name!r}", nearest(name, personas))
+        if crowd.name in (*personas, *populations, *crowds[:k]):
+            message = f"{crowd.name!r} is the name of a persona, a population or another crowd"
+            wrong(f"crowd[{k}].name", message, "give it another name")
     for key, names in (
         ("retraining.against", document.retraining.against),
         ("rounds.personas", document.rounds.personas),

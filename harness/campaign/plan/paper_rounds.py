@@ -6,9 +6,12 @@
 | 1 | for each persona: train `<persona>` against the naive ego; assess `<persona>_alone`, `naive_vs_<persona>` |
 | 2 | for each persona: train `retrained_<persona>`; assess `retrained_vs_<persona>`, `retrained_alone_<persona>` |
 
-A population is an opponent like a persona, but its members are trained as personas. `robust` is the ego retrained
-against several personas at once. Round 2 of an external ego is a parameter search (`search_rounds`), if it has tunable
-parameters. A campaign with a folder of policies has the same arms and no trainings.
+A population or crowd is an opponent like a persona, but its members are trained as personas. `robust` is the ego
+retrained against several personas at once. Round 2 of an external ego is a parameter search (`search_rounds`), if it
+has tunable parameters. A campaign with a folder of policies has the same arms and no trainings.
+
+On a scene with several people, a persona drives all of them (`naive_vs_<persona>`, `retrained_vs_<persona>`), and one
+at a time without the ego (`<persona>_alone`); in a crowd, each has a persona of its own.
 """
 
 from __future__ import annotations
@@ -18,7 +21,13 @@ from collections.abc import Sequence
 from harness.campaign.plan.competence import alone_bounds
 from harness.campaign.plan.planned_drivers import PlannedDriver
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
-from harness.campaign.plan.strategy_drivers import driver_of, ego_learns, learned_driver, population_driver
+from harness.campaign.plan.strategy_drivers import (
+    driver_of,
+    ego_learns,
+    learned_driver,
+    mixed_people,
+    population_driver,
+)
 from harness.config.campaign import Campaign
 from harness.evaluation.research_questions import Question, ResearchQuestion
 from harness.evaluation.strategies import (
@@ -60,10 +69,9 @@ def plan_paper_rounds(campaign: Campaign, personas: Sequence[str], seed: int) ->
         stages += _retrainings(campaign, persona, driver, seed)
         stages.append(AssessmentStage(seed=seed, persona=persona, arm=Arm(non_ego=non_ego), ego=None, non_ego=driver))
         stages += _ego_arms(campaign, persona, driver, seed)
-    for population in campaign.population:
-        people = population_driver(campaign, population.shares, seed)
-        stages += _retrainings(campaign, population.name, people, seed)
-        stages += _ego_arms(campaign, population.name, people, seed)
+    for name, people in mixed_people(campaign, seed).items():
+        stages += _retrainings(campaign, name, people, seed)
+        stages += _ego_arms(campaign, name, people, seed)
     return stages
 
 
@@ -149,7 +157,7 @@ def round_2_arms(
 def questions(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> list[Question]:
     """The research questions (paper, section 4.2) for each persona or population and seed; `tunable` as in `plan`."""
     asked = []
-    for name in [*personas, *(each.name for each in campaign.population)]:
+    for name in [*personas, *campaign.mixed_people]:
         non_ego = PersonaNonEgo(persona=name)
         naive_alone, naive = Arm(ego=NaiveEgo()), Arm(ego=NaiveEgo(), non_ego=non_ego)
         pairs: list[tuple[ResearchQuestion, Arm, Arm]] = [("RQ1", naive_alone, naive)]

@@ -52,6 +52,13 @@ class Mixture:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Crowd:
+    """A driver for each person of a scene with several, in their order. Any other driver drives all of them."""
+
+    members: tuple[PlannedMember, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
 class EquilibriumMixture:
     """One of several drivers in each game, drawn by the shares of an equilibrium."""
 
@@ -70,7 +77,7 @@ class BestOf:
 
 PlannedMember = SumoDriven | External | Reconfigured | Trained | TrainedBefore
 """One driver, the same in every game."""
-PlannedDriver = PlannedMember | Mixture | EquilibriumMixture | BestOf
+PlannedDriver = PlannedMember | Mixture | Crowd | EquilibriumMixture | BestOf
 
 
 def members_of(driver: PlannedDriver | None) -> tuple[PlannedMember, ...]:
@@ -78,7 +85,12 @@ def members_of(driver: PlannedDriver | None) -> tuple[PlannedMember, ...]:
     match driver:
         case None:
             return ()
-        case Mixture(members=members) | EquilibriumMixture(members=members) | BestOf(members=members):
+        case (
+            Mixture(members=members)
+            | Crowd(members=members)
+            | EquilibriumMixture(members=members)
+            | BestOf(members=members)
+        ):
             return members
         case _:
             return (driver,)
@@ -124,3 +136,5 @@ def description(driver: PlannedDriver) -> str:
             return "best"
         case Mixture(members=members) | EquilibriumMixture(members=members):
             return "one in each game of " + ", ".join(description(each) for each in members)
+        case Crowd(members=members):
+            return "together " + ", ".join(description(each) for each in members)

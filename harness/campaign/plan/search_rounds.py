@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from harness.campaign.plan.paper_rounds import round_2_arms
 from harness.campaign.plan.stages import SearchStage, Stage
-from harness.campaign.plan.strategy_drivers import driver_of, population_driver
+from harness.campaign.plan.strategy_drivers import driver_of, mixed_people
 from harness.config.campaign import Campaign
 from harness.evaluation.strategies import PersonaNonEgo, ReconfiguredEgo
 
@@ -17,9 +17,8 @@ from harness.evaluation.strategies import PersonaNonEgo, ReconfiguredEgo
 def plan_searches(campaign: Campaign, personas: Sequence[str], seed: int) -> list[Stage]:
     """The stages of round 2 for one training seed, each after those it needs."""
     opponents = {persona: driver_of(campaign, PersonaNonEgo(persona=persona), seed) for persona in personas}
-    populations = {each.name: population_driver(campaign, each.shares, seed) for each in campaign.population}
     stages: list[Stage] = []
-    for name, opponent in {**opponents, **populations}.items():
+    for name, opponent in {**opponents, **mixed_people(campaign, seed)}.items():
         stages.append(SearchStage(seed=seed, persona=name, opponent=opponent))
         stages += round_2_arms(campaign, ReconfiguredEgo(against=name), opponent, seed)
     return stages

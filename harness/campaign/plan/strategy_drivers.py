@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 
 from harness.campaign.plan.planned_drivers import (
+    Crowd,
     External,
     Mixture,
     PlannedDriver,
@@ -62,6 +63,17 @@ def population_driver(campaign: Campaign, shares: Mapping[str, float], seed: int
     """Personas by their shares, one of which is drawn for each game."""
     members = tuple(driver_of(campaign, PersonaNonEgo(persona=name), seed) for name in shares)
     return Mixture(members=members, shares=tuple(shares.values()))
+
+
+def crowd_driver(campaign: Campaign, personas: Sequence[str], seed: int) -> Crowd:
+    """A persona for each person of the scene."""
+    return Crowd(members=tuple(driver_of(campaign, PersonaNonEgo(persona=name), seed) for name in personas))
+
+
+def mixed_people(campaign: Campaign, seed: int) -> dict[str, PlannedDriver]:
+    """The populations and crowds of a campaign, by name: opponents that are made of several personas."""
+    populations = {each.name: population_driver(campaign, each.shares, seed) for each in campaign.population}
+    return populations | {each.name: crowd_driver(campaign, each.personas, seed) for each in campaign.crowd}
 
 
 def crossplay_drivers(campaign: Campaign) -> dict[str, PlannedMember]:

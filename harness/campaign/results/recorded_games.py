@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.trace_quantities import series_of
-from harness.game.state import ROLES
 from harness.replay import choose_games, worst_first
 from harness.replay.contact import contacts
 from harness.replay.vehicles import types_of_vehicles
@@ -48,7 +48,7 @@ def watching_order(episodes: pd.DataFrame, arms: Mapping[str, Arm]) -> pd.DataFr
     order: dict[Any, None] = {}
     chosen = worst_first(choose_games(played))
     turn = chosen.groupby(["arm", "seed"]).cumcount() // TAKE_TURNS
-    turn[chosen["ego_outcome"].where(chosen["ego_outcome"] != "", chosen["non_ego_outcome"]) == "goal"] = 0
+    turn[judged_outcomes(chosen) == "goal"] = 0
     for game in chosen.loc[turn.sort_values(kind="stable").index].itertuples():
         order[game.Index] = None
         for arm in _counterparts(arms.get(game.arm)):
@@ -71,7 +71,7 @@ def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedG
     series = series_of(trace, scene.world, sizes_m)
     by_name = {str(name): rows.sort_values("step") for name, rows in trace.groupby("player", sort=True)}
     players = []
-    for place, role in enumerate(ROLES):
+    for place, role in enumerate(scene.world.roles):
         if role in by_name:
             rows = by_name.pop(role)
             steps = rows["step"].to_numpy()
@@ -95,7 +95,7 @@ def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedG
         episode=int(game.episode),
         step_s=scene.world.step_s,
         steps=int(trace["step"].max()),
-        outcome=game.ego_outcome or game.non_ego_outcome,
+        outcome=judged(game._asdict())[1],
         players=players,
         background=[Track(**_track(name, piece, sizes_m)) for name, rows in by_name.items() for piece in _pieces(rows)],
         touches=[

@@ -20,6 +20,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError, plain
 from harness.evaluation.manoeuvres import pairs_in
+from harness.evaluation.people import people_in
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
 from harness.replay import follow_in_sumo_gui, replay_name, worst_first, write_film, write_replay
@@ -42,12 +43,15 @@ def game_table(run: Path, arm: str | None) -> Table:
         box=SIMPLE,
         padding=0,
     )
-    for name in ("arm", "seed", "episode", "ego", "non-ego", "manoeuvres", "TTC (s)"):
-        table.add_column(name, overflow="fold", no_wrap=name in ("arm", "ego", "non-ego"))
+    players = ("ego", *people_in(episodes.columns))
+    for name in ("arm", "seed", "episode", *players, "manoeuvres", "TTC (s)"):
+        heading = name.replace("non_ego", "non-ego").replace("_", " ")
+        table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *players))
     for game in worst_first(episodes).itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
         pair = pairs.get((game.arm, game.seed, game.episode))
-        words = (str(game.seed), str(game.episode), game.ego_outcome, game.non_ego_outcome, pair.words if pair else "")
+        outcomes = [getattr(game, f"{name}_outcome") for name in players]
+        words = (str(game.seed), str(game.episode), *outcomes, pair.words if pair else "")
         table.add_row(
             *(Text(plain(cell)) for cell in (game.arm, *words, ttc))
         )  # text without markup, whatever the table contains

@@ -108,7 +108,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     warn(mixed_versions(manifest["stages"]), console)
     failed = tuple(name for name, entry in manifest["stages"].items() if entry["status"] not in FINISHED)
     found = results(report)
-    personas = [*manifest["personas"], *(each.name for each in campaign.population)]
+    personas = [*manifest["personas"], *campaign.mixed_people]
     verdicts = [(persona, found.verdicts(question, persona)) for persona in personas for question in ARMS]
     verdicts += gap_verdicts(game.gaps) if game is not None else []
     result = RunResult(

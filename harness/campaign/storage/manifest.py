@@ -96,7 +96,8 @@ def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]
             yield key, _words(error)
     if "harness" not in manifest.get("versions", {}):
         yield "versions.harness", "is missing"
-    populations = {each.get("name") for each in manifest["campaign"].get("population", ())}
+    written = manifest["campaign"]
+    populations = {each.get("name") for each in (*written.get("population", ()), *written.get("crowd", ()))}
     for name, entry in manifest["stages"].items():
         if entry.get("persona", "") not in {"", *manifest["persona_documents"], *populations}:
             yield f"stages.{name}.persona", f"there is no document of persona {entry['persona']!r}"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,7 @@ from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_b
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities
 from harness.game.route_coordinates import PATH_M
-from harness.game.state import EGO, ROLES, Bodies
+from harness.game.state import EGO, Bodies
 from harness.game.world import World
 
 _HERE = int(np.flatnonzero(PATH_M == 0.0)[0])
@@ -33,7 +33,7 @@ class Course:
     quantities: Quantities
     """Of the players among all road users."""
     between: Quantities
-    """Of the players alone: the leader and the collision partner are the other player."""
+    """Of the players alone: with two, the leader and the collision partner are the other player."""
     drove: BoolArray
     """[T, P] whether each player was driving; in a game with an ego, only until the ego's game ends."""
 
@@ -46,13 +46,24 @@ class Course:
     ) -> Course:
         """From one game's trace. `sizes_m` are length and width of vehicle types, by default those of SUMO."""
         quantities = quantities_of(trace, world, sizes_by_name(trace, sizes_m))
-        players = len(ROLES)
+        players = len(world.roles)
         bodies = Bodies(*(getattr(quantities.bodies, each.name)[:, :players].copy() for each in fields(Bodies)))
         between = Quantities(world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m)
-        drove = drove_in(trace)
+        drove = drove_in(trace, world.roles)
         if drove[:, EGO].any():
             drove[int(np.flatnonzero(drove[:, EGO])[-1]) + 1 :] = False
         return cls(quantities=quantities, between=between, drove=drove)
+
+    def of_pair(self, player: int, other: int) -> Course:
+        """The course in which these are the only players in `between`."""
+        bodies = self.between.bodies
+        if bodies.present.shape[1] == 2:
+            return self
+        alone = np.isin(np.arange(bodies.present.shape[1]), (player, other))
+        of_both = replace(bodies, present=bodies.present & alone)
+        q = self.quantities
+        between = Quantities(q.world, q.state, of_both, q.advanced_m, q.lateral_offset_m)
+        return replace(self, between=between)
 
     @property
     def step_s(self) -> float:

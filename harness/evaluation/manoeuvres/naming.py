@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import pandas as pd
 
 from harness.evaluation.manoeuvres.course import Course
-from harness.evaluation.manoeuvres.rules import RULES
+from harness.evaluation.manoeuvres.rules import PAIRWISE, RULES
 from harness.evaluation.manoeuvres.spans import Span
-from harness.game.state import ROLES
 from harness.game.world import World
 
 NAMES = tuple(RULES)
@@ -34,7 +33,7 @@ class Manoeuvre:
 def find_manoeuvres(
     trace: pd.DataFrame, world: World, sizes_m: Mapping[str, tuple[float, float]] | None = None
 ) -> list[Manoeuvre]:
-    """The manoeuvres of both players in one game, by the time they begin.
+    """The manoeuvres of the players in one game, by the time they begin.
 
     `trace` are the game's rows (columns as in `traces/`) on the scene of `world`; `sizes_m` are length and width of
     the vehicle types in it, with SUMO's default for the others. In a game with an ego, manoeuvres end with the ego's
@@ -42,11 +41,23 @@ def find_manoeuvres(
     """
     course = Course.of(trace, world, sizes_m or {})
     found = []
-    for player, role in enumerate(ROLES):
+    for player, role in enumerate(world.roles):
         if course.drove[:, player].any():
-            for name, rule in RULES.items():
-                found += [_named(course, role, name, span) for span in rule(course, player, 1 - player)]
+            found += [_named(course, role, name, span) for name, span in _spans(course, player)]
     return sorted(found, key=lambda each: (each.time_s, each.player, each.manoeuvre))
+
+
+def _spans(course: Course, player: int) -> Iterator[tuple[str, Span]]:
+    """The manoeuvres of a player, each with its name. A rule about a pair is applied to every other player."""
+    roles = course.quantities.world.roles
+    others = [other for other in range(len(roles)) if other != player]
+    for name, rule in RULES.items():
+        if len(others) == 1 or name not in PAIRWISE:
+            yield from ((name, span) for span in rule(course, player, others[0]))
+            continue
+        for other in others:
+            for span in rule(course.of_pair(player, other), player, other):
+                yield name, replace(span, text=f"{span.text}, before {roles[other]}")
 
 
 def _named(course: Course, role: str, name: str, span: Span) -> Manoeuvre:

@@ -1,4 +1,4 @@
-"""The pair of manoeuvres that led to the end of a game: one of the non-ego and the ego's response to it."""
+"""The pair of manoeuvres that led to the end of a game: one of a non-ego and the ego's response to it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pandas as pd
 
 from harness.evaluation.manoeuvres.naming import Manoeuvre, manoeuvres_in
 from harness.evaluation.manoeuvres.thresholds import AFTERMATH_S, ANSWER_WITHIN_S
-from harness.game.state import EGO, NON_EGO, ROLES
+from harness.game.state import EGO, ROLES
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,10 +32,10 @@ def pair_of(found: Sequence[Manoeuvre], ended_s: float = math.inf) -> Pair:
 
     The ego's manoeuvre is its last one (the response). The non-ego's is the last one that began before the response and
     ended at most `ANSWER_WITHIN_S` before it; without such a manoeuvre, the last one that began after the response. A
-    manoeuvre that the non-ego begins more than `AFTERMATH_S` after the response is a new cause without a response.
+    manoeuvre that a non-ego begins more than `AFTERMATH_S` after the response is a new cause without a response.
     """
     found = sorted((each for each in found if each.time_s <= ended_s), key=lambda each: each.time_s)
-    non_ego = [each for each in found if each.player == ROLES[NON_EGO]]
+    non_ego = [each for each in found if each.player != ROLES[EGO]]
     ego = [each for each in found if each.player == ROLES[EGO]]
     if not ego or not non_ego:
         return Pair(non_ego=non_ego[-1] if non_ego else None, ego=ego[-1] if ego else None)

@@ -176,6 +176,9 @@ RULES: Mapping[str, Callable[[Course, int, int], Iterator[Span]]] = {
     "wrong_way": wrong_ways,
 }
 
+PAIRWISE = frozenset({"cut_in", "overtake"})
+"""The rules about the player and one other; the others are about the player among all road users."""
+
 
 def _while(mask: BoolArray, step: int) -> int:
     """The last step of the stretch of `mask` [T] that `step` is in."""

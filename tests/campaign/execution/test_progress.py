@@ -62,6 +62,19 @@ def test_elsewhere__each_preparation_is_one_line() -> None:
     assert lines == [f"started  {NAIVE}", f"waiting  {NAIVE}: merging"]
 
 
+def test_elsewhere__a_running_stage_has_a_line_each_minute_with_the_time_left() -> None:
+    console, seconds = Console(file=io.StringIO(), width=160), 0.0
+    with StageProgress(STAGES, 0, console, clock=lambda: seconds) as progress:
+        progress.show(STARTED)
+        for seconds in (0.0, 30.0, 59.0, 60.0, 90.0, 119.0, 120.0):
+            progress.show(Event(kind="progress", stage=NAIVE, done=int(1000 * seconds), total=300_000))
+    assert console.file.getvalue().splitlines() == [  # type: ignore[attr-defined]
+        f"started  {NAIVE}",
+        f"running  {NAIVE}: 60,000 of 300,000 steps, 0:04:00 left",
+        f"running  {NAIVE}: 120,000 of 300,000 steps, 0:03:00 left",
+    ]
+
+
 def test_preparations__are_the_log_of_what_is_prepared(caplog: pytest.LogCaptureFixture) -> None:
     told, log = [], logging.getLogger("harness.preparation")
     with preparations_reported(lambda *what: told.append(what)):

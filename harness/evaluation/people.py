@@ -1,0 +1,76 @@
+"""Games with several people: the columns of each person in `episodes.csv`, and values over all of them.
+
+A person's columns begin with its name (`game.state.roles_of`): `non_ego_outcome` with one person, `non_ego_1_outcome`,
+`non_ego_2_outcome` and so on with several.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import pandas as pd
+
+from harness.evaluation.metrics import OF_NON_EGO, PlayerSeries
+from harness.game.state import MOST_PEOPLE, NON_EGO, ROLES, roles_of
+
+COLLIDED_WITH = "ego_collided_with"
+"""The column of what the ego collided with, a person or `background`; only tables of several people have it."""
+_ONE = f"{ROLES[NON_EGO]}_"
+
+
+def of_person(name: str) -> Mapping[str, Callable[[PlayerSeries], float | None]]:
+    """The metrics of a person, by their columns."""
+    return {f"{name}_{column.removeprefix(_ONE)}": metric for column, metric in OF_NON_EGO.items()}
+
+
+def people_in(columns: Iterable[str]) -> tuple[str, ...]:
+    """The names of the people in a table of games with these columns."""
+    columns = set(columns)
+    for people in range(MOST_PEOPLE, 1, -1):
+        names = roles_of(people + 1)[1:]
+        if f"{names[-1]}_outcome" in columns:
+            return names
+    return ROLES[NON_EGO:]
+
+
+def columns_for(people: int, columns: Mapping[str, str]) -> dict[str, str]:
+    """Columns of a table of games with one person, for a number of people.
+
+    With several, those of a person occur for each of them, and `COLLIDED_WITH` follows `ego_failed`.
+    """
+    result: dict[str, str] = {}
+    names = roles_of(people + 1)[1:]
+    own = {name: dtype for name, dtype in columns.items() if name.startswith(_ONE)}
+    for name, dtype in columns.items():
+        if name not in own:
+            result[name] = dtype
+            result |= {COLLIDED_WITH: "object"} if people > 1 and name == "ego_failed" else {}
+        elif name == next(iter(own)):
+            result |= {f"{each}_{cell.removeprefix(_ONE)}": kind for each in names for cell, kind in own.items()}
+    return result
+
+
+def of_people(games: pd.DataFrame, cell: str) -> pd.DataFrame:
+    """A cell of every person (such as `outcome`) in each game: a column for each person."""
+    return games[[f"{name}_{cell}" for name in people_in(games.columns)]]
+
+
+def judged_outcomes(games: pd.DataFrame) -> pd.Series:
+    """The outcome of the judged player of each game: the ego, or the person that drives where there is no ego."""
+    ego = games["ego_outcome"].fillna("")
+    return ego.where(ego != "", outcomes_of_people(games))
+
+
+def outcomes_of_people(games: pd.DataFrame) -> pd.Series:
+    """The outcome of the first person that took part in each game; empty without one."""
+    first, *others = (outcomes.fillna("") for _, outcomes in of_people(games, "outcome").items())
+    for each in others:
+        first = first.where(first != "", each)
+    return first
+
+
+def judged(game: Mapping[str, Any]) -> tuple[str, str]:
+    """The name of the judged player of a game, a row of `episodes.csv`, and its outcome."""
+    names = ("ego", *people_in(game))
+    return next(((name, game[f"{name}_outcome"]) for name in names if game[f"{name}_outcome"]), (names[-1], ""))

@@ -1,0 +1,45 @@
+"""Whether the players of a scene can all start: their start ranges leave room for their cars beside one another."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+
+import shapely
+from shapely.affinity import rotate
+
+from harness.errors import UsageError
+from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
+from harness.game.world import World
+
+_DRAWS = 200
+
+
+def check_starts(file: Path, starts: StartDistribution, world: World) -> None:
+    """Raise UsageError if cars of players overlap in each of many drawn starts of the scene document `file`."""
+    found: Counter[tuple[int, int]] = Counter()
+    for draw in range(_DRAWS):
+        pairs = list(_overlapping(draw_initial_state(starts, "start check", draw), world))
+        if not pairs:
+            return
+        found.update(pairs)
+    (first, second), count = found.most_common(1)[0]
+    names = world.roles
+    message = f"{names[first]} and {names[second]} overlap in {count} of {_DRAWS} drawn starts, and no draw is free"
+    raise UsageError.of(file, names[second], message, "give it another lane, or a wider range on a longer one")
+
+
+def _overlapping(start: InitialState, world: World) -> Iterator[tuple[int, int]]:
+    bodies = [_body(start, world, player) for player in range(len(world.roles))]
+    for first, second in combinations(range(len(bodies)), 2):
+        if bodies[first].intersects(bodies[second]):
+            yield first, second
+
+
+def _body(start: InitialState, world: World, player: int) -> shapely.Geometry:
+    x_m, y_m = float(start.x_m[player]), float(start.y_m[player])
+    ahead_m, beside_m = 0.5 * world.length_m[player], 0.5 * world.width_m[player]
+    upright = shapely.box(x_m - ahead_m, y_m - beside_m, x_m + ahead_m, y_m + beside_m)
+    return rotate(upright, float(start.heading_rad[player]), origin=(x_m, y_m), use_radians=True)
