@@ -18,7 +18,6 @@ from playwright.sync_api import sync_playwright
 ROOT = Path(__file__).parents[2]
 SCENES = ("left_across", "priority_crossing", "red_light", "roundabout")
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
-SIZE = {"width": 900, "height": 560}
 
 
 def main() -> None:
@@ -28,7 +27,7 @@ def main() -> None:
         sys.exit(f"none of {', '.join(CHROMIUM)} is installed")
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_file, args=["--no-sandbox"])
-        tab = browser.new_page(viewport=SIZE)
+        tab = browser.new_page(viewport={"width": 900, "height": 560})
         for scene in SCENES:
             page = Path(folder) / f"{scene}.html"
             show = [sys.executable, "-m", "harness.cli.main", "scene", "show", f"networks/{scene}", "--html", str(page)]
