@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sumo
+from hypothesis import settings
 
 from harness.game.arrays import FloatArray
 from harness.game.quantities import Quantities
@@ -21,6 +22,9 @@ from tests.support.repository import REPOSITORY
 from tests.support.shared import shared_folder
 from tests.support.slow import slow_tests
 from tests.support.stations import nearest_station_m
+
+settings.register_profile("harness", deadline=None)  # a busy machine exceeds any deadline now and then
+settings.load_profile("harness")
 
 
 def pytest_configure() -> None:

@@ -6,9 +6,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from harness.cli.net_tables import conflict_words
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.reports.net_page import Drawing, DrawnShape
+from harness.traffic.net_conflicts import ListedConflict
 from harness.traffic.net_listing import ListedJunction, ListedLane
 from harness.traffic.scene import OpenScene
 
@@ -17,22 +19,34 @@ def drawing_of(
     title: str,
     lanes: Sequence[ListedLane],
     junctions: Sequence[ListedJunction],
+    conflicts: Sequence[ListedConflict],
     scene: OpenScene | None,
     *,
     starts: int,
 ) -> Drawing:
-    """The drawing of these lanes and junctions; for a scene also its routes and goals, and seeded starts."""
+    """The drawing of these lanes, junctions and conflicts; for a scene also its routes and goals, and seeded starts."""
     shapes = [*_junction_shapes(junctions), *(_lane_shape(lane) for lane in lanes)]
     marks = [
         DrawnShape(points=point[None], kind="signal", text=f"signal of junction {junction.name}")
         for junction in junctions
         for point in junction.signals
     ]
+    marks += [
+        DrawnShape(
+            points=each.place[None],
+            kind="conflict",
+            text=conflict_words(each),
+            label=str(each.number),
+        )
+        for each in conflicts
+    ]
     if scene is not None:
         shapes += _routes_and_goals(scene)
         marks += _starts(scene, starts)
     signals = sum(len(junction.signals) for junction in junctions)
-    summary = f"{len(lanes)} lanes, {len(junctions)} junctions, {signals} lanes with a signal."
+    summary = (
+        f"{len(lanes)} lanes, {len(junctions)} junctions, {signals} lanes with a signal, {len(conflicts)} conflicts."
+    )
     return Drawing(title=title, summary=summary, shapes=shapes, marks=marks)
 
 

@@ -42,13 +42,16 @@ def show_scene(
     ] = None,
 ) -> None:
     """List the lanes of a net: id, length, speed limit, permissions, the junctions at both ends, and the edges to which
-    each lane leads: straight on (s), to the right (r, R), to the left (l, L) or back (t).
+    each lane leads: straight on (s), to the right (r, R), to the left (l, L) or back (t). A second table lists the
+    conflicts at the junctions: which connections cross or merge, and which of them has priority.
 
-    The page shows junctions and signals, too, and for a scene the players' routes, starts and goals.
+    The page shows junctions, signals and the numbers of conflicts, too, and for a scene the players' routes, starts and
+    goals.
     """
     from rich.console import Console
-    from rich.table import Table
 
+    from harness.cli.net_tables import conflict_table, lane_table
+    from harness.traffic.net_conflicts import listed_conflicts
     from harness.traffic.net_file import check_net
     from harness.traffic.net_listing import edges_near, listed_junctions, listed_lanes
     from harness.traffic.network import read_net
@@ -59,26 +62,25 @@ def show_scene(
         check_net(net_file)
     net = read_net(net_file)
     edges = edges_near(net, net_file, near, within)
-    lanes = listed_lanes(edges)
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("lane", "length m", "limit m/s", "width m", "for", "from", "to", "leads to"):
-        table.add_column(name, justify="left" if name.isalpha() or name == "leads to" else "right", overflow="fold")
-    for lane in lanes[:rows]:
-        numbers = (f"{lane.length_m:.1f}", f"{lane.limit_mps:.2f}", f"{lane.width_m:.1f}")
-        ends = (lane.start_junction, lane.end_junction, "\n".join(lane.leads_to))
-        table.add_row(lane.name, *numbers, lane.permissions, *ends)
+    lanes, junctions = listed_lanes(edges), listed_junctions(edges)
+    conflicts = listed_conflicts(net, [junction.name for junction in junctions])
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="replace")  # the terminal may not have every character
     console = Console()
-    console.print(table, markup=False, highlight=False)
-    if len(lanes) > rows:
-        console.print(wording.lanes_left_out(len(lanes) - rows), markup=False, highlight=False, soft_wrap=True)
+    console.print(lane_table(lanes[:rows]), markup=False, highlight=False)
+    if conflicts:
+        console.print()
+        console.print(conflict_table(conflicts[:rows]), markup=False, highlight=False)
+    for what, count in (("lanes", len(lanes)), ("conflicts", len(conflicts))):
+        if count > rows:
+            left_out = wording.rows_left_out(count - rows, what)
+            console.print(left_out, markup=False, highlight=False, soft_wrap=True)
     if html is not None:
         from harness.cli.net_drawing import drawing_of
         from harness.reports.net_page import write_net_page
 
         title = scene.document.name if scene is not None else path.name
-        write_net_page(drawing_of(title, lanes, listed_junctions(edges), scene, starts=_STARTS), html)
+        write_net_page(drawing_of(title, lanes, junctions, conflicts, scene, starts=_STARTS), html)
         console.print(wording.page_written(html), highlight=False, markup=False, soft_wrap=True)
 
 

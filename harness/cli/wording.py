@@ -97,8 +97,8 @@ def scene_lines(scene: OpenScene) -> Iterator[str]:
     yield "with background traffic" if scene.has_background_traffic else "without background traffic"
 
 
-def lanes_left_out(number: int) -> str:
-    return f"{number} more lanes are not listed: choose some with --near EDGE and --within M, or give a larger --rows"
+def rows_left_out(number: int, what: str) -> str:
+    return f"{number} more {what} are not listed: choose some with --near EDGE and --within M, or give a larger --rows"
 
 
 def ego(campaign: OpenCampaign) -> str:

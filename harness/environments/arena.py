@@ -44,10 +44,7 @@ from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading, with_game
 
-_RUNNING, _GOAL = (
-    int(Outcome.RUNNING),
-    int(Outcome.GOAL),
-)  # plain integers: comparing arrays with members of the enumeration is slower
+_RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # comparing arrays with members of an enumeration is slower
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,8 @@ _functions = 0
 def compiled(function: _Function) -> _Function:
     """Compile a function on its first call.
 
-    Processes compile in turns, so that each finds the machine code of the others on disk. If no folder is writable,
-    every process compiles for itself.
+    Processes that compile the same version of a package do so in turns, so that each finds the machine code of the
+    others on disk. If no folder is writable, every process compiles for itself.
     """
     global _functions
     _functions += 1
@@ -39,7 +39,8 @@ def compiled(function: _Function) -> _Function:
     options: dict[str, Any] = {"error_model": "numpy"}
     try:
         dispatcher: Any = numba.njit(cache=True, **options)(function)
-        dispatcher.compile = _in_turn(dispatcher.compile)  # `compile` reads the cache on disk first
+        # `compile` reads the cache on disk first
+        dispatcher.compile = _in_turn(dispatcher.compile, Path(config.CACHE_DIR))
     except RuntimeError:  # numba found no writable folder
         dispatcher = numba.njit(**options)(function)
     finally:
@@ -63,9 +64,9 @@ class _Compilations(event.Listener):
 event.register("numba:compile", _Compilations())
 
 
-def _in_turn(work: Callable[..., object]) -> Callable[..., object]:
+def _in_turn(work: Callable[..., object], folder: Path) -> Callable[..., object]:
     def in_turn(*arguments: object) -> object:
-        with _turn():
+        with _turn(folder):
             return work(*arguments)
 
     return in_turn
@@ -76,14 +77,15 @@ _depth = 0  # compiling a function may compile the functions that it calls
 
 
 @contextlib.contextmanager
-def _turn() -> Iterator[None]:
-    """Only this thread of this process compiles in the block. The turn of a process that dies ends with it."""
+def _turn(folder: Path) -> Iterator[None]:
+    """Only this thread of this process compiles functions with this folder of the cache, and functions that they call,
+    in the block. The turn of a process that dies ends with it."""
     global _depth
     with _threads, contextlib.ExitStack() as stack:
         if _depth == 0:
             # a file system without locks is no error; a lock made of a file's existence would outlive its process
             with contextlib.suppress(OSError, NotImplementedError):
-                stack.enter_context(_lock())
+                stack.enter_context(_lock(folder))
         _depth += 1
         try:
             yield
@@ -91,17 +93,12 @@ def _turn() -> Iterator[None]:
             _depth -= 1
 
 
-def _lock() -> contextlib.AbstractContextManager[object]:
-    """The lock of all processes that use the same cache. Entering it raises OSError if it can't be written."""
+def _lock(folder: Path) -> contextlib.AbstractContextManager[object]:
+    """The lock of all processes that use a folder of the cache. Entering it raises OSError if it can't be written."""
     from filelock import FileLock  # imports asyncio and sqlite3: only for processes that run compiled code
 
-    folder = _cache()
     folder.mkdir(parents=True, exist_ok=True)
     return FileLock(folder / "turn", fallback_to_soft=False)
-
-
-def _cache() -> Path:
-    return Path(platformdirs.user_cache_dir("harness")) / "compiled"
 
 
 @cache
@@ -112,4 +109,4 @@ def _folder(package: Path) -> str:
     """
     sources = [each for folder in (Path(__file__).parent, package) for each in sorted(folder.glob("*.py"))]
     digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:24]
-    return str(_cache() / digest)
+    return str(Path(platformdirs.user_cache_dir("harness")) / "compiled" / digest)

@@ -108,7 +108,7 @@ class BackgroundTraffic:
         if departures:
             self._waiting[game] = list(reversed(departures))
             self._depart(game)
-        return _warmed_up(departures)
+        return _warmed_up(departures) if departures else None
 
     def advance(self) -> None:
         """Process a step of SUMO: arrivals, vehicles that entered the traffic, and departures that are due."""

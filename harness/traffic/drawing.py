@@ -25,10 +25,18 @@ def lane_marks(net: Net) -> list[FloatArray]:
     """The lines [n, 2] between neighbouring lanes of an edge."""
     marks = []
     for edge in net.getEdges(withInternal=False):
-        for right, _ in pairwise(car_lanes(edge)):  # SUMO counts an edge's lanes from the right
-            line = shapely.LineString(lane_line(right)).offset_curve(right.getWidth() / 2.0, join_style="mitre")
+        for outer, inner in pairwise(car_lanes(edge)):  # SUMO counts an edge's lanes from its outer side
+            line = shapely.LineString(lane_line(outer))
+            side = 1.0 if _is_left_of(lane_line(inner), lane_line(outer)) else -1.0
+            line = line.offset_curve(side * outer.getWidth() / 2.0, join_style="mitre")
             marks += [np.asarray(part.coords) for part in getattr(line, "geoms", [line]) if len(part.coords) > 1]
     return marks
+
+
+def _is_left_of(line: FloatArray, other: FloatArray) -> bool:
+    """Whether a line [n, 2] is on the left of another one beside it, as inner lanes are where traffic keeps right."""
+    along, across = other[1] - other[0], line[0] - other[0]
+    return bool(along[0] * across[1] - along[1] * across[0] > 0.0)
 
 
 def goal_lines(scene: OpenScene, net: Net) -> list[FloatArray]:

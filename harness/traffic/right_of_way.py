@@ -88,10 +88,10 @@ class _Builder:
     def _conflicts(self, player: int, junction: JunctionOnRoute) -> Iterator[dict[str, Any]]:
         """The rows of `Conflicts` of a junction on a player's route."""
         for own in _own_links(junction):
-            for foe in _foes(own.link):
+            for foe in foes_of(own.link):
                 zone = self._zone(junction, own.link, foe)
                 if zone is not None:
-                    yields, first_come = _yields(own.link, foe)
+                    yields, first_come = yields_to(own.link, foe)
                     yield {
                         "player": player,
                         "stream": self._numbers.setdefault(foe, len(self._numbers)),
@@ -116,9 +116,8 @@ class _Builder:
     def _zone(self, junction: JunctionOnRoute, own: Connection, foe: Connection) -> dict[str, float | bool] | None:
         """Where the lanes of two links overlap, in the columns of `Conflicts`; None if they do not."""
         way, stream = self._stream(own), self._stream(foe)
-        joins = own.getToLane() is foe.getToLane()
-        overlap = way.swept(joins).intersection(stream.swept(joins))
-        if overlap.area < _LEAST_AREA_M2:
+        joins, overlap = own.getToLane() is foe.getToLane(), overlap_of(way, stream)
+        if overlap is None:
             return None
         begin_m, end_m = _extent(self._stream(junction.link).onward, overlap)
         zone_m, zone_end_m = _extent(stream.onward, overlap)
@@ -132,6 +131,13 @@ class _Builder:
             "from_m": from_m,
             "until_m": until_m,
         }
+
+
+def overlap_of(way: Stream, other: Stream) -> BaseGeometry | None:
+    """The area that cars on both ways need; None if it is negligible. Ways to the same lane share its beginning too."""
+    joins = way.link.getToLane() is other.link.getToLane()
+    overlap = way.swept(joins).intersection(other.swept(joins))
+    return None if overlap.area < _LEAST_AREA_M2 else overlap
 
 
 def _heading_rad(line: shapely.LineString, place_m: float) -> float:
@@ -152,7 +158,7 @@ def _own_links(junction: JunctionOnRoute) -> list[_OwnLink]:
     return [_OwnLink(link, bounds[k], bounds[k + 1]) for link, k in zip(junction.links, places, strict=True)]
 
 
-def _foes(own: Connection) -> list[Connection]:
+def foes_of(own: Connection) -> list[Connection]:
     """The links of the junction whose traffic may be in conflict with that of a link."""
     node = own.getJunction()
     links = [link for link in node.getConnections() if carries_traffic(link) and link is not own]
@@ -163,7 +169,7 @@ def _foes(own: Connection) -> list[Connection]:
         return [link for link in links if link.getFromLane() is not own.getFromLane()]
 
 
-def _yields(own: Connection, foe: Connection) -> tuple[bool, bool]:
+def yields_to(own: Connection, foe: Connection) -> tuple[bool, bool]:
     """Whether a link must yield to a foe while no signal says otherwise, and whether the first to come has priority.
 
     With signals, SUMO lets major links regard vehicles that wait inside the junction: that is no duty to yield.

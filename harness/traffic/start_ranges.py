@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial import KDTree
 from sumolib.net import Net
 from sumolib.net.lane import Lane
 
@@ -30,6 +29,8 @@ class Meeting:
 
 def meeting(ego: Route, other: Route) -> Meeting | None:
     """The first place where the routes, up to their goals, meet; None if they do not."""
+    from scipy.spatial import KDTree  # loads SciPy's sparse matrices: only for commands that open a scene
+
     ego_points, other_points = (_points(route)[: round(route.goal_m / SPACING_M) + 1] for route in (ego, other))
     distances, rows = KDTree(other_points).query(ego_points)
     near = np.flatnonzero(distances < _MEETS_M)

@@ -79,7 +79,7 @@ def test_report__says_it_on_its_first_lines_and_on_each_card(run: Path) -> None:
 def test_command__again_has_nothing_to_do_and_says_the_same(run: Path, tmp_path: Path) -> None:
     again = shutil.copytree(run, tmp_path / "again")
     before = (again / "manifest.json").read_bytes()
-    command = harness("campaign", run.with_suffix(".toml"), "--out", again)
+    command = harness("campaign", run.with_suffix(".toml"), "--out", again, "--jobs", 1)
     assert command.returncode == 0, command.stdout + command.stderr
     text = " ".join(command.stdout.split())
     assert text.startswith("Nothing to do")
@@ -95,7 +95,7 @@ def test_command__lower_bounds_play_nothing_again_and_answer(run: Path, tmp_path
     document = again.with_suffix(".toml")
     bounds = "[competence]\nego_goal_share = 0.0\nnon_ego_goal_share = 0.0\n"
     document.write_text(document.read_text(encoding="utf-8") + bounds, encoding="utf-8")
-    command = harness("campaign", document, "--out", again)
+    command = harness("campaign", document, "--out", again, "--jobs", 1)
     assert command.returncode == 0, command.stdout + command.stderr
     assert "started" not in command.stdout
     assert "not answered" not in command.stdout

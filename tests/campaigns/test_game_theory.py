@@ -81,7 +81,7 @@ def test_arms_race__the_same_bytes_when_some_of_it_is_done_again(tmp_path: Path)
     for name in names:
         shutil.rmtree(run / ".stages" / f"{name}-seed1")
     campaign = arms_race().with_suffix(".toml")
-    done = harness("campaign", campaign, "--out", run)
+    done = harness("campaign", campaign, "--out", run, "--jobs", 1)
     assert done.returncode == 0, done.stdout + done.stderr
     assert {name: (run / name).read_bytes() for name in TABLES} == before
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import platformdirs
 import pytest
 import sumo
 from defusedxml import ElementTree
@@ -266,6 +267,9 @@ def test_campaign__is_the_same_with_one_worker_from_elsewhere_and_writes_nowhere
     folders = {name: tmp_path / name for name in ("cwd", "home", "tmp", "out")}
     for folder in folders.values():
         folder.mkdir()
+    compiled = folders["home"] / "cache" / "harness" / "compiled"  # machine code as on any machine after its first run
+    compiled.parent.mkdir(parents=True)
+    compiled.symlink_to(Path(platformdirs.user_cache_dir("harness")) / "compiled")
     environment = {
         **os.environ,
         "HOME": str(folders["home"]),
@@ -319,7 +323,7 @@ def rows_of(run: Path, *personas: str) -> pd.DataFrame:
 def test_campaign__another_persona_needs_no_python_and_changes_no_row_of_the_others(tmp_path: Path) -> None:
     personas = [str(write_persona(tmp_path, "x")), str(SPEEDY)]
     changes: dict[str, Any] = {**BY_SUMO, "personas": personas}
-    done = harness("campaign", write_campaign(tmp_path, **changes), "--out", tmp_path / "run")
+    done = harness("campaign", write_campaign(tmp_path, **changes), "--out", tmp_path / "run", "--jobs", 1)
     assert done.returncode == 0, done.stdout + done.stderr
     pd.testing.assert_frame_equal(rows_of(tmp_path / "run", "speedy"), rows_of(sumo_run(), "speedy"))
     assert set(rows_of(tmp_path / "run", "x")["arm"]) == {"naive_alone", "naive_vs_sumo", "x_alone", "naive_vs_x"}
@@ -342,7 +346,7 @@ def test_campaign__an_ego_that_is_a_policy_drives_as_where_it_was_trained(run: P
         "ego": {"driver": "ego", "persona": str(CAREFUL)},
         "personas": [str(write_persona(tmp_path, "x"))],
     }
-    done = harness("campaign", write_campaign(tmp_path, **changes), "--out", tmp_path / "run", "--quick")
+    done = harness("campaign", write_campaign(tmp_path, **changes), "--out", tmp_path / "run", "--quick", "--jobs", 1)
     assert done.returncode == 0, done.stdout + done.stderr
     given, trained = (read_csv(each / "episodes.csv") for each in (tmp_path / "run", run))
     for arm in ("naive_alone", "naive_vs_sumo"):

@@ -173,7 +173,7 @@ def campaign() -> Path:
 
     def build(folder: Path) -> None:
         file = write(folder)
-        done = harness("campaign", file, "--out", folder / "run")
+        done = harness("campaign", file, "--out", folder / "run", "--jobs", 1)
         assert done.returncode == 0, done.stdout + done.stderr
         (folder / "printed").write_text(done.stdout)
 
@@ -257,7 +257,7 @@ def test_campaign__the_driver_that_was_found_is_an_ego_that_plays_the_same_games
     found = run / "policies" / STAGE / "driver.toml"
     assert found.read_text().startswith("# the rules adas (")
     file = write(tmp_path, document(tmp_path, found.read_text() + "\n[tunable]\n"), reconfiguration=None)
-    done = harness("campaign", file, "--out", tmp_path / "run")
+    done = harness("campaign", file, "--out", tmp_path / "run", "--jobs", 1)
     assert done.returncode == 0, done.stdout + done.stderr
     theirs, ours = read_csv(run / "episodes.csv"), read_csv(tmp_path / "run" / "episodes.csv")
     for now, then in (("naive_vs_speedy", "reconfigured_vs_speedy"), ("naive_alone", "reconfigured_alone_speedy")):
@@ -283,7 +283,7 @@ def test_campaign__killed_in_its_search_goes_on_and_ends_the_same(campaign: Path
         os.kill(process.pid, signal_number)
         end(process)
         assert trials <= trials_of(again) < 8
-    done = harness("campaign", campaign, "--out", again)
+    done = harness("campaign", campaign, "--out", again, "--jobs", 1)
     assert done.returncode == 0, done.stdout + done.stderr
     assert numbers(again) == numbers(run)
     skipped = harness("campaign", campaign, "--out", again)
@@ -328,7 +328,7 @@ def test_campaign__a_program_that_plays_one_game_at_a_time_is_searched_so(tmp_pa
     assert "one at a time" in said
     search = {"trials": 2, "games": 2, "games_at_once": 1}
     file = write(tmp_path, "perl/perl.toml", reconfiguration=search, assessment={"episodes": 2})
-    done = harness("campaign", file, "--out", tmp_path / "run", "--allow-code")
+    done = harness("campaign", file, "--out", tmp_path / "run", "--allow-code", "--jobs", 1)
     assert done.returncode == 0, done.stdout + done.stderr
     table = read_csv(tmp_path / "run" / "reconfiguration.csv")
     assert table["mean_payoff"].nunique() == 1  # it heeds no parameter:

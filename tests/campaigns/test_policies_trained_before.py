@@ -312,7 +312,7 @@ def test_played__a_policy_that_was_changed_is_played_anew_in_its_arms_only(playe
     run = shutil.copytree(played, tmp_path / "run")
     policy = some_policy()
     write_policy(type(policy)(policy.tensors, {"stage": "speedy-seed1"}), tmp_path / "policies" / "speedy-seed1")
-    done = harness("campaign", write_played(tmp_path, personas=[str(SPEEDY)]), "--out", run)
+    done = harness("campaign", write_played(tmp_path, personas=[str(SPEEDY)]), "--out", run, "--jobs", 1)
     assert done.returncode == 0, done.stdout + done.stderr
     started = {line.split()[1] for line in done.stdout.splitlines() if line.startswith("started")}
     assert started == {"speedy_alone-seed1", "naive_vs_speedy-seed1", "retrained_vs_speedy-seed1"}

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from harness.cli.main import app
 from harness.errors import UsageError
 from tests.support.repository import REPOSITORY
+from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES
 
 MERGE = REPOSITORY / "tests" / "data" / "merge"
 Run = Callable[..., list[str]]
@@ -32,6 +33,11 @@ def lines_of(monkeypatch: pytest.MonkeyPatch) -> Run:
         return [line.rstrip() for line in result.output.splitlines()]
 
     return run
+
+
+def lanes_in(lines: list[str]) -> list[str]:
+    """The rows of the table of lanes, without its head."""
+    return lines[1 : lines.index("") if "" in lines else None]
 
 
 def net_file(folder: Path) -> Path:
@@ -56,14 +62,16 @@ def test_show__of_a_compressed_net(tmp_path: Path, lines_of: Run) -> None:
 def test_show__says_how_many_lanes_are_left_out(generate_net: Callable[..., Path], lines_of: Run) -> None:
     net = generate_net("--grid", "--grid.number", "3")
     lines = lines_of("scene", "show", net, "--rows", "5")
-    lanes = [line for line in lines[1:-1] if not line.startswith(" ")]  # a lane may lead to several edges
+    lanes = [line for line in lanes_in(lines) if not line.startswith(" ")]  # a lane may lead to several edges
     assert len(lanes) == 5
-    assert lines[-1].startswith("19 more lanes are not listed")
+    assert lines[-2].startswith("19 more lanes are not listed")
+    assert re.match(r"\d+ more conflicts are not listed", lines[-1])
 
 
 def test_show__near_an_edge_lists_it_first(generate_net: Callable[..., Path], lines_of: Run) -> None:
     net = generate_net("--grid", "--grid.number", "3", "--grid.length", "200")
-    names = [line.split()[0] for line in lines_of("scene", "show", net, "--near", "A0A1", "--within", "30")[1:]]
+    lines = lines_of("scene", "show", net, "--near", "A0A1", "--within", "30")
+    names = [line.split()[0] for line in lanes_in(lines)]
     assert names[0] == "A0A1_0"
     assert {"A1A0_0", "A1A2_0", "A1B1_0"} <= set(names)
     assert "C1C2_0" not in names
@@ -72,6 +80,60 @@ def test_show__near_an_edge_lists_it_first(generate_net: Callable[..., Path], li
 def test_show__an_edge_that_does_not_exist_is_refused_by_name(lines_of: Run) -> None:
     with pytest.raises(UsageError, match=r"no edge 'aproach'.*did you mean 'approach'"):
         lines_of("scene", "show", MERGE, "--near", "aproach")
+
+
+def crossing_of_two_roads(build_net: Callable[..., Path], *options: str) -> Path:
+    return build_net(CROSSING_NODES, CROSSING_EDGES, "", "--no-turnarounds", *options)
+
+
+def conflicts_in(lines: list[str]) -> set[tuple[str, ...]]:
+    """The rows of the table of conflicts, without their numbers."""
+    rows = [re.split(r"  +", line) for line in lines[lines.index("") + 2 :]]
+    assert [row[0] for row in rows] == [str(k + 1) for k in range(len(rows))]
+    return {tuple(row[1:]) for row in rows}
+
+
+# Two one-way roads with a lane each: eastward w, c, e with priority; northward s, c, n. Cars may turn from one into the
+# other, so where each of them ends another way merges, and eastward and northward cars cross.
+@pytest.mark.parametrize("options", [(), ("--lefthand",)])
+def test_show__lists_the_conflicts_with_the_side_that_has_priority(
+    options: tuple[str, ...], build_net: Callable[..., Path], lines_of: Run
+) -> None:
+    assert conflicts_in(lines_of("scene", "show", crossing_of_two_roads(build_net, *options))) == {
+        ("c", "crossing", "wc_0 to ce_0", "sc_0 to cn_0", "the first"),
+        ("c", "merging", "wc_0 to ce_0", "sc_0 to ce_0", "the first"),
+        ("c", "merging", "wc_0 to cn_0", "sc_0 to cn_0", "the first"),
+    }
+
+
+@pytest.mark.parametrize(
+    ("kind", "priority"), [("traffic_light", "signals, then the first"), ("allway_stop", "first to arrive")]
+)
+def test_show__conflicts_at_signals_and_stops(
+    kind: str, priority: str, build_net: Callable[..., Path], lines_of: Run
+) -> None:
+    nodes = CROSSING_NODES.replace('y="0" type="priority"/><node id="e"', f'y="0" type="{kind}"/><node id="e"')
+    net = build_net(nodes, CROSSING_EDGES, "", "--no-turnarounds")
+    crossing = [row for row in conflicts_in(lines_of("scene", "show", net)) if row[1] == "crossing"]
+    assert [row[-1] for row in crossing] == [priority]
+
+
+@pytest.mark.parametrize(("options", "y_m"), [((), -1.6), (("--lefthand",), 1.6)])
+def test_show__draws_the_number_of_a_conflict_where_the_lanes_cross(
+    options: tuple[str, ...], y_m: float, tmp_path: Path, build_net: Callable[..., Path], lines_of: Run
+) -> None:
+    page = tmp_path / "crossing.html"
+    lines_of("scene", "show", crossing_of_two_roads(build_net, *options), "--html", page)
+    text = page.read_text(encoding="utf-8")
+    marks = re.findall(
+        r'<circle class="conflict" cx="([-.\d]+)" cy="([-.\d]+)".*?<title>conflict (\d+): (.*?)</title>', text
+    )
+    (crossing,) = [mark for mark in marks if " crosses " in mark[3]]
+    # the nodes are in lines x = 100 and y = 100; lanes of 3.2 m are on the right or on the left of them
+    assert (float(crossing[0]), -float(crossing[1])) == pytest.approx((100.0 - y_m, 100.0 + y_m), abs=0.2)
+    assert crossing[3] == "wc_0 to ce_0 crosses sc_0 to cn_0; priority: the first"
+    numbers = re.findall(r'<text class="number" x="([-.\d]+)" y="([-.\d]+)">(\d+)</text>', text)
+    assert numbers == [mark[:3] for mark in marks]
 
 
 def test_show__writes_a_page_with_the_players_of_the_scene(tmp_path: Path, lines_of: Run) -> None:

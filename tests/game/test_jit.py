@@ -16,28 +16,26 @@ from tests.support.repository import REPOSITORY
 
 HOLD_TURN = """
 import sys
+from pathlib import Path
 from harness.game import jit
 print("waiting", flush=True)
-with jit._turn():
+with jit._turn(Path(sys.argv[1])):
     print("in turn", flush=True)
     sys.stdin.readline()
 """
 
 
 @pytest.fixture
-def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The cache's folder, moved to a temporary one that does not exist yet."""
-    folder = tmp_path / "compiled"
-    monkeypatch.setattr(jit, "_cache", lambda: folder)
-    return folder
+def cache(tmp_path: Path) -> Path:
+    """A folder of the cache that does not exist yet."""
+    return tmp_path / "compiled"
 
 
-def turn_holder(cache_home: Path) -> subprocess.Popen[str]:
+def turn_holder(folder: Path) -> subprocess.Popen[str]:
     """A process that takes the turn and keeps it until its input ends."""
     return subprocess.Popen(
-        [sys.executable, "-c", HOLD_TURN],
+        [sys.executable, "-c", HOLD_TURN, folder],
         cwd=REPOSITORY,
-        env={**os.environ, "XDG_CACHE_HOME": str(cache_home)},
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -49,26 +47,27 @@ def line_of(process: subprocess.Popen[str]) -> str:
     return process.stdout.readline().strip()
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="XDG_CACHE_HOME")
-def test_turn__passes_to_the_next_process_when_its_process_dies(tmp_path: Path) -> None:
+def test_turn__of_a_folder_passes_to_the_next_process_when_its_process_dies(tmp_path: Path) -> None:
     first = turn_holder(tmp_path)
-    second = None
+    second = third = None
     try:
         assert [line_of(first), line_of(first)] == ["waiting", "in turn"]
         second = turn_holder(tmp_path)
         assert line_of(second) == "waiting"
         with pytest.raises(subprocess.TimeoutExpired):
             second.communicate(timeout=0.5)  # the end of its input does not end it: it is not in turn
+        third = turn_holder(tmp_path / "another version")
+        assert [line_of(third), line_of(third)] == ["waiting", "in turn"]
         first.kill()
         assert second.communicate(timeout=30)[0].split("\n")[-2] == "in turn"
     finally:
-        for process in filter(None, (first, second)):
+        for process in filter(None, (first, second, third)):
             process.kill()
             process.communicate()
 
 
 def test_turn__is_reentrant(cache: Path) -> None:
-    with jit._turn(), jit._turn():
+    with jit._turn(cache), jit._turn(cache):
         assert jit._depth == 2
     assert jit._depth == 0
     assert [each.name for each in cache.iterdir()] == ["turn"]
@@ -76,13 +75,13 @@ def test_turn__is_reentrant(cache: Path) -> None:
 
 def test_turn__does_not_need_a_writable_folder(cache: Path) -> None:
     cache.write_text("a file, not a folder")
-    with jit._turn():
+    with jit._turn(cache):
         assert jit._depth == 1
 
 
 def test_turn__does_not_need_a_writable_file(cache: Path) -> None:
     (cache / "turn").mkdir(parents=True)
-    with jit._turn():
+    with jit._turn(cache):
         assert jit._depth == 1
 
 
@@ -93,5 +92,5 @@ def test_turn__does_not_need_locks_of_the_file_system(cache: Path, monkeypatch: 
         raise OSError(errno.ENOSYS, os.strerror(errno.ENOSYS))
 
     monkeypatch.setattr(fcntl, "flock", no_locks)
-    with jit._turn():
+    with jit._turn(cache):
         assert jit._depth == 1

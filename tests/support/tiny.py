@@ -180,12 +180,13 @@ def numbers(run: Path) -> dict[str, bytes]:
 
 def finished(*options: object, **changes: Any) -> Path:
     """The run folder of a finished campaign, beside its document and `printed`, what the command printed. Built once
-    for the whole test session, by the campaign's name: tests read it, and none may change it."""
-    name = changes["name"]
+    for the whole test session, by the campaign's name: tests read it, and none may change it. It has one worker unless
+    the options say otherwise: each loads PyTorch, and tests run in as many processes as there are cores."""
+    name, jobs = changes["name"], () if "--jobs" in options else ("--jobs", 1)
 
     def build(folder: Path) -> None:
         campaign = write_campaign(folder, **changes)
-        done = harness("campaign", campaign, "--out", campaign.with_suffix(""), *options)
+        done = harness("campaign", campaign, "--out", campaign.with_suffix(""), *jobs, *options)
         assert done.returncode == 0, done.stdout + done.stderr
         (folder / "printed").write_text(done.stdout, encoding="utf-8")
 

@@ -109,6 +109,21 @@ def test_lane_marks__are_between_the_lanes_whatever_way_the_road_goes(build_net)
     assert sorted(float(mark[0, 0]) for mark in lane_marks(read_net(net))) == pytest.approx([-1.6, 1.6])
 
 
+@pytest.mark.parametrize("options", [(), ("--lefthand",)])
+def test_lane_marks__are_between_lanes_of_different_widths_on_either_side(build_net, options):
+    net = build_net(
+        '<node id="a" x="0" y="0"/><node id="b" x="100" y="0"/>',
+        '<edge id="road" from="a" to="b" numLanes="3" spreadType="center">'
+        '<lane index="0" width="2.0"/><lane index="1" width="3.0"/><lane index="2" width="4.0"/></edge>',
+        "",
+        *options,
+    )
+    outwards = 1.0 if options else -1.0  # SUMO's lane 0 is on the left side where traffic keeps left
+    # 9 m around the line y = 0, from the outer side: 4.5 to 2.5, 2.5 to -0.5, -0.5 to -4.5
+    marks = [outwards * float(mark[0, 1]) for mark in lane_marks(read_net(net))]
+    assert sorted(marks) == pytest.approx([-0.5, 2.5])
+
+
 def test_scene__is_opened_from_a_copy_alone(merge, tmp_path):
     for name in ("scene.toml", "merge.net.xml", "merge.rou.xml"):
         (tmp_path / name).write_bytes((merge.folder / name).read_bytes())
