@@ -85,7 +85,6 @@ class Arena:
         only those near a player; this costs time. Raises SimulationError if SUMO can't load the scene.
         """
         self.scene, self.world, self.games = scene, scene.world, games
-        self._roles = scene.world.roles
         self.seats = tuple((each,) if isinstance(each, Seat) else tuple(each) for each in seats)
         first_drivers = [of_player[0].driver for of_player in self.seats]
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
@@ -192,7 +191,7 @@ class Arena:
                     noise = self._noise[games, player, now[games]]
                     decided = seat.driver.decide(games, self.observation[games, player], noise)
                     chosen[games, player] = checked_decisions(
-                        decided, seat.driver, role=self._roles[player], games=games, steps=state.step
+                        decided, seat.driver, role=self.world.roles[player], games=games, steps=state.step
                     )
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)

@@ -7,7 +7,7 @@ noise, independent of their drivers. Arms are therefore paired.
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import atan2, hypot
@@ -191,7 +191,7 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
         ego_mps, ego_m = poses[0][-2:] if poses else (speed, 0.0)
         position = place.position_m(share, speed, ego_m, ego_mps)
         poses.append((*place.pose(position, length), speed, position))
-    present = _present([next(draws) for _ in players], start_distribution.present_share)
+    present = _present(draws, start_distribution.present_share)
     member = [
         0 if len(shares) == 1 else draw_member(shares, player, *parts)
         for player, shares in enumerate(start_distribution.shares)
@@ -236,10 +236,16 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
     )
 
 
-def _present(draws: Sequence[float], shares: Sequence[float]) -> list[bool]:
-    """Which players take part: players with shares below 1 are absent together, by the draw of the first of them."""
-    deciding = next((draw for draw, share in zip(draws, shares, strict=True) if share < 1.0), 0.0)
-    return [deciding < share for share in shares]
+def _present(draws: Iterator[float], shares: Sequence[float]) -> list[bool]:
+    """Which players take part, by a draw each: those with shares below 1 are absent together, by the first one's."""
+    present: list[bool] = []
+    deciding = None
+    for share in shares:
+        draw = next(draws)
+        if share < 1.0 and deciding is None:
+            deciding = draw
+        present.append(deciding is None or deciding < share or share >= 1.0)
+    return present
 
 
 def _varied(bounds: tuple[float, float], name: str, *parts: str | int) -> float:

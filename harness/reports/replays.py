@@ -64,7 +64,7 @@ def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tu
         return None
     game = min(games, key=_worst)
     (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
-    return _key(game), page_wording.worst_game(game["episode"], outcome, ttc)
+    return _key(game), page_wording.worst_game(game["episode"], outcome, ttc, _with(game))
 
 
 def keys(episodes: pd.DataFrame) -> list[str]:

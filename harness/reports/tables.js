@@ -64,7 +64,7 @@ function filters(table, rows) {
     }
     count.textContent = `${shown} of ${rows.length} games`;
   };
-  for (const name of columns.filter(each => each === "arm" || each.endsWith("ego_outcome") || /^non_ego_\d_outcome$/.test(each))) {
+  for (const name of columns.filter(each => /^(arm|ego_outcome|non_ego(_\d)?_outcome)$/.test(each))) {
     const place = columns.indexOf(name);
     const values = [...new Set(rows.map(row => exactOf(row.cells[place])))];
     if (values.length < 2 || values.length > MOST_CHOICES) continue;

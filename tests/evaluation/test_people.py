@@ -13,8 +13,8 @@ from harness.evaluation.manoeuvres import find_manoeuvres, pair_of
 from harness.evaluation.people import COLLIDED_WITH, columns_for, judged, judged_outcomes, people_in
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import EPISODE_COLUMNS, read_csv, typed, write_csv
-from tests.evaluation.test_trace_quantities import drawn
 from tests.support.scenes import LEFT_Y, RIGHT_Y, THREE_PEOPLE, build_scene
+from tests.support.traces import drawn
 
 PEOPLE = ("non_ego_1", "non_ego_2", "non_ego_3")
 

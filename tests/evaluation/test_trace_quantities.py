@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from harness.campaign.results.recorded_games import recorded_games
@@ -10,18 +9,7 @@ from harness.evaluation.trace_quantities import drove_in, series_of
 from harness.game.state import ROLES
 from harness.traffic.scene import open_scene
 from tests.support.tiny import learned_run, sumo_run
-
-
-def drawn(**players):
-    """A trace of players that drive straight on approach_1 or _0 of networks/merge: x (m) per step, speed, y."""
-    rows = []
-    for name, (places, speed_mps, y_m, outcomes) in players.items():
-        for step, x_m in enumerate(places):
-            cells = {"episode": 0, "step": step, "time_s": step * 0.1, "player": name, "vehicle_type": "ego_car"}
-            cells |= {"x_m": x_m, "y_m": y_m, "heading_rad": 0.0, "speed_mps": speed_mps, "acceleration_mps2": 0.0}
-            rows.append(cells | {"steering_rad": 0.0, "lapsed": False, "outcome": outcomes.get(step, "")})
-    return pd.DataFrame(rows)
-
+from tests.support.traces import drawn
 
 SIZES_M = dict.fromkeys((*ROLES, "other"), (4.6, 1.8))
 

@@ -52,6 +52,9 @@ def bombs(file: str) -> list[Bad]:
     ]
 
 
+PERSON = '[[non_ego]]\nvehicle = "non_ego"\nlane = "approach_0"\nposition_m = [20.0, 20.1]\nspeed_mps = [11.0, 14.0]\n'
+
+
 # --- campaigns --------------------------------------------------------------------------------------------------------
 
 ODD_NAMES = {
@@ -100,6 +103,8 @@ CAMPAIGNS = [
     *no_numbers(CAMPAIGN, "significance = 0.01", "assessment.significance"),
     *no_numbers(CAMPAIGN, "learning_rate = 1e-4", "training.learning_rate"),
     *no_numbers(CAMPAIGN, "alone_share = 0.25", "non_ego_training.alone_share"),
+    Bad("tiny.toml: a crowd for one person", edit(CAMPAIGN, "[assessment]", '[[crowd]]\nname = "mixed"\npersonas = ["anna", "anna"]\n[assessment]'), ("tiny.toml: crowd[0]", "one person")),
+    Bad("tiny.toml: a crowd of one", edit(CAMPAIGN, "[assessment]", '[[crowd]]\nname = "mixed"\npersonas = ["anna"]\n[assessment]'), ("tiny.toml: crowd[0].personas",)),
     *(Bad(f"tiny.toml: named {way}", edit(CAMPAIGN, '"tiny"', f'"{name}"'), ("tiny.toml: name",)) for way, name in ODD_NAMES.items()),
     *odd_paths("scene", '"../networks/road"'),
     *odd_paths("personas[0]", '["../personas/anna.toml"]', "[", "]"),
@@ -254,6 +259,9 @@ SCENES = [
         ("a place in the cycle that ends before it begins", "[goal]", "[varies]\nsignal_place = [0.5, 0.1]\n[goal]", ("varies.signal_place", "empty")),
         ("a place in the cycle without a light", "[goal]", "[varies]\nsignal_place = [0.0, 0.5]\n[goal]", ("varies.signal_place", "no player's route passes a traffic light")),
         ("a phase by number", "[goal]", "[varies]\nsignal_phase = 9\n[goal]", ("varies.signal_phase: unknown key", "'signal_place'")),
+        ("five people", "[non_ego]", PERSON * 4 + "[[non_ego]]", ("non_ego: 5 people", "one to 4")),
+        ("three people on one place", "[non_ego]", PERSON * 3 + "[[non_ego]]", ("non_ego_2: non_ego_1 and non_ego_2 overlap",)),
+        ("a person of several without a vehicle", "[non_ego]", PERSON + PERSON.replace('"non_ego"', '"nonego"') + "[[non_ego]]", ("non_ego_2.vehicle", "'non_ego'")),
         ("a list of nets", 'net = "merge.net.xml"', 'net = ["merge.net.xml"]', ("net",)),
     ),
     Bad("scene.toml: a net misspelt", edit(SCENE, '"merge.net.xml"', '"merg.net.xml"'), ("merg.net.xml", "'merge.net.xml'")),

@@ -122,7 +122,9 @@ class StageProgress:
 def _running_line(event: Event, unit: str, task: Task) -> str:
     left_s = task.time_remaining
     left = f", {timedelta(seconds=round(left_s))} left" if left_s is not None else ""
-    return f"running  {event.stage}: {event.done:,} of {event.total:,} {unit}{left}"
+    done = f"{event.done:,} of {event.total:,}"
+    what = f"waiting  {event.stage}: {unit}, {done}" if event.message else f"running  {event.stage}: {done} {unit}"
+    return what + left
 
 
 def _done_line(event: Event) -> str:

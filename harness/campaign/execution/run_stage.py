@@ -132,7 +132,7 @@ def _train(stage: TrainingStage, run: StageRun) -> Made:
         parts=("training", stage.seed, stage.name),
         as_it_drives=stage.is_best_response,
     )
-    card = _policy_card(stage, spec, settings)
+    card = _policy_card(stage, spec, settings) | ({"people": run.people} if several else {})
     checkpoint = folder.work(stage.id) / "checkpoint.safetensors"
     versions = _versions_since(checkpoint)
     try:

@@ -29,7 +29,7 @@ from harness.errors import UsageError
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
-from harness.game.state import NON_EGO, ROLES
+from harness.game.state import EGO, NON_EGO, ROLES
 from harness.reports.numbers import interval, number, percent
 from harness.reports.page_wording import stopped
 
@@ -145,6 +145,9 @@ def _facts(
     yield "scene", f"`{policy['scene']}`"
     partner = {None: "no other player", "sumo": "SUMO's own driver", "given": _given(manifest, campaign)}
     yield "against", partner.get(against, f"`{against}`")
+    if isinstance(people := policy.get("people"), int) and against is not None:
+        learns = "it learned in each place, beside SUMO's own driver in the others"
+        yield "people in a game", f"{people}" if policy["player"] == ROLES[EGO] else f"{people}; {learns}"
     if against is not None:
         how = campaign.retraining if entry["name"] != entry["persona"] else campaign.non_ego_training
         yield "games without the other player", percent(how.alone_share)
