@@ -15,10 +15,13 @@ def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, ste
 
         steering = atan(wheelbase curvature) + heading_gain turned + atan(offset_gain left / (v + softening))
 
-    where `left` is the distance of the path to the left of the front axle. The angle and its rate are limited so that
-    lateral acceleration and lateral jerk stay within UN R79.
+    where `turned` is the direction of the path relative to that in which the middle of the car moves when it follows
+    the path, and `left` is the distance of the path to the left of the front axle. In a bend a car on its path points
+    outwards by the steady-state yaw of that paper, atan(tan(steering) / 2): without this term it would cut the bend.
+    The angle and its rate are limited so that lateral acceleration and lateral jerk stay within UN R79.
     """
-    turned, speed = motion.path_turned_rad[:, 0], motion.speed_mps
+    steady_yaw = np.arctan(0.5 * np.tan(motion.road_steering_rad))
+    turned, speed = motion.path_turned_rad[:, 0] - steady_yaw, motion.speed_mps
     left = motion.path_left_m + 0.5 * wheelbase_m * np.sin(turned)
     wanted = (
         motion.road_steering_rad

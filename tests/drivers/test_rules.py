@@ -281,10 +281,12 @@ def test_steering__by_hand() -> None:
 
 
 def test_steering__adds_the_angle_that_follows_the_road() -> None:
-    """On the path and along it, in a bend for which the road asks 0.08 rad: nothing else is added."""
+    """On the path in a bend for which the road asks 0.08 rad: nothing else is added. The middle of the car then moves
+    along the path, and the car points outwards by atan(tan(0.08) / 2): its circle is around a point beside the rear axle.
+    """
     law = LaneKeeping(max_lateral_mps2=6.0, max_lateral_jerk_mps3=20.0)
     for road in (0.08, -0.08):
-        view = motion(9.0, 13.9, steering=road, road=road)
+        view = motion(9.0, 13.9, turned=np.arctan(0.5 * np.tan(road)), steering=road, road=road)
         assert steering_rad(view, law=law, wheelbase_m=2.7, step_s=0.1)[0] == pytest.approx(road)
 
 
@@ -420,6 +422,15 @@ def test_games__a_bend_is_driven_slower_and_in_the_lane(repository: Path, tmp_pa
         assert (record["ego_outcome"], record["error"]) == ("goal", "")
         assert 1.0 < record["ego_max_lateral_acceleration_mps2"] <= 3.1
         assert record["ego_max_deceleration_mps2"] <= 3.5
+
+
+@pytest.mark.parametrize("ego", EGOS)
+def test_games__a_roundabout_is_driven_without_touching_the_kerb(repository: Path, ego: str) -> None:
+    """Bends of some 6 m to the right, the left and the right, with 0.7 m beside the car."""
+    roundabout = open_scene(repository / "networks" / "roundabout")
+    (record,) = play(repository, roundabout, ego=ego, other=None, games=1)
+    assert (record["ego_outcome"], record["error"]) == ("goal", "")
+    assert record["ego_max_lateral_acceleration_mps2"] <= 3.1
 
 
 def test_find_driver__makes_a_rule_based_ego(repository: Path, car: Car) -> None:
