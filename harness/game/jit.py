@@ -22,7 +22,7 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 
 COMPILING = "compiling numeric loops, once per installation"
 _LOGGER = logging.getLogger("harness.preparation")
-_functions = 0
+_functions: set[object] = set()  # to be compiled; numba compiles functions of its own besides
 
 
 def compiled(function: _Function) -> _Function:
@@ -31,8 +31,7 @@ def compiled(function: _Function) -> _Function:
     Processes that compile the same version of a package do so in turns, so that each finds the machine code of the
     others on disk. If no folder is writable, every process compiles for itself.
     """
-    global _functions
-    _functions += 1
+    _functions.add(function)
     config: Any = numba.config
     default = config.CACHE_DIR
     config.CACHE_DIR = default or _folder(Path(function.__code__.co_filename).parent)
@@ -55,10 +54,12 @@ class _Compilations(event.Listener):
         self._done: set[object] = set()
 
     def on_start(self, event: event.Event) -> None:
-        _LOGGER.info(COMPILING, extra={"done": len(self._done), "total": _functions})
+        _LOGGER.info(COMPILING, extra={"done": len(self._done), "total": len(_functions)})
 
     def on_end(self, event: event.Event) -> None:
-        self._done.add(event.data["dispatcher"])  # once per function, however many types it is compiled for
+        function = event.data["dispatcher"].py_func
+        if function in _functions:  # once per function, however many types it is compiled for
+            self._done.add(function)
 
 
 event.register("numba:compile", _Compilations())

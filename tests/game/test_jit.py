@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import errno
+import logging
 import os
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
+import numba
+import numpy as np
 import pytest
 
 from harness.game import jit
@@ -64,6 +67,23 @@ def test_turn__of_a_folder_passes_to_the_next_process_when_its_process_dies(tmp_
         for process in filter(None, (first, second, third)):
             process.kill()
             process.communicate()
+
+
+def median_of_sorted(values: np.ndarray) -> float:
+    return float(np.median(np.sort(values)))
+
+
+def test_compiling__is_counted_by_own_functions(
+    cache: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """numba compiles several of its own for this one."""
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(cache))
+    monkeypatch.setattr(jit, "_functions", set())
+    with caplog.at_level(logging.INFO, logger="harness.preparation"):
+        assert jit.compiled(median_of_sorted)(np.array([3.0, 1.0, 2.0])) == 2.0
+    counts = [(record.done, record.total) for record in caplog.records]  # type: ignore[attr-defined]
+    assert len(counts) > 1
+    assert set(counts) == {(0, 1)}
 
 
 def test_turn__is_reentrant(cache: Path) -> None:
