@@ -12,7 +12,7 @@ from typing import Any
 
 import libsumo
 import numpy as np
-from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
+from libsumo import _libsumo  # the same functions without Python wrappers
 from numpy.typing import NDArray
 
 from harness.errors import SimulationError
@@ -20,6 +20,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.neighbours import Search, rows_by_game
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.insertion import Insertion, put_beside
+from harness.traffic.levels import on_players_level
 from harness.traffic.route_file import Departure
 from harness.traffic.simulation import Reading
 from harness.traffic.vehicle_reads import DIRECT, read_near, string_record
@@ -81,9 +82,12 @@ class BackgroundTraffic:
         fastest_player_mps: float,
         recorded: bool,
         insertion: Insertion,
+        roads_m: FloatArray | None = None,
     ) -> None:
+        """`roads_m` are the points [n, 3] of the players' roads: vehicles on other levels are left out of readings."""
         self._prefixes, self._offsets_m, self._step_s = prefixes, offsets_m, step_s
         self._fastest_player_mps, self._recorded, self._insertion = fastest_player_mps, recorded, insertion
+        self._roads_m = roads_m
         self._step = 0
         self._first_step = [0] * len(prefixes)
         self._waiting: dict[int, list[Departure]] = {}  # by game, the next departure last
@@ -105,10 +109,11 @@ class BackgroundTraffic:
             self._table.clear(game)
         self._first_step[game] = self._step
         self._waiting.pop(game, None)
-        if departures:
-            self._waiting[game] = list(reversed(departures))
-            self._depart(game)
-        return _warmed_up(departures) if departures else None
+        if not departures:
+            return None
+        self._waiting[game] = list(reversed(departures))
+        self._depart(game)
+        return _warmed_up(self._on_level(game, departures))
 
     def advance(self) -> None:
         """Process a step of SUMO: arrivals, vehicles that entered the traffic, and departures that are due."""
@@ -142,7 +147,27 @@ class BackgroundTraffic:
             *(self._step, self._step_s, 1 if self._recorded else _LONGEST_WAIT, self._recorded),
         )
         direct = DIRECT and self._sumo_has_all(players_present)
-        return self._reading(*read_near(search, table.sumo_name, table.sumo_record, due, direct))
+        places, motion = read_near(search, table.sumo_name, table.sumo_record, due, direct)
+        if self._roads_m is not None and len(places):
+            names, games = table.sumo_name.ravel()[places], places // table.due.shape[1]
+            near = on_players_level(self._roads_m, self._points(names, games))
+            places, motion = places[near], np.ascontiguousarray(motion[:, near])
+        return self._reading(places, motion)
+
+    def _points(self, sumo_names: NDArray[np.object_], games: IntArray) -> FloatArray:
+        """[m, 3] where vehicles are, with their heights, in the coordinates of the net."""
+        points = np.array([_libsumo.vehicle_getPosition3D(name) for name in sumo_names.tolist()]).reshape(-1, 3)
+        points[:, 1] -= self._offsets_m[games]
+        return points
+
+    def _on_level(self, game: int, departures: Sequence[Departure]) -> list[Departure]:
+        """The vehicles of the warm-up among the departures that are on the level of the players' roads."""
+        vehicles = [each for each in departures if each.motion is not None]
+        if self._roads_m is None or not vehicles:
+            return vehicles
+        names = np.array([self._prefixes[game] + each.name for each in vehicles], dtype=object)
+        near = on_players_level(self._roads_m, self._points(names, np.full(len(names), game)))
+        return [each for each, kept in zip(vehicles, near.tolist(), strict=True) if kept]
 
     def _sumo_has_all(self, players_present: BoolArray) -> bool:
         """Whether SUMO has as many vehicles as were inserted and have neither arrived nor been removed."""

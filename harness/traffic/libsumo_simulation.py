@@ -151,6 +151,7 @@ class LibsumoSimulation:
             fastest_player_mps=float(world.actuators.max_speed_mps.max()),
             recorded=self._recorded,
             insertion=self._traffic,
+            roads_m=self._scene.roads_m,
         )
 
     def reload(self, seed: int) -> None:

@@ -84,14 +84,23 @@ def drivable_area(net: Net, own: Collection[Edge] = ()) -> BaseGeometry:
     over one another, and without `own`, the levels are one area.
     """
     edges = _near(net, own) if own else net.getEdges(withInternal=True)
-    own_edges = set(own)
-    nodes = {node for edge in own_edges for node in (edge.getFromNode(), edge.getToNode())}
-    parts = [*_lane_parts(net, edges, own_edges, nodes), *_junction_parts(edges, nodes)]
-    level = surface.own_level(parts)
-    is_cut = any(part is not kept for part, kept in zip(parts, level, strict=True))
+    level, is_cut = _own_level(net, edges, own)
     area = surface.without_slits(surface.joined([part.shape for part in level if not part.shape.is_empty]))
-    followed = [edge for edge in edges if edge in own_edges] if is_cut else edges
+    followed = [edge for edge in edges if edge in set(own)] if is_cut else edges
     return surface.with_swept_paths(area, list(_followed_lines(net, followed)))
+
+
+def passes_other_levels(net: Net, own: Collection[Edge]) -> bool:
+    """Whether other roads pass over or under the edges `own` of the players' routes."""
+    return _own_level(net, _near(net, own), own)[1]
+
+
+def _own_level(net: Net, edges: Sequence[Edge], own: Collection[Edge]) -> tuple[list[Part], bool]:
+    """The parts of edges on the level of `own`, and whether parts of other levels were cut off."""
+    nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
+    parts = [*_lane_parts(net, edges, set(own), nodes), *_junction_parts(edges, nodes)]
+    level = surface.own_level(parts)
+    return level, any(part is not kept for part, kept in zip(parts, level, strict=True))
 
 
 def junctions_near(net: Net, own: Collection[Edge]) -> frozenset[str] | None:

@@ -26,6 +26,7 @@ from harness.game.seeding import between
 from harness.game.world import World
 from harness.traffic import network
 from harness.traffic.departures import background_departures, check_departures, edges_of
+from harness.traffic.levels import heights_of_players_roads
 from harness.traffic.net_file import check_net
 from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
@@ -49,6 +50,7 @@ class OpenScene:
     edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
     rail_lines: tuple[FloatArray, ...]
     junctions: frozenset[str] | None = None  # those that games need; None: all of the net
+    roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
 
     @property
     def net_file(self) -> Path:
@@ -187,6 +189,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
         junctions=network.junctions_near(net, [*own, *_background_edges(vehicles, net, routes)]),
+        roads_m=heights_of_players_roads(net, own),
     )
     factors, present = [HumanFactors()] * len(places), [1.0] * len(places)
     check_starts(document_file, scene.start_distribution(factors, present), world)

@@ -1,0 +1,52 @@
+"""The levels of roads: which background vehicles are above or below the players' roads, so that no player meets them.
+
+The road of a game is flat: the drivable area has the level of the players' routes (`network.drivable_area`), and so
+have contact and observation. A vehicle on a bridge over a player's road, or under it, takes no part in the game.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+from sumolib.net import Net
+from sumolib.net.edge import Edge
+
+from harness.game.arrays import BoolArray, FloatArray
+from harness.traffic.network import passes_other_levels
+from harness.traffic.surface import CLEARANCE_M
+
+_SPACING_M = 4.0  # between points of the players' roads
+_AT_ONE_PLACE_M = 5.0  # points of the players' roads whose distances differ by less are at one place
+_GRADE, _RISE_M = 0.06, 1.5  # a road beside the players' roads may rise by so much per metre, and in all; bridges more
+
+
+def heights_of_players_roads(net: Net, own: Collection[Edge]) -> FloatArray | None:
+    """[n, 3] points of the edges `own` of the players' routes and of the junctions on them; None if no other road
+    passes over or under them."""
+    if not passes_other_levels(net, own):
+        return None
+    nodes = {node for edge in own for node in (edge.getFromNode(), edge.getToNode())}
+    inside = [edge for edge in net.getEdges() if edge.isSpecial() and edge.getFromNode() in nodes]
+    lanes = [lane for edge in [*own, *inside] for lane in edge.getLanes()]
+    return np.concatenate([_points(np.array(lane.getShape3D(), dtype=float)) for lane in lanes])
+
+
+def _points(line: FloatArray) -> FloatArray:
+    """[m, 3] points of a line [n, 3] at equal distances, with both ends."""
+    along_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(line[:, :2], axis=0).T))))
+    places_m = np.linspace(0.0, along_m[-1], int(along_m[-1] / _SPACING_M) + 2)
+    return np.stack([np.interp(places_m, along_m, column) for column in line.T], axis=1)
+
+
+def on_players_level(roads: FloatArray, places: FloatArray) -> BoolArray:
+    """[m] whether vehicles at places [m, 3] are on the level of the players' roads, given as points [n, 3].
+
+    The height of a vehicle is compared with that of the players' roads where they are nearest to it.
+    """
+    away_m = np.hypot(*(places[:, None, :2] - roads[None, :, :2]).transpose(2, 0, 1))
+    nearest_m = away_m.min(1)
+    differences_m = np.abs(places[:, None, 2] - roads[None, :, 2])
+    least_m = np.where(away_m <= nearest_m[:, None] + _AT_ONE_PLACE_M, differences_m, np.inf).min(1)
+    on_level: BoolArray = least_m <= CLEARANCE_M + np.minimum(_GRADE * nearest_m, _RISE_M)
+    return on_level
