@@ -88,11 +88,11 @@ def _worst(game: Mapping[Any, Any]) -> tuple[Any, ...]:
 
 def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: Container[str]) -> Replay:
     arm, seed, episode = game["arm"], game["seed"], game["episode"]
-    name, outcome = judged(game)
+    who, outcome = judged(game)
     return Replay(
         name=name,
         game=f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
-        outcome=f"{_in_words(name)}: {outcome}{_with(game)}",
+        outcome=f"{_in_words(who)}: {outcome}{_with(game)}",
         min_ttc=number(game["ego_min_ttc_s"], 2),
         command=f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
         scene=_scene(name),
