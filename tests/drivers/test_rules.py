@@ -282,7 +282,7 @@ def test_steering__by_hand() -> None:
 
 def test_steering__adds_the_angle_that_follows_the_road() -> None:
     """On the path in a bend for which the road asks 0.08 rad: nothing else is added. The middle of the car then moves
-    along the path, and the car points outwards by atan(tan(0.08) / 2): its circle is around a point beside the rear axle.
+    along the path, and the car points outwards by atan(tan(0.08) / 2): the bend's centre is beside the rear axle.
     """
     law = LaneKeeping(max_lateral_mps2=6.0, max_lateral_jerk_mps3=20.0)
     for road in (0.08, -0.08):
