@@ -54,12 +54,10 @@ class _Compilations(event.Listener):
         self._done: set[object] = set()
 
     def on_start(self, event: event.Event) -> None:
-        _LOGGER.info(COMPILING, extra={"done": len(self._done), "total": len(_functions)})
+        _LOGGER.info(COMPILING, extra={"done": len(self._done & _functions), "total": len(_functions)})
 
     def on_end(self, event: event.Event) -> None:
-        function = event.data["dispatcher"].py_func
-        if function in _functions:  # once per function, however many types it is compiled for
-            self._done.add(function)
+        self._done.add(event.data["dispatcher"].py_func)  # once per function, however many types it is compiled for
 
 
 event.register("numba:compile", _Compilations())

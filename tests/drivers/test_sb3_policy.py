@@ -120,9 +120,9 @@ class Other(gymnasium.Env[Any, Any]):
     [
         (
             (12, -1.0, 2),
-            "observation_space: its observation space is Box(-1.0, 1.0, (12,), float32), not Box(-1.0, 1.0, (97,)",
+            "observation_space: its observation space is Box(-1.0, 1.0, (12,), float32), not Box(-1.0, 1.0, (98,)",
         ),
-        ((SIZE, 0.0, 2), "its observation space is Box(0.0, 1.0, (97,), float32), not"),
+        ((SIZE, 0.0, 2), "its observation space is Box(0.0, 1.0, (98,), float32), not"),
         ((SIZE, -1.0, 1), "action_space: its action space is Box(-1.0, 1.0, (1,), float32), not Box(-1.0, 1.0, (2,)"),
     ],
 )

@@ -161,7 +161,7 @@ segments.assess = lambda arm, episodes, begin, abandoned: (game(each) for each i
 segments.name_manoeuvres = lambda table, traces, scene: segments.pd.DataFrame(columns=list(MANOEUVRE_COLUMNS))
 from harness.evaluation.tables import MANOEUVRE_COLUMNS
 class Anyone:
-    scene = None
+    scene, drivers = None, (None, None)
 parts = segments.segments_of(folder / "segments", episodes)
 segments.play_segments(Anyone, parts, {"arm": "a", "persona": "", "seed": 1}, FIRST, None, lambda done, total: None)
 segments.join_segments(parts, folder / "e.csv", folder / "m.csv", folder / "t.parquet")
