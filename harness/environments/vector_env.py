@@ -70,7 +70,7 @@ class GamesVecEnv(VecEnv):
 class ArenaVecEnv(GamesVecEnv):
     """G games of one learner, as Stable-Baselines3's `VecEnv`. A game ends when the learner's part in it ends.
 
-    Observation: Box(-1, 1, (98,), float32) per game, [G, 97]; entries as in
+    Observation: Box(-1, 1, (98,), float32) per game, [G, 98]; entries as in
     `harness.environments.gymnasium_env.DrivingEnv`.
 
     Action: Box(-1, 1, (2,), float32) per game, [G, 2]: pedals and wheel.

@@ -17,8 +17,8 @@ from harness.traffic.network import passes_other_levels
 from harness.traffic.surface import CLEARANCE_M
 
 _SPACING_M = 4.0  # between points of the players' roads
-_AT_ONE_PLACE_M = 5.0  # points of the players' roads whose distances differ by less are at one place
-_GRADE, _RISE_M = 0.06, 1.5  # a road beside the players' roads may rise by so much per metre, and in all; bridges more
+_AT_ONE_PLACE_M = 5.0  # our own: points of the players' roads whose distances differ by less are at one place
+_GRADE, _RISE_M = 0.06, 1.5  # our own: a road beside the players' roads rises by at most so much per metre, and in all
 
 
 def heights_of_players_roads(net: Net, own: Collection[Edge]) -> FloatArray | None:
