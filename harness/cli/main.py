@@ -241,7 +241,7 @@ def _show(outcome: RunResult, run: Path, console: Console) -> None:
     for verdict in outcome.verdicts:
         label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
         console.print(label, style=f"bold {styles[verdict.tone]}", highlight=False, markup=False)
-        for sentence in (verdict.sentence, verdict.speed):
+        for sentence in (verdict.sentence, *verdict.causes, verdict.speed):
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
     _print_plain([wording.report_written(run)], console)

@@ -152,7 +152,8 @@ def _facts(persona: str, change: Change | None, found: Results) -> list[tuple[st
     facts: list[tuple[str, Sequence[str]]] = []
     causes = {seed: page_wording.causes(row) for seed, row in against.items() if failures(row)}
     if causes:
-        facts.append((page_wording.how_it_fails(persona), page_wording.by_seed(causes)))
+        lines = [*page_wording.by_seed(causes), *found.causes("RQ1", persona)]
+        facts.append((page_wording.how_it_fails(persona), lines))
     facts.append((page_wording.ORDINARY_DRIVER, _ordinary_driver(persona, found)))
     by_driver = [row for row in found.by_driver if row["population"] == persona]
     if by_driver:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
+from harness.evaluation.causes.sentences import cause_lines
 from harness.evaluation.people import people_in
 from harness.evaluation.strategies import ReconfiguredEgo
 from harness.reports import wording
@@ -38,6 +39,8 @@ class Results:
     """The personas of each crowd, in the order of the scene's people."""
     by_driver: Sequence[Row]
     """Rows of `populations`: each arm against a population, by the persona that drove."""
+    failures: pd.DataFrame
+    """Rows of `causes`."""
 
     def of(self, arm: str) -> dict[int, Row]:
         """The arm's rows by seed, where there are games that could be played."""
@@ -68,6 +71,13 @@ class Results:
             who=self._who(persona),
         )
 
+    def causes(self, question: str, persona: str) -> tuple[str, ...]:
+        """Why the ego failed against a persona in the arm that a question is about, a line for each kind of cause."""
+        if question not in ARMS:
+            return ()
+        _, treatment = ARMS[question](persona, self.change)
+        return tuple(cause_lines(self.failures[self.failures["arm"] == treatment]))
+
     def _who(self, persona: str) -> str:
         """What the ego meets, if it is not one driver with a persona."""
         if persona in self.crowds:
@@ -94,6 +104,7 @@ def results(tables: RunTables) -> Results:
         people=len(people_in(tables.episodes.columns)),
         crowds={each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())},
         by_driver=tables.populations.to_dict("records"),
+        failures=tables.causes,
     )
 
 

@@ -34,6 +34,7 @@ class RunTables:
     reconfiguration: pd.DataFrame = field(default_factory=_empty("reconfiguration"))
     """Empty: the report has no section on searches."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
+    causes: pd.DataFrame = field(default_factory=_empty("causes"))
     manoeuvres: pd.DataFrame | None = None
     """None: the report has no section on manoeuvres."""
     game: GameFindings | None = None
@@ -51,6 +52,7 @@ class RunTables:
             training=typed(self.training),
             reconfiguration=typed(self.reconfiguration),
             populations=typed(self.populations),
+            causes=typed(self.causes),
             manoeuvres=None if self.manoeuvres is None else typed(self.manoeuvres),
         )
 
