@@ -20,13 +20,14 @@ from harness.campaign.plan.people_checks import check_people
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.strategy_drivers import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
-from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego, resolve
+from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
 from harness.config.persona import Persona
 from harness.config.toml_reading import Document, read_document
 from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import Problem, UsageError, collect
 from harness.game.state import EGO
+from harness.shipped_documents import PACKAGE, Kind, find_document, is_name, missing_document
 from harness.traffic.load_check import check_loads
 from harness.traffic.scene import OpenScene, open_scene
 
@@ -135,9 +136,10 @@ def _find_documents(
     """Read and check what a campaign names; what is wrong is added to `problems`."""
     ego_driver = collect(problems, lambda: _find_ego(file, named.ego.driver, allow_code))
     vehicle_type = ego_driver.vehicle_type if ego_driver is not None else None
-    scene = collect(problems, lambda: open_scene(resolve(file, named.scene), vehicle_type))
-    persona_files = [resolve(file, each) for each in (named.ego.persona, *named.personas)]
-    personas = [collect(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
+    scene = collect(problems, lambda: open_scene(_find(file, "scene", named.scene, "networks"), vehicle_type))
+    written = [("ego.persona", named.ego.persona), *(("personas", each) for each in named.personas)]
+    found = [collect(problems, lambda each=each: _read_persona(file, *each)) for each in written]  # type: ignore[misc]
+    personas = [each[1] if each is not None else None for each in found]
     if ego_driver is not None and scene is not None:
         sampled = personas[0] is not None and personas[0].decisions == "sampled"
         games = _games_at_once(document, ego_driver)
@@ -150,7 +152,7 @@ def _find_documents(
         collect(problems, lambda: check_loads(scene))
     return _Documents(
         scene=scene,
-        persona_files=persona_files,
+        persona_files=[each[0] for each in found if each is not None],
         personas=personas,
         ego_driver=ego_driver,
         other_egos=other_egos,
@@ -158,11 +160,26 @@ def _find_documents(
     )
 
 
+def _find(file: Path, key: str, written: str, kind: Kind) -> Path:
+    """A document that a campaign names. Raises UsageError if a name is that of no document."""
+    found = find_document(written, file.parent, kind)
+    if is_name(written) and not found.exists():
+        raise UsageError.of(file, key, *missing_document(written, file.parent, kind))
+    return found
+
+
+def _read_persona(file: Path, key: str, written: str) -> tuple[Path, Persona]:
+    path = _find(file, key, written, "personas")
+    return path, read_document(path, Persona)
+
+
 def _is_tunable(driver: ExternalDriver | None) -> bool:
     return driver is not None and bool(driver.searched)
 
 
 def _relative(campaign_file: Path, path: Path) -> str:
+    if path.resolve().is_relative_to(PACKAGE):
+        return path.resolve().relative_to(PACKAGE.parent).as_posix()
     return Path(os.path.relpath(path.resolve(), campaign_file.resolve().parent)).as_posix()
 
 

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from harness.cli import wording
+from harness.shipped_documents import document_at
 
 NOT_CONFORMANT = 1
 
@@ -45,7 +46,12 @@ def new_persona(
 
 @persona_app.command("show")
 def show_persona(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The TOML file of the persona.", show_default=False)],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
+        ),
+    ],
     html: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Also write an HTML page that opens offline.", show_default=False),
@@ -59,6 +65,7 @@ def show_persona(
     from harness.reports.persona.profile import persona_profile
     from harness.reports.persona.terminal import show
 
+    file = document_at(file, "personas")
     profile = persona_profile(read_document(file, Persona))
     if html is not None:
         from harness.reports.persona.page import write_profile
@@ -111,8 +118,11 @@ def check_driver(
         ),
     ],
     scene: Annotated[
-        Path, typer.Option(metavar="DIR", help="The scene of the games.  [default: networks/merge]", show_default=False)
-    ] = Path("networks/merge"),
+        Path,
+        typer.Option(
+            metavar="DIR", help="The scene of the games, a folder or a name.  [default: merge]", show_default=False
+        ),
+    ] = Path("merge"),
     games: Annotated[int, typer.Option(min=2, max=1000, metavar="N", help="Games to play.")] = 3,
     allow_code: AllowCode = False,
 ) -> None:
@@ -124,7 +134,7 @@ def check_driver(
 
     from harness.environments.conformance import check_named
 
-    findings = check_named(driver, scene, games, allow_code=allow_code)
+    findings = check_named(driver, document_at(scene, "networks"), games, allow_code=allow_code)
     console = Console()
     for line in findings.lines():
         console.print(line, highlight=False, markup=False, soft_wrap=True)

@@ -15,6 +15,7 @@ from harness.cli import wording
 from harness.cli.documents import AllowCode, check_driver, persona_app, schema
 from harness.cli.scenes import check_scene, folder_of_scene, scene_app
 from harness.cli.workers import Ray, started_on
+from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -47,14 +48,17 @@ app = typer.Typer(
 A campaign trains a naive ego, trains a non-ego with a human persona against it, retrains the ego against the non-ego,
 and reports the differences with paired statistics:
 
-`harness campaign campaigns/merge.toml --quick`
+`harness demo` plays such a campaign with trained policies; `harness new FOLDER` makes one of your own.
 """,
     epilog="Exit codes: 0 success; 1 some games or stages failed; 2 usage error; 130 interrupted; 143 terminated. "
     "Finished work is kept in every case.",
 )
 
 CampaignFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="The TOML file of the campaign.", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="FILE", help="The TOML file of the campaign, or the name of a shipped campaign.", show_default=False
+    ),
 ]
 RunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
@@ -96,6 +100,7 @@ def campaign(
     """
     from rich.console import Console
 
+    file = document_at(file, "campaigns")
     console = Console()
     with console.status(wording.reading(file)):  # shown before what takes time to import
         from harness.campaign.execution.run_campaign import run_campaign
@@ -121,12 +126,33 @@ def campaign(
 
 
 @app.command()
+def demo(out: RunOut = None, jobs: Jobs = None) -> None:
+    """Play the paper's campaign with the shipped policies: a minute on two cores. Nothing is trained.
+
+    The same as `harness campaign merge-demo`.
+    """
+    campaign(Path("merge-demo"), out=out, jobs=jobs)
+
+
+@app.command()
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.", show_default=False)],
+) -> None:
+    """Make a project: a campaign, a scene and a persona of your own, which run as they are, and a README."""
+    from rich.console import Console
+
+    from harness.cli.project import create_project
+
+    _print_plain(wording.project_created(folder, create_project(folder)), Console())
+
+
+@app.command()
 def check(
     file: Annotated[
         Path,
         typer.Argument(
             metavar="PATH",
-            help="The TOML file of a campaign, or a scene.toml, or a scene's folder.",
+            help="The TOML file of a campaign or the name of a shipped one, or a scene.toml, or a scene's folder.",
             show_default=False,
         ),
     ],
@@ -144,6 +170,7 @@ def check(
     from harness.config.campaign import LEARNED
     from harness.errors import plain
 
+    file = document_at(file, "campaigns")
     opened = open_campaign(file, allow_code=allow_code)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
     console = Console()

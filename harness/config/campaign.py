@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, TypeAdapter, ValidationError, field_validator, model_validator
 
 from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
@@ -24,9 +24,9 @@ class Ego(Document):
     """The vehicle under study."""
 
     driver: DocumentPath = LEARNED
-    """`learned`: trained by the campaign. `sumo`: SUMO's own models. Else the folder of a policy, a driver document or
-    an installed driver."""
-    persona: DocumentPath = "../personas/careful.toml"
+    """`learned`: trained by the campaign. `sumo`: SUMO's own models. Else the folder of a policy, a driver document, or
+    the name of an installed or shipped driver."""
+    persona: DocumentPath = "careful"
     """The persona of the ego, which gives its payoff."""
 
 
@@ -214,9 +214,10 @@ class Campaign(Document):
     name: CampaignName
     """The name of the campaign. The default run folder is reports/<name>."""
     scene: DocumentPath
-    """Folder of the scene, relative to this file."""
+    """Folder of the scene, relative to this file, or the name of a shipped scene."""
     personas: list[DocumentPath] = Field(min_length=1, max_length=50)
-    """Files of the personas that the ego meets, one after the other, relative to this file."""
+    """Files of the personas that the ego meets, one after the other, relative to this file, or names of shipped
+    personas."""
     seeds: list[Seed] = Field([1], min_length=1, max_length=100)
     """Training seeds. All players are trained and assessed once per seed."""
     policies: DocumentPath | None = None
@@ -288,6 +289,15 @@ class Campaign(Document):
         if self.best_response is None:
             unused |= {"training": True, "non_ego_training": True}
         return self.model_dump(mode="json", exclude=unused)
+
+
+def is_campaign_name(name: str) -> bool:
+    """Whether a campaign can have this name."""
+    try:
+        TypeAdapter(CampaignName).validate_python(name)
+    except ValidationError:
+        return False
+    return True
 
 
 def resolve(campaign_file: Path, path: str) -> Path:
