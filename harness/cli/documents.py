@@ -1,4 +1,4 @@
-"""The commands for documents: personas, drivers, and the schemas of all documents."""
+"""The commands for documents: new projects and personas, checks of campaigns, scenes and drivers, and schemas."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from typing import Annotated
 import typer
 
 from harness.cli import wording
+from harness.cli.scenes import check_scene, folder_of_scene
+from harness.cli.terminal import print_plain
 from harness.shipped_documents import document_at
 
 NOT_CONFORMANT = 1
@@ -77,6 +79,50 @@ def show_persona(
     show(profile, console)
     if html is not None:
         console.print(wording.page_written(html), highlight=False, markup=False, soft_wrap=True)
+
+
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.", show_default=False)],
+) -> None:
+    """Make a project: a campaign, a scene and a persona of your own, which run as they are, and a README."""
+    from rich.console import Console
+
+    from harness.cli.project import create_project
+
+    print_plain(wording.project_created(folder, create_project(folder)), Console())
+
+
+def check(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PATH",
+            help="The TOML file of a campaign or the name of a shipped one, or a scene.toml, or a scene's folder.",
+            show_default=False,
+        ),
+    ],
+    allow_code: AllowCode = False,
+) -> None:
+    """Check a campaign and everything it names, and list its stages; or check one scene. Nothing is run or written."""
+    from rich.console import Console
+
+    if (folder := folder_of_scene(file)) is not None:
+        print_plain(check_scene(folder), Console())
+        return
+
+    from harness.campaign.plan.plan import plan
+    from harness.campaign.preflight import open_campaign
+    from harness.config.campaign import LEARNED
+    from harness.errors import plain
+
+    file = document_at(file, "campaigns")
+    opened = open_campaign(file, allow_code=allow_code)
+    stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
+    console = Console()
+    print_plain([wording.in_order(file)], console)
+    if opened.document.ego.driver != LEARNED:
+        print_plain([plain(wording.ego(opened))], console)
+    print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
 
 
 def schema(

@@ -5,15 +5,15 @@ from __future__ import annotations
 import errno
 import signal
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from harness.cli import wording
-from harness.cli.documents import AllowCode, check_driver, persona_app, schema
-from harness.cli.scenes import check_scene, folder_of_scene, scene_app
+from harness.cli.documents import AllowCode, check, check_driver, new, persona_app, schema
+from harness.cli.scenes import scene_app
+from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
 from harness.shipped_documents import document_at
 
@@ -84,6 +84,15 @@ Jobs = Annotated[
 ]
 
 
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
 @app.command()
 def campaign(
     file: CampaignFile,
@@ -116,7 +125,7 @@ def campaign(
         console.print(wording.NOTHING_TO_SHORTEN)
     _handle_termination_signals()
     try:
-        with started_on(ray, jobs, lambda line: _print_plain([line], console)) as start_workers:
+        with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
             outcome = run_campaign(opened, folder, start_workers, console)
     except KeyboardInterrupt as interrupt:
         console.print(wording.INTERRUPTED)
@@ -132,52 +141,6 @@ def demo(out: RunOut = None, jobs: Jobs = None) -> None:
     The same as `harness campaign merge-demo`.
     """
     campaign(Path("merge-demo"), out=out, jobs=jobs)
-
-
-@app.command()
-def new(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.", show_default=False)],
-) -> None:
-    """Make a project: a campaign, a scene and a persona of your own, which run as they are, and a README."""
-    from rich.console import Console
-
-    from harness.cli.project import create_project
-
-    _print_plain(wording.project_created(folder, create_project(folder)), Console())
-
-
-@app.command()
-def check(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="PATH",
-            help="The TOML file of a campaign or the name of a shipped one, or a scene.toml, or a scene's folder.",
-            show_default=False,
-        ),
-    ],
-    allow_code: AllowCode = False,
-) -> None:
-    """Check a campaign and everything it names, and list its stages; or check one scene. Nothing is run or written."""
-    from rich.console import Console
-
-    if (folder := folder_of_scene(file)) is not None:
-        _print_plain(check_scene(folder), Console())
-        return
-
-    from harness.campaign.plan.plan import plan
-    from harness.campaign.preflight import open_campaign
-    from harness.config.campaign import LEARNED
-    from harness.errors import plain
-
-    file = document_at(file, "campaigns")
-    opened = open_campaign(file, allow_code=allow_code)
-    stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
-    console = Console()
-    _print_plain([wording.in_order(file)], console)
-    if opened.document.ego.driver != LEARNED:
-        _print_plain([plain(wording.ego(opened))], console)
-    _print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
 
 
 @app.command()
@@ -237,6 +200,8 @@ def replay(
             film(game, film_file, console)
 
 
+app.command()(new)
+app.command()(check)
 app.command("check-driver")(check_driver)
 app.add_typer(persona_app, name="persona")
 app.add_typer(scene_app, name="scene")
@@ -270,7 +235,7 @@ def _show(outcome: RunResult, run: Path, console: Console) -> None:
         for sentence in (verdict.sentence, verdict.speed):
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
-    _print_plain([wording.report_written(run)], console)
+    print_plain([wording.report_written(run)], console)
 
 
 def _exit_if_failed(outcome: RunResult, console: Console) -> None:
@@ -280,12 +245,6 @@ def _exit_if_failed(outcome: RunResult, console: Console) -> None:
         console.print(wording.error_games(outcome.error_games), style="red")
     if outcome.failed_stages or outcome.error_games:
         raise typer.Exit(FAILED)
-
-
-def _print_plain(lines: Iterable[str], console: Console) -> None:
-    """Print lines as they are: without markup, colours or line breaks."""
-    for line in lines:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -6,10 +6,11 @@ import shutil
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from pydantic import TypeAdapter, ValidationError
 
 from harness.cli import wording
 from harness.cli.persona_template import create_persona
-from harness.config.campaign import is_campaign_name
+from harness.config.campaign import CampaignName
 from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.shipped_documents import shipped
@@ -26,8 +27,10 @@ def create_project(folder: Path) -> list[Path]:
     campaign, or it can't be written.
     """
     name = folder.absolute().name
-    if not is_campaign_name(name):
-        raise UsageError.of(folder, "", *wording.BAD_PROJECT_NAME)
+    try:
+        TypeAdapter(CampaignName).validate_python(name)
+    except ValidationError:
+        raise UsageError.of(folder, "", *wording.BAD_PROJECT_NAME) from None
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError.of(folder, "", *wording.FOLDER_NOT_EMPTY)
     if not folder.absolute().parent.is_dir():
