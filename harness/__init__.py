@@ -13,7 +13,7 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from harness.version import __version__
+from harness.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from harness.config.persona import Persona

@@ -46,6 +46,6 @@ def find_named(file: Path, key: str, written: str, kind: Kind) -> Path:
 
 
 def read_named_persona(file: Path, key: str, written: str) -> tuple[Path, Persona]:
-    """The file of a persona that a campaign names, and the persona. Raises UsageError if there is none, or it is wrong."""
+    """The file of a persona that a campaign names, and the persona. Raises UsageError if it is missing or wrong."""
     path = find_named(file, key, written, "personas")
     return path, read_document(path, Persona)
