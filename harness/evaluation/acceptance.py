@@ -119,8 +119,17 @@ def judge(
             for seed in seeds:
                 subject = Subject(ego=judged_ego(judged, persona, seed, evidence), persona=persona, seed=seed)
                 for arm, value, limit, games in MEASURES[name](subject, evidence):
-                    found = {"arm": arm, "value": value, "limit": limit, "games": games}
-                    checks.append(Check(bound=name, persona=persona, seed=seed, allowed=allowed, **found))
+                    check = Check(
+                        bound=name,
+                        persona=persona,
+                        seed=seed,
+                        arm=arm,
+                        value=value,
+                        limit=limit,
+                        allowed=allowed,
+                        games=games,
+                    )
+                    checks.append(check)
     return checks
 
 

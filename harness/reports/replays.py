@@ -67,6 +67,11 @@ def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tu
     return _key(game), page_wording.worst_game(game["episode"], outcome, ttc, _with(game))
 
 
+def most_severe(episodes: pd.DataFrame) -> Mapping[Any, Any]:
+    """The worst of these games, of which there is at least one."""
+    return min(episodes.to_dict("records"), key=_worst)
+
+
 def keys(episodes: pd.DataFrame) -> list[str]:
     """The key of each game."""
     return [_key(game) for game in episodes[["arm", "seed", "episode"]].to_dict("records")]

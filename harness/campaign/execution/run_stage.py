@@ -101,6 +101,7 @@ def carry_out(
         case SearchStage():
             info, files = _search(stage, run)
     info["seconds"] = round(time.monotonic() - started, 1)
+    info["finished_on"] = time.strftime("%Y-%m-%d", time.gmtime())
     folder.finish(stage.id, key, info, files)
     if not info.get("errors"):  # the segments of failed games are kept: the next run of the command plays those again
         folder.drop_segments(stage.id)

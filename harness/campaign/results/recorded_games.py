@@ -126,6 +126,7 @@ def scene_drawing(scene: OpenScene) -> SceneDrawing:
     return SceneDrawing(
         surfaces=drawing.surfaces(net),
         lane_marks=drawing.lane_marks(net),
+        edge_lines=drawing.edge_lines(net),
         rails=scene.rail_lines,
         goal=drawing.goal_lines(scene, net),
     )
