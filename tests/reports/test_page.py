@@ -9,7 +9,8 @@ import pytest
 from harness.evaluation.research_questions import INCOMPETENT, Verdict
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import write_csv
-from harness.replay.selection import choose_games, replay_name, worst_first
+from harness.evaluation.worst_first import worst_first
+from harness.replay.selection import choose_games, replay_name
 from harness.reports import page as page_module
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, speed_sentence, too_few
 from harness.reports.numbers import duration, number, p_number, p_text, percent

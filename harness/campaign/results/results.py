@@ -25,6 +25,7 @@ from harness.campaign.storage.learned import did_not_learn, judged
 from harness.campaign.storage.manifest import FINISHED, is_tuned
 from harness.campaign.storage.manoeuvre_table import manoeuvres_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.campaign.storage.severity_table import severity_table, with_severity
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
 from harness.evaluation.acceptance import Evidence
@@ -35,8 +36,8 @@ from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.research_questions import Question
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import (
-    EPISODE_COLUMNS,
     MANOEUVRE_COLUMNS,
+    PLAYED_COLUMNS,
     RECONFIGURATION_COLUMNS,
     TRAINING_COLUMNS,
     is_of_a_search,
@@ -45,8 +46,9 @@ from harness.evaluation.tables import (
     write_csv,
 )
 from harness.evaluation.trace_file import TraceReader, check_traces
+from harness.evaluation.worst_first import worst_first
 from harness.files import write_atomically
-from harness.replay import choose_games, replay_name, worst_first, write_replay
+from harness.replay import choose_games, replay_name, write_replay
 from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions, warn
@@ -64,7 +66,11 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     campaign = _campaign(written)
     stages = plan(campaign, written["personas"], is_tuned(written))
     done = {name: entry for name, entry in written["stages"].items() if entry["status"] == "done"}
-    episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
+    played = _gather(folder, done, "assessment", "episodes.csv", list(PLAYED_COLUMNS))
+    _check_traces(folder, played)
+    scene = open_scene(folder.scene)
+    with console.status("working out how severe each game is"):
+        episodes = with_severity(played, [severity_table(folder, name, scene) for name in _arms(done)])
     entries = judged(written["stages"], campaign, stages, _goals(stages, episodes))
     manifest = {**written, "stages": entries}
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
@@ -80,8 +86,6 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     populations = by_who_drove(campaign, episodes)
     tables |= {"populations": populations} if campaign.population else {}
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
-    scene = open_scene(folder.scene)
-    _check_traces(folder, episodes)
     write_model_cards(folder, manifest, summary)
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
@@ -182,6 +186,11 @@ def _done(manifest: Mapping[str, Any]) -> set[str]:
     return {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
 
 
+def _arms(done: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """The finished stages that are arms."""
+    return [name for name, entry in done.items() if entry["kind"] == "assessment"]
+
+
 def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, columns: list[str]) -> pd.DataFrame:
     frames = []
     for name, entry in done.items():
@@ -203,8 +212,7 @@ def _check_traces(folder: RunFolder, episodes: pd.DataFrame) -> None:
 
 
 def _manoeuvres(folder: RunFolder, done: Mapping[str, Any], scene: OpenScene) -> pd.DataFrame:
-    arms = [name for name, entry in done.items() if entry["kind"] == "assessment"]
-    frames = [manoeuvres_of(folder, name, scene) for name in arms]
+    frames = [manoeuvres_of(folder, name, scene) for name in _arms(done)]
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
 
 
