@@ -15,6 +15,7 @@ from harness.cli.documents import AllowCode, check, check_driver, new, persona_a
 from harness.cli.scenes import scene_app
 from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
+from harness.errors import FAILED, USAGE_ERROR
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
@@ -34,8 +35,8 @@ MACHINE_ERRORS = (
     errno.EIO,
 )
 """Errors of the operating system that are no mistakes of the program: they are reported without a traceback."""
-FAILED, USAGE_ERROR, INTERRUPTED = 1, 2, 130
-"""Exit codes. The last is 128 plus the number of SIGINT."""
+INTERRUPTED = 130
+"""The exit code after Ctrl-C: 128 plus the number of SIGINT."""
 
 app = typer.Typer(
     name="harness",
@@ -50,8 +51,8 @@ and reports the differences with paired statistics:
 
 `harness demo` plays such a campaign with trained policies; `harness new FOLDER` makes one of your own.
 """,
-    epilog="Exit codes: 0 success; 1 some games or stages failed; 2 usage error; 130 interrupted; 143 terminated. "
-    "Finished work is kept in every case.",
+    epilog="Exit codes: 0 success; 1 some games or stages failed; 2 usage error; 3 a bound of [acceptance] is not "
+    "kept; 130 interrupted; 143 terminated. Finished work is kept in every case.",
 )
 
 CampaignFile = Annotated[
@@ -131,7 +132,7 @@ def campaign(
         console.print(wording.INTERRUPTED)
         raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
     _show(outcome, folder.path, console)
-    _exit_if_failed(outcome, console)
+    _exit_as(outcome, console)
 
 
 @app.command()
@@ -156,6 +157,7 @@ def report(run: RunPath) -> None:
     with folder.held():
         outcome = write_results(folder, console)
     _show(outcome, run, console)
+    _exit_as(outcome, console)
 
 
 @app.command()
@@ -235,16 +237,19 @@ def _show(outcome: RunResult, run: Path, console: Console) -> None:
         for sentence in (verdict.sentence, verdict.speed):
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
+    for check in outcome.acceptance:
+        style = "green" if check.passed else "bold red"
+        console.print(check.text, style=style, highlight=False, markup=False, soft_wrap=True)
     print_plain([wording.report_written(run)], console)
 
 
-def _exit_if_failed(outcome: RunResult, console: Console) -> None:
+def _exit_as(outcome: RunResult, console: Console) -> None:
     if outcome.failed_stages:
         console.print(wording.failed_stages(outcome.failed_stages), style="red", highlight=False)
     if outcome.error_games:
         console.print(wording.error_games(outcome.error_games), style="red")
-    if outcome.failed_stages or outcome.error_games:
-        raise typer.Exit(FAILED)
+    if outcome.exit_code:
+        raise typer.Exit(outcome.exit_code)
 
 
 def _fail(message: str, code: int) -> NoReturn:

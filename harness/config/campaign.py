@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from harness.config.acceptance import Acceptance
 from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
 from harness.config.training import NonEgoTraining, Reconfiguration, Retraining, Training
@@ -135,6 +136,7 @@ class Campaign(Document):
     crossplay: CrossPlay | None = None
     competence: Competence = Competence()
     assessment: Assessment = Assessment()
+    acceptance: Acceptance | None = None
 
     @field_validator("seeds")
     @classmethod
@@ -148,15 +150,17 @@ class Campaign(Document):
         if self.policies is not None and (unused := self._unused_tables()):
             message = "with `policies` nothing is trained: this table would be ignored"
             raise Mistakes([(name, message, "leave out this table or `policies`") for name in unused])
-        if self.rounds.stop_early and self.best_response is None:
-            message = "without [best_response], it is not measured whether an equilibrium is reached"
-            raise Mistakes([("rounds.stop_early", message, "add [best_response] or leave out this key")])
-        if self.ego.driver != LEARNED and self.rounds.count > Rounds().count:
-            message = "the ego does not learn, so there are no further rounds"
-            raise Mistakes([("rounds.count", message, "leave out this key, or set ego.driver to 'learned'")])
-        if self.ego.driver != LEARNED and self.retraining.against:
-            message = "an ego that does not learn can't be retrained"
-            raise Mistakes([("retraining.against", message, "leave out this key, or set ego.driver to 'learned'")])
+        measures_gaps, learns = self.best_response is not None, self.ego.driver == LEARNED
+        add = "add [best_response] or leave out this key"
+        leave_out = "leave out this key, or set ego.driver to 'learned'"
+        if self.rounds.stop_early and not measures_gaps:
+            raise Mistakes([("rounds.stop_early", "without [best_response], no equilibrium can be found", add)])
+        if self.acceptance is not None and self.acceptance.needs_gaps and not measures_gaps:
+            raise Mistakes([("acceptance.gap_share", "without [best_response], no gap is measured", add)])
+        if not learns and self.rounds.count > Rounds().count:
+            raise Mistakes([("rounds.count", "the ego does not learn, so there are no further rounds", leave_out)])
+        if not learns and self.retraining.against:
+            raise Mistakes([("retraining.against", "an ego that does not learn can't be retrained", leave_out)])
         return self
 
     def _unused_tables(self) -> list[str]:
@@ -181,6 +185,7 @@ class Campaign(Document):
         out where they have no effect."""
         unused: dict[str, Any] = {"reconfiguration": True} if self.ego.driver in (LEARNED, SUMO) else {}
         unused |= {} if self.crowd else {"crowd": True}
+        unused |= {} if self.acceptance else {"acceptance": True}
         if self.policies is None:
             return self.model_dump(mode="json", exclude=unused)
         unused["retraining"] = {"alone_share", "warm_start"} if self.retraining.against else True
