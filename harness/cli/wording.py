@@ -106,6 +106,10 @@ def in_order(file: Path) -> str:
 def scene_lines(scene: OpenScene) -> Iterator[str]:
     """What a checked scene is: its players with their routes, and whether there is other traffic."""
     for role, player, edges in zip(scene.world.roles, scene.document.players, scene.edges, strict=True):
+        if player.way is not None:
+            length_m = scene.world.road.routes.goal_m[scene.world.roles.index(role)]
+            yield f"{role}: on foot, {length_m:.1f} m to its goal"
+            continue
         goal = scene.document.goal_of(player)[1]
         yield f"{role}: vehicle {player.vehicle}, {len(edges)} edges, goal {goal.position_m:g} m along {goal.edge}"
     yield "with background traffic" if scene.has_background_traffic else "without background traffic"
