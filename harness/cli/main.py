@@ -237,9 +237,9 @@ def _show(outcome: RunResult, run: Path, console: Console) -> None:
         for sentence in (verdict.sentence, verdict.speed):
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
-    for check in outcome.acceptance:
-        style = "green" if check.passed else "bold red"
-        console.print(check.text, style=style, highlight=False, markup=False, soft_wrap=True)
+    for bound in outcome.acceptance:
+        style = "green" if bound.passed else "bold red"
+        console.print(bound.text, style=style, highlight=False, markup=False, soft_wrap=True)
     print_plain([wording.report_written(run)], console)
 
 
