@@ -120,8 +120,7 @@ def campaign(
         if ray is not None:  # the nodes of a cluster know no working folder
             file, out = file.absolute(), out.absolute() if out is not None else None
         opened = open_campaign(file, quick, allow_code)
-    name = opened.document.name + ("-quick" if opened.quick else "")
-    folder = RunFolder(out or Path("reports") / name)
+    folder = RunFolder(out or Path("reports") / opened.run_name)
     if quick and not opened.quick:
         console.print(wording.NOTHING_TO_SHORTEN)
     _handle_termination_signals()
