@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from harness.cli import wording
-from harness.cli.documents import AllowCode, check_driver, persona_app, schema
+from harness.cli.documents import AllowCode, check_driver, columns, persona_app, schema
 from harness.cli.scenes import check_scene, folder_of_scene, scene_app
 from harness.cli.workers import Ray, started_on
 from harness.errors import FAILED, USAGE_ERROR
@@ -216,6 +216,7 @@ app.command("check-driver")(check_driver)
 app.add_typer(persona_app, name="persona")
 app.add_typer(scene_app, name="scene")
 app.command()(schema)
+app.command()(columns)
 
 
 class _Terminated(KeyboardInterrupt):
