@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from harness.config.campaign import Training
+from harness.config.training import Training
 from harness.errors import NOT_ACCEPTED
 from tests.support.repository import REPOSITORY
 from tests.support.shared import built_once

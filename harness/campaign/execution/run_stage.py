@@ -23,7 +23,7 @@ from harness.campaign.plan.planned_drivers import BestOf, description, persona_o
 from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions_of_numbers
-from harness.config.campaign import Training
+from harness.config.training import Training
 from harness.drivers.mixture import Player
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
