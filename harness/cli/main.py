@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from harness.cli import wording
+from harness.cli.comparison import compare
 from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
 from harness.cli.replays import replay
 from harness.cli.scenes import scene_app
@@ -162,6 +163,7 @@ def report(run: RunPath) -> None:
 
 
 app.command()(replay)
+app.command()(compare)
 app.command()(new)
 app.command()(check)
 app.command("check-driver")(check_driver)
