@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from scipy import stats
+import scipy  # loads `scipy.stats` at its first use: workers do without
 
 from harness.evaluation.comparison import CONFIDENCE, mean_interval
 from harness.evaluation.people import of_people
@@ -79,7 +79,7 @@ def _rate(column: str, successes: int, games: int) -> dict[str, float]:
     """The rate and its Clopper-Pearson interval, as three columns; empty without games."""
     if games == 0:
         return {column: np.nan, f"{column}_low": np.nan, f"{column}_high": np.nan}
-    interval = stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
+    interval = scipy.stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
     return {
         column: successes / games,
         f"{column}_low": float(interval.low),
