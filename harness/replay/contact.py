@@ -29,7 +29,7 @@ def contacts(trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], rails: Sequ
     """Every contact of one game, in order of time; a collision of two players is one contact."""
     hit = trace[trace["outcome"].isin(["collision", "rail"])].sort_values("step", kind="stable")
     hit = hit.drop_duplicates("player")
-    several = trace["player"].str.fullmatch(r"non_ego_\d").any()
+    several = len(hit) > 0 and trace["player"].drop_duplicates().str.fullmatch(r"non_ego_\d").any()
     touches = []
     for (step, outcome), rows in hit.groupby(["step", "outcome"]):
         frame = trace[trace["step"] == step]
