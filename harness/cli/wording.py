@@ -22,11 +22,20 @@ KEPT = "finished work is kept"
 FILM_NEEDS_A_GAME = ("shows one game", "name the game: harness replay RUN ARM EPISODE")
 NOT_A_FOLDER = ("is not a folder", "name a folder")
 NOT_A_TOML_FILE = ("is not the name of a TOML file", "the name must end with .toml")
+FOLDER_NOT_EMPTY = ("is there already, and not empty", "name a new folder")
+BAD_PROJECT_NAME = (
+    "the folder's name is that of the campaign, too: letters, digits, _ and -, a letter first, at most 40",
+    "name another folder",
+)
 FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
 
 
 def reading(file: Path) -> str:
     return f"reading {escape(str(file))}"
+
+
+def cannot_write(error: OSError) -> tuple[str, str]:
+    return f"can't be written: {error.strerror}", "name a folder that you may write"
 
 
 def no_folder(folder: Path) -> tuple[str, str]:
@@ -60,6 +69,11 @@ def machine_error(error: OSError) -> str:
 
 def persona_created(file: Path) -> str:
     return f"{file}: a valid persona, a careful driver. To see what it means: harness persona show {file}"
+
+
+def project_created(folder: Path, files: Sequence[Path]) -> list[str]:
+    """The files of a new project, and the next command."""
+    return [*(f"wrote {file}" for file in files), f"Next: cd {folder} && harness campaign campaign.toml --quick"]
 
 
 def page_written(file: Path) -> str:
