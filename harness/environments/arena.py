@@ -140,7 +140,10 @@ class Arena:
         state = self.state = before.copy()  # the quantities of the step before refer to the old state
         drove = state.running
         acceleration, steering = self._decide(actions, drove)
-        self._move(state, acceleration, steering, drove)
+        world = self.world
+        move(state, acceleration, steering, drove & self._on_wheels, world.actuators, world.step_s)
+        if world.on_foot:
+            walk(state, acceleration, steering, drove & world.walks, world.actuators, world.step_s)
         reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         self.reading = reading
         if reading.signals is not None:
@@ -168,12 +171,6 @@ class Arena:
         self.simulation.close()
 
     # --- the parts of a step -------------------------------------------------------------------------------------
-
-    def _move(self, state: State, acceleration: FloatArray, steering: FloatArray, drove: BoolArray) -> None:
-        world = self.world
-        move(state, acceleration, steering, drove & self._on_wheels, world.actuators, world.step_s)
-        if world.on_foot:
-            walk(state, acceleration, steering, drove & world.walks, world.actuators, world.step_s)
 
     def _decide(self, actions: FloatArray | None, drove: BoolArray) -> tuple[FloatArray, FloatArray]:
         state = self.state
