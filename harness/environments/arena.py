@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.drivers.protocol import Driver
-from harness.environments.nearby_bodies import nearby_bodies
+from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.sumo_players import read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import release_controls
@@ -107,8 +107,7 @@ class Arena:
         self.reading: Reading | None = None
         self.signal_texts = [""] * games
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
-        self._players_length = np.tile(self.world.length_m, (games, 1))
-        self._players_width = np.tile(self.world.width_m, (games, 1))
+        self.nearby = NearbyBodies(self.world, scene.obstacles, games)
 
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
@@ -272,6 +271,7 @@ class Arena:
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
         state.unseen_behind_m[game], self._member[game] = start.unseen_behind_m, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
+        self.nearby.place(game, start)
         for player in range(len(self.seats)):
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
@@ -293,6 +293,5 @@ class Arena:
         )
 
     def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
-        """The players and the background vehicles near them in `games`; `state` is that of the same games."""
-        lengths_m, widths_m = self._players_length[games], self._players_width[games]
-        return nearby_bodies(state, self.reading, games, length_m=lengths_m, width_m=widths_m)
+        """The players and the bodies near them in `games`; `state` is that of the same games."""
+        return self.nearby.of(state, self.reading, games)

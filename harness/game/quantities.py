@@ -18,6 +18,7 @@ from harness.game.jit import compiled
 from harness.game.meetings import Meetings, entered_before_s, least_gap_s, meetings
 from harness.game.road import Along
 from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
+from harness.game.sight import hidden, nothing_hidden
 from harness.game.state import Bodies, Outcome, State
 from harness.game.traffic_rules import Rules, rules
 from harness.game.world import World
@@ -153,6 +154,15 @@ class Quantities:
     def visible(self) -> BoolArray:
         """[G, P, B] bodies that are present and are not the player itself."""
         return _visible(self.state.present, self.bodies.present)
+
+    @cached_property
+    def hidden(self) -> BoolArray:
+        """[G, P, B] bodies that a player does not see because something hides them (`game.sight`)."""
+        state, bodies, hiding = self.state, self.bodies, self.world.hiding
+        if not hiding.anything:
+            return nothing_hidden((*state.present.shape, bodies.present.shape[1]))
+        of_bodies = (self._boxes, bodies.present)
+        return hidden(state.x_m, state.y_m, state.present, *of_bodies, hiding.obstacles, hiding.walls, hiding.vehicles)
 
     @cached_property
     def on_path(self) -> OnPath:

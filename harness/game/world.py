@@ -9,6 +9,7 @@ from harness.game.arrays import FloatArray
 from harness.game.bicycle import Actuators
 from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Road
+from harness.game.sight import NOTHING_HIDES, Hiding
 from harness.game.state import roles_of
 
 
@@ -23,6 +24,7 @@ class World:
     step_s: float
     time_limit_s: float
     right_of_way: RightOfWay = NO_JUNCTIONS
+    hiding: Hiding = NOTHING_HIDES
 
     @cached_property
     def roles(self) -> tuple[str, ...]:

@@ -20,14 +20,17 @@ from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
 from harness.game.initial_state import Conditions, StartDistribution, StartRange
+from harness.game.obstacles import NO_OBSTACLES, Obstacles
 from harness.game.quantities import REACH_M
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.world import World
 from harness.traffic import network
+from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
 from harness.traffic.levels import heights_of_players_roads
 from harness.traffic.net_file import check_net
+from harness.traffic.obstacles import check_clear_starts, hiding_in, open_obstacles, with_types
 from harness.traffic.player import open_player
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
@@ -50,6 +53,8 @@ class OpenScene:
     edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
     rail_lines: tuple[FloatArray, ...]
     junctions: frozenset[str] | None = None  # those that games need; None: all of the net
+    obstacles: Obstacles = NO_OBSTACLES
+    lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
     roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
 
     @property
@@ -115,6 +120,7 @@ class OpenScene:
             routes=self.world.road.routes,
             conditions=_conditions(self.document),
             along_route_share=along_route_share,
+            obstacles=self.obstacles,
         )
 
 
@@ -166,16 +172,20 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     places = tuple(start for start in starts if start is not None)
     if problems:
         raise UsageError(problems)
+    ways = [player.route for player in players]
+    obstacles = open_obstacles(file=document_file, document=document, net=net, area=area, routes=routes, ways=ways)
+    background = _background_edges(vehicles, net, routes)
     lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
     world = World(
-        road=Road(network.rails(lines, REACH_M + 10.0), Routes.of([player.route for player in players])),
+        road=Road(network.rails(lines, REACH_M + 10.0), Routes.of(ways)),
         actuators=_actuators(document, types),
         length_m=np.array([each.length_m for each in types]),
         width_m=np.array([each.width_m for each in types]),
         step_s=document.step_length_s,
         time_limit_s=document.time_limit_s,
         right_of_way=right_of_way(net, [[net.getEdge(name) for name in player.edges] for player in players]),
+        hiding=hiding_in(obstacles, routes, document),
     )
     if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:
         message, remedy = "no player's route passes a traffic light", "leave it out, or choose other routes"
@@ -184,15 +194,18 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         folder=folder,
         document=document,
         world=world,
-        routes=routes,
+        routes=with_types(routes, obstacles),
+        obstacles=obstacles,
+        lane_strips=strips_near(net, [*own, *background], obstacles),
         places=places,
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
-        junctions=network.junctions_near(net, [*own, *_background_edges(vehicles, net, routes)]),
+        junctions=network.junctions_near(net, [*own, *background]),
         roads_m=heights_of_players_roads(net, own),
     )
     factors, present = [HumanFactors()] * len(places), [1.0] * len(places)
     check_starts(document_file, scene.start_distribution(factors, present), world)
+    check_clear_starts(document_file, scene.start_distribution(factors, present), world)
     return scene
 
 
