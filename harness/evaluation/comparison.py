@@ -139,7 +139,7 @@ def rate_interval(successes: int, games: int) -> tuple[float, float]:
     """Two-sided 95 % Clopper-Pearson interval of a rate; NaN, NaN without games."""
     if games == 0:
         return np.nan, np.nan
-    interval = stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
+    interval = scipy.stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
     return float(interval.low), float(interval.high)
 
 

@@ -158,6 +158,7 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
             title=title,
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
+            obstacles=scene.obstacles,
         )
         yield FoundGame(replay=replay, trace=trace, title=title, step_length_s=scene.world.step_s)
 
