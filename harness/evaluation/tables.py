@@ -21,6 +21,7 @@ from harness.errors import UsageError
 from harness.evaluation.comparison import COMPARISON_COLUMNS
 from harness.evaluation.game_theory.columns import GAME_TABLES
 from harness.evaluation.people import columns_for, people_in
+from harness.evaluation.reference_columns import REFERENCE_TABLES
 from harness.files import content_of, replace_durably, scratch_beside, write_atomically
 
 EPISODE_COLUMNS = {
@@ -154,6 +155,7 @@ TABLES = {
     "populations": POPULATION_COLUMNS,
     "reconfiguration": RECONFIGURATION_COLUMNS,
     **GAME_TABLES,
+    **REFERENCE_TABLES,
 }
 
 _MOST_BYTES = 500_000_000

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from harness.evaluation.people import people_in
+from harness.evaluation.preventability import Preventability, preventability_of
 from harness.evaluation.strategies import ReconfiguredEgo
 from harness.reports import wording
 from harness.reports.run_tables import RunTables
@@ -36,6 +37,8 @@ class Results:
     """Non-egos of the scene."""
     crowds: Mapping[str, Sequence[str]]
     """The personas of each crowd, in the order of the scene's people."""
+    preventability: Mapping[str, Sequence[Preventability]]
+    """By arm: what reference drivers prevent, for each training seed."""
     by_driver: Sequence[Row]
     """Rows of `populations`: each arm against a population, by the persona that drove."""
 
@@ -93,6 +96,10 @@ def results(tables: RunTables) -> Results:
         is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),
         people=len(people_in(tables.episodes.columns)),
         crowds={each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())},
+        preventability={
+            arm: preventability_of(tables.preventability, tables.reference_drivers, arm)
+            for arm in tables.preventability["arm"].unique()
+        },
         by_driver=tables.populations.to_dict("records"),
     )
 

@@ -15,6 +15,7 @@ from rich.progress import track
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
+from harness.campaign.results.judged_failures import preventability_tables
 from harness.campaign.results.kept_results import RunResult, ShownVerdict, keep_result
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
@@ -75,6 +76,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
     game = _game(campaign, manifest, episodes)
     tables |= game.tables if game is not None else {}
+    prevented = preventability_tables(folder, done, episodes)
+    tables |= prevented
     populations = by_who_drove(campaign, episodes)
     tables |= {"populations": populations} if campaign.population else {}
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
@@ -100,6 +103,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         game=game,
         replays=replays,
         populations=populations,
+        **prevented,
     )
     with console.status("writing the report"):
         games = recorded_games(episodes, arms, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
