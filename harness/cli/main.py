@@ -13,6 +13,7 @@ import typer
 
 from harness.cli import wording
 from harness.cli.documents import AllowCode, check_driver, persona_app, schema
+from harness.cli.pinned_games import minimise, regression
 from harness.cli.scenes import check_scene, folder_of_scene, scene_app
 from harness.cli.workers import Ray, started_on
 
@@ -211,6 +212,8 @@ def replay(
 
 
 app.command("check-driver")(check_driver)
+app.command()(minimise)
+app.command()(regression)
 app.add_typer(persona_app, name="persona")
 app.add_typer(scene_app, name="scene")
 app.command()(schema)
