@@ -13,6 +13,8 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from harness.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from harness.config.persona import Persona
     from harness.config.toml_reading import read_document
@@ -25,8 +27,6 @@ if TYPE_CHECKING:
     from harness.environments.vector_env import ArenaVecEnv
     from harness.errors import HarnessError, SimulationError, UsageError
     from harness.traffic.scene import OpenScene, open_scene
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Arena",

@@ -9,15 +9,12 @@ import typer
 
 from harness.cli import pinned_wording, wording
 from harness.cli.documents import AllowCode
-from harness.errors import UsageError
+from harness.errors import FAILED, NOT_ACCEPTED, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
 
     from harness.campaign.execution.regression import PlayedAgain
-
-NOT_PLAYED, GAMES_FAILED = 1, 3
-"""Exit codes: a game could not be played; the ego fails in a game."""
 
 
 def minimise(
@@ -117,9 +114,9 @@ def regression(
         write_junit(junit, "regression", [pinned_wording.check_of(each) for each in played], {"ego": ego})
     _print(console, pinned_wording.regression_result(played))
     if any(each.error for each in played):
-        raise typer.Exit(NOT_PLAYED)
+        raise typer.Exit(FAILED)
     if not all(each.passed for each in played):
-        raise typer.Exit(GAMES_FAILED)
+        raise typer.Exit(NOT_ACCEPTED)
 
 
 def _print(console: Console, *lines: str) -> None:

@@ -4,7 +4,7 @@
 | --- | --- | --- |
 | 1 | drivers decide from the observations of the step before; learners' actions are an argument | `drivers` |
 | 2 | reaction delay, limits of the controls and lapses of attention | `game.human_limits`, `game.attention` |
-| 3 | the players' cars move | `game.bicycle` |
+| 3 | the players move, on wheels or on foot | `game.bicycle`, `game.walking` |
 | 4 | their poses are sent to SUMO, SUMO moves the other vehicles, their state is read | `traffic.simulation` |
 | 5 | contact, goal and time limit determine outcomes | `game.quantities` |
 | 6 | payoffs are computed | `game.payoff` |
@@ -24,8 +24,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.drivers.protocol import Driver
 from harness.environments.nearby_bodies import nearby_bodies
+from harness.environments.seats import Seat as Seat
+from harness.environments.seats import with_walkers
 from harness.environments.sumo_players import read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import release_controls
@@ -34,26 +35,17 @@ from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
 from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
-from harness.game.payoff import Payoff
 from harness.game.quantities import Quantities, terminations
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
 from harness.game.state import Bodies, Outcome, State
 from harness.game.traffic_rules import since_change_s
+from harness.game.walking import walk
 from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading, Simulation, with_game
 
 _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # comparing arrays with members of an enumeration is slower
-
-
-@dataclass(frozen=True)
-class Seat:
-    """A player's seat in the arena: its driver and its payoff (None: the payoff is not computed)."""
-
-    driver: Driver | None
-    """None: a learner; its actions are an argument of `Arena.step`."""
-    payoff: Payoff | None = None
 
 
 @dataclass(kw_only=True)
@@ -86,9 +78,10 @@ class Arena:
         only those near a player; this costs time. Raises SimulationError if SUMO can't load the scene.
         """
         self.scene, self.world, self.games = scene, scene.world, games
-        self.seats = tuple((each,) if isinstance(each, Seat) else tuple(each) for each in seats)
+        self.seats = with_walkers([(each,) if isinstance(each, Seat) else tuple(each) for each in seats], scene.world)
         first_drivers = [of_player[0].driver for of_player in self.seats]
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
+        self._on_wheels = self._taken_over & ~self.world.walks
         self._slack_m = slack_m(self._taken_over)
         self.simulation = simulation or open_simulation(
             scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
@@ -148,7 +141,7 @@ class Arena:
         state = self.state = before.copy()  # the quantities of the step before refer to the old state
         drove = state.running
         acceleration, steering = self._decide(actions, drove)
-        move(state, acceleration, steering, drove & self._taken_over, self.world.actuators, self.world.step_s)
+        self._move(state, acceleration, steering, drove)
         reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         self.reading = reading
         if reading.signals is not None:
@@ -176,6 +169,12 @@ class Arena:
         self.simulation.close()
 
     # --- the parts of a step -------------------------------------------------------------------------------------
+
+    def _move(self, state: State, acceleration: FloatArray, steering: FloatArray, drove: BoolArray) -> None:
+        world = self.world
+        move(state, acceleration, steering, drove & self._on_wheels, world.actuators, world.step_s)
+        if world.on_foot:
+            walk(state, acceleration, steering, drove & world.walks, world.actuators, world.step_s)
 
     def _decide(self, actions: FloatArray | None, drove: BoolArray) -> tuple[FloatArray, FloatArray]:
         state = self.state

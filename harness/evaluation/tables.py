@@ -22,9 +22,10 @@ from harness.evaluation.comparison import COMPARISON_COLUMNS
 from harness.evaluation.game_theory.columns import GAME_TABLES
 from harness.evaluation.people import columns_for, people_in
 from harness.evaluation.reference_columns import REFERENCE_TABLES
+from harness.evaluation.severity.columns import SEVERITY_COLUMNS
 from harness.files import content_of, replace_durably, scratch_beside, write_atomically
 
-EPISODE_COLUMNS = {
+PLAYED_COLUMNS = {
     "arm": "object",
     "persona": "object",
     "seed": "int64",
@@ -52,8 +53,16 @@ EPISODE_COLUMNS = {
     "duration_s": "float64",
     "error": "object",
 }
-"""Columns of `episodes.csv` in order, each with its pandas dtype (Int64: whole numbers or empty). With several people,
-those of the non-ego occur for each of them (`people.columns_for`)."""
+"""Columns of the records of played games in order, each with its pandas dtype (Int64: whole numbers or empty). With
+several people, those of the non-ego occur for each of them (`people.columns_for`)."""
+
+EPISODE_COLUMNS = {name: dtype for name, dtype in PLAYED_COLUMNS.items() if name != "error"}
+EPISODE_COLUMNS |= {**SEVERITY_COLUMNS, "error": PLAYED_COLUMNS["error"]}
+"""Columns of `episodes.csv`: those of the records, and what the traces tell besides. `columns.EPISODES` describes each
+of them. A file without the columns of severity is that of an earlier version."""
+
+SEVERITY_TABLE = {name: PLAYED_COLUMNS[name] for name in ("arm", "seed", "episode")} | dict(SEVERITY_COLUMNS)
+"""Columns of a stage's table of severity."""
 
 RECONFIGURATION_COLUMNS = {
     "stage": "object",
@@ -148,6 +157,8 @@ POPULATION_COLUMNS = {
 
 TABLES = {
     "episodes": EPISODE_COLUMNS,
+    "played": PLAYED_COLUMNS,
+    "severity": SEVERITY_TABLE,
     "summary": SUMMARY_COLUMNS,
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,
@@ -174,8 +185,9 @@ def typed(frame: pd.DataFrame) -> pd.DataFrame:
 
 def _columns_of(names: Iterable[str]) -> Mapping[str, str]:
     names = list(names)
-    episodes = columns_for(len(people_in(names)), EPISODE_COLUMNS)
-    for columns in (episodes, *TABLES.values()):
+    people = len(people_in(names))
+    of_games = (columns_for(people, columns) for columns in (EPISODE_COLUMNS, PLAYED_COLUMNS))
+    for columns in (*of_games, *TABLES.values()):
         if sorted(names) == sorted(columns):
             return columns
     nearest, columns = max(TABLES.items(), key=lambda table: len(set(names) & set(table[1])))

@@ -15,7 +15,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
-from harness.game.meetings import Meetings, entered_before_s, least_gap_s, meetings
+from harness.game.meetings import STANDING_MPS, Meetings, entered_before_s, least_gap_s, meetings
 from harness.game.road import Along
 from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
 from harness.game.state import Bodies, Outcome, State
@@ -147,6 +147,16 @@ class Quantities:
         over_mps = np.maximum(speed_mps - asked.permitted_mps, 0.0) + np.minimum(speed_mps - asked.due_mps, 0.0)
         return over_mps / self.speed_limit_mps
 
+    @cached_property
+    def on_carriageway(self) -> FloatArray:
+        """1 for a player on foot whose centre is on the carriageway, else 0."""
+        return self.world.on_carriageway(self.state.x_m, self.state.y_m)
+
+    @property
+    def stands(self) -> FloatArray:
+        """1 for a player that stands, else 0."""
+        return (np.abs(self.state.speed_mps) <= STANDING_MPS).astype(float)
+
     # --- other bodies --------------------------------------------------------------------------------------------
 
     @cached_property
@@ -222,8 +232,13 @@ class Quantities:
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
-        """Distance to the nearest edge of the drivable area: 0 on the edge, at most `REACH_M`."""
-        return self.world.road.rails.distance_m(self._cars, REACH_M)
+        """Distance to the nearest edge of the drivable area, for walkers of their surface: 0 on the edge, at most
+        `REACH_M`."""
+        road = self.world.road
+        distance_m = road.rails.distance_m(self._cars, REACH_M)
+        if road.walkers_rails is None:
+            return distance_m
+        return np.where(self.world.walks, road.walkers_rails.distance_m(self._cars, REACH_M), distance_m)
 
     @cached_property
     def clearance_m(self) -> FloatArray:

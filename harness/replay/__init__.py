@@ -2,7 +2,7 @@
 
 from harness.replay.bundle import write_replay
 from harness.replay.film import write_film
-from harness.replay.selection import choose_games, replay_name, worst_first
+from harness.replay.selection import choose_games, replay_name
 from harness.replay.sumo_gui import follow_in_sumo_gui, open_in_sumo_gui
 
 __all__ = [
@@ -10,7 +10,6 @@ __all__ = [
     "follow_in_sumo_gui",
     "open_in_sumo_gui",
     "replay_name",
-    "worst_first",
     "write_film",
     "write_replay",
 ]

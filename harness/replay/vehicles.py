@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from harness.traffic.footway import WALKER_ATTRIBUTES, WALKER_TYPE
 from harness.traffic.xml_file import parse_xml
 
 PLAYER_COLOURS = {
@@ -81,7 +82,7 @@ def types_of_vehicles(trace: pd.DataFrame, route_files: Sequence[Path]) -> dict[
     The players get types of their own. Background vehicles keep their type, in grey where it has no colour. A type that
     the route files do not define is SUMO's default.
     """
-    defined: dict[str, dict[str, str]] = {}
+    defined: dict[str, dict[str, str]] = {WALKER_TYPE: WALKER_ATTRIBUTES}
     for route_file in route_files:
         defined |= _defined_types(route_file, route_file.stat().st_mtime_ns)
     vehicles = trace.drop_duplicates("player")

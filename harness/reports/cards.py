@@ -11,12 +11,15 @@ from markupsafe import Markup
 from harness.evaluation.research_questions import Verdict
 from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, Arm, NaiveEgo, against_persona, persona_alone
 from harness.reports import page_wording
+from harness.reports.differences import Row, effect, statistics
 from harness.reports.distributions import MOST_LINES, Pairs, paired_figure, pairs_of, spread_figure, spreads_of
 from harness.reports.figures import Column, Point, rate_figure, speed_figure
+from harness.reports.key_figures import KeyFigure, key_figures
 from harness.reports.numbers import MISSING, p_number, percent
+from harness.reports.portrait import portrait
 from harness.reports.results import Results
 from harness.reports.treatment import Change
-from harness.reports.wording import QUESTIONS, Conclusion, Row, effect, failures
+from harness.reports.wording import QUESTIONS, Conclusion, failures
 
 LONGEST_LABEL = 12
 """Letters of a persona's name that fit under a column of a figure."""
@@ -66,6 +69,11 @@ class Card:
     paired_note: str
     """How many of the episodes are drawn in it, if not all."""
     spread_figure: Markup
+    portrait: str
+    """The persona in a line; empty without its document."""
+    key_figures: Sequence[KeyFigure]
+    statistics: Sequence[str]
+    """A line for each test behind the verdicts."""
     worst: tuple[str, str] | None
     """Key and description of the game to show: the worst that is embedded."""
 
@@ -110,8 +118,20 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
             f"spread{place}",
             page_wording.spread_alternative(_values(columns, found, "min_ttc_s")),
         ),
+        portrait=portrait(found.persona_documents.get(persona, {})),
+        key_figures=key_figures(persona, found),
+        statistics=_statistics(persona, found),
         worst=worst,
     )
+
+
+def _statistics(persona: str, found: Results) -> list[str]:
+    several = len(found.seeds) > 1
+    return [
+        f"{row['question']}{', seed ' + str(row['seed']) if several else ''}. {statistics(row)}"
+        for row in found.comparisons
+        if row["persona"] == persona and row["p_value"] == row["p_value"]
+    ]
 
 
 def _paired(persona: str, place: int, found: Results) -> tuple[Markup, str]:

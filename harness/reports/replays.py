@@ -10,12 +10,10 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.people import COLLIDED_WITH, judged, judged_outcomes
+from harness.evaluation.worst_first import FAILURES, worst_first
 from harness.reports import page_wording
 from harness.reports.numbers import MISSING, number
 from harness.reports.player_data import key
-
-FAILURES = ("collision", "rail", "timeout")
-"""Failures from the worst on."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,15 +39,14 @@ def failures(episodes: pd.DataFrame, among: Sequence[str] | None = None) -> int:
 
 
 def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[Replay]:
-    """The replays, worst first, in the order of `harness.replay.selection.worst_first`, which reports may not import.
+    """The replays, worst first.
 
     `embedded` are the keys of the games that the page can play.
     """
-    games = {_name(game): game for game in episodes.to_dict("records")}
+    games = {_name(game): game for game in worst_first(episodes).to_dict("records")}
     several_seeds = episodes["seed"].nunique() > 1
-    known = [(name, games[name]) for name in names if name in games]
-    known.sort(key=lambda pair: _worst(pair[1]))
-    shown = [_replay(name, game, several_seeds, embedded) for name, game in known]
+    wanted = set(names)
+    shown = [_replay(name, game, several_seeds, embedded) for name, game in games.items() if name in wanted]
     unknown = sorted(set(names) - set(games))
     return shown + [
         Replay(name=name, game=name, outcome=MISSING, min_ttc=MISSING, command="", scene=_scene(name), watch="")
@@ -59,12 +56,17 @@ def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Containe
 
 def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tuple[str, str] | None:
     """Key and description of the worst game of an arm, of those that the page can play; None where it can play none."""
-    games = [game for game in episodes[episodes["arm"] == arm].to_dict("records") if _key(game) in embedded]
-    if not games:
+    games = worst_first(episodes[episodes["arm"] == arm]).to_dict("records")
+    game = next((game for game in games if _key(game) in embedded), None)
+    if game is None:
         return None
-    game = min(games, key=_worst)
     (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
     return _key(game), page_wording.worst_game(game["episode"], outcome, ttc, _with(game))
+
+
+def most_severe(episodes: pd.DataFrame) -> Mapping[Any, Any]:
+    """The worst of these games, of which there is at least one."""
+    return worst_first(episodes).to_dict("records")[0]
 
 
 def keys(episodes: pd.DataFrame) -> list[str]:
@@ -78,12 +80,6 @@ def _name(game: Mapping[Any, Any]) -> str:
 
 def _key(game: Mapping[Any, Any]) -> str:
     return key(game["arm"], game["seed"], game["episode"])
-
-
-def _worst(game: Mapping[Any, Any]) -> tuple[Any, ...]:
-    (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
-    severity = FAILURES.index(outcome) if outcome in FAILURES else len(FAILURES) + (outcome == "error")
-    return severity, ttc if ttc == ttc else float("inf"), game["arm"], game["seed"], game["episode"]
 
 
 def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: Container[str]) -> Replay:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.acceptance import Check
 from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.strategies import Arm, Strategy
 from harness.evaluation.tables import TABLES, typed
@@ -41,6 +42,8 @@ class RunTables:
     """None: the report has no section on manoeuvres."""
     game: GameFindings | None = None
     """None: the report has no section on the game."""
+    acceptance: Sequence[Check] | None = None
+    """The checks of the campaign's bounds; None: it has none."""
     replays: Sequence[str] = ()
     """Names of the folders under `replays/`, in any order."""
 

@@ -8,6 +8,7 @@ from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
+import shapely
 from pydantic import ConfigDict
 from sumolib.net import Net
 from sumolib.net.edge import Edge
@@ -21,20 +22,24 @@ from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
 from harness.game.initial_state import Conditions, StartDistribution, StartRange
 from harness.game.quantities import REACH_M
+from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.world import World
 from harness.traffic import network
 from harness.traffic.departures import background_departures, check_departures, edges_of
+from harness.traffic.footway import open_walker, opened_ground, with_walkers
 from harness.traffic.levels import heights_of_players_roads
 from harness.traffic.net_file import check_net
-from harness.traffic.player import open_player
+from harness.traffic.player import OpenPlayer, open_player
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_reading import read_route_file
 from harness.traffic.start_overlaps import check_starts
 from harness.traffic.start_ranges import start_range
 from harness.traffic.trips import with_routes
+from harness.traffic.users_lanes import lanes_for
+from harness.traffic.walker_conflicts import Way, with_walkers_conflicts
 from harness.traffic.warm_up import Snapshot, snapshots
 
 
@@ -65,7 +70,7 @@ class OpenScene:
     @cached_property
     def has_background_traffic(self) -> bool:
         """Whether vehicles other than the players may depart."""
-        players = {player.vehicle for player in self.document.players}
+        players = set(self.document.vehicles)
         return bool(self.routes.flows) or bool(set(self.routes.vehicles) - players)
 
     @cached_property
@@ -75,13 +80,13 @@ class OpenScene:
 
     def vehicle(self, player: int) -> Departure:
         """A player's vehicle in the route file."""
-        return self.routes.vehicles[self.document.players[player].vehicle]
+        return self.routes.vehicles[self.document.vehicles[player]]
 
     def departures(self, generator: np.random.Generator) -> list[Departure]:
         """The background vehicles that depart during a game. What is random about them is drawn from the generator."""
         if not self.has_background_traffic:
             return []
-        players = {player.vehicle for player in self.document.players}
+        players = set(self.document.vehicles)
         begin_s, end_s = self.document.game_window_s
         varied = self.document.varies.traffic_density
         density = 1.0 if varied is None else between(varied, generator.random())
@@ -151,9 +156,14 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         raise UsageError(problems)
     own = _edges_of_players(document, net, routes)
     area = network.drivable_area(net, own)
+    ground = opened_ground(document, net, area)
     open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
-    opened = [collect(problems, partial(open_one, role)) for role in document.roles]
-    vehicles = {player.vehicle for player in document.players}
+    on_foot = partial(open_walker, file=document_file, document=document, routes=routes, ground=ground)
+    opened = [
+        collect(problems, partial(on_foot if player.on_foot else open_one, role))
+        for role, player in zip(document.roles, document.players, strict=True)
+    ]
+    vehicles = set(document.vehicles)
     collect(problems, lambda: check_departures(vehicles, net, routes, document.traffic_window_s, document.roles))
     players = [player for player in opened if player is not None]
     if problems or len(players) < len(opened):
@@ -168,14 +178,21 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         raise UsageError(problems)
     lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
+    walking = tuple(player.on_foot for player in document.players)
     world = World(
-        road=Road(network.rails(lines, REACH_M + 10.0), Routes.of([player.route for player in players])),
+        road=Road(
+            network.rails(lines, REACH_M + 10.0),
+            Routes.of([player.route for player in players]),
+            None if ground is None else network.rails(ground.rail_lines, REACH_M + 10.0),
+            None if ground is None else ground.raster,
+        ),
         actuators=_actuators(document, types),
         length_m=np.array([each.length_m for each in types]),
         width_m=np.array([each.width_m for each in types]),
         step_s=document.step_length_s,
         time_limit_s=document.time_limit_s,
-        right_of_way=right_of_way(net, [[net.getEdge(name) for name in player.edges] for player in players]),
+        right_of_way=_right_of_way(document, net, players),
+        on_foot=walking if any(walking) else (),
     )
     if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:
         message, remedy = "no player's route passes a traffic light", "leave it out, or choose other routes"
@@ -196,9 +213,22 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     return scene
 
 
+def _right_of_way(document: Scene, net: Net, players: Sequence[OpenPlayer]) -> RightOfWay:
+    ways = [
+        Way(player=k, line=shapely.LineString(player.way), marked=player.marked_crossing)
+        for k, player in enumerate(document.players)
+        if player.way is not None
+    ]
+    walkers = {way.player for way in ways}
+    routes = [[] if k in walkers else [net.getEdge(name) for name in player.edges] for k, player in enumerate(players)]
+    lanes_of = [lanes_for(player.kind) for player in document.players]
+    table = right_of_way(net, routes, lanes_of)
+    return with_walkers_conflicts(table, net, [player.route for player in players], ways)
+
+
 def _edges_of_players(document: Scene, net: Net, routes: RouteFile) -> list[Edge]:
     """The edges of the players' routes, each once; those of invalid routes are left out."""
-    vehicles = [routes.vehicles[player.vehicle] for player in document.players if player.vehicle in routes.vehicles]
+    vehicles = [routes.vehicles[name] for name in document.vehicles if name in routes.vehicles]
     found = [collect([], partial(edges_of, each, net, routes)) or [] for each in vehicles]
     return list(dict.fromkeys(edge for edges in found for edge in edges))
 
@@ -248,12 +278,13 @@ def _checked_routes(paths: Sequence[Path], folder: Path, document: Scene | None,
 
 def _with_routes(routes: RouteFile, net_file: Path, net: Net, document: Scene) -> RouteFile:
     """The route file with routes for the trips of the players, and for those that may depart in a game."""
-    players = [routes.vehicles[each.vehicle] for each in document.players if each.vehicle in routes.vehicles]
+    routes = with_walkers(routes, document, net)
+    players = [routes.vehicles[name] for name in document.vehicles if name in routes.vehicles]
     return with_routes(routes, net_file, net, [*players, *routes.within(*document.traffic_window_s)])
 
 
 def _actuators(document: Scene, types: Sequence[VehicleType]) -> Actuators:
-    limits = [player.actuators for player in document.players]
+    limits = [player.actuators.with_defaults_of(player.kind) for player in document.players]
     return Actuators(
         max_acceleration_mps2=np.array([each.max_acceleration_mps2 for each in limits]),
         max_braking_mps2=np.array([each.max_braking_mps2 for each in limits]),
@@ -261,5 +292,6 @@ def _actuators(document: Scene, types: Sequence[VehicleType]) -> Actuators:
         max_steering_rad=np.array([each.max_steering_rad for each in limits]),
         max_steering_rate_radps=np.array([each.max_steering_rate_radps for each in limits]),
         wheelbase_m=np.array([each.wheelbase_m for each in limits]),
+        max_lateral_mps2=np.array([each.max_lateral_mps2 for each in limits]),
         friction=document.friction,
     )

@@ -171,8 +171,8 @@ def test_write_csv__writes_exactly_these_bytes(tmp_path):
     write_csv(episodes_of(*rows), path)
     assert path.read_bytes().decode() == (
         ",".join(TABLES["episodes"]) + "\n"
-        "naive_alone,,1,0,goal,0,0.30000000000000004,,,,,,,,,,,,,,,,,,12.0,\n"
-        'naive_alone,,1,1,error,,,,,,,,,,,,,-1e-17,,,,,,,,"no ""lane"",\nat all"\n'
+        "naive_alone,,1,0,goal,0,0.30000000000000004,,,,,,,,,,,,,,,,,,12.0" + "," * 14 + "\n"
+        "naive_alone,,1,1,error,,,,,,,,,,,,,-1e-17,,,,,,," + "," * 14 + '"no ""lane"",\nat all"\n'
     )
 
 

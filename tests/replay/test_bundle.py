@@ -11,7 +11,8 @@ import pytest
 from defusedxml import ElementTree
 
 from harness.errors import UsageError
-from harness.replay import choose_games, open_in_sumo_gui, replay_name, worst_first
+from harness.evaluation.worst_first import worst_first
+from harness.replay import choose_games, open_in_sumo_gui, replay_name
 from harness.replay import sumo_gui as sumo_gui_module
 from harness.replay.contact import contacts
 from harness.replay.gui_settings import choose_view

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
-from harness.replay.selection import choose_games, worst_first
+from harness.replay.selection import choose_games
 from harness.reports.player_data import PlayerTrack, RecordedGame, SceneDrawing, Touch, Track
 
 STEP_S, STEPS = 0.1, 80

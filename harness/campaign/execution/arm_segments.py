@@ -24,7 +24,7 @@ from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES, name_
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.environments.rollout import Arm, Game, assess
 from harness.evaluation.people import columns_for
-from harness.evaluation.tables import EPISODE_COLUMNS, join_csv, typed, write_csv
+from harness.evaluation.tables import PLAYED_COLUMNS, join_csv, typed, write_csv
 from harness.evaluation.trace_file import TraceWriter, join_traces
 from harness.files import make_folder
 
@@ -61,7 +61,7 @@ class Segment:
                 if game.trace is not None:
                     traces.add(game.trace)
                 on_game()
-        table = typed(pd.DataFrame(records).reindex(columns=list(columns_for(len(arm.drivers) - 1, EPISODE_COLUMNS))))
+        table = typed(pd.DataFrame(records).reindex(columns=list(columns_for(len(arm.drivers) - 1, PLAYED_COLUMNS))))
         write_csv(table, self.file(EPISODES))
         write_csv(name_manoeuvres(table, self.file(_TRACES), arm.scene), self.file(MANOEUVRES))
         files = [self.file(name) for name in (EPISODES, MANOEUVRES, _TRACES)]

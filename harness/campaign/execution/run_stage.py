@@ -23,7 +23,7 @@ from harness.campaign.plan.planned_drivers import BestOf, SumoDriven, descriptio
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, SearchStage, Stage, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions_of_numbers
-from harness.config.campaign import Training
+from harness.config.training import Training
 from harness.drivers.mixture import Player
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
@@ -103,6 +103,7 @@ def carry_out(
         case PreventabilityStage():
             info, files = _judge(stage, run)
     info["seconds"] = round(time.monotonic() - started, 1)
+    info["finished_on"] = time.strftime("%Y-%m-%d", time.gmtime())
     folder.finish(stage.id, key, info, files)
     if not info.get("errors"):  # the segments of failed games are kept: the next run of the command plays those again
         folder.drop_segments(stage.id)
@@ -215,6 +216,7 @@ def _search(stage: SearchStage, run: StageRun) -> Made:
 def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     from harness.campaign.execution.arm_segments import join_segments, play_segments, segments_of
     from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES
+    from harness.campaign.storage.severity_table import SEVERITY, severity_table
 
     context, folder = run.context, run.folder
     if run.people > 1:
@@ -227,6 +229,9 @@ def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     work = folder.work(stage.id)
     files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
     join_segments(segments, *files)
+    (work / SEVERITY).unlink(missing_ok=True)  # of games that could not be played in an earlier run
+    severity_table(folder, stage.id, run.scene)
+    files.append(work / SEVERITY)
     episodes = segments[-1].episodes.stop
     facts = {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}
     return facts | _goals_alone(stage, work / EPISODES), files

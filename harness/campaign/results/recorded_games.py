@@ -14,7 +14,8 @@ from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.trace_quantities import series_of
-from harness.replay import choose_games, worst_first
+from harness.evaluation.worst_first import worst_first
+from harness.replay import choose_games
 from harness.replay.contact import contacts
 from harness.replay.vehicles import types_of_vehicles
 from harness.reports.player_data import PlayerTrack, RecordedGame, SceneDrawing, Touch, Track
@@ -126,6 +127,7 @@ def scene_drawing(scene: OpenScene) -> SceneDrawing:
     return SceneDrawing(
         surfaces=drawing.surfaces(net),
         lane_marks=drawing.lane_marks(net),
+        edge_lines=drawing.edge_lines(net),
         rails=scene.rail_lines,
         goal=drawing.goal_lines(scene, net),
     )

@@ -23,7 +23,8 @@ from harness.evaluation.manoeuvres import pairs_in
 from harness.evaluation.people import people_in
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
-from harness.replay import follow_in_sumo_gui, replay_name, worst_first, write_film, write_replay
+from harness.evaluation.worst_first import worst_first
+from harness.replay import follow_in_sumo_gui, replay_name, write_film, write_replay
 from harness.traffic.scene import open_scene
 
 

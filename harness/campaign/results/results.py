@@ -15,8 +15,9 @@ from rich.progress import track
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
+from harness.campaign.results.acceptance import checks_of, shown_lines, write_ci_files
 from harness.campaign.results.judged_failures import preventability_tables
-from harness.campaign.results.kept_results import RunResult, ShownVerdict, keep_result
+from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownVerdict, keep_result
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
@@ -25,8 +26,10 @@ from harness.campaign.storage.learned import did_not_learn, judged
 from harness.campaign.storage.manifest import FINISHED, is_tuned
 from harness.campaign.storage.manoeuvre_table import manoeuvres_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.campaign.storage.severity_table import severity_table, with_severity
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
+from harness.evaluation.acceptance import Evidence
 from harness.evaluation.comparison import compare, games_by_arm
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import find
@@ -34,8 +37,8 @@ from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.research_questions import Question
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import (
-    EPISODE_COLUMNS,
     MANOEUVRE_COLUMNS,
+    PLAYED_COLUMNS,
     RECONFIGURATION_COLUMNS,
     TRAINING_COLUMNS,
     is_of_a_search,
@@ -44,8 +47,9 @@ from harness.evaluation.tables import (
     write_csv,
 )
 from harness.evaluation.trace_file import TraceReader, check_traces
+from harness.evaluation.worst_first import worst_first
 from harness.files import write_atomically
-from harness.replay import choose_games, replay_name, worst_first, write_replay
+from harness.replay import choose_games, replay_name, write_replay
 from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions, warn
@@ -63,7 +67,11 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     campaign = _campaign(written)
     stages = plan(campaign, written["personas"], is_tuned(written))
     done = {name: entry for name, entry in written["stages"].items() if entry["status"] == "done"}
-    episodes = _gather(folder, done, "assessment", "episodes.csv", list(EPISODE_COLUMNS))
+    played = _gather(folder, done, "assessment", "episodes.csv", list(PLAYED_COLUMNS))
+    _check_traces(folder, played)
+    scene = open_scene(folder.scene)
+    with console.status("working out how severe each game is"):
+        episodes = with_severity(played, [severity_table(folder, name, scene) for name in _arms(done)])
     entries = judged(written["stages"], campaign, stages, _goals(stages, episodes))
     manifest = {**written, "stages": entries}
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
@@ -81,8 +89,6 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     populations = by_who_drove(campaign, episodes)
     tables |= {"populations": populations} if campaign.population else {}
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
-    scene = open_scene(folder.scene)
-    _check_traces(folder, episodes)
     write_model_cards(folder, manifest, summary)
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
@@ -90,6 +96,9 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         manoeuvres = _manoeuvres(folder, done, scene)
     write_csv(manoeuvres, folder.path / "manoeuvres.csv")
     replays = _write_replays(folder, scene, episodes, console)
+    gaps = game.gaps if game is not None else None
+    evidence = Evidence(arms=arms, episodes=episodes, summary=summary, gaps=gaps)
+    checks = checks_of(campaign, manifest["personas"], evidence)
     report = RunTables(
         manifest=manifest,
         arms=arms,
@@ -104,6 +113,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         replays=replays,
         populations=populations,
         **prevented,
+        acceptance=checks,
     )
     with console.status("writing the report"):
         games = recorded_games(episodes, arms, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
@@ -120,7 +130,11 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         failed_stages=failed,
         error_games=int((episodes["error"] != "").sum()),
         did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(entries).items()),
+        acceptance=tuple(
+            ShownCheck(passed=each.passed, text=each.text) for each in shown_lines(checks, len(campaign.seeds))
+        ),
     )
+    write_ci_files(folder, manifest, checks, result)
     keep_result(folder, written, result)
     return result
 
@@ -176,6 +190,11 @@ def _done(manifest: Mapping[str, Any]) -> set[str]:
     return {name for name, entry in manifest["stages"].items() if entry["status"] == "done"}
 
 
+def _arms(done: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """The finished stages that are arms."""
+    return [name for name, entry in done.items() if entry["kind"] == "assessment"]
+
+
 def _gather(folder: RunFolder, done: Mapping[str, Any], kind: str, table: str, columns: list[str]) -> pd.DataFrame:
     frames = []
     for name, entry in done.items():
@@ -197,8 +216,7 @@ def _check_traces(folder: RunFolder, episodes: pd.DataFrame) -> None:
 
 
 def _manoeuvres(folder: RunFolder, done: Mapping[str, Any], scene: OpenScene) -> pd.DataFrame:
-    arms = [name for name, entry in done.items() if entry["kind"] == "assessment"]
-    frames = [manoeuvres_of(folder, name, scene) for name in arms]
+    frames = [manoeuvres_of(folder, name, scene) for name in _arms(done)]
     return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
 
 

@@ -1,0 +1,1 @@
+"""How severe a recorded game is: the contact, and how close it came without one."""

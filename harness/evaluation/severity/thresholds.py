@@ -1,0 +1,26 @@
+"""The numbers behind the measures of severity, each with its source."""
+
+from __future__ import annotations
+
+import math
+
+CONFLICT_TTC_S = 1.5
+"""A time to collision up to this is a conflict. Surrogate Safety Assessment Model, its default (Gettman, Pu, Sayed and
+Shelby 2008, FHWA-HRT-08-051); the same number in Van der Horst 1990, "A time-based analysis of road user behaviour"."""
+CONFLICT_PET_S = 1.0
+"""A post-encroachment time up to this is a conflict. Peesapati, Hunter and Rodgers 2018 ("Can post encroachment time
+substitute intersection characteristics in crash prediction models?"): of the thresholds from 0.5 to 3.5 s, 1 s
+correlates best with crashes."""
+CONFLICT_HEADWAY_S = 0.5
+"""A time headway below this is a conflict. Our own: half of the least time gap of UN Regulation No. 157 (5.2.3.3)."""
+SHORT_HEADWAY_S = 1.0
+"""UN Regulation No. 157 (5.2.3.3): the shortest time gap at any speed, here as time headway."""
+LONGEST_PET_S = 5.0
+"""A longer time between two passages is no encounter: the default of the Surrogate Safety Assessment Model."""
+CROSSING_RAD = math.radians(30.0)
+"""Paths at a smaller angle do not cross: the Surrogate Safety Assessment Model calls such encounters rear-end."""
+NEEDED_WITHIN_S = 4.0
+"""Braking is needed for a contact that is at most this far away. Van der Horst and Hogema (1993), "Time-to-collision
+and collision avoidance systems": 4 s separates drivers in danger from drivers in control."""
+LEADER_TURNED_RAD = math.radians(90.0)
+"""A road user at a larger angle to the way crosses it, and is not followed. Our own."""

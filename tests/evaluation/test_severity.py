@@ -1,0 +1,260 @@
+"""Measures of severity, compared with cases computed by hand: boxes at any angle, contacts and near misses.
+
+The road of the merge runs east; its lanes are centred on y = -4.8 and -1.6 m. Cars are 5 m long and 1.8 m wide.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from harness.evaluation.severity.columns import OF_SEVERITY
+from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
+from harness.evaluation.severity.masses import mass_kg
+from harness.evaluation.severity.measures import Kind, severity_of, side_of
+from harness.evaluation.tables import EPISODE_COLUMNS, TABLES, typed
+from harness.evaluation.worst_first import severities, worst_first
+from harness.game.geometry import Box
+
+KINDS = {
+    "car": Kind(),
+    "ego_car": Kind(length_m=4.6),  # the scene's ego
+    "truck": Kind(vehicle_class="truck"),
+    "foot": Kind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian"),
+}
+QUARTER = 0.5 * math.pi
+
+
+def rows(player: str, poses: list[tuple[float, float, float, float]], kind: str = "car", end: str = "") -> list[dict]:
+    """A player's rows of a trace from its poses (x, y, heading, speed) in each step; `end`: its outcome in the last."""
+    cells = {"episode": 0, "vehicle_type": kind, "steering_rad": 0.0, "lapsed": False, "signals": "", "player": player}
+    result = []
+    for step, (x, y, heading, speed) in enumerate(poses):
+        before = poses[max(step - 1, 0)][3]
+        motion = {"x_m": x, "y_m": y, "heading_rad": heading, "speed_mps": speed}
+        acceleration = (speed - before) / 0.1
+        outcome = end if step == len(poses) - 1 else ""
+        row = {**cells, **motion, "step": step, "time_s": 0.1 * step, "acceleration_mps2": acceleration}
+        result.append({**row, "outcome": outcome})
+    return result
+
+
+def along(x: float, y: float, heading: float, speed: float, steps: int) -> list[tuple[float, float, float, float]]:
+    """Poses at constant velocity."""
+    move = 0.1 * speed
+    return [(x + k * move * math.cos(heading), y + k * move * math.sin(heading), heading, speed) for k in range(steps)]
+
+
+def severity(merge: Any, *players: list[dict]) -> dict[str, Any]:
+    return severity_of(pd.DataFrame([row for player in players for row in player]), merge.world, KINDS)
+
+
+# --- contacts -----------------------------------------------------------------------------------------------------
+
+
+def test_contact__rear_end_of_equal_cars_shares_the_closing_speed(merge: Any) -> None:
+    # 14 m/s into 4 m/s: both go on at 9 m/s; the gap is 1.5 m at the start and -0.5 m after 2 steps
+    ego = rows("ego", along(20.0, -1.6, 0.0, 14.0, 3), end="collision")
+    cells = severity(merge, ego, rows("non_ego", along(26.5, -1.6, 0.0, 4.0, 3)))
+    assert cells["closing_speed_mps"] == pytest.approx(10.0)
+    assert (cells["ego_delta_v_mps"], cells["other_delta_v_mps"]) == (pytest.approx(5.0), pytest.approx(5.0))
+    assert cells["impact_side"] == "front"
+    assert cells["near_miss"] == 0
+    assert cells["severity"] == pytest.approx(305.0)
+
+
+def test_contact__the_lighter_one_changes_its_velocity_more(merge: Any) -> None:
+    # a truck of 4500 kg, a car of 1500 kg, 10 m/s: 10 * 4500 / 6000 = 7.5 and 10 * 1500 / 6000 = 2.5
+    ego = rows("ego", along(20.0, -1.6, 0.0, 14.0, 3), end="collision")
+    cells = severity(merge, ego, rows("non_ego", along(26.5, -1.6, 0.0, 4.0, 3), kind="truck"))
+    assert (cells["ego_delta_v_mps"], cells["other_delta_v_mps"]) == (pytest.approx(7.5), pytest.approx(2.5))
+    assert cells["severity"] == pytest.approx(307.5)
+
+
+def test_contact__a_pedestrian_decides_how_severe_it_is(merge: Any) -> None:
+    # 70 kg at rest, 1500 kg at 10 m/s: 10 * 1500 / 1570 = 9.554
+    ego = rows("ego", along(20.0, -1.6, 0.0, 10.0, 3), end="collision")
+    cells = severity(merge, ego, rows("walker", along(24.5, -1.6, QUARTER, 0.0, 3), kind="foot"))
+    assert cells["other_delta_v_mps"] == pytest.approx(9.554, abs=1e-3)
+    assert cells["severity"] == pytest.approx(309.554, abs=1e-3)
+
+
+def test_contact__a_crossing_car_adds_its_velocity_at_right_angles(merge: Any) -> None:
+    # ego 12 m/s east, the other 5 m/s north: 13 m/s; it reaches the ego's right side at y = -1.6 - 0.9
+    ego = rows("ego", along(20.0, -1.6, 0.0, 12.0, 3), end="collision")
+    cells = severity(merge, ego, rows("non_ego", along(22.0, -5.9, QUARTER, 5.0, 3)))
+    assert cells["closing_speed_mps"] == pytest.approx(13.0)
+    assert cells["ego_delta_v_mps"] == pytest.approx(6.5)
+    assert cells["impact_side"] == "right"
+
+
+@pytest.mark.parametrize(
+    ("other", "velocity", "side"),
+    [
+        (Box(4.9, 0.0, 0.0, 5.0, 1.8), (-10.0, 0.0), "front"),
+        (Box(-4.9, 0.5, 0.0, 5.0, 1.8), (10.0, 0.0), "rear"),
+        (Box(1.0, 1.75, 0.0, 5.0, 1.8), (0.0, -1.0), "left"),
+        (Box(4.0, 1.75, 0.0, 5.0, 1.8), (-4.0, -1.0), "left"),  # met sideways 0.05 s ago, lengthways 0.25 s ago
+        (Box(4.9, 1.7, 0.0, 5.0, 1.8), (-4.0, -1.0), "front"),  # met lengthways 0.025 s ago, sideways 0.1 s ago
+        (Box(0.0, -3.3, QUARTER, 5.0, 1.8), (0.0, 8.0), "right"),
+        (Box(0.0, -1.0, 0.0, 5.0, 1.8), (0.0, 0.0), "right"),  # no motion: the axis of least overlap
+    ],
+)
+def test_impact__is_on_the_side_of_the_surfaces_that_met_last(other: Box, velocity: Any, side: str) -> None:
+    own = Box(0.0, 0.0, 0.0, 5.0, 1.8)
+    assert side_of(impact_angle_rad(own, other, *velocity)) == side
+
+
+@pytest.mark.parametrize("turned", [0.7, 2.5, -1.9])
+def test_impact__is_the_same_in_every_direction_of_the_compass(turned: float) -> None:
+    def rotate(x: float, y: float) -> tuple[float, float]:
+        return x * math.cos(turned) - y * math.sin(turned), x * math.sin(turned) + y * math.cos(turned)
+
+    own, other = Box(0.0, 0.0, turned, 5.0, 1.8), Box(*rotate(1.0, 1.75), turned + 0.02, 5.0, 1.8)
+    assert side_of(impact_angle_rad(own, other, *rotate(0.0, -1.0))) == "left"
+
+
+# --- without a contact ----------------------------------------------------------------------------------------------
+
+
+def needed(other: Box, velocity_mps: float, speed_mps: float = 10.0) -> float:
+    own = Box(*(np.array([value]) for value in (0.0, 0.0, 0.0, 5.0, 1.8)))
+    others = Box(*(np.array([[float(value)]]) for value in other))
+    found = needed_braking_mps2(
+        own, np.array([speed_mps]), others, np.array([[velocity_mps]]), np.ones((1, 1), bool), 8.0, 4.0
+    )
+    return float(found[0])
+
+
+@pytest.mark.parametrize(
+    ("other", "velocity_mps", "expected"),
+    [
+        (Box(15.0, 0.0, 0.0, 5.0, 1.8), 0.0, 5.0),  # 10 m behind a standing car: 10**2 / (2 * 10)
+        (Box(15.0, 0.0, 0.0, 5.0, 1.8), 4.0, 1.8),  # a car at 4 m/s: (10 - 4)**2 / (2 * 10)
+        (Box(8.0, 0.0, 0.0, 5.0, 1.8), 0.0, 8.0),  # 3 m: 16.7 m/s2 are more than the car can do
+        (Box(15.0, 0.0, 0.0, 5.0, 1.8), 10.0, 0.0),  # the same speed
+        (Box(15.0, 3.0, 0.0, 5.0, 1.8), 0.0, 0.0),  # beside the way
+        (Box(-10.0, 0.0, 0.0, 5.0, 1.8), 20.0, 0.0),  # from behind: it would hit the standing ego as well
+        (Box(15.0, 0.0, math.pi, 5.0, 1.8), 10.0, 0.0),  # oncoming: the same
+        (Box(60.0, 0.0, 0.0, 5.0, 1.8), 0.0, 0.0),  # 5.5 s away
+    ],
+)
+def test_needed_braking__of_one_moment(other: Box, velocity_mps: float, expected: float) -> None:
+    assert needed(other, velocity_mps) == pytest.approx(expected, abs=0.01)
+
+
+def test_needed_braking__lets_a_crossing_car_pass() -> None:
+    # its rear is clear of the ego's way (half widths 0.9, half length 2.5, now 6 m to the right) after
+    # (6 + 0.9 + 2.5) / 8 = 1.175 s; the ego's front may cover 10 - 0.9 - 2.5 = 6.6 m until then:
+    # 10 * 1.175 - b / 2 * 1.175**2 = 6.6, b = 7.460
+    assert needed(Box(10.0, -6.0, QUARTER, 5.0, 1.8), 8.0) == pytest.approx(7.460, abs=0.02)
+
+
+def presence(x: float, y: float, heading: float, speed: float, steps: int = 60) -> Box:
+    poses = np.array(along(x, y, heading, speed, steps))
+    return Box(poses[:, 0], poses[:, 1], poses[:, 2], np.full(steps, 5.0), np.full(steps, 1.8))
+
+
+def pet(own: Box, other: Box) -> float:
+    others = Box(*(each[:, None] for each in other))
+    return float(post_encroachment_s(own, others, np.ones((len(own.x_m), 1), bool), math.radians(30.0), 0.1, 50))
+
+
+def test_post_encroachment__at_a_crossing() -> None:
+    # the ego's rear leaves the other's way (x = 0.9 to the right of it) at (20 + 2.5 + 0.9) / 10 = 2.34 s, the other's
+    # front enters the ego's way at (40 - 2.5 - 0.9) / 10 = 3.66 s: 1.32 s, in steps of 0.1 s
+    own, other = presence(-20.0, 0.0, 0.0, 10.0), presence(0.0, -40.0, QUARTER, 10.0)
+    assert pet(own, other) == pytest.approx(1.4)
+    assert pet(other, own) == pytest.approx(1.4)
+
+
+def test_post_encroachment__of_paths_that_do_not_cross_is_unmeasured() -> None:
+    assert math.isinf(pet(presence(-20.0, 0.0, 0.0, 10.0), presence(-40.0, 0.0, 0.0, 10.0)))  # one behind the other
+    assert math.isinf(pet(presence(-20.0, 0.0, 0.0, 10.0), presence(0.0, -90.0, QUARTER, 10.0)))  # 6.3 s later
+
+
+def test_closeness__of_following_at_a_lower_speed_each_step(merge: Any) -> None:
+    # gap 8 m, 16 m/s behind 12 m/s for 10 steps: in step k the gap is 8 - 0.4 k
+    ego = rows("ego", along(20.0, -1.6, 0.0, 16.0, 11), kind="ego_car", end="goal")
+    cells = severity(merge, ego, rows("non_ego", along(32.8, -1.6, 0.0, 12.0, 11)))
+    gaps = [8.0 - 0.4 * k for k in range(1, 11)]
+    ttc = [gap / 4.0 for gap in gaps]
+    assert cells["min_time_headway_s"] == pytest.approx(4.0 / 16.0)
+    assert cells["time_headway_below_1_s"] == pytest.approx(1.0)
+    assert cells["time_exposed_ttc_s"] == pytest.approx(0.1 * sum(each <= 1.5 + 1e-9 for each in ttc))
+    assert cells["time_integrated_ttc_s2"] == pytest.approx(0.1 * sum(max(1.5 - each, 0.0) for each in ttc))
+    assert cells["needed_braking_mps2"] == pytest.approx(4.0**2 / (2.0 * 4.0), abs=0.01)
+    assert cells["used_braking_mps2"] == 0.0
+    assert cells["near_miss"] == 1
+    # TTC 1 s of 1.5 s, headway 0.25 s of 0.5 s: 100 / (1 + 0.5)
+    assert cells["severity"] == pytest.approx(100.0 / 1.5)
+    assert "closing_speed_mps" not in cells
+
+
+def test_used_braking__counts_from_when_braking_was_needed(merge: Any) -> None:
+    speeds = [16.0, 15.5, 15.5, 15.2, 15.2]  # 5 m/s2 while nobody is near, 3 m/s2 when the other is there
+    ego = rows("ego", [(20.0 + 1.5 * k, -1.6, 0.0, speed) for k, speed in enumerate(speeds)], end="goal")
+    other = [(35.0 + k, -1.6 if k > 1 else -4.8, 0.0, 10.0) for k in range(5)]
+    assert severity(merge, ego, rows("non_ego", other))["used_braking_mps2"] == pytest.approx(3.0)
+
+
+def test_alone__nothing_is_near(merge: Any) -> None:
+    cells = severity(merge, rows("ego", along(20.0, -1.6, 0.0, 14.0, 5), end="goal"))
+    assert cells["near_miss"] == 0
+    assert cells["severity"] == 0.0
+    assert cells["min_time_headway_s"] is None
+    assert cells["used_braking_mps2"] is None
+
+
+def test_ends__rails_and_timeouts_lie_between(merge: Any) -> None:
+    rail = severity(merge, rows("ego", along(20.0, -1.6, 0.1, 14.0, 5), end="rail"))
+    timeout = severity(merge, rows("ego", along(20.0, -1.6, 0.0, 0.0, 5), end="timeout"))
+    assert (rail["severity"], timeout["severity"]) == (pytest.approx(214.0), pytest.approx(100.0))
+
+
+def test_without_the_ego__the_person_is_judged_by_severity_alone(merge: Any) -> None:
+    assert severity(merge, rows("non_ego", along(20.0, -1.6, 0.1, 9.0, 5), end="rail")) == {"severity": 209.0}
+
+
+# --- tables -----------------------------------------------------------------------------------------------------
+
+
+def test_columns__have_a_place_in_the_table_and_a_definition() -> None:
+    assert set(OF_SEVERITY) <= set(EPISODE_COLUMNS)
+    assert all(column.meaning.endswith(".") for column in OF_SEVERITY.values())
+
+
+def test_masses__of_two_wheels_include_the_rider() -> None:
+    assert (mass_kg("bicycle"), mass_kg("passenger"), mass_kg("custom1")) == (80.0, 1500.0, 1500.0)
+
+
+def test_worst_first__a_harder_contact_comes_before_an_earlier_episode() -> None:
+    common = {"arm": "a", "persona": "", "seed": 1, "non_ego_outcome": "", "error": ""}
+    ends = [
+        ("collision", 301.5),
+        ("goal", 60.0),
+        ("collision", 308.0),
+        ("error", None),
+        ("goal", None),
+        ("rail", 212.0),
+    ]
+    games = [
+        {**common, "episode": k, "ego_outcome": end, "severity": number, "ego_failed": None}
+        for k, (end, number) in enumerate(ends)
+    ]
+    table = typed(pd.DataFrame(games, columns=list(TABLES["episodes"])))
+    assert worst_first(table)["episode"].tolist() == [2, 0, 5, 1, 4, 3]
+
+
+def test_severity__of_a_table_without_it_is_estimated_from_outcome_and_time_to_collision() -> None:
+    common = {"arm": "a", "persona": "", "seed": 1, "non_ego_outcome": "", "error": "", "ego_failed": 0}
+    games = [
+        {**common, "episode": 0, "ego_outcome": "goal", "ego_min_ttc_s": 1.5},
+        {**common, "episode": 1, "ego_outcome": "collision", "ego_min_ttc_s": 0.0},
+    ]
+    table = typed(pd.DataFrame(games, columns=list(TABLES["played"])))
+    assert severities(table).tolist() == [50.0, 300.0]
