@@ -174,7 +174,7 @@ class ConflictReplay:
 
 
 class _Replayed(Arena):
-    """An arena whose games begin in the middle of a drive. SUMO's seats repeat a recording, those of pedestrians too."""
+    """An arena whose games begin in the middle of a drive. Seats of SUMO repeat a recording, also of pedestrians."""
 
     def __init__(self, scene: OpenScene, seats: Sequence[Seat], simulation: RecordedCourses, games: int) -> None:
         super().__init__(scene, games, seats, simulation=simulation)
