@@ -22,7 +22,7 @@ from benchmarks.figures import Measured
 from benchmarks.games import GAMES, MERGE, coasting_policy, merge_scene, persona, persona_file
 from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers, take_turns
 from harness.campaign.execution.worker_pool import cores
-from harness.config.campaign import Retraining, Training
+from harness.config.training import Retraining, Training
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import write_policy
 from harness.environments.gymnasium_env import DrivingEnv

@@ -13,6 +13,8 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
+from harness.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from harness.config.persona import Persona
     from harness.config.toml_reading import read_document
@@ -24,9 +26,8 @@ if TYPE_CHECKING:
     from harness.environments.gymnasium_env import DrivingEnv, ParallelDrivingEnv
     from harness.environments.vector_env import ArenaVecEnv
     from harness.errors import HarnessError, SimulationError, UsageError
+    from harness.library import Results, load, run
     from harness.traffic.scene import OpenScene, open_scene
-
-__version__ = "0.1.0"
 
 __all__ = [
     "Arena",
@@ -39,14 +40,17 @@ __all__ = [
     "ParallelDrivingEnv",
     "Persona",
     "Policy",
+    "Results",
     "Seat",
     "SimulationError",
     "Step",
     "SumoDriver",
     "UsageError",
+    "load",
     "open_scene",
     "read_document",
     "read_policy",
+    "run",
 ]
 
 _MODULES = {
@@ -60,6 +64,7 @@ _MODULES = {
     "environments.gymnasium_env": ("DrivingEnv", "ParallelDrivingEnv"),
     "environments.vector_env": ("ArenaVecEnv",),
     "errors": ("HarnessError", "SimulationError", "UsageError"),
+    "library": ("Results", "load", "run"),
     "traffic.scene": ("OpenScene", "open_scene"),
 }
 

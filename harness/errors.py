@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 T = TypeVar("T")
+FAILED, USAGE_ERROR, NOT_ACCEPTED = 1, 2, 3
+"""Exit codes: games, stages or checks failed; a mistake of the user; a bound of [acceptance] is not kept."""
 _LONGEST = 2_000  # characters of each part of a problem
 
 

@@ -13,20 +13,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ConfigDict
-
+from harness.campaign.named_documents import NamedDocuments, find_named, read_named_persona, read_names
 from harness.campaign.plan.name_checks import check_names
 from harness.campaign.plan.people_checks import check_people
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.strategy_drivers import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
-from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego, resolve
+from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.persona import Persona
-from harness.config.toml_reading import Document, read_document
+from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import Problem, UsageError, collect
 from harness.game.state import EGO
+from harness.shipped_documents import PACKAGE
 from harness.traffic.load_check import check_loads
 from harness.traffic.scene import OpenScene, open_scene
 
@@ -56,6 +56,11 @@ class OpenCampaign:
     """SHA-256 of every file that the campaign rests on, by its path from the campaign's folder."""
 
     @property
+    def run_name(self) -> str:
+        """The name of its run folder in `reports/`."""
+        return self.document.name + ("-quick" if self.quick else "")
+
+    @property
     def tunable(self) -> bool:
         """Whether the ego is external and has tunable parameters."""
         return _is_tunable(self.ego_driver)
@@ -76,7 +81,7 @@ def open_campaign(
     """
     problems: list[Problem] = []
     document = collect(problems, lambda: read_document(file, Campaign))
-    named = document or _read_names(file)
+    named = document or read_names(file)
     if named is None:
         raise UsageError(problems)
     found = _find_documents(file, document, named, allow_code, problems)
@@ -130,14 +135,15 @@ class _Documents:
 
 
 def _find_documents(
-    file: Path, document: Campaign | None, named: Campaign | _Names, allow_code: bool, problems: list[Problem]
+    file: Path, document: Campaign | None, named: Campaign | NamedDocuments, allow_code: bool, problems: list[Problem]
 ) -> _Documents:
     """Read and check what a campaign names; what is wrong is added to `problems`."""
     ego_driver = collect(problems, lambda: _find_ego(file, named.ego.driver, allow_code))
     vehicle_type = ego_driver.vehicle_type if ego_driver is not None else None
-    scene = collect(problems, lambda: open_scene(resolve(file, named.scene), vehicle_type))
-    persona_files = [resolve(file, each) for each in (named.ego.persona, *named.personas)]
-    personas = [collect(problems, lambda path=path: read_document(path, Persona)) for path in persona_files]  # type: ignore[misc]
+    scene = collect(problems, lambda: open_scene(find_named(file, "scene", named.scene, "networks"), vehicle_type))
+    written = [("ego.persona", named.ego.persona), *(("personas", each) for each in named.personas)]
+    found = [collect(problems, lambda each=each: read_named_persona(file, *each)) for each in written]  # type: ignore[misc]
+    personas = [each[1] if each is not None else None for each in found]
     if ego_driver is not None and scene is not None:
         sampled = personas[0] is not None and personas[0].decisions == "sampled"
         games = _games_at_once(document, ego_driver)
@@ -150,7 +156,7 @@ def _find_documents(
         collect(problems, lambda: check_loads(scene))
     return _Documents(
         scene=scene,
-        persona_files=persona_files,
+        persona_files=[each[0] for each in found if each is not None],
         personas=personas,
         ego_driver=ego_driver,
         other_egos=other_egos,
@@ -163,30 +169,9 @@ def _is_tunable(driver: ExternalDriver | None) -> bool:
 
 
 def _relative(campaign_file: Path, path: Path) -> str:
+    if path.resolve().is_relative_to(PACKAGE):
+        return path.resolve().relative_to(PACKAGE.parent).as_posix()
     return Path(os.path.relpath(path.resolve(), campaign_file.resolve().parent)).as_posix()
-
-
-class _NamedByEgo(Document):
-    model_config = ConfigDict(extra="ignore")
-    driver: DocumentPath = LEARNED
-    persona: DocumentPath = Ego().persona
-
-
-class _Names(Document):
-    """The documents that a campaign names: they are checked even where the rest of it is wrong."""
-
-    model_config = ConfigDict(extra="ignore")
-    scene: DocumentPath
-    personas: list[DocumentPath]
-    policies: DocumentPath | None = None
-    ego: _NamedByEgo = _NamedByEgo()
-
-
-def _read_names(file: Path) -> _Names | None:
-    try:
-        return read_document(file, _Names)
-    except UsageError:
-        return None
 
 
 def _same_names(file: Path, written: Sequence[str], personas: Sequence[Persona | None]) -> list[Problem]:

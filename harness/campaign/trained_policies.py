@@ -7,19 +7,20 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from harness.campaign.plan.plan import plan
-from harness.config.campaign import Campaign, resolve
+from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
 from harness.drivers.policy_file import Policy, check_no_archive, persona_hash, policy_files, read_policy
 from harness.errors import Problem, UsageError, collect
 from harness.game.state import EGO, ROLES
+from harness.shipped_documents import find_document
 
 
 def find_policies(file: Path, written: str | None) -> Path | None:
     """The folder of policies that a campaign names. Raises UsageError if there is none."""
     if written is None:
         return None
-    folder = resolve(file, written)
+    folder = find_document(written, file.parent, "policies")
     check_no_archive(file, "policies", written, folder)
     if not os.path.isdir(folder):
         remedy = f"name one laid out as <run>/policies/; {_folders_beside(folder)}"

@@ -1,4 +1,4 @@
-"""The commands for documents: personas, drivers, and the schemas of all documents."""
+"""The commands for documents: new projects and personas, checks of campaigns, scenes and drivers, and schemas."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from typing import Annotated
 import typer
 
 from harness.cli import wording
+from harness.cli.scenes import check_scene, folder_of_scene
+from harness.cli.terminal import print_plain
+from harness.shipped_documents import document_at
 
 NOT_CONFORMANT = 1
 
@@ -45,7 +48,12 @@ def new_persona(
 
 @persona_app.command("show")
 def show_persona(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="The TOML file of the persona.", show_default=False)],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
+        ),
+    ],
     html: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Also write an HTML page that opens offline.", show_default=False),
@@ -59,6 +67,7 @@ def show_persona(
     from harness.reports.persona.profile import persona_profile
     from harness.reports.persona.terminal import show
 
+    file = document_at(file, "personas")
     profile = persona_profile(read_document(file, Persona))
     if html is not None:
         from harness.reports.persona.page import write_profile
@@ -70,6 +79,50 @@ def show_persona(
     show(profile, console)
     if html is not None:
         console.print(wording.page_written(html), highlight=False, markup=False, soft_wrap=True)
+
+
+def new(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.", show_default=False)],
+) -> None:
+    """Make a project: a campaign, a scene and a persona of your own, which run as they are, and a README."""
+    from rich.console import Console
+
+    from harness.cli.project import create_project
+
+    print_plain(wording.project_created(folder, create_project(folder)), Console())
+
+
+def check(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="PATH",
+            help="The TOML file of a campaign or the name of a shipped one, or a scene.toml, or a scene's folder.",
+            show_default=False,
+        ),
+    ],
+    allow_code: AllowCode = False,
+) -> None:
+    """Check a campaign and everything it names, and list its stages; or check one scene. Nothing is run or written."""
+    from rich.console import Console
+
+    if (folder := folder_of_scene(file)) is not None:
+        print_plain(check_scene(folder), Console())
+        return
+
+    from harness.campaign.plan.plan import plan
+    from harness.campaign.preflight import open_campaign
+    from harness.config.campaign import LEARNED
+    from harness.errors import plain
+
+    file = document_at(file, "campaigns")
+    opened = open_campaign(file, allow_code=allow_code)
+    stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
+    console = Console()
+    print_plain([wording.in_order(file)], console)
+    if opened.document.ego.driver != LEARNED:
+        print_plain([plain(wording.ego(opened))], console)
+    print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
 
 
 def schema(
@@ -126,8 +179,11 @@ def check_driver(
         ),
     ],
     scene: Annotated[
-        Path, typer.Option(metavar="DIR", help="The scene of the games.  [default: networks/merge]", show_default=False)
-    ] = Path("networks/merge"),
+        Path,
+        typer.Option(
+            metavar="DIR", help="The scene of the games, a folder or a name.  [default: merge]", show_default=False
+        ),
+    ] = Path("merge"),
     games: Annotated[int, typer.Option(min=2, max=1000, metavar="N", help="Games to play.")] = 3,
     allow_code: AllowCode = False,
 ) -> None:
@@ -139,7 +195,7 @@ def check_driver(
 
     from harness.environments.conformance import check_named
 
-    findings = check_named(driver, scene, games, allow_code=allow_code)
+    findings = check_named(driver, document_at(scene, "networks"), games, allow_code=allow_code)
     console = Console()
     for line in findings.lines():
         console.print(line, highlight=False, markup=False, soft_wrap=True)

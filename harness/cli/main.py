@@ -5,16 +5,21 @@ from __future__ import annotations
 import errno
 import signal
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from harness.cli import wording
-from harness.cli.documents import AllowCode, check_driver, columns, persona_app, schema
-from harness.cli.scenes import check_scene, folder_of_scene, scene_app
+from harness.cli.comparison import compare
+from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
+from harness.cli.pinned_games import minimise, regression
+from harness.cli.replays import replay
+from harness.cli.scenes import scene_app
+from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
+from harness.errors import FAILED, USAGE_ERROR
+from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,8 +38,8 @@ MACHINE_ERRORS = (
     errno.EIO,
 )
 """Errors of the operating system that are no mistakes of the program: they are reported without a traceback."""
-FAILED, USAGE_ERROR, INTERRUPTED = 1, 2, 130
-"""Exit codes. The last is 128 plus the number of SIGINT."""
+INTERRUPTED = 130
+"""The exit code after Ctrl-C: 128 plus the number of SIGINT."""
 
 app = typer.Typer(
     name="harness",
@@ -47,14 +52,17 @@ app = typer.Typer(
 A campaign trains a naive ego, trains a non-ego with a human persona against it, retrains the ego against the non-ego,
 and reports the differences with paired statistics:
 
-`harness campaign campaigns/merge.toml --quick`
+`harness demo` plays such a campaign with trained policies; `harness new FOLDER` makes one of your own.
 """,
-    epilog="Exit codes: 0 success; 1 some games or stages failed; 2 usage error; 130 interrupted; 143 terminated. "
-    "Finished work is kept in every case.",
+    epilog="Exit codes: 0 success; 1 some games or stages failed; 2 usage error; 3 a bound of [acceptance] is not "
+    "kept; 130 interrupted; 143 terminated. Finished work is kept in every case.",
 )
 
 CampaignFile = Annotated[
-    Path, typer.Argument(metavar="FILE", help="The TOML file of the campaign.", show_default=False)
+    Path,
+    typer.Argument(
+        metavar="FILE", help="The TOML file of the campaign, or the name of a shipped campaign.", show_default=False
+    ),
 ]
 RunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
@@ -80,6 +88,15 @@ Jobs = Annotated[
 ]
 
 
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=print_version, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    pass
+
+
 @app.command()
 def campaign(
     file: CampaignFile,
@@ -96,6 +113,7 @@ def campaign(
     """
     from rich.console import Console
 
+    file = document_at(file, "campaigns")
     console = Console()
     with console.status(wording.reading(file)):  # shown before what takes time to import
         from harness.campaign.execution.run_campaign import run_campaign
@@ -105,52 +123,27 @@ def campaign(
         if ray is not None:  # the nodes of a cluster know no working folder
             file, out = file.absolute(), out.absolute() if out is not None else None
         opened = open_campaign(file, quick, allow_code)
-    name = opened.document.name + ("-quick" if opened.quick else "")
-    folder = RunFolder(out or Path("reports") / name)
+    folder = RunFolder(out or Path("reports") / opened.run_name)
     if quick and not opened.quick:
         console.print(wording.NOTHING_TO_SHORTEN)
     _handle_termination_signals()
     try:
-        with started_on(ray, jobs, lambda line: _print_plain([line], console)) as start_workers:
+        with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
             outcome = run_campaign(opened, folder, start_workers, console)
     except KeyboardInterrupt as interrupt:
         console.print(wording.INTERRUPTED)
         raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
     _show(outcome, folder.path, console)
-    _exit_if_failed(outcome, console)
+    _exit_as(outcome, console)
 
 
 @app.command()
-def check(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="PATH",
-            help="The TOML file of a campaign, or a scene.toml, or a scene's folder.",
-            show_default=False,
-        ),
-    ],
-    allow_code: AllowCode = False,
-) -> None:
-    """Check a campaign and everything it names, and list its stages; or check one scene. Nothing is run or written."""
-    from rich.console import Console
+def demo(out: RunOut = None, jobs: Jobs = None) -> None:
+    """Play the paper's campaign with the shipped policies: a minute on two cores. Nothing is trained.
 
-    if (folder := folder_of_scene(file)) is not None:
-        _print_plain(check_scene(folder), Console())
-        return
-
-    from harness.campaign.plan.plan import plan
-    from harness.campaign.preflight import open_campaign
-    from harness.config.campaign import LEARNED
-    from harness.errors import plain
-
-    opened = open_campaign(file, allow_code=allow_code)
-    stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
-    console = Console()
-    _print_plain([wording.in_order(file)], console)
-    if opened.document.ego.driver != LEARNED:
-        _print_plain([plain(wording.ego(opened))], console)
-    _print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
+    The same as `harness campaign merge-demo`.
+    """
+    campaign(Path("merge-demo"), out=out, jobs=jobs)
 
 
 @app.command()
@@ -166,51 +159,16 @@ def report(run: RunPath) -> None:
     with folder.held():
         outcome = write_results(folder, console)
     _show(outcome, run, console)
+    _exit_as(outcome, console)
 
 
-@app.command()
-def replay(
-    run: RunPath,
-    arm: Annotated[
-        str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.", show_default=False)
-    ] = None,
-    episode: Annotated[
-        int | None, typer.Argument(metavar="EPISODE", help="The number of the episode.", show_default=False)
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="The training seed.  [default: the first of the campaign]", show_default=False)
-    ] = None,
-    list_games: Annotated[bool, typer.Option("--list", help="List the recorded games, worst first.")] = False,
-    film_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--film",
-            metavar="FILE",
-            help="Write the game as a .gif or .mp4 film instead; this needs no screen.",
-            show_default=False,
-        ),
-    ] = None,
-) -> None:
-    """Watch a recorded game in SUMO-GUI. Without ARM or EPISODE, list the recorded games."""
-    from rich.console import Console
-
-    from harness.campaign.results.replay_game import film, found_game, game_table, watch
-    from harness.errors import UsageError
-
-    console = Console()
-    if film_file is not None and (list_games or arm is None or episode is None):
-        raise UsageError.of("--film", str(film_file), *wording.FILM_NEEDS_A_GAME)
-    if list_games or arm is None or episode is None:
-        console.print(game_table(run, arm))
-        return
-    with found_game(run, arm, episode, seed) as game:
-        if film_file is None:
-            watch(game, console)
-        else:
-            film(game, film_file, console)
-
-
+app.command()(replay)
+app.command()(compare)
+app.command()(new)
+app.command()(check)
 app.command("check-driver")(check_driver)
+app.command()(minimise)
+app.command()(regression)
 app.add_typer(persona_app, name="persona")
 app.add_typer(scene_app, name="scene")
 app.command()(schema)
@@ -244,22 +202,19 @@ def _show(outcome: RunResult, run: Path, console: Console) -> None:
         for sentence in (verdict.sentence, *verdict.causes, verdict.speed):
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
-    _print_plain([wording.report_written(run)], console)
+    for bound in outcome.acceptance:
+        style = "green" if bound.passed else "bold red"
+        console.print(bound.text, style=style, highlight=False, markup=False, soft_wrap=True)
+    print_plain([wording.report_written(run)], console)
 
 
-def _exit_if_failed(outcome: RunResult, console: Console) -> None:
+def _exit_as(outcome: RunResult, console: Console) -> None:
     if outcome.failed_stages:
         console.print(wording.failed_stages(outcome.failed_stages), style="red", highlight=False)
     if outcome.error_games:
         console.print(wording.error_games(outcome.error_games), style="red")
-    if outcome.failed_stages or outcome.error_games:
-        raise typer.Exit(FAILED)
-
-
-def _print_plain(lines: Iterable[str], console: Console) -> None:
-    """Print lines as they are: without markup, colours or line breaks."""
-    for line in lines:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    if outcome.exit_code:
+        raise typer.Exit(outcome.exit_code)
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -68,9 +68,16 @@ def _kind(player: int) -> str:
     return "ego" if player == 0 else "person"
 
 
+def _route_text(scene: OpenScene, player: int) -> str:
+    name = scene.world.roles[player]
+    if scene.document.players[player].on_foot:
+        return f"way of {name}, on foot"
+    return f"route of {name}: {' '.join(scene.edges[player])}"
+
+
 def _routes_and_goals(scene: OpenScene) -> Iterator[DrawnShape]:
     routes = scene.world.road.routes
-    for player, edges in enumerate(scene.edges):
+    for player in range(len(scene.edges)):
         rows = slice(int(routes.first_row[player]), int(routes.last_row[player]) + 1)
         line = np.stack((routes.x_m[rows], routes.y_m[rows]), axis=1)
         goal = int(routes.rows(np.array([routes.goal_m]))[0, player])
@@ -79,7 +86,7 @@ def _routes_and_goals(scene: OpenScene) -> Iterator[DrawnShape]:
         name = scene.world.roles[player]
         begin = int(routes.rows(np.zeros((1, len(routes.goal_m))))[0, player]) - rows.start
         way = line[begin : goal - rows.start + 1]
-        yield DrawnShape(points=way, kind=f"route {_kind(player)}", text=f"route of {name}: {' '.join(edges)}")
+        yield DrawnShape(points=way, kind=f"route {_kind(player)}", text=_route_text(scene, player))
         ends = np.stack((place - across, place + across))
         yield DrawnShape(points=ends, kind=f"goal {_kind(player)}", text=f"goal of {name}")
 

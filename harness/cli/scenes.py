@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from harness.cli import wording
+from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
     from harness.traffic.scene import OpenScene
@@ -25,7 +26,9 @@ def show_scene(
     path: Annotated[
         Path,
         typer.Argument(
-            metavar="NET_OR_SCENE", help="A .net.xml or .net.xml.gz, a scene.toml, or its folder.", show_default=False
+            metavar="NET_OR_SCENE",
+            help="A .net.xml or .net.xml.gz, a scene.toml or its folder, or the name of a shipped scene.",
+            show_default=False,
         ),
     ],
     near: Annotated[
@@ -56,6 +59,7 @@ def show_scene(
     from harness.traffic.net_listing import edges_near, listed_junctions, listed_lanes
     from harness.traffic.network import read_net
 
+    path = document_at(path, "networks")
     scene = _scene_of(path)
     net_file = scene.net_file if scene is not None else path
     if scene is None:

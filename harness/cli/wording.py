@@ -22,11 +22,20 @@ KEPT = "finished work is kept"
 FILM_NEEDS_A_GAME = ("shows one game", "name the game: harness replay RUN ARM EPISODE")
 NOT_A_FOLDER = ("is not a folder", "name a folder")
 NOT_A_TOML_FILE = ("is not the name of a TOML file", "the name must end with .toml")
+FOLDER_NOT_EMPTY = ("is there already, and not empty", "name a new folder")
+BAD_PROJECT_NAME = (
+    "the folder's name is that of the campaign, too: letters, digits, _ and -, a letter first, at most 40",
+    "name another folder",
+)
 FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
 
 
 def reading(file: Path) -> str:
     return f"reading {escape(str(file))}"
+
+
+def cannot_write(error: OSError) -> tuple[str, str]:
+    return f"can't be written: {error.strerror}", "name a folder that you may write"
 
 
 def no_folder(folder: Path) -> tuple[str, str]:
@@ -62,6 +71,11 @@ def persona_created(file: Path) -> str:
     return f"{file}: a valid persona, a careful driver. To see what it means: harness persona show {file}"
 
 
+def project_created(folder: Path, files: Sequence[Path]) -> list[str]:
+    """The files of a new project, and the next command."""
+    return [*(f"wrote {file}" for file in files), f"Next: cd {folder} && harness campaign campaign.toml --quick"]
+
+
 def page_written(file: Path) -> str:
     return f"Page: {file}"
 
@@ -92,6 +106,10 @@ def in_order(file: Path) -> str:
 def scene_lines(scene: OpenScene) -> Iterator[str]:
     """What a checked scene is: its players with their routes, and whether there is other traffic."""
     for role, player, edges in zip(scene.world.roles, scene.document.players, scene.edges, strict=True):
+        if player.way is not None:
+            length_m = scene.world.road.routes.goal_m[scene.world.roles.index(role)]
+            yield f"{role}: on foot, {length_m:.1f} m to its goal"
+            continue
         goal = scene.document.goal_of(player)[1]
         yield f"{role}: vehicle {player.vehicle}, {len(edges)} edges, goal {goal.position_m:g} m along {goal.edge}"
     yield "with background traffic" if scene.has_background_traffic else "without background traffic"

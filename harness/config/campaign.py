@@ -8,8 +8,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
+from harness.config.acceptance import Acceptance
 from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
+from harness.config.training import NonEgoTraining, Reconfiguration, Retraining, Training
 from harness.game.state import MOST_PEOPLE
 
 LEARNED, SUMO = "learned", "sumo"  # drivers of an ego that have a name
@@ -24,100 +26,10 @@ class Ego(Document):
     """The vehicle under study."""
 
     driver: DocumentPath = LEARNED
-    """`learned`: trained by the campaign. `sumo`: SUMO's own models. Else the folder of a policy, a driver document or
-    an installed driver."""
-    persona: DocumentPath = "../personas/careful.toml"
+    """`learned`: trained by the campaign. `sumo`: SUMO's own models. Else the folder of a policy, a driver document, or
+    the name of an installed or shipped driver."""
+    persona: DocumentPath = "careful"
     """The persona of the ego, which gives its payoff."""
-
-
-class Training(Document):
-    """Training of the players with PPO. The defaults are those of table 1 of the paper."""
-
-    steps: int = Field(3_000_000, ge=1_000, le=1_000_000_000)
-    """Budget of each training, in steps of the player."""
-    early_convergence: bool = True
-    """Stop when the learning curve has converged (the manifest states the rule)."""
-    learning_rate: float = Field(1e-4, gt=0.0, le=1.0)
-    """Step size of Adam, the optimiser of PPO."""
-    discount: float = Field(0.99, gt=0.0, le=1.0)
-    """Gamma: factor of the payoff of the next step."""
-    clip: float = Field(0.1, gt=0.0, le=1.0)
-    """Epsilon: in an update, the probability ratio of an action is clipped to 1 - epsilon and 1 + epsilon."""
-    entropy_coefficient: float = Field(0.02, ge=0.0, le=1.0)
-    """Weight of the policy's entropy in the loss of PPO, which keeps the policy exploring."""
-    buffer: int = Field(2048, ge=64, le=1_000_000)
-    """Steps collected, over all games, between two updates."""
-    games: int = Field(64, ge=1, le=1024)
-    """Games played in parallel."""
-    minibatch: int = Field(512, ge=8, le=1_000_000)
-    """Steps per gradient step; at most the buffer."""
-    epochs: int = Field(10, ge=1, le=100)
-    """Passes over the buffer per update."""
-    network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)
-    """Sizes of the hidden layers of the actor, and of the critic."""
-    initial_deviation: float = Field(0.5, gt=0.0, le=2.0)
-    """Standard deviation of the actions of a new policy."""
-    max_deviation: float = Field(0.5, gt=0.0, le=2.0)
-    """Upper bound of that standard deviation. Without it, the entropy term raises the standard deviation without limit
-    once little is left to learn."""
-    final_deviation: float = Field(0.1, gt=0.0, le=2.0)
-    """Upper bound at the end of a training. A player that drives by the mean action meets other situations than one
-    that explores; with a narrow deviation, the last updates are made where it drives."""
-    narrowing_share: float = Field(0.1, ge=0.0, le=1.0)
-    """Share of the budget in which the upper bound falls from `max_deviation` to `final_deviation`: the last part of
-    the training, before its budget ends or after it has converged."""
-    payoff_scale: float = Field(0.1, gt=0.0, le=1000.0)
-    """Factor of the payoffs that PPO receives; tables show the payoffs without it. The gradients of actor and critic
-    are clipped together: with large payoffs, the errors of the critic would leave little of the step to the actor."""
-    along_route_share: float = Field(0.7, ge=0.0, le=1.0)
-    """Share of the games that start anywhere along the players' routes, at any legal speed, without contact. The other
-    games, and all games of an assessment, start as the scene says."""
-    segment_steps: int = Field(131_072, ge=1_024, le=100_000_000)
-    """A checkpoint is written, and the learning curve evaluated, each time after this many steps."""
-    learner: Literal["compiled", "stable_baselines3"] = "compiled"
-    """`compiled`: Stable-Baselines3's PPO with its gradient steps in machine code, several times as fast.
-    `stable_baselines3`: the reference; the numbers of an update are the same but for rounding."""
-
-    @model_validator(mode="after")
-    def _sizes_are_consistent(self) -> Training:
-        if self.buffer % self.games:
-            raise ValueError(f"buffer ({self.buffer}) must be a multiple of games ({self.games})")
-        if self.initial_deviation > self.max_deviation:
-            raise ValueError(
-                f"initial_deviation ({self.initial_deviation:g}) must not exceed max_deviation ({self.max_deviation:g})"
-            )
-        if self.final_deviation > self.max_deviation:
-            raise ValueError(
-                f"final_deviation ({self.final_deviation:g}) must not exceed max_deviation ({self.max_deviation:g})"
-            )
-        if self.minibatch > self.buffer:
-            raise ValueError(f"minibatch ({self.minibatch}) must not exceed buffer ({self.buffer})")
-        return self
-
-
-class NonEgoTraining(Document):
-    """Training of the non-ego in round 1."""
-
-    alone_share: float = Field(0.7, ge=0.0, le=1.0)
-    """Share of games without the ego: people mostly learn to drive on roads with no car beside them."""
-    attentive_share: float = Field(0.5, ge=0.0, le=1.0)
-    """Share of the budget, at its start, without lapses of attention: people learn to drive before they text."""
-    warm_start: bool = False
-    """Start from the parameters of the naive ego, which can drive on the empty road, instead of random ones."""
-
-
-class Retraining(Document):
-    """Retraining of the ego in round 2."""
-
-    alone_share: float = Field(0.25, ge=0.0, le=1.0)
-    """Share of games without the non-ego, so that the ego does not forget what it has learned."""
-    warm_start: bool = False
-    """Start from the parameters of the naive ego, instead of random ones."""
-
-    against: list[Name] = Field([], max_length=50)
-    """Names of personas. One more ego, `robust`, is retrained against all of them, in equal shares of its games, and
-    with a budget multiplied by their number. It is also assessed against the other personas of the campaign, which it
-    has not met in training."""
 
 
 class Population(Document):
@@ -176,19 +88,6 @@ class CrossPlay(Document):
     """Further egos, as in `[ego] driver`: `sumo`, a driver document or the folder of a policy."""
 
 
-class Reconfiguration(Document):
-    """Round 2 of an external ego with tunable parameters: the search of these parameters."""
-
-    trials: int = Field(40, ge=2, le=10_000)
-    """Number of trials of the search. The first has the parameters of the ego's document."""
-    games: int = Field(64, ge=1, le=100_000)
-    """Games of each trial, the same for all trials. The search maximises the ego's mean payoff in them."""
-    alone_share: float = Field(0.25, ge=0.0, le=1.0)
-    """Share of these games without the non-ego, so that the ego still drives well alone."""
-    games_at_once: int = Field(64, ge=1, le=1024)
-    """Games played in parallel."""
-
-
 class Assessment(Document):
     """Assessment of the players."""
 
@@ -196,6 +95,8 @@ class Assessment(Document):
     """Games of each arm. Game k has the same start in every arm."""
     significance: float = Field(0.01, gt=0.0, lt=1.0)
     """A difference is called real if its p-value, after Holm's correction, is below this."""
+    reference_drivers: bool = True
+    """Whether each failure of an ego against a persona is judged: would a reference driver have prevented it?"""
 
 
 class Competence(Document):
@@ -214,9 +115,10 @@ class Campaign(Document):
     name: CampaignName
     """The name of the campaign. The default run folder is reports/<name>."""
     scene: DocumentPath
-    """Folder of the scene, relative to this file."""
+    """Folder of the scene, relative to this file, or the name of a shipped scene."""
     personas: list[DocumentPath] = Field(min_length=1, max_length=50)
-    """Files of the personas that the ego meets, one after the other, relative to this file."""
+    """Files of the personas that the ego meets, one after the other, relative to this file, or names of shipped
+    personas."""
     seeds: list[Seed] = Field([1], min_length=1, max_length=100)
     """Training seeds. All players are trained and assessed once per seed."""
     policies: DocumentPath | None = None
@@ -236,6 +138,7 @@ class Campaign(Document):
     crossplay: CrossPlay | None = None
     competence: Competence = Competence()
     assessment: Assessment = Assessment()
+    acceptance: Acceptance | None = None
 
     @field_validator("seeds")
     @classmethod
@@ -249,15 +152,17 @@ class Campaign(Document):
         if self.policies is not None and (unused := self._unused_tables()):
             message = "with `policies` nothing is trained: this table would be ignored"
             raise Mistakes([(name, message, "leave out this table or `policies`") for name in unused])
-        if self.rounds.stop_early and self.best_response is None:
-            message = "without [best_response], it is not measured whether an equilibrium is reached"
-            raise Mistakes([("rounds.stop_early", message, "add [best_response] or leave out this key")])
-        if self.ego.driver != LEARNED and self.rounds.count > Rounds().count:
-            message = "the ego does not learn, so there are no further rounds"
-            raise Mistakes([("rounds.count", message, "leave out this key, or set ego.driver to 'learned'")])
-        if self.ego.driver != LEARNED and self.retraining.against:
-            message = "an ego that does not learn can't be retrained"
-            raise Mistakes([("retraining.against", message, "leave out this key, or set ego.driver to 'learned'")])
+        measures_gaps, learns = self.best_response is not None, self.ego.driver == LEARNED
+        add = "add [best_response] or leave out this key"
+        leave_out = "leave out this key, or set ego.driver to 'learned'"
+        if self.rounds.stop_early and not measures_gaps:
+            raise Mistakes([("rounds.stop_early", "without [best_response], no equilibrium can be found", add)])
+        if self.acceptance is not None and self.acceptance.needs_gaps and not measures_gaps:
+            raise Mistakes([("acceptance.gap_share", "without [best_response], no gap is measured", add)])
+        if not learns and self.rounds.count > Rounds().count:
+            raise Mistakes([("rounds.count", "the ego does not learn, so there are no further rounds", leave_out)])
+        if not learns and self.retraining.against:
+            raise Mistakes([("retraining.against", "an ego that does not learn can't be retrained", leave_out)])
         return self
 
     def _unused_tables(self) -> list[str]:
@@ -282,6 +187,7 @@ class Campaign(Document):
         out where they have no effect."""
         unused: dict[str, Any] = {"reconfiguration": True} if self.ego.driver in (LEARNED, SUMO) else {}
         unused |= {} if self.crowd else {"crowd": True}
+        unused |= {} if self.acceptance else {"acceptance": True}
         if self.policies is None:
             return self.model_dump(mode="json", exclude=unused)
         unused["retraining"] = {"alone_share", "warm_start"} if self.retraining.against else True

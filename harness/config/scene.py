@@ -7,14 +7,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
-from harness.config.toml_reading import TABLE, TABLES, Document, Mistakes
+from harness.config.obstacle import Obstacle
+from harness.config.road_user import WALKER_RUN_MPS, Actuators, Kind
+from harness.config.toml_reading import TABLE, TABLES, Document, Interval, Mistakes
 from harness.game.state import MOST_PEOPLE, roles_of
-
-
-def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
-    if interval[0] > interval[1]:
-        raise ValueError(f"the interval [{interval[0]:g}, {interval[1]:g}] is empty: write the lower end first")
-    return interval
 
 
 def _positive(interval: tuple[float, float]) -> tuple[float, float]:
@@ -24,8 +20,8 @@ def _positive(interval: tuple[float, float]) -> tuple[float, float]:
 
 
 _LARGEST = 10.0
-Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
+Point = tuple[float, float]
 Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 
 
@@ -38,26 +34,17 @@ class Goal(Document):
     """Distance along that edge."""
 
 
-class Actuators(Document):
-    """Limits of a player's car that its vehicle type in the route file does not have."""
-
-    max_acceleration_mps2: float = Field(3.0, gt=0.0, le=15.0)
-    """Acceleration at full throttle."""
-    max_braking_mps2: float = Field(8.0, gt=0.0, le=15.0)
-    """Deceleration at full brake."""
-    max_steering_rad: float = Field(0.6, gt=0.0, le=1.2)
-    """Road wheel angle at full lock."""
-    max_steering_rate_radps: float = Field(0.8, gt=0.0, le=10.0)
-    """Greatest rate of the road wheel angle."""
-    wheelbase_m: float = Field(2.7, gt=0.5, le=12.0)
-    """Distance between the axles."""
-
-
 class Player(Document):
-    """A vehicle of the route file that the harness controls, its goal, and the ranges of its start in each episode."""
+    """A road user that the harness controls, its goal, and the ranges of its start in each episode."""
 
-    vehicle: str
-    """The id of the vehicle in the route file. It gives the route and the vehicle type."""
+    kind: Kind = "car"
+    """What it is. Size and top speed are those of the vehicle type; the limits of `actuators` depend on the kind."""
+    vehicle: str = ""
+    """The id of the vehicle in the route file. It gives the route and the vehicle type. A pedestrian has none."""
+    way: Annotated[tuple[Point, ...], Field(min_length=2, max_length=200)] | None = None
+    """The way of a pedestrian: points [x, y] in the net's coordinates, from its start to its goal. It may leave it."""
+    marked_crossing: bool = False
+    """Whether a pedestrian's way crosses the road on a marked crossing, where vehicles must yield."""
     lane: str | None = None
     """The lane of the start, with `position_m` or `beside_ego_m`."""
     position_m: Interval | None = None
@@ -72,8 +59,31 @@ class Player(Document):
     speed_mps: Interval
     """Range of the speed at the start."""
     goal: Goal | None = None
-    """Its destination; left out: the goal of the scene."""
+    """Its destination; left out: the goal of the scene. A pedestrian's is the end of its way."""
     actuators: Actuators = Actuators()
+
+    @model_validator(mode="after")
+    def _is_one_kind(self) -> Player:
+        if self.on_foot:
+            if self.way is None:
+                raise ValueError("a pedestrian needs a way: points [x, y] from its start to its goal")
+            for name in ("vehicle", "lane", "goal"):
+                if getattr(self, name):
+                    raise ValueError(f"a pedestrian has no {name}: give its way only")
+            if self.speed_mps[1] > WALKER_RUN_MPS:
+                raise ValueError(f"a pedestrian's speed_mps is up to {WALKER_RUN_MPS:g}")
+            return self
+        for name in ("way", "marked_crossing"):
+            if getattr(self, name):
+                raise ValueError(f'{name} is a pedestrian\'s: give kind = "pedestrian", or leave it out')
+        if not self.vehicle:
+            raise ValueError("give the vehicle: the id of one in the route file")
+        return self
+
+    @property
+    def on_foot(self) -> bool:
+        """Whether it walks."""
+        return self.kind == "pedestrian"
 
     @model_validator(mode="after")
     def _one_start(self) -> Player:
@@ -163,6 +173,8 @@ class Scene(Document):
     non_ego: NonEgos
     """The person that the ego meets, or `[[non_ego]]` for each of several: up to four, named `non_ego_1`, `non_ego_2`
     and so on."""
+    obstacle: tuple[Obstacle, ...] = Field((), max_length=50)
+    """What stands on the road or beside it: `[[obstacle]]` for each, named `obstacle_1`, `obstacle_2` and so on."""
 
     @model_validator(mode="after")
     def _players_fit(self) -> Scene:
@@ -172,9 +184,9 @@ class Scene(Document):
         for role, player in zip(self.roles, self.players, strict=True):
             if player.beside_ego_m is not None and self.ego.position_m is None:
                 raise ValueError(f"{role}.beside_ego_m needs ego.position_m, along the ego's lane")
-            if self.goal is None and player.goal is None:
+            if self.goal is None and player.goal is None and not player.on_foot:
                 raise ValueError(f"{role} has no goal: give [goal] for all players, or [{role}.goal]")
-        if self.goal is not None and all(player.goal is not None for player in self.players):
+        if self.goal is not None and all(player.goal is not None or player.on_foot for player in self.players):
             raise ValueError("every player has a goal of its own: leave out [goal]")
         return self
 
@@ -184,6 +196,8 @@ class Scene(Document):
         match location:
             case ["non_ego", int(place), *rest]:
                 return [f"non_ego_{place + 1}", *rest]
+            case ["obstacle", int(place), *rest]:
+                return [f"obstacle_{place + 1}", *rest]
             case _:
                 return location
 
@@ -201,6 +215,12 @@ class Scene(Document):
     def roles(self) -> tuple[str, ...]:
         """The players' names, in that order."""
         return roles_of(len(self.players))
+
+    @property
+    def vehicles(self) -> tuple[str, ...]:
+        """The ids of the players' vehicles in the route file. Those of pedestrians are made by the harness."""
+        pairs = zip(self.roles, self.players, strict=True)
+        return tuple(f"{role} on foot" if player.on_foot else player.vehicle for role, player in pairs)
 
     def player(self, role: str) -> Player:
         """The player of a name."""

@@ -4,6 +4,7 @@
 | --- | --- |
 | `driver = "policies/naive-seed1"` | the folder of a policy |
 | `driver = "egos/adas.toml"` | a driver document, see `harness.config.driver` |
+| `driver = "adas"` | a shipped driver document |
 | `driver = "my_driver"` | an installed package's entry point, see `harness.drivers.entry_points` |
 
 Programs, FMUs and files of Stable-Baselines3 are code in files. Campaigns are documents that people exchange: neither a
@@ -38,6 +39,7 @@ from harness.drivers.rules import RulesDriver
 from harness.drivers.sumo import SumoDriver
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import SIZE
+from harness.shipped_documents import find_document, shipped_names
 
 ALLOW_CODE = "--allow-code"
 _RUNS_CODE = {
@@ -201,7 +203,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
 
     Raises UsageError if it is not found or invalid, and if it runs code in files without permission (`allow_code`).
     """
-    place = resolve(file, written)
+    place = _place(file, written)
     if os.path.isdir(place):
         read_policy(place)
         return _external(written, place, None, files=policy_files(place))
@@ -215,7 +217,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
                 nearest(place.name, names_beside(place)) if os.path.isdir(place.parent) else f"no folder {place.parent}"
             )
             raise UsageError.of(file, key, f"{written!r}: there is no such file or folder", remedy)
-        names = [LEARNED, SUMO, *installed_names()]
+        names = [LEARNED, SUMO, *installed_names(), *shipped_names("egos")]
         if written not in names:
             remedy = nearest(written, names) + "; or name a driver document or the folder of a policy"
             raise UsageError.of(file, key, f"there is no driver {written!r}", remedy)
@@ -227,6 +229,12 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
         remedy = f"if you trust it, allow it on the command line: {ALLOW_CODE}"
         raise UsageError.of(place, "kind", f"this driver {runs}; a document can't give the permission", remedy)
     return _from_document(written, place, document)
+
+
+def _place(file: Path, written: str) -> Path:
+    """Where a driver would be that a file names: beside the file, or shipped, unless a package provides one."""
+    beside = resolve(file, written)
+    return beside if written in installed_names() else find_document(written, file.parent, "egos")
 
 
 def _from_document(written: str, place: Path, document: DriverDocument) -> ExternalDriver:

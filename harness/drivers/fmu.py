@@ -59,7 +59,7 @@ def wiring(document: Fmu, file: Path) -> Wiring:
     try:
         import fmpy
     except ImportError:
-        message, remedy = "FMUs need FMPy, which is not installed", "pip install 'harness[fmi]'"
+        message, remedy = "FMUs need FMPy, which is not installed", "pip install 'safedriverl-harness[fmi]'"
         raise UsageError.of(file, "", message, remedy) from None
     try:
         description = fmpy.read_model_description(str(file))

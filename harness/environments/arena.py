@@ -4,7 +4,7 @@
 | --- | --- | --- |
 | 1 | drivers decide from the observations of the step before; learners' actions are an argument | `drivers` |
 | 2 | reaction delay, limits of the controls and lapses of attention | `game.human_limits`, `game.attention` |
-| 3 | the players' cars move | `game.bicycle` |
+| 3 | the players move, on wheels or on foot | `game.bicycle`, `game.walking` |
 | 4 | their poses are sent to SUMO, SUMO moves the other vehicles, their state is read | `traffic.simulation` |
 | 5 | contact, goal and time limit determine outcomes | `game.quantities` |
 | 6 | payoffs are computed | `game.payoff` |
@@ -24,8 +24,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.drivers.protocol import Driver
-from harness.environments.nearby_bodies import nearby_bodies
+from harness.environments.nearby_bodies import NearbyBodies
+from harness.environments.seats import Seat as Seat
+from harness.environments.seats import with_walkers
 from harness.environments.sumo_players import read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import release_controls
@@ -34,26 +35,18 @@ from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
 from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
-from harness.game.payoff import Payoff
-from harness.game.quantities import Quantities, terminations
+from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
 from harness.game.state import Bodies, Outcome, State
+from harness.game.terminations import terminations
 from harness.game.traffic_rules import since_change_s
+from harness.game.walking import walk
 from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.simulation import Reading, with_game
+from harness.traffic.simulation import Reading, Simulation, with_game
 
 _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # comparing arrays with members of an enumeration is slower
-
-
-@dataclass(frozen=True)
-class Seat:
-    """A player's seat in the arena: its driver and its payoff (None: the payoff is not computed)."""
-
-    driver: Driver | None
-    """None: a learner; its actions are an argument of `Arena.step`."""
-    payoff: Payoff | None = None
 
 
 @dataclass(kw_only=True)
@@ -77,19 +70,21 @@ class Arena:
         seats: Sequence[Seat | Sequence[Seat]],
         seed: int = 0,
         recorded: bool = False,
+        simulation: Simulation | None = None,
     ) -> None:
-        """Load SUMO. Each game needs a `reset` before the first step.
+        """Load SUMO, or use another `simulation`. Each game needs a `reset` before the first step.
 
         `seats` has one entry per player: a seat, or several, of which `InitialState.member` selects one per game. SUMO
         drives all seats of a player or none. `recorded`: `reading` contains all background vehicles in every step, not
         only those near a player; this costs time. Raises SimulationError if SUMO can't load the scene.
         """
         self.scene, self.world, self.games = scene, scene.world, games
-        self.seats = tuple((each,) if isinstance(each, Seat) else tuple(each) for each in seats)
+        self.seats = with_walkers([(each,) if isinstance(each, Seat) else tuple(each) for each in seats], scene.world)
         first_drivers = [of_player[0].driver for of_player in self.seats]
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
+        self._on_wheels = self._taken_over & ~self.world.walks
         self._slack_m = slack_m(self._taken_over)
-        self.simulation = open_simulation(
+        self.simulation = simulation or open_simulation(
             scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
         )
         players = len(self.seats)
@@ -107,8 +102,7 @@ class Arena:
         self.reading: Reading | None = None
         self.signal_texts = [""] * games
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
-        self._players_length = np.tile(self.world.length_m, (games, 1))
-        self._players_width = np.tile(self.world.width_m, (games, 1))
+        self.nearby = NearbyBodies(self.world, scene.obstacles, games)
 
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
@@ -147,7 +141,10 @@ class Arena:
         state = self.state = before.copy()  # the quantities of the step before refer to the old state
         drove = state.running
         acceleration, steering = self._decide(actions, drove)
-        move(state, acceleration, steering, drove & self._taken_over, self.world.actuators, self.world.step_s)
+        world = self.world
+        move(state, acceleration, steering, drove & self._on_wheels, world.actuators, world.step_s)
+        if world.on_foot:
+            walk(state, acceleration, steering, drove & world.walks, world.actuators, world.step_s)
         reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         self.reading = reading
         if reading.signals is not None:
@@ -230,8 +227,8 @@ class Arena:
         """Remove players that reached their goal, stop those that crashed, and observe."""
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
+        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
         if not ended.any():
-            self._observe(quantities)
             return
         for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
             if reached == _GOAL:
@@ -240,19 +237,20 @@ class Arena:
                 self.simulation.halt(game, player)
         self.state = self.state.copy()  # `quantities` refers to the old state
         self._stop(ended)
-        # Positions are unchanged: only speeds are, and which players are present.
+        self._observe_again(quantities, np.flatnonzero(ended.any(1)))
+
+    def _observe_again(self, before: Quantities, games: IntArray) -> None:
+        """Observe games [N] in which players have stopped or were removed. Their positions are those of `before`."""
+        state = self.state.of(games)
         after = Quantities(
             world=self.world,
-            state=self.state,
-            bodies=self._bodies(self.state),
-            advanced_m=quantities.advanced_m,
-            lateral_offset_m=quantities.lateral_offset_m,
+            state=state,
+            bodies=self._bodies(state, games),
+            advanced_m=before.advanced_m[games],
+            lateral_offset_m=before.lateral_offset_m[games],
         )
-        self._observe(after)
-
-    def _observe(self, quantities: Quantities) -> None:
-        """Observe, and keep what the next decisions need: the steering that follows the road."""
-        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
+        self._road_steering_rad = self._road_steering_rad.copy()  # `before` refers to the array
+        self.observation[games], self._road_steering_rad[games] = observe(after), after.road_steering_rad
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
@@ -272,6 +270,7 @@ class Arena:
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
         state.unseen_behind_m[game], self._member[game] = start.unseen_behind_m, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
+        self.nearby.place(game, start)
         for player in range(len(self.seats)):
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
@@ -293,6 +292,5 @@ class Arena:
         )
 
     def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
-        """The players and the background vehicles near them in `games`; `state` is that of the same games."""
-        lengths_m, widths_m = self._players_length[games], self._players_width[games]
-        return nearby_bodies(state, self.reading, games, length_m=lengths_m, width_m=widths_m)
+        """The players and the bodies near them in `games`; `state` is that of the same games."""
+        return self.nearby.of(state, self.reading, games)

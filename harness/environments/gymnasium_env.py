@@ -26,10 +26,10 @@ from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.observation_layout import SIZE
+from harness.shipped_documents import Kind, find_document
 from harness.traffic.scene import OpenScene, open_scene
 
-SCENE, PERSONA = "networks/merge", "personas/careful.toml"
-_CHECKOUT = Path(__file__).resolve().parents[2]
+SCENE, PERSONA = "merge", "careful"
 
 Place: TypeAlias = str | Path
 
@@ -94,10 +94,10 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
         `player` (a name of the scene: "ego" or "non_ego", with several people "non_ego_1" and so on) is the learner; it
         has the payoff and the human factors of `persona`. `other` is the driver of every other player: None (the player
         is alone), "sumo", or the folder of a policy, which has the human factors of `other_persona`. Paths are relative
-        to the working directory or, if they do not exist there, to the harness's checkout. Raises UsageError for
-        arguments that are wrong and files that can't be read, SimulationError if SUMO fails.
+        to the working directory; scenes and personas also have names, as in a campaign ("merge", "speedy"). Raises
+        UsageError for arguments that are wrong and files that can't be read, SimulationError if SUMO fails.
         """
-        opened = scene if isinstance(scene, OpenScene) else open_scene(_resolve(scene))
+        opened = scene if isinstance(scene, OpenScene) else open_scene(_find(scene, "networks"))
         roles = opened.world.roles
         if player not in roles:
             raise UsageError.of("DrivingEnv", "player", f"there is no player {player!r}", nearest(player, roles))
@@ -110,7 +110,7 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
             opponent = Seat(SumoDriver())
         else:
             sampled = opponent_persona.decisions == "sampled"
-            opponent = Seat(LearnedDriver(read_policy(_resolve(other)), sampled))
+            opponent = Seat(LearnedDriver(read_policy(Path(other)), sampled))
         opponent_factors = opponent_persona.human_factors if other_persona else HumanFactors()
         players, there = len(roles), float(other is not None)
         seats, human_factors, present = [opponent] * players, [opponent_factors] * players, [there] * players
@@ -173,7 +173,7 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
     ) -> None:
         """Open the scene and load SUMO. `non_ego_persona` is one persona for all people of the scene, or one for each.
         Paths and errors are those of `DrivingEnv`."""
-        opened = scene if isinstance(scene, OpenScene) else open_scene(_resolve(scene))
+        opened = scene if isinstance(scene, OpenScene) else open_scene(_find(scene, "networks"))
         self._roles = opened.world.roles
         people = len(self._roles) - 1
         written = [non_ego_persona] * people if isinstance(non_ego_persona, str | Path) else list(non_ego_persona)
@@ -244,11 +244,9 @@ def _action_space() -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
 
 
-def _resolve(written: Place) -> Path:
-    """A path relative to the working directory or, if it does not exist there, to the harness's checkout."""
-    path = Path(written)
-    return _CHECKOUT / path if not path.exists() and (_CHECKOUT / path).exists() else path
+def _find(written: Place, kind: Kind) -> Path:
+    return find_document(written, Path(), kind) if isinstance(written, str) else written
 
 
 def _read_persona(written: Place) -> Persona:
-    return read_document(_resolve(written), Persona)
+    return read_document(_find(written, "personas"), Persona)

@@ -1,11 +1,12 @@
-"""Vehicle dynamics of a player's car: a kinematic bicycle inside a friction circle.
+"""Vehicle dynamics of a player on wheels: a kinematic bicycle inside a friction circle.
 
 Kinematic bicycle about the centre of the wheelbase (Rajamani, Vehicle Dynamics and Control, 2nd ed., section 2.2):
 
     slip = atan(tan(steering) / 2)          x' = v cos(heading + slip)
     heading' = v cos(slip) tan(steering) / wheelbase          y' = v sin(heading + slip)
 
-Integration follows SUMO's Euler update (displacement = new speed times step), with the heading at mid-step.
+Integration follows SUMO's Euler update (displacement = new speed times step), with the heading at mid-step. The lateral
+acceleration of a two-wheeler is also limited by its lean.
 """
 
 from __future__ import annotations
@@ -32,13 +33,14 @@ class Actuators(NamedTuple):
     max_steering_rad: FloatArray
     max_steering_rate_radps: FloatArray
     wheelbase_m: FloatArray
+    max_lateral_mps2: FloatArray  # by the lean of a two-wheeler; a car is limited by its grip alone
     friction: float
 
 
 @compiled
 def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArray:
     """[G, P] largest useful steering angle at a speed [G, P]: the lock, or the angle at which the tyres lose grip."""
-    grip = actuators.friction * GRAVITY_MPS2
+    grip = np.minimum(actuators.friction * GRAVITY_MPS2, actuators.max_lateral_mps2)
     return np.minimum(
         actuators.max_steering_rad,
         np.arctan(actuators.wheelbase_m * grip / np.maximum(speed_mps, 0.1) ** 2),
@@ -135,7 +137,8 @@ def _move(
             speed = min(max(before + acceleration * step_s, 0.0), actuators.max_speed_mps[p])
             acceleration = (speed - before) / step_s
 
-            curvature = _clamped(requested_curvature, _remaining_grip(grip, acceleration) / max(speed, 0.1) ** 2)
+            sideways = min(_remaining_grip(grip, acceleration), actuators.max_lateral_mps2[p])
+            curvature = _clamped(requested_curvature, sideways / max(speed, 0.1) ** 2)
             slip = np.arcsin(_clamped(0.5 * curvature * actuators.wheelbase_m[p], 1.0))
             turned = curvature * speed * step_s
             course = heading_rad[g, p] + 0.5 * turned + slip
@@ -154,7 +157,8 @@ def curvature_per_m(steering_rad: FloatArray, wheelbase_m: FloatArray) -> FloatA
 def lateral_acceleration_mps2(state: State, actuators: Actuators) -> FloatArray:
     """[G, P] lateral acceleration (m/s^2) at the state's steering and speed, bounded by the grip left by the pedals."""
     motion = (state.steering_rad, state.speed_mps, state.acceleration_mps2)
-    return _lateral_acceleration_mps2(*motion, state.friction[:, None], actuators.wheelbase_m)
+    wheels = (actuators.wheelbase_m, actuators.max_lateral_mps2)
+    return _lateral_acceleration_mps2(*motion, state.friction[:, None], *wheels)
 
 
 @compiled
@@ -164,9 +168,11 @@ def _lateral_acceleration_mps2(
     acceleration_mps2: FloatArray,
     friction: FloatArray,
     wheelbase_m: FloatArray,
+    max_lateral_mps2: FloatArray,
 ) -> FloatArray:
     sideways = curvature_per_m(steering_rad, wheelbase_m) * speed_mps**2
-    return _clamped(sideways, _remaining_grip(friction * GRAVITY_MPS2, acceleration_mps2))
+    grip = _remaining_grip(friction * GRAVITY_MPS2, acceleration_mps2)
+    return _clamped(sideways, np.minimum(grip, max_lateral_mps2))
 
 
 @compiled

@@ -183,6 +183,20 @@ TERMS: Mapping[str, Term] = {
         form=Form.LESS_SQUARED,
         per_second=True,
     ),
+    "on_carriageway": Term(
+        group="safety",
+        meaning="being on the carriageway, on foot",
+        quantity="on_carriageway",
+        form=Form.LESS,
+        per_second=True,
+    ),
+    "waiting": Term(
+        group="human",
+        meaning="standing still",
+        quantity="stands",
+        form=Form.LESS,
+        per_second=True,
+    ),
     "time_pressure": Term(
         group="human",
         meaning="every second on the way",

@@ -15,10 +15,11 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
-from harness.game.meetings import Meetings, entered_before_s, least_gap_s, meetings
+from harness.game.meetings import STANDING_MPS, Meetings, entered_before_s, least_gap_s, meetings
 from harness.game.road import Along
 from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
-from harness.game.state import Bodies, Outcome, State
+from harness.game.sight import hidden, nothing_hidden
+from harness.game.state import Bodies, State
 from harness.game.traffic_rules import Rules, rules
 from harness.game.world import World
 
@@ -147,12 +148,31 @@ class Quantities:
         over_mps = np.maximum(speed_mps - asked.permitted_mps, 0.0) + np.minimum(speed_mps - asked.due_mps, 0.0)
         return over_mps / self.speed_limit_mps
 
+    @cached_property
+    def on_carriageway(self) -> FloatArray:
+        """1 for a player on foot whose centre is on the carriageway, else 0."""
+        return self.world.on_carriageway(self.state.x_m, self.state.y_m)
+
+    @property
+    def stands(self) -> FloatArray:
+        """1 for a player that stands, else 0."""
+        return (np.abs(self.state.speed_mps) <= STANDING_MPS).astype(float)
+
     # --- other bodies --------------------------------------------------------------------------------------------
 
     @cached_property
     def visible(self) -> BoolArray:
         """[G, P, B] bodies that are present and are not the player itself."""
         return _visible(self.state.present, self.bodies.present)
+
+    @cached_property
+    def hidden(self) -> BoolArray:
+        """[G, P, B] bodies that a player does not see because something hides them (`game.sight`)."""
+        state, bodies, hiding = self.state, self.bodies, self.world.hiding
+        if not hiding.anything:
+            return nothing_hidden((*state.present.shape, bodies.present.shape[1]))
+        of_bodies = (self._boxes, bodies.present)
+        return hidden(state.x_m, state.y_m, state.present, *of_bodies, hiding.obstacles, hiding.walls, hiding.vehicles)
 
     @cached_property
     def on_path(self) -> OnPath:
@@ -222,8 +242,13 @@ class Quantities:
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
-        """Distance to the nearest edge of the drivable area: 0 on the edge, at most `REACH_M`."""
-        return self.world.road.rails.distance_m(self._cars, REACH_M)
+        """Distance to the nearest edge of the drivable area, for walkers of their surface: 0 on the edge, at most
+        `REACH_M`."""
+        road = self.world.road
+        distance_m = road.rails.distance_m(self._cars, REACH_M)
+        if road.walkers_rails is None:
+            return distance_m
+        return np.where(self.world.walks, road.walkers_rails.distance_m(self._cars, REACH_M), distance_m)
 
     @cached_property
     def clearance_m(self) -> FloatArray:
@@ -242,30 +267,6 @@ class Quantities:
     def time_to_collision_s(self) -> FloatArray:
         """Seconds until contact with another body at constant headings and speeds; inf without a contact."""
         return time_to_first_contact(self._cars, self._boxes, self.state.speed_mps, self.bodies.speed_mps, self.visible)
-
-
-@compiled
-def terminations(
-    outcome: IntArray,
-    drove: BoolArray,
-    taken_over: BoolArray,
-    time_is_up: BoolArray,
-    goal_m: FloatArray,
-    vehicle_clearance_m: FloatArray,
-    rail_clearance_m: FloatArray,
-) -> None:
-    """Set the outcomes [G, P] of the players that drove [G, P], in place: contact before goal, goal before timeout
-    (time_is_up [G]). Contact with a rail counts only for players that the harness drives (taken_over [P])."""
-    for g, p in np.ndindex(outcome.shape):
-        if drove[g, p]:
-            if vehicle_clearance_m[g, p] <= 0.0:
-                outcome[g, p] = Outcome.COLLISION
-            elif rail_clearance_m[g, p] <= 0.0 and taken_over[p]:
-                outcome[g, p] = Outcome.RAIL
-            elif goal_m[g, p] <= 0.0:
-                outcome[g, p] = Outcome.GOAL
-            elif time_is_up[g]:
-                outcome[g, p] = Outcome.TIMEOUT
 
 
 @compiled

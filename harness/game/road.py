@@ -12,6 +12,7 @@ import numpy as np
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.rails import Rails
+from harness.game.raster import Raster
 
 SPACING_M = 0.5  # between stations of a route
 MARGIN_M = 100.0  # straight extension of a route's table before its start and beyond its end
@@ -292,3 +293,7 @@ class Road:
 
     rails: Rails
     routes: Routes
+    walkers_rails: Rails | None = None
+    """The edges of the surface for players on foot; None if no player is."""
+    carriageway: Raster | None = None
+    """The part of that surface for vehicles, around the ways of players on foot."""

@@ -146,7 +146,7 @@ def _first_fault(
             for values in now:
                 if not np.isfinite(values[g, p]):
                     return _MOTION, g, p
-            speed = min(max(before[2][g, p], speed_mps[g, p]), max_speed_mps[p])
+            speed = min(max(abs(before[2][g, p]), abs(speed_mps[g, p])), max_speed_mps[p])  # walkers step back
             if not np.hypot(x_m[g, p] - before[0][g, p], y_m[g, p] - before[1][g, p]) <= speed * step_s + slack[p]:
                 return _MOVED, g, p
         if p == 0:  # the players of a game have the same bodies

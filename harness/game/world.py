@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from harness.game.arrays import FloatArray
+import numpy as np
+
+from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import Actuators
 from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Road
+from harness.game.sight import NOTHING_HIDES, Hiding
 from harness.game.state import roles_of
 
 
@@ -23,11 +26,25 @@ class World:
     step_s: float
     time_limit_s: float
     right_of_way: RightOfWay = NO_JUNCTIONS
+    on_foot: tuple[bool, ...] = ()
+    """Which players walk; empty if none does."""
+    hiding: Hiding = NOTHING_HIDES
 
     @cached_property
     def roles(self) -> tuple[str, ...]:
         """The players' names, as `roles_of`."""
         return roles_of(len(self.length_m))
+
+    @cached_property
+    def walks(self) -> BoolArray:
+        """[P] players on foot."""
+        return np.array(self.on_foot or [False] * len(self.length_m), dtype=bool)
+
+    def on_carriageway(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+        """[G, P] 1 for players on foot at points [G, P] of the carriageway, else 0."""
+        if self.road.carriageway is None:
+            return np.zeros(x_m.shape)
+        return np.where(self.walks, self.road.carriageway.at(x_m, y_m), 0.0)
 
     @cached_property
     def steps(self) -> int:

@@ -1,6 +1,7 @@
 """A replay as a film: SUMO-GUI plays it on a virtual screen, and its pictures become a GIF or an MP4.
 
-The view follows the ego (after it has left, the other player), in real time.
+The view follows the ego (after it has left, the other player), in real time. A caption names the cars, and the film
+stays on its last picture for two seconds.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ from harness.traffic.gui import WindowClosed, gui_environment, steered_gui
 SIZE_PX = (960, 480)
 WIDTH_M = 80.0  # of visible road: a car of 4.6 m is 55 pixels long
 MOST_PER_S = 25.0  # pictures; with shorter steps some steps are skipped
+HOLD_S = 2.0  # the last picture stays this much longer: it shows how the game ended
+_COLOUR_NAMES = {"ego": "blue", "non_ego": "orange", "non_ego_1": "orange", "non_ego_2": "red"}
+_COLOUR_NAMES |= {"non_ego_3": "purple", "non_ego_4": "brown"}
 _SCREEN_PX = (1280, 800)
 _CAPTION_PX = 16
 
@@ -87,7 +91,9 @@ def write_film(
                 work=work,
                 display=display,
             )
-            encode(_reported(pictures, len(shown), on_progress), scratch, SIZE_PX, step_length_s * shown.step)
+            interval_s = step_length_s * shown.step
+            filmed = _held(_reported(pictures, len(shown), on_progress), round(HOLD_S / interval_s))
+            encode(filmed, scratch, SIZE_PX, interval_s)
         os.replace(scratch, file)
     finally:
         scratch.unlink(missing_ok=True)
@@ -100,6 +106,24 @@ def _reported(
     for done, picture in enumerate(pictures, 1):
         yield picture
         on_progress(done, total)
+
+
+def _held(pictures: Iterator[Image.Image], times: int) -> Iterator[Image.Image]:
+    """The pictures, the last of them `times` more."""
+    last = None
+    for last in pictures:
+        yield last
+    for _ in range(times if last is not None else 0):
+        assert last is not None
+        yield last
+
+
+def _legend(trace: pd.DataFrame) -> str:
+    """Which car is whose, by its colour."""
+    present = [name for name in PLAYER_COLOURS if (trace["player"] == name).any()]
+    return ", ".join(
+        f"{_COLOUR_NAMES[name]}: {name.replace('non_ego', 'non-ego').replace('_', ' ')}" for name in present
+    )
 
 
 def _pictures(
@@ -123,6 +147,7 @@ def _pictures(
         content = (folder / name).read_text(encoding="utf-8")
         (work / name).write_text(re.sub(left_out, "", content), encoding="utf-8")
         options += [option, str(work / name)]
+    legend = _legend(trace)
     centres, picture = _centres(trace), work / "picture.png"
     font = ImageFont.load_default(_CAPTION_PX)
     height_m = WIDTH_M * SIZE_PX[1] / SIZE_PX[0]
@@ -138,7 +163,7 @@ def _pictures(
                     window.photograph_next(picture, SIZE_PX)
                 window.step()
                 if step in shown:
-                    yield _captioned(picture, f"{title}   {step * step_length_s:.1f} s", font)
+                    yield _captioned(picture, f"{title}   {step * step_length_s:.1f} s\n{legend}", font)
         except WindowClosed as error:
             raise HarnessError(f"the film could not be finished: {error}") from error
 

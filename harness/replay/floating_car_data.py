@@ -79,7 +79,7 @@ def _records(
             "x": front[:, 0],
             "y": front[:, 1],
             "angle": np.round(90.0 - np.degrees(heading), 6) % 360.0,
-            "speed": np.where(leaves, _SEND_OFF_MPS, trace["speed_mps"].to_numpy(float)),
+            "speed": np.where(leaves, _SEND_OFF_MPS, np.abs(trace["speed_mps"].to_numpy(float))),  # a step back
             "pos": lanes.position(lane, front),
             "lane": np.array(lanes.ids, dtype=object)[lane],
         }

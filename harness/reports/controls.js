@@ -3,8 +3,8 @@
 function control(root) {
   const part = name => root.querySelector(`[data-is="${name}"]`);
   const button = name => root.querySelector(`[data-do="${name}"]`);
-  const [choice, beside, slider, clock, speed, status] = ["game", "with", "time", "time-text", "speed", "status"].map(part);
-  const order = [...games.keys()];
+  const [arms, choice, beside, slider, clock, speed, status] = ["arm", "game", "with", "time", "time-text", "speed", "status"].map(part);
+  const [worst] = games.keys();
   const player = new Player(root.querySelector(".screens"), show);
 
   function show() {
@@ -32,6 +32,7 @@ function control(root) {
 
   async function open(key, other, time) {
     if (!await player.open(key, other, time)) return false;
+    list(player.game.arm);
     choice.value = key;
     offer(player.game);
     beside.value = player.beside ? keyOf(player.beside) : "";
@@ -49,13 +50,19 @@ function control(root) {
     beside.replaceChildren(make("option", { value: "", text: "nothing" }), ...options);
   }
 
-  function fillChoice() {
-    const arms = new Map();
-    for (const [key, game] of games) {
-      if (!arms.has(game.arm)) arms.set(game.arm, make("optgroup", { label: game.arm }));
-      arms.get(game.arm).append(make("option", { value: key, text: describe(game) }));
-    }
-    choice.append(...arms.values());
+  /** The games of an arm, worst first: the list that the buttons "previous" and "next" go through. */
+  function list(arm) {
+    if (arms.value === arm && choice.length) return;
+    arms.value = arm;
+    const ofArm = [...games].filter(([, game]) => game.arm === arm);
+    choice.replaceChildren(...ofArm.map(([key, game]) => make("option", { value: key, text: describe(game) })));
+  }
+
+  function fillArms() {
+    const counts = new Map();
+    for (const game of games.values()) counts.set(game.arm, (counts.get(game.arm) ?? 0) + 1);
+    arms.append(...[...counts].map(([arm, count]) => make("option", { value: arm, text: `${arm} (${count})` })));
+    arms.selectedIndex = -1;
   }
 
   async function copyLink() {
@@ -91,8 +98,8 @@ function control(root) {
     in: () => player.zoom(1.25),
     out: () => player.zoom(0.8),
     resetView: () => player.eachCamera(camera => camera.reset()),
-    later: () => to(order[order.indexOf(choice.value) + 1]),
-    earlier: () => to(order[order.indexOf(choice.value) - 1]),
+    later: () => to(choice.options[choice.selectedIndex + 1]?.value),
+    earlier: () => to(choice.options[choice.selectedIndex - 1]?.value),
     beside: () => {
       const other = player.beside ? undefined : counterpartOf(player.game);
       if (!other && !player.beside) report("This page does not contain this episode of the other ego.");
@@ -123,6 +130,11 @@ function control(root) {
   });
   slider.addEventListener("change", remember);
   speed.addEventListener("change", () => { player.speed = Number(speed.value); });
+  arms.addEventListener("change", () => {
+    choice.replaceChildren();
+    list(arms.value);
+    to(choice.value);
+  });
   choice.addEventListener("change", () => to(choice.value));
   beside.addEventListener("change", () => open(choice.value, beside.value, player.time).then(remember));
 
@@ -131,7 +143,7 @@ function control(root) {
     const wanted = parsed(location.hash);
     if (!wanted && moved) return;
     const found = wanted && await open(wanted.key, wanted.beside, wanted.time);
-    if (!found && !player.game) await open(order[0]);
+    if (!found && !player.game) await open(worst);
     if (!wanted) return;
     if (!found) report("This page does not contain that game. It is in the run folder: harness replay opens it.");
     root.scrollIntoView({ behavior: moved && !stillMotion.matches ? "smooth" : "auto" });
@@ -142,7 +154,7 @@ function control(root) {
     }
   }
 
-  fillChoice();
+  fillArms();
   root.hidden = false;
   window.addEventListener("hashchange", () => follow(true));
   follow(false);

@@ -22,10 +22,15 @@ if TYPE_CHECKING:
 QUANTITIES = {
     "ego_mean_speed_mps": "average speed (m/s)",
     "ego_trailing_distance_m": "trailing distance (m)",
-    "ego_min_ttc_s": "least time to collision (s)",
+    "ego_min_ttc_s": "least time to collision (s; 20: and more)",
     "ego_max_deceleration_mps2": "hardest braking (m/s²)",
 }
 PAIRED = ("ego_mean_speed_mps", "ego_min_ttc_s")
+LONGEST_TIME_S = 20.0
+"""Longer times to collision are drawn at this one: nothing is at stake in them, and they would squeeze the others."""
+TIMES = ("ego_min_ttc_s",)
+FEWEST_IN_A_BOX = 8
+"""Fewer games have no middle half: only the games themselves are drawn."""
 MOST_DOTS = 600
 """The most games of an arm that are drawn one by one; of more, only the middle half and the median are drawn."""
 MOST_LINES = 300
@@ -62,8 +67,8 @@ def pairs_of(persona: str, games: pd.DataFrame, change: Change = RETRAINED) -> l
     return [
         Pairs(
             label=QUANTITIES[column],
-            before=both[column].to_numpy(float),
-            after=both[f"{column}_after"].to_numpy(float),
+            before=_values(both[column], column),
+            after=_values(both[f"{column}_after"], column),
             before_failed=before_failed,
             after_failed=after_failed,
         )
@@ -78,12 +83,17 @@ def spreads_of(arms: Sequence[tuple[str, str, str]], games: pd.DataFrame) -> lis
         Spread(
             label=label,
             arms=[
-                (name, series, rows[column].to_numpy(float), _failed(rows["ego_failed"]))
+                (name, series, _values(rows[column], column), _failed(rows["ego_failed"]))
                 for name, series, rows in of_arm
             ],
         )
         for column, label in QUANTITIES.items()
     ]
+
+
+def _values(cells: pd.Series, column: str) -> FloatArray:
+    values: FloatArray = cells.to_numpy(float)
+    return np.minimum(values, LONGEST_TIME_S) if column in TIMES else values
 
 
 def _failed(column: pd.Series) -> NDArray[np.bool_]:
@@ -140,14 +150,15 @@ def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> 
                     )  # fmt: skip
                     continue
                 low, median, high = np.quantile(values[measured], [0.25, 0.5, 0.75])
-                axes.bar(place, high - low, 0.66, bottom=low, color=SERIES[series], alpha=0.22, linewidth=0)
+                if measured.sum() >= FEWEST_IN_A_BOX:
+                    axes.bar(place, high - low, 0.66, bottom=low, color=SERIES[series], alpha=0.22, linewidth=0)
                 axes.plot([place - 0.33, place + 0.33], [median, median], color=SERIES[series], linewidth=2)
                 if measured.sum() <= MOST_DOTS:
                     _games(axes, place + _beside(len(values)), values, failed, series)
             axes.use_sticky_edges = False
             axes.set_title(spread.label, fontsize=10, loc="left")
             axes.set_xlim(-0.6, len(spread.arms) - 0.4)
-            labels = [label for label, *_ in spread.arms]
+            labels = [f"{label}\nn = {np.isfinite(values).sum()}" for label, _, values, _ in spread.arms]
             axes.set_xticks(range(len(labels)), labels, fontsize=8)
             axes.tick_params(axis="x", length=0)
             axes.tick_params(axis="y", labelsize=9)

@@ -88,6 +88,7 @@ def _scene(scene: SceneDrawing | None) -> dict[str, Any] | None:
     return {
         "surfaces": [[_points(ring) for ring in rings] for rings in scene.surfaces],
         "laneMarks": [_points(line) for line in scene.lane_marks],
+        "edgeLines": [_points(line) for line in scene.edge_lines],
         "rails": [_points(line) for line in scene.rails],
         "goal": [_points(line) for line in scene.goal],
     }

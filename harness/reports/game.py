@@ -12,6 +12,7 @@ from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.research_questions import Verdict
 from harness.evaluation.tables import typed
 from harness.reports.data_table import Table, table
+from harness.reports.differences import Row
 from harness.reports.game_wording import (
     CAPTIONS,
     NONE_FOUND,
@@ -24,7 +25,7 @@ from harness.reports.game_wording import (
 )
 from harness.reports.heatmaps import MatrixView, views
 from harness.reports.numbers import MISSING, interval, number, p_number, percent
-from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, Row, as_sentence
+from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, as_sentence
 
 _CELL_BYTES, _REST_BYTES = 60, 50_000
 

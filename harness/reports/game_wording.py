@@ -13,8 +13,9 @@ import pandas as pd
 
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
+from harness.reports.differences import Row
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, trimmed
-from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, Row, Tone, as_sentence, left_out
+from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, Tone, as_sentence, left_out
 
 QUESTION = "Equilibrium"
 NO, NEAR, OPEN = "no", "not refuted", "not decided"

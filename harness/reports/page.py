@@ -7,16 +7,20 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.acceptance import worst_of_each
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports import page_wording
+from harness.reports.acceptance_wording import headline, line
 from harness.reports.cards import Card, card
 from harness.reports.data_table import Table, table
 from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
 from harness.reports.game import GameSection, game_section
+from harness.reports.header import command_of, facts
 from harness.reports.learning import learning
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
+from harness.reports.next_steps import next_steps
 from harness.reports.page_template import environment_of, script
 from harness.reports.player_data import RecordedGame, SceneDrawing, key
 from harness.reports.provenance import mixed_versions
@@ -50,6 +54,7 @@ def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: Sc
     page = environment.get_template("report.html.jinja").render(
         **_header(tables, found),
         **_troubles(tables),
+        **_acceptance(tables, found),
         **_cards(tables, found, embedded.keys),
         **_player(tables, embedded),
         **_manoeuvres(tables),
@@ -72,8 +77,9 @@ def _room_for_games(rows: int, section: GameSection | None) -> int:
 def _header(tables: RunTables, found: Results) -> dict[str, Any]:
     manifest = tables.manifest
     return {
+        "command": command_of(manifest),
         "name": manifest.get("name", "campaign"),
-        "facts": page_wording.facts(manifest, found.seeds, len(tables.personas)),
+        "facts": facts(manifest, found.seeds, len(tables.personas)),
         "quick": page_wording.QUICK if manifest.get("quick") else "",
         "trained_before": manifest.get("campaign", {}).get("policies") or "",
         "several_seeds": len(found.seeds) > 1,
@@ -94,6 +100,17 @@ def _troubles(tables: RunTables) -> dict[str, Any]:
         "mixed": mixed_versions(tables.stages),
         "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
         "errors": len(errored),
+    }
+
+
+def _acceptance(tables: RunTables, found: Results) -> dict[str, Any]:
+    """The verdict on the bounds of the campaign, and what to do next."""
+    checks = tables.acceptance
+    lines = [line(check, len(found.seeds)) for check in worst_of_each(checks or ())]
+    left = len(unfinished(tables.stages))
+    return {
+        "acceptance": None if checks is None else (all(each.passed for each in lines), headline(checks), lines),
+        "next_steps": next_steps(tables.manifest, tables.personas, found, checks, left),
     }
 
 

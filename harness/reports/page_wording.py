@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from harness.evaluation.competence import DID_NOT_LEARN
@@ -18,9 +18,10 @@ from harness.evaluation.strategies import (
     against_persona,
     strategy_name,
 )
+from harness.reports.differences import Row
 from harness.reports.numbers import MISSING, SURE, interval, number, percent, steps_text, trimmed
 from harness.reports.treatment import Change
-from harness.reports.wording import Row, failures_of, played
+from harness.reports.wording import failures_of, played
 
 QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 NOT_PLAYED = "not played"
@@ -37,6 +38,7 @@ OUTCOMES = {"rail": "contact with the rail", "timeout": "out of time", "goal": "
 """Outcomes in words, where the name is not clear."""
 
 ORDINARY_DRIVER = "An ordinary SUMO driver in the persona's place"
+PREVENTABLE = "Could it have been prevented?"
 BY_DRIVER = "Results by the persona that drove"
 PERSONA_ALONE = "The persona alone on the road"
 CAUTION = "Caution"
@@ -45,26 +47,7 @@ FAILS_ALONE = "The naive ego also fails alone: the persona does not cause all of
 MIXED_VERSIONS = "This run mixes versions: its results may differ from those of a single version."
 UNKNOWN_VERSION = "of no known version"
 
-# --- the header ---
-
-
-def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
-    """The facts below the page's title, as label and value. `personas` is their number."""
-    campaign = manifest.get("campaign", {})
-    assessment, training = campaign.get("assessment", {}), campaign.get("training", {})
-    ego = str(campaign.get("ego", {}).get("driver", ""))
-    found = [
-        ("Scene", str(campaign.get("scene", "")).rstrip("/").rsplit("/", 1)[-1]),
-        ("Ego", str((manifest.get("ego_driver") or {}).get("in_words") or ego)),
-        ("Rounds", "" if ego in ("", "learned") else rounds(manifest.get("stages", {}).values())),
-        ("Personas", str(personas)),
-        ("Training seeds", ", ".join(map(str, manifest.get("seeds", seeds)))),
-        ("Games per arm and seed", f"{assessment['episodes']:,}" if "episodes" in assessment else ""),
-        ("Players", "trained before" if campaign.get("policies") else ""),
-        ("Training budget", f"{steps_text(training['steps'])} steps" if "steps" in training else ""),
-        ("Significance", f"{assessment['significance']:g}" if "significance" in assessment else ""),
-    ]
-    return [(label, value) for label, value in found if value]
+# --- method and provenance ---
 
 
 def asked_alone(manifest: Mapping[str, Any]) -> str:
@@ -77,13 +60,6 @@ def asked_alone(manifest: Mapping[str, Any]) -> str:
     return (
         f"A question is answered only if its players reach their goals alone in a share of games: {', '.join(bounds)}."
     )
-
-
-def rounds(stages: Iterable[Mapping[str, Any]]) -> str:
-    """The rounds of an ego that is not trained."""
-    if any(stage.get("kind") == "reconfiguration" for stage in stages):
-        return "0, 1 and 2: this ego is not trained, but its parameters are tuned"
-    return "0 and 1: this ego has nothing to train or to tune"
 
 
 def made_with(versions: str, stages: Sequence[str]) -> str:

@@ -34,6 +34,7 @@ class Player {
     this.element.classList.toggle("two", this.screens.length > 1);
     const ranges = rangesOf(chosen);
     for (const screen of this.screens) {
+      screen.others = chosen.filter(game => game !== screen.game);
       screen.camera.follows = this.follows;
       screen.start();
       screen.strips.align(ranges, this.duration);

@@ -79,6 +79,8 @@ class SceneDrawing:
     lane_marks: Sequence[FloatArray]
     rails: Sequence[FloatArray]
     goal: Sequence[FloatArray]
+    edge_lines: Sequence[FloatArray] = ()
+    """Solid lines between lanes and hard shoulders."""
 
 
 def key(arm: str, seed: int, episode: int) -> str:

@@ -51,7 +51,7 @@ class Sheet {
 }
 
 const ROAD = (() => {
-  const scene = recorded.scene ?? { surfaces: [], laneMarks: [], rails: [], goal: [] };
+  const scene = recorded.scene ?? { surfaces: [], laneMarks: [], edgeLines: [], rails: [], goal: [] };
   const points = scene.surfaces.flat(2);
   const path = lines => {
     const drawn = new Path2D();
@@ -63,6 +63,7 @@ const ROAD = (() => {
   return {
     surface: path(scene.surfaces.flat()),
     marks: path(scene.laneMarks),
+    edges: path(scene.edgeLines),
     rails: path(scene.rails),
     goal: scene.goal,
     left: most(xs, Math.min, Infinity), right: most(xs, Math.max, -Infinity),
@@ -83,8 +84,8 @@ class Camera {
     this.moved = { x: 0, y: 0 };
   }
 
-  /** Look at a game at a time, on a canvas of that size. It depends on the time alone, so that dragging and playing show the same. */
-  look(game, time, width, height) {
+  /** Look at games at a time, on a canvas of that size. It depends on the time alone, so that dragging and playing show the same. */
+  look(games, time, width, height) {
     Object.assign(this, { width, height });
     if (!this.follows) {
       const [wide, high] = [ROAD.right - ROAD.left + 8, ROAD.top - ROAD.bottom + 8];
@@ -92,7 +93,8 @@ class Camera {
       this.y = (ROAD.bottom + ROAD.top) / 2;
       this.scale = Math.min(width / wide, height / high);
     } else {
-      const seen = game.players.map(track => this.seen(game, track, time)).filter(each => each.weight > 0);
+      const seen = games.flatMap(game => game.players.map(track => this.seen(game, track, Math.min(time, game.duration))))
+        .filter(each => each.weight > 0);
       const total = seen.reduce((sum, each) => sum + each.weight, 0);
       this.x = seen.reduce((sum, each) => sum + each.weight * each.x, 0) / total;
       this.y = seen.reduce((sum, each) => sum + each.weight * each.y, 0) / total;
@@ -144,6 +146,7 @@ function drawRoad(context, camera, ratio) {
     context.setLineDash([3, 3]);
     context.stroke(ROAD.marks);
     context.setLineDash([]);
+    context.stroke(ROAD.edges);
     context.lineJoin = "round";
     for (const [colour, width] of [[palette.verge, 0.75], [palette.rail, 0.34]]) {
       context.strokeStyle = colour;

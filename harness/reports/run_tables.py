@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.acceptance import Check
 from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.strategies import Arm, Strategy
 from harness.evaluation.tables import TABLES, typed
@@ -35,10 +36,15 @@ class RunTables:
     """Empty: the report has no section on searches."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
     causes: pd.DataFrame = field(default_factory=_empty("causes"))
+    reference_drivers: pd.DataFrame = field(default_factory=_empty("reference_drivers"))
+    preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
+    """Empty: no failure was judged by reference drivers."""
     manoeuvres: pd.DataFrame | None = None
     """None: the report has no section on manoeuvres."""
     game: GameFindings | None = None
     """None: the report has no section on the game."""
+    acceptance: Sequence[Check] | None = None
+    """The checks of the campaign's bounds; None: it has none."""
     replays: Sequence[str] = ()
     """Names of the folders under `replays/`, in any order."""
 
@@ -53,6 +59,8 @@ class RunTables:
             reconfiguration=typed(self.reconfiguration),
             populations=typed(self.populations),
             causes=typed(self.causes),
+            reference_drivers=typed(self.reference_drivers),
+            preventability=typed(self.preventability),
             manoeuvres=None if self.manoeuvres is None else typed(self.manoeuvres),
         )
 

@@ -13,6 +13,7 @@ class GameScreen {
   /** `seek` is called with the time of a click on the curves or on a manoeuvre. */
   constructor(game, seek) {
     this.game = game;
+    this.others = []; // games beside this one: the same view, their players as outlines
     this.camera = new Camera(46);
     this.view = make("canvas", { class: "view", role: "img" });
     this.curves = make("canvas", { class: "curves", role: "img", "aria-label": this.described() });
@@ -79,8 +80,9 @@ class GameScreen {
     const { context, ratio, width, height } = sheet;
     const shown = Math.min(time, game.duration);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    camera.look(game, shown, width, height);
+    camera.look([game, ...this.others], this.others.length ? time : shown, width, height);
     drawRoad(context, camera, ratio);
+    for (const other of this.others) drawGhost(context, camera, ratio, other, time);
     drawGame(context, camera, ratio, game, shown, true);
     drawScaleBar(context, camera);
     if (time > game.duration + 1e-6) this.drawEnded(context, width);

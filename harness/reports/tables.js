@@ -95,7 +95,7 @@ function equip(table) {
   const save = make("button", { type: "button", text: "Download CSV" });
   const name = `${table.id || table.caption.textContent.trim().toLowerCase().replace(/[^a-z0-9]+/g, "_")}.csv`;
   const [heading, inOrder] = [table.tHead.rows[0], [...rows]];
-  save.addEventListener("click", () => download(name, csvOf(heading, inOrder)));
+  save.addEventListener("click", () => download(name, csvOf(heading, inOrder.filter(row => !row.hidden))));
   const bar = table.id === "episodes" ? filters(table, rows) : make("div", { class: "filters" });
   bar.append(save);
   region.before(bar);
@@ -104,8 +104,27 @@ function equip(table) {
 
 for (const table of document.querySelectorAll(".scroll table")) equip(table);
 
-// A link to a folded list opens the list.
+/** Open every folded part that an element is in. */
+function unfold(element) {
+  for (let each = element?.closest("details"); each; each = each.parentElement.closest("details")) each.open = true;
+  for (const each of element?.querySelectorAll(":scope > details.evidence") ?? []) each.open = true;
+}
+
+// A link to a folded part opens it.
+function unfoldAddressed(hash) {
+  const target = hash.length > 1 && document.getElementById(decodeURIComponent(hash.slice(1)));
+  if (!target) return;
+  unfold(target);
+  if (target.matches("details")) target.open = true;
+}
 document.addEventListener("click", event => {
-  const target = event.target.closest('a[href^="#pair-"]')?.getAttribute("href").slice(1);
-  if (target) document.getElementById(target).open = true;
+  const link = event.target.closest('a[href^="#"]');
+  if (link && !link.hash.startsWith("#game=")) unfoldAddressed(link.hash);
+});
+window.addEventListener("hashchange", () => unfoldAddressed(location.hash));
+unfoldAddressed(location.hash);
+
+// On paper the evidence is unfolded.
+matchMedia("print").addEventListener("change", event => {
+  if (event.matches) for (const each of document.querySelectorAll("details.evidence")) each.open = true;
 });

@@ -21,6 +21,26 @@ function drawGame(context, camera, ratio, game, time, labels) {
   if (labels) drawLabels(context, camera, game, time);
 }
 
+/** Draw the players of another game of the same start as outlines. */
+function drawGhost(context, camera, ratio, game, time) {
+  camera.inMetres(context, ratio, () => {
+    context.setLineDash([0.5, 0.35]);
+    context.lineWidth = Math.max(0.16, 1.5 / camera.scale);
+    for (const track of game.players) {
+      const pose = poseAt(game, track, Math.min(time, game.duration));
+      if (!pose) continue;
+      context.save();
+      context.translate(pose.x, pose.y);
+      context.rotate(pose.heading);
+      context.strokeStyle = colourOf(track);
+      box(context, ...track.size, 0.4);
+      context.stroke();
+      context.restore();
+    }
+    context.setLineDash([]);
+  });
+}
+
 function colourOf(track) {
   return palette[track.name === "ego" ? "ego" : "non-ego"];
 }

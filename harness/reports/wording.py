@@ -5,23 +5,22 @@ A label says "yes" only for `Verdict.SIGNIFICANT`. Every other label says what i
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from harness.evaluation.research_questions import INCOMPETENT, Verdict
-from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, p_text, trimmed
+from harness.reports.differences import CHANCE, NO_T_STATISTIC, Row, speed_sentence, statistics, too_few
+from harness.reports.numbers import p_text
 from harness.reports.treatment import ARMS, RETRAINED, Change
 
-Row = Mapping[Any, Any]
 Tone = Literal["harm", "mended", "open"]
 """harm: RQ1 is yes in any seed; mended: RQ2 is yes in all seeds; open: everything else."""
 
 TONE_OF_YES: dict[str, Tone] = {"RQ1": "harm", "RQ2": "mended"}
 QUESTIONS = {
-    "RQ1": "Does the persona make the ego fail?",
-    "RQ2": "Does {doing} reduce the failures?",
+    "RQ1": "Does this driver cause failures?",
+    "RQ2": "Did {doing} fix it?",
 }
 NOT_ASKED, NOT_ANSWERED = "not asked", "not answered"
 LABELS = {
@@ -37,9 +36,8 @@ NO_ROUND_2 = "Round 2 was not played: this ego has nothing to train or to tune."
 NO_SEED_ANSWERS = "It is not answered in any training seed."
 NOT_COMPARED = "Not compared."
 FAILURES_NOT_COMPARED = "The failures were not compared."
-BEFORE_HOLM_ONLY = "without correction, but not after Holm's correction"
+BEFORE_HOLM_ONLY = "significantly {direction} without correction, but not after Holm's correction"
 NO_DIFFERENCE = "In each of the {pairs} pairs both games have the same result, so there is nothing to test."
-NO_T_STATISTIC = "all {pairs} pairs have the same difference, so there is no t statistic"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +50,9 @@ class Answer:
     tone: Tone
     sentence: str
     speed: str
-    """The answer of average speed to the same question; empty when there is no such row."""
+    """What happened to the average speed; empty when it was not compared."""
+    statistics: Sequence[str] = ()
+    """A line for each test behind the answer."""
 
     @property
     def answered(self) -> bool:
@@ -70,6 +70,7 @@ class Conclusion:
     sentence: str
     speed: str
     per_seed: Sequence[Answer]
+    statistics: Sequence[str] = ()
 
     @classmethod
     def of_one(cls, question: str, answer: Answer) -> Conclusion:
@@ -81,6 +82,7 @@ class Conclusion:
             sentence=answer.sentence,
             speed=answer.speed,
             per_seed=(),
+            statistics=answer.statistics,
         )
 
 
@@ -160,11 +162,11 @@ def _answer(
     sentence = _failure_sentence(question, who, verdict, failure, before, after, change)
     if verdict is Verdict.ALL_EQUAL and significance is not None:
         sentence += _beside_significance(failure["mcnemar_p"], significance)
-    speed_sentence = ""
+    told_speed = ""
     if speed is not None:
-        speed_sentence = _speed_sentence(Verdict(speed["verdict"]), speed, before, after)
+        told_speed = speed_sentence(speed, before, after, significance)
         if speed["pairs_left_out"] != failure["pairs_left_out"]:
-            speed_sentence += left_out(speed)
+            told_speed += left_out(speed)
     yes = verdict is Verdict.SIGNIFICANT
     return Answer(
         seed=seed,
@@ -172,7 +174,8 @@ def _answer(
         label=LABELS[verdict],
         tone=TONE_OF_YES[question] if yes else "open",
         sentence=sentence + left_out(failure),
-        speed=speed_sentence,
+        speed=told_speed,
+        statistics=[statistics(row) for row in (failure, speed) if row is not None],
     )
 
 
@@ -196,7 +199,7 @@ def _beside_significance(p: float, significance: float) -> str:
 def _failure_sentence(
     question: str, who: str, verdict: Verdict, row: Row, before: Row, after: Row, change: Change
 ) -> str:
-    was, now, tests, pairs = failures_of(before), failures_of(after), p_values(row), row["pairs"]
+    was, now, pairs = failures_of(before), failures_of(after), row["pairs"]
     if question == "RQ1":
         claim = f"{who[:1].upper()}{who[1:]} makes the naive ego fail in {now} games instead of {was}"
         counts = f"The naive ego fails in {now} games against {who} and in {was} alone"
@@ -207,9 +210,9 @@ def _failure_sentence(
         counts = f"Against {who} the {change.made} ego fails in {now} games, the naive ego in {was}"
         direction = "less often"
     return {
-        Verdict.SIGNIFICANT: f"{claim} ({tests}).",
-        Verdict.BEFORE_HOLM_ONLY: f"{counts}: significantly {direction} {BEFORE_HOLM_ONLY} ({tests}).",
-        Verdict.NOT_SIGNIFICANT: f"{counts}: not significantly {direction} ({tests}).",
+        Verdict.SIGNIFICANT: f"{claim}.",
+        Verdict.BEFORE_HOLM_ONLY: f"{counts}: {BEFORE_HOLM_ONLY.format(direction=direction)}.",
+        Verdict.NOT_SIGNIFICANT: f"{counts}: {CHANCE}.",
         Verdict.NO_DIFFERENCE: f"{counts}. {NO_DIFFERENCE.format(pairs=pairs)}",
         Verdict.ALL_EQUAL: (
             f"{counts}; {NO_T_STATISTIC.format(pairs=pairs)}. McNemar's exact test gives {p_text(row['mcnemar_p'])}."
@@ -218,63 +221,12 @@ def _failure_sentence(
     }[verdict]
 
 
-def _speed_sentence(verdict: Verdict, row: Row, before: Row, after: Row) -> str:
-    was, now = (number(arm["mean_speed_mps"], 1) for arm in (before, after))
-    if was == now:
-        was, now = (number(arm["mean_speed_mps"], 3) for arm in (before, after))
-    direction = "slower" if row["question"] == "RQ1" else "faster"
-    tests, pairs = p_values(row), row["pairs"]
-    finding = {
-        Verdict.SIGNIFICANT: f"significantly {direction} ({tests})",
-        Verdict.BEFORE_HOLM_ONLY: f"significantly {direction} {BEFORE_HOLM_ONLY} ({tests})",
-        Verdict.NOT_SIGNIFICANT: f"not significantly {direction} ({tests})",
-        Verdict.NO_DIFFERENCE: f"equal in each of the {pairs} pairs",
-        Verdict.ALL_EQUAL: NO_T_STATISTIC.format(pairs=pairs),
-        Verdict.NOT_ENOUGH_PAIRS: too_few(pairs),
-    }[verdict]
-    return f"Average speed: {now}{NO_SPACE}m/s instead of {was}{NO_SPACE}m/s: {finding}."
-
-
-def too_few(pairs: int) -> str:
-    """Why there is no test of so few pairs."""
-    count = {0: "no pair of games", 1: "only one pair of games"}.get(pairs, f"only {pairs} pairs of games")
-    return f"but {count} could be compared: too few for a test"
-
-
 def left_out(row: Row) -> str:
     """A sentence, with a space before it, on the pairs that are not in the test; empty when all are."""
     out = row["pairs_left_out"]
     if not out:
         return ""
     return f" {out} of {out + row['pairs']} pairs {'is' if out == 1 else 'are'} left out: not played or not measured."
-
-
-def effect(row: Row) -> str:
-    """The mean difference and its interval, worded by its sign, e.g. "25 points more failures"."""
-    mean, low, high = row["mean_difference"], row["ci_low"], row["ci_high"]
-    if not math.isfinite(mean):
-        return MISSING
-    failure = row["metric"] == "failure"
-    scale, digits, unit = (100, 1, " points") if failure else (1, 2, f"{NO_SPACE}m/s")
-    more_is_h1 = (row["question"] == "RQ1") == failure  # RQ1: fails more, drives slower; RQ2: the reverse
-    rises = (mean > 0) == more_is_h1
-    if mean < 0:
-        low, high = -high, -low
-    words = ("more failures", "fewer failures") if failure else ("faster", "slower")
-    text = f"{trimmed(abs(mean) * scale, digits)}{unit} {words[0 if rises else 1]}"
-    if mean == 0:
-        text = "none"
-    if math.isfinite(low):
-        text += f" ({SURE}: {trimmed(low * scale, digits)} to {trimmed(high * scale, digits)})"
-    return text
-
-
-def p_values(row: Row) -> str:
-    """The test's p-value without and with Holm's correction."""
-    p, corrected = p_text(row["p_value"]), p_text(row["p_holm"])
-    if not math.isfinite(row["p_holm"]) or row["p_holm"] == row["p_value"]:
-        return p
-    return f"{p}, also after Holm's correction" if corrected == p else f"{p}; {corrected} after Holm's correction"
 
 
 def played(row: Row | None) -> int:

@@ -10,7 +10,7 @@ from sumolib.net import Net
 
 from harness.config.scene import Goal
 from harness.game.arrays import FloatArray
-from harness.traffic.network import car_lanes, drivable_area, lane_line
+from harness.traffic.network import car_lanes, drivable_area, lane_line, paved_lanes
 from harness.traffic.scene import OpenScene
 
 
@@ -31,6 +31,21 @@ def lane_marks(net: Net) -> list[FloatArray]:
             line = line.offset_curve(side * outer.getWidth() / 2.0, join_style="mitre")
             marks += [np.asarray(part.coords) for part in getattr(line, "geoms", [line]) if len(part.coords) > 1]
     return marks
+
+
+def edge_lines(net: Net) -> list[FloatArray]:
+    """The lines [n, 2] between a lane of cars and a paved lane beside it that is none, such as a hard shoulder."""
+    lines = []
+    for edge in net.getEdges(withInternal=True):
+        cars = set(car_lanes(edge))
+        for outer, inner in pairwise(paved_lanes(edge)):
+            if (outer in cars) == (inner in cars):
+                continue
+            line = shapely.LineString(lane_line(outer))
+            side = 1.0 if _is_left_of(lane_line(inner), lane_line(outer)) else -1.0
+            line = line.offset_curve(side * outer.getWidth() / 2.0, join_style="mitre")
+            lines += [np.asarray(part.coords) for part in getattr(line, "geoms", [line]) if len(part.coords) > 1]
+    return lines
 
 
 def _is_left_of(line: FloatArray, other: FloatArray) -> bool:

@@ -74,7 +74,7 @@ def _check_warm_up(scene: OpenScene) -> None:
 
 def _write_vehicles(scene: OpenScene, file: Path) -> int:
     """Write one background vehicle of each kind, one after another. Returns the end time in s. Raises OSError."""
-    players = {player.vehicle for player in scene.document.players}
+    players = set(scene.document.vehicles)
     departures = background_departures(scene.routes, players, scene.document.traffic_window_s)
     kinds = {replace(each, name="", depart_s=0.0, stops=()): each for each in departures}
     root = ElementTree.Element("routes")

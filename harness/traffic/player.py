@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from sumolib.net import Net
 from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
+from harness.config.road_user import CYCLING
 from harness.config.scene import Player, Scene
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
@@ -18,8 +20,10 @@ from harness.traffic import network
 from harness.traffic.departures import edges_of
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_table import route_table
+from harness.traffic.users_lanes import bicycle_lanes, lanes_for
 
 _LONGEST_ROUTE_M = 50_000.0
+_CYCLING_CLASSES = ("bicycle", "scooter")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,14 +71,31 @@ def open_player(
     if length_m > _LONGEST_ROUTE_M:
         message = f"its route is {length_m / 1e3:,.0f} km long, up to {_LONGEST_ROUTE_M / 1e3:g} km are possible"
         raise UsageError.of(routes.path, key, message, "remove edges from the route")
+    _check_kind(routes, player, vehicle, route_edges)
     goal_position_m = document.goal_of(player)[1].position_m
     try:
-        route = route_table(net, area, route_edges, goal=goal, goal_position_m=goal_position_m)
+        lanes_of = lanes_for(player.kind)
+        route = route_table(net, area, route_edges, goal=goal, goal_position_m=goal_position_m, lanes_of=lanes_of)
     except ValueError as error:
         raise UsageError.of(routes.path, key, f"its route {error}", "correct the route's edges") from None
     vehicle_type = routes.types[vehicle.vehicle_type]
     _check_room_beyond_goal(file, document, player, route, vehicle_type)
     return OpenPlayer(route=route, edges=tuple(edge.getID() for edge in route_edges), vehicle_type=vehicle_type)
+
+
+def _check_kind(routes: RouteFile, player: Player, vehicle: Departure, edges: Sequence[Edge]) -> None:
+    """Raise UsageError for a bicycle whose vehicle type is another one, or whose route forbids bicycles."""
+    if player.kind not in CYCLING:
+        return
+    key, type_name = f"vehicle {vehicle.name}", vehicle.vehicle_type
+    vehicle_class = routes.types[type_name].vehicle_class
+    if vehicle_class not in _CYCLING_CLASSES:
+        message = f"has vClass {vehicle_class!r}, and the scene's player is a {player.kind}"
+        raise UsageError.of(routes.path, f"vType {type_name}", message, 'give it vClass="bicycle"')
+    for edge in edges:
+        if not bicycle_lanes(edge):
+            message = f"its route passes edge {edge.getID()!r}, which forbids bicycles"
+            raise UsageError.of(routes.path, key, message, "choose another route, or allow them on a lane of it")
 
 
 def _check_room_beyond_goal(

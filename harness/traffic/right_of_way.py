@@ -16,9 +16,10 @@ from sumolib.net.lane import Lane
 
 from harness.game.arrays import FloatArray
 from harness.game.right_of_way import Conflicts, Control, RightOfWay, StopLines, Streams
-from harness.traffic.network import lane_line
+from harness.traffic.network import car_lanes, lane_line
 from harness.traffic.route_table import JunctionOnRoute, junctions_on_route
 from harness.traffic.stream import Feeders, Stream, carries_traffic, samples_of
+from harness.traffic.users_lanes import LanesOf
 
 _MERGING_M = 10.0  # length of the zone of a stream that joins the route
 _LEAST_AREA_M2 = 0.5
@@ -29,9 +30,11 @@ _CONTROL = {"m": Control.GIVE_WAY, "=": Control.GIVE_WAY, "s": Control.STOP, "w"
 _MAJOR = "MO"  # states of links with the right of way
 
 
-def right_of_way(net: Net, routes: Sequence[Sequence[Edge]]) -> RightOfWay:
-    """Conflicts and stop lines of players with routes along connected edges, in the order of the players."""
-    return _Builder(net).build([junctions_on_route(net, edges) for edges in routes])
+def right_of_way(net: Net, routes: Sequence[Sequence[Edge]], lanes_of: Sequence[LanesOf] | None = None) -> RightOfWay:
+    """Conflicts and stop lines of players with routes along connected edges, in the order of the players. The route of
+    a player on foot has no edges. `lanes_of` are the lanes that each player may use; None: those of cars."""
+    users = lanes_of or [car_lanes] * len(routes)
+    return _Builder(net).build([junctions_on_route(net, *each) for each in zip(routes, users, strict=True)])
 
 
 def control_of(link: Connection) -> Control:

@@ -22,6 +22,7 @@ from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic.network import car_lanes, lane_line
 from harness.traffic.oncoming_lanes import own_side
 from harness.traffic.surface import curve_between
+from harness.traffic.users_lanes import LanesOf
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1
@@ -49,17 +50,20 @@ class JunctionOnRoute:
     end_m: float
 
 
-def junctions_on_route(net: Net, edges: Sequence[Edge]) -> list[JunctionOnRoute]:
-    """The junctions of a route along connected edges, in order, with the stations of its table."""
-    starts = _join([piece.line for piece in _pieces(net, edges)])[1].tolist()
+def junctions_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -> list[JunctionOnRoute]:
+    """The junctions of a route along connected edges, in order, with the stations of its table. `lanes_of` are the
+    lanes that the player may use."""
+    if len(edges) < 2:
+        return []
+    starts = _join([piece.line for piece in _pieces(net, edges, lanes_of)])[1].tolist()
     return [
         JunctionOnRoute(
             link=link,
-            links=_car_links(edges[k], edges[k + 1]),
+            links=_links_between(edges[k], edges[k + 1], lanes_of),
             begin_m=starts[2 * k + 1],
             end_m=starts[2 * k + 2],
         )
-        for k, link in enumerate(_links(edges))
+        for k, link in enumerate(_links(edges, lanes_of))
     ]
 
 
@@ -68,21 +72,30 @@ def line_over_junction(net: Net, link: Connection) -> FloatArray:
     return _over_junction(net, link)[0]
 
 
-def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Edge, goal_position_m: float) -> Route:
-    """The table of a route along connected edges; `area` is the net's drivable area.
+def route_table(
+    net: Net,
+    area: BaseGeometry,
+    edges: Sequence[Edge],
+    *,
+    goal: Edge,
+    goal_position_m: float,
+    lanes_of: LanesOf = car_lanes,
+) -> Route:
+    """The table of a route along connected edges; `area` is the net's drivable area, `lanes_of` are the lanes that the
+    player may use.
 
     Raises ValueError if consecutive edges are not connected or the goal's edge is not on the route.
     """
     if goal not in edges:
         raise ValueError(f"does not pass the goal's edge {goal.getID()!r}")
-    pieces = _pieces(net, edges)
+    pieces = _pieces(net, edges, lanes_of)
     points, starts = _join([piece.line for piece in pieces])
     line = shapely.LineString(points)
     stations = np.arange(-MARGIN_M, line.length + MARGIN_M + SPACING_M, SPACING_M)
-    points, headings = _sample(line, stations)
+    points, headings = sampled(line, stations)
     piece_at = np.clip(np.searchsorted(starts, stations, side="right") - 1, 0, len(pieces) - 1)
 
-    ends = _lane_ends(edges, [starts[2 * k] + _length(pieces[2 * k].line) for k in range(len(edges))])
+    ends = _lane_ends(edges, lanes_of, [starts[2 * k] + _length(pieces[2 * k].line) for k in range(len(edges))])
     most = max(len(piece.lanes) for piece in pieces)
     offsets = np.full((len(stations), most), np.nan)
     lane_ends = np.full((len(stations), most), np.inf)
@@ -91,7 +104,7 @@ def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Ed
         for column, (lane_points, lane) in enumerate(piece.lanes):
             offsets[rows, column] = _offsets(points[rows], headings[rows], lane_points)
             lane_ends[rows, column] = ends[piece.edge][lane.getID()]
-    left, right = _road_edges(area, points, headings)
+    left, right = road_edges(area, points, headings)
     widths = np.array([max((lane.getWidth() for _, lane in piece.lanes), default=0.0) for piece in pieces])[piece_at]
     on_edge = ~np.array([piece.is_junction for piece in pieces])[piece_at]
     own_left, own_right = own_side(net, points, headings, offsets_m=offsets, width_m=widths, on_edge=on_edge)
@@ -101,10 +114,10 @@ def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Ed
         x_m=points[:, 0],
         y_m=points[:, 1],
         heading_rad=headings,
-        left_edge_m=_extend(left, inside),
-        right_edge_m=_extend(right, inside),
-        own_left_m=_extend(own_left, inside),
-        own_right_m=_extend(own_right, inside),
+        left_edge_m=extended(left, inside),
+        right_edge_m=extended(right, inside),
+        own_left_m=extended(own_left, inside),
+        own_right_m=extended(own_right, inside),
         speed_limit_mps=np.array([pieces[k].speed_mps for k in piece_at]),
         lane_offset_m=offsets,
         lane_end_m=lane_ends,
@@ -116,41 +129,42 @@ def route_table(net: Net, area: BaseGeometry, edges: Sequence[Edge], *, goal: Ed
 # --- the line --------------------------------------------------------------------------------------------------------
 
 
-def _pieces(net: Net, edges: Sequence[Edge]) -> list[_Piece]:
+def _pieces(net: Net, edges: Sequence[Edge], lanes_of: LanesOf) -> list[_Piece]:
     """The pieces of a route: edge, junction, edge, ..., edge."""
-    links = _links(edges)
+    links = _links(edges, lanes_of)
     entries = [link.getToLane() for link in links]
     exits = [link.getFromLane() for link in links]
-    entries.insert(0, exits[0] if exits else car_lanes(edges[0])[-1])
+    entries.insert(0, exits[0] if exits else lanes_of(edges[0])[-1])
     exits.append(entries[-1])
     pieces = []
     for k, edge in enumerate(edges):
-        lanes = [(lane_line(lane), lane) for lane in car_lanes(edge)]
+        lanes = [(lane_line(lane), lane) for lane in lanes_of(edge)]
         line = _between(entries[k], exits[k])
         pieces.append(_Piece(line=line, lanes=lanes, edge=k, speed_mps=entries[k].getSpeed()))
         if k < len(links):
             line, speed = _over_junction(net, links[k])
-            lanes = [(_over_junction(net, link)[0], link.getToLane()) for link in _car_links(edge, edges[k + 1])]
+            between = _links_between(edge, edges[k + 1], lanes_of)
+            lanes = [(_over_junction(net, link)[0], link.getToLane()) for link in between]
             pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed, is_junction=True))
     return pieces
 
 
-def _car_links(edge: Edge, following: Edge) -> list[Connection]:
-    starts, ends = car_lanes(edge), car_lanes(following)
+def _links_between(edge: Edge, following: Edge, lanes_of: LanesOf) -> list[Connection]:
+    starts, ends = lanes_of(edge), lanes_of(following)
     return [
         link for link in edge.getConnections(following) if link.getFromLane() in starts and link.getToLane() in ends
     ]
 
 
-def _links(edges: Sequence[Edge]) -> list[Connection]:
+def _links(edges: Sequence[Edge], lanes_of: LanesOf) -> list[Connection]:
     """The connections of a route, one between each two edges: the leftmost ones that lead to its end.
 
     A greedy search from the end of the route keeps the number of lane changes small.
     """
     chosen: list[Connection] = []
-    target = (car_lanes(edges[-1]) or edges[-1].getLanes())[-1]
+    target = (lanes_of(edges[-1]) or edges[-1].getLanes())[-1]
     for edge, following in zip(reversed(edges[:-1]), reversed(edges[1:]), strict=True):
-        links = _car_links(edge, following)
+        links = _links_between(edge, following, lanes_of)
         if not links:
             raise ValueError(f"has no connection from edge {edge.getID()!r} to {following.getID()!r}")
         best = min(
@@ -204,7 +218,7 @@ def _join(lines: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
     return points[keep], np.cumsum(steps)[first]
 
 
-def _sample(line: shapely.LineString, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
+def sampled(line: shapely.LineString, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Points [N, 2] and headings [N] of a line at stations [N], extended straight at both ends."""
     within = np.clip(stations, 0.0, line.length)
 
@@ -220,13 +234,13 @@ def _sample(line: shapely.LineString, stations: FloatArray) -> tuple[FloatArray,
 # --- lanes and road edges --------------------------------------------------------------------------------------------
 
 
-def _lane_ends(edges: Sequence[Edge], end_of_edge_m: Sequence[float]) -> list[dict[str, float]]:
+def _lane_ends(edges: Sequence[Edge], lanes_of: LanesOf, end_of_edge_m: Sequence[float]) -> list[dict[str, float]]:
     """For each edge of the route: the station where each lane stops leading along the route; inf if it never does."""
-    ends = [{lane.getID(): np.inf for lane in car_lanes(edges[-1])}]
+    ends = [{lane.getID(): np.inf for lane in lanes_of(edges[-1])}]
     for k in reversed(range(len(edges) - 1)):
-        links, following = _car_links(edges[k], edges[k + 1]), ends[0]
+        links, following = _links_between(edges[k], edges[k + 1], lanes_of), ends[0]
         lane_ends = {}
-        for lane in car_lanes(edges[k]):
+        for lane in lanes_of(edges[k]):
             reached = [following[link.getToLane().getID()] for link in links if link.getFromLane() is lane]
             lane_ends[lane.getID()] = max(reached, default=end_of_edge_m[k])
         ends.insert(0, lane_ends)
@@ -241,7 +255,7 @@ def _offsets(points: FloatArray, headings: FloatArray, lane_points: FloatArray) 
     return dy * np.cos(headings) - dx * np.sin(headings)
 
 
-def _road_edges(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
+def road_edges(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
     """[N] lateral offsets of the drivable area's left (positive) and right (negative) edges from each point."""
     if shapely.get_num_coordinates(area) <= _FEW_POINTS:
         return _edges_of(area, points, headings)
@@ -268,7 +282,7 @@ def _edges_of(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> t
     return sides[0], sides[1]
 
 
-def _extend(values: FloatArray, inside: FloatArray) -> FloatArray:
+def extended(values: FloatArray, inside: FloatArray) -> FloatArray:
     """[N] values whose entries before the start and beyond the end of the route repeat those at its start and end."""
     rows = np.flatnonzero(inside)
     first, last = rows[0] + 1, rows[-1] - 1

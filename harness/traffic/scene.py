@@ -3,38 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
-from pydantic import ConfigDict
+import shapely
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 
-from harness.config.scene import PlainFile, Scene, scene_file
-from harness.config.toml_reading import Document, nearest, read_document
+from harness.config.scene import Scene, scene_file
+from harness.config.toml_reading import read_document
 from harness.errors import Problem, UsageError, collect
-from harness.files import leads_out
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
 from harness.game.initial_state import Conditions, StartDistribution, StartRange
+from harness.game.obstacles import NO_OBSTACLES, Obstacles
 from harness.game.quantities import REACH_M
+from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.world import World
 from harness.traffic import network
+from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
+from harness.traffic.footway import open_walker, opened_ground, with_walkers
 from harness.traffic.levels import heights_of_players_roads
-from harness.traffic.net_file import check_net
-from harness.traffic.player import open_player
+from harness.traffic.obstacles import check_clear_starts, hiding_in, open_obstacles, with_types
+from harness.traffic.player import OpenPlayer, open_player
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
-from harness.traffic.route_reading import read_route_file
+from harness.traffic.scene_files import NamedFiles, check_within, checked_net, checked_routes
 from harness.traffic.start_overlaps import check_starts
 from harness.traffic.start_ranges import start_range
 from harness.traffic.trips import with_routes
+from harness.traffic.users_lanes import lanes_for
+from harness.traffic.walker_conflicts import Way, with_walkers_conflicts
 from harness.traffic.warm_up import Snapshot, snapshots
 
 
@@ -50,6 +55,8 @@ class OpenScene:
     edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
     rail_lines: tuple[FloatArray, ...]
     junctions: frozenset[str] | None = None  # those that games need; None: all of the net
+    obstacles: Obstacles = NO_OBSTACLES
+    lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
     roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
 
     @property
@@ -65,7 +72,7 @@ class OpenScene:
     @cached_property
     def has_background_traffic(self) -> bool:
         """Whether vehicles other than the players may depart."""
-        players = {player.vehicle for player in self.document.players}
+        players = set(self.document.vehicles)
         return bool(self.routes.flows) or bool(set(self.routes.vehicles) - players)
 
     @cached_property
@@ -75,13 +82,13 @@ class OpenScene:
 
     def vehicle(self, player: int) -> Departure:
         """A player's vehicle in the route file."""
-        return self.routes.vehicles[self.document.players[player].vehicle]
+        return self.routes.vehicles[self.document.vehicles[player]]
 
     def departures(self, generator: np.random.Generator) -> list[Departure]:
         """The background vehicles that depart during a game. What is random about them is drawn from the generator."""
         if not self.has_background_traffic:
             return []
-        players = {player.vehicle for player in self.document.players}
+        players = set(self.document.vehicles)
         begin_s, end_s = self.document.game_window_s
         varied = self.document.varies.traffic_density
         density = 1.0 if varied is None else between(varied, generator.random())
@@ -115,16 +122,8 @@ class OpenScene:
             routes=self.world.road.routes,
             conditions=_conditions(self.document),
             along_route_share=along_route_share,
+            obstacles=self.obstacles,
         )
-
-
-class _NamedFiles(Document):
-    """The files that a scene names. They are checked even if the rest of the document is invalid."""
-
-    model_config = ConfigDict(extra="ignore")
-    net: PlainFile
-    routes: PlainFile
-    additional: tuple[PlainFile, ...] = ()
 
 
 def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
@@ -134,16 +133,16 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     """
     document_file = scene_file(folder)
     problems: list[Problem] = []
-    collect(problems, lambda: _check_within(document_file, folder))
+    collect(problems, lambda: check_within(document_file, folder))
     if problems:
         raise UsageError(problems)
     document = collect(problems, lambda: read_document(document_file, Scene))
-    named = document or collect([], lambda: read_document(document_file, _NamedFiles))
+    named = document or collect([], lambda: read_document(document_file, NamedFiles))
     if named is None:
         raise UsageError(problems)
     net_file, route_files = folder / named.net, [folder / each for each in (named.routes, *named.additional)]
-    net = collect(problems, lambda: _checked_net(net_file, folder))
-    routes = collect(problems, lambda: _checked_routes(route_files, folder, document, ego_type))
+    net = collect(problems, lambda: checked_net(net_file, folder))
+    routes = collect(problems, lambda: checked_routes(route_files, folder, document, ego_type))
     if document is None or net is None or routes is None:
         raise UsageError(problems)
     routes = collect(problems, partial(_with_routes, routes, net_file, net, document))
@@ -151,9 +150,14 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         raise UsageError(problems)
     own = _edges_of_players(document, net, routes)
     area = network.drivable_area(net, own)
+    ground = opened_ground(document, net, area)
     open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
-    opened = [collect(problems, partial(open_one, role)) for role in document.roles]
-    vehicles = {player.vehicle for player in document.players}
+    on_foot = partial(open_walker, file=document_file, document=document, routes=routes, ground=ground)
+    opened = [
+        collect(problems, partial(on_foot if player.on_foot else open_one, role))
+        for role, player in zip(document.roles, document.players, strict=True)
+    ]
+    vehicles = set(document.vehicles)
     collect(problems, lambda: check_departures(vehicles, net, routes, document.traffic_window_s, document.roles))
     players = [player for player in opened if player is not None]
     if problems or len(players) < len(opened):
@@ -166,16 +170,27 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     places = tuple(start for start in starts if start is not None)
     if problems:
         raise UsageError(problems)
+    ways = [player.route for player in players]
+    obstacles = open_obstacles(file=document_file, document=document, net=net, area=area, routes=routes, ways=ways)
+    background = _background_edges(vehicles, net, routes)
     lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
+    walking = tuple(player.on_foot for player in document.players)
     world = World(
-        road=Road(network.rails(lines, REACH_M + 10.0), Routes.of([player.route for player in players])),
+        road=Road(
+            network.rails(lines, REACH_M + 10.0),
+            Routes.of(ways),
+            None if ground is None else network.rails(ground.rail_lines, REACH_M + 10.0),
+            None if ground is None else ground.raster,
+        ),
         actuators=_actuators(document, types),
         length_m=np.array([each.length_m for each in types]),
         width_m=np.array([each.width_m for each in types]),
         step_s=document.step_length_s,
         time_limit_s=document.time_limit_s,
-        right_of_way=right_of_way(net, [[net.getEdge(name) for name in player.edges] for player in players]),
+        right_of_way=_right_of_way(document, net, players),
+        on_foot=walking if any(walking) else (),
+        hiding=hiding_in(obstacles, routes, document),
     )
     if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:
         message, remedy = "no player's route passes a traffic light", "leave it out, or choose other routes"
@@ -184,21 +199,37 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         folder=folder,
         document=document,
         world=world,
-        routes=routes,
+        routes=with_types(routes, obstacles),
+        obstacles=obstacles,
+        lane_strips=strips_near(net, [*own, *background], obstacles),
         places=places,
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
-        junctions=network.junctions_near(net, [*own, *_background_edges(vehicles, net, routes)]),
+        junctions=network.junctions_near(net, [*own, *background]),
         roads_m=heights_of_players_roads(net, own),
     )
     factors, present = [HumanFactors()] * len(places), [1.0] * len(places)
     check_starts(document_file, scene.start_distribution(factors, present), world)
+    check_clear_starts(document_file, scene.start_distribution(factors, present), world)
     return scene
+
+
+def _right_of_way(document: Scene, net: Net, players: Sequence[OpenPlayer]) -> RightOfWay:
+    ways = [
+        Way(player=k, line=shapely.LineString(player.way), marked=player.marked_crossing)
+        for k, player in enumerate(document.players)
+        if player.way is not None
+    ]
+    walkers = {way.player for way in ways}
+    routes = [[] if k in walkers else [net.getEdge(name) for name in player.edges] for k, player in enumerate(players)]
+    lanes_of = [lanes_for(player.kind) for player in document.players]
+    table = right_of_way(net, routes, lanes_of)
+    return with_walkers_conflicts(table, net, [player.route for player in players], ways)
 
 
 def _edges_of_players(document: Scene, net: Net, routes: RouteFile) -> list[Edge]:
     """The edges of the players' routes, each once; those of invalid routes are left out."""
-    vehicles = [routes.vehicles[player.vehicle] for player in document.players if player.vehicle in routes.vehicles]
+    vehicles = [routes.vehicles[name] for name in document.vehicles if name in routes.vehicles]
     found = [collect([], partial(edges_of, each, net, routes)) or [] for each in vehicles]
     return list(dict.fromkeys(edge for edges in found for edge in edges))
 
@@ -218,42 +249,15 @@ def _background_edges(players: Collection[str], net: Net, routes: RouteFile) -> 
     return [net.getEdge(name) for name in sorted(names)]
 
 
-def _with_ego_type(routes: RouteFile, document: Scene | None, ego_type: str | None) -> RouteFile:
-    if ego_type is None or document is None or document.ego.vehicle not in routes.vehicles:
-        return routes
-    if ego_type not in routes.types:
-        message, remedy = f"has no vehicle type {ego_type!r} for the ego", nearest(ego_type, routes.types)
-        raise UsageError.of(routes.path, "vType", message, remedy)
-    ego = replace(routes.vehicles[document.ego.vehicle], vehicle_type=ego_type)
-    return replace(routes, vehicles={**routes.vehicles, document.ego.vehicle: ego})
-
-
-def _check_within(path: Path, folder: Path) -> None:
-    if leads_out(path, folder):
-        message = "is a link that leads out of the scene's folder"
-        raise UsageError.of(path, "", message, "replace the link by a copy of its target")
-
-
-def _checked_net(path: Path, folder: Path) -> Net:
-    _check_within(path, folder)
-    check_net(path)
-    return network.read_net(path)
-
-
-def _checked_routes(paths: Sequence[Path], folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
-    for path in paths:
-        _check_within(path, folder)
-    return _with_ego_type(read_route_file(*paths), document, ego_type)
-
-
 def _with_routes(routes: RouteFile, net_file: Path, net: Net, document: Scene) -> RouteFile:
     """The route file with routes for the trips of the players, and for those that may depart in a game."""
-    players = [routes.vehicles[each.vehicle] for each in document.players if each.vehicle in routes.vehicles]
+    routes = with_walkers(routes, document, net)
+    players = [routes.vehicles[name] for name in document.vehicles if name in routes.vehicles]
     return with_routes(routes, net_file, net, [*players, *routes.within(*document.traffic_window_s)])
 
 
 def _actuators(document: Scene, types: Sequence[VehicleType]) -> Actuators:
-    limits = [player.actuators for player in document.players]
+    limits = [player.actuators.with_defaults_of(player.kind) for player in document.players]
     return Actuators(
         max_acceleration_mps2=np.array([each.max_acceleration_mps2 for each in limits]),
         max_braking_mps2=np.array([each.max_braking_mps2 for each in limits]),
@@ -261,5 +265,6 @@ def _actuators(document: Scene, types: Sequence[VehicleType]) -> Actuators:
         max_steering_rad=np.array([each.max_steering_rad for each in limits]),
         max_steering_rate_radps=np.array([each.max_steering_rate_radps for each in limits]),
         wheelbase_m=np.array([each.wheelbase_m for each in limits]),
+        max_lateral_mps2=np.array([each.max_lateral_mps2 for each in limits]),
         friction=document.friction,
     )

@@ -19,13 +19,13 @@ from harness.traffic.network import lane_line
 from harness.traffic.route_table import line_over_junction
 
 TURNAROUNDS = (Connection.LINKDIR_TURN, Connection.LINKDIR_TURN_LEFTHAND)
-_USERS = ("passenger", "bus", "truck", "motorcycle", "bicycle", "tram")
+USERS = ("passenger", "bus", "truck", "motorcycle", "bicycle", "tram")
 _BEYOND_M = 20.0  # a stream goes on for this length behind the junction
 _BACK_M = 120.0  # and begins at most this far before it
 _ANYHOW_M = 40.0  # it leads back at least this far, although traffic there may turn off before the junction
 _SPACING_M = 4.0  # of samples
 _SPARE_M = 0.3  # overlap of the lengths that samples stand for, on the inside of a curve
-_CORRIDOR_M = 2.2  # what a car needs in its lane: 1.8 m, and 0.2 m on either side
+CORRIDOR_M = 2.2  # what a car needs in its lane: 1.8 m, and 0.2 m on either side
 
 
 def carries_traffic(link: Connection) -> bool:
@@ -33,7 +33,7 @@ def carries_traffic(link: Connection) -> bool:
     lanes = (link.getFromLane(), link.getToLane())
     if any(lane.getEdge().isSpecial() for lane in lanes) or link.getDirection() in TURNAROUNDS:
         return False
-    return any(all(lane.allows(user) for lane in lanes) for user in _USERS)
+    return any(all(lane.allows(user) for lane in lanes) for user in USERS)
 
 
 class Feeders:
@@ -109,14 +109,14 @@ class Stream:
     def swept(self, beyond: bool) -> BaseGeometry:
         """The area that cars on the link need inside the junction and, if wanted, shortly beyond it."""
         line = self.onward if beyond else _joined([self._inner])
-        return line.buffer(min(_CORRIDOR_M, self.width_m) / 2.0, cap_style="flat", join_style="mitre")
+        return line.buffer(min(CORRIDOR_M, self.width_m) / 2.0, cap_style="flat", join_style="mitre")
 
     @cached_property
     def samples(self) -> FloatArray:
         """[N, 7] samples of the stream, with the first columns of `game.right_of_way.Streams`."""
         pieces = [Piece(0.0, shapely.get_coordinates(self.onward), self.width_m)]
         pieces += self._feeders.approaches(self.link.getFromLane())
-        return np.concatenate([_samples(piece) for piece in pieces])
+        return np.concatenate([samples_on(piece) for piece in pieces])
 
 
 def _joined(lines: Sequence[FloatArray]) -> shapely.LineString:
@@ -126,7 +126,7 @@ def _joined(lines: Sequence[FloatArray]) -> shapely.LineString:
     return shapely.LineString(points[np.concatenate(([True], apart))] if apart.any() else points[[0, 0]])
 
 
-def _samples(piece: Piece) -> FloatArray:
+def samples_on(piece: Piece) -> FloatArray:
     """[N, 7] samples of the last `_BACK_M` before the stop line and of everything behind it."""
     line = _joined([piece.line])
     skipped_m = max(-_BACK_M - piece.begin_m, 0.0)

@@ -57,7 +57,7 @@ class Snapshot:
 
 def snapshots(document: Scene, routes: RouteFile, net_file: Path) -> tuple[Snapshot, ...]:
     """The snapshots of a scene, from the cache if it has them. Raises SimulationError if SUMO fails."""
-    players = {player.vehicle for player in document.players}
+    players = set(document.vehicles)
     drawn = [_drawn(document, routes, players, k) for k in range(SNAPSHOTS)]
     version = importlib.metadata.version("eclipse-sumo")
     options = _options(document)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from harness.config.campaign import Training
+from harness.config.training import Training
 
 
 @dataclass(frozen=True, kw_only=True)

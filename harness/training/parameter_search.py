@@ -18,8 +18,8 @@ from typing import Any
 
 import optuna
 
-from harness.config.campaign import Reconfiguration
 from harness.config.persona import Persona
+from harness.config.training import Reconfiguration
 from harness.config.tunable import Tunable
 from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver

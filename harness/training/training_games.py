@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from harness.config.campaign import Training
 from harness.config.persona import Persona
+from harness.config.training import Training
 from harness.drivers.mixture import Mixture, Player, mixture_of
 from harness.drivers.policy_file import Policy
 from harness.environments.arena import Arena, Seat

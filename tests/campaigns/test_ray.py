@@ -167,7 +167,9 @@ def test_ray__that_is_not_installed_is_named_with_the_remedy(tmp_path: Path) -> 
     campaign = write_campaign(tmp_path, **BY_SUMO)
     refused = harness("campaign", campaign, "--ray", "local", env={**os.environ, "PYTHONPATH": path})
     assert refused.returncode == 2
-    assert refused.stderr == "--ray: local: needs Ray, which is not installed (pip install 'harness[ray]')\n"
+    assert (
+        refused.stderr == "--ray: local: needs Ray, which is not installed (pip install 'safedriverl-harness[ray]')\n"
+    )
 
 
 # --- deaths of workers ------------------------------------------------------------------------------------------------

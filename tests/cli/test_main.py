@@ -11,15 +11,28 @@ from typing import Any
 
 import pytest
 import typer
+from junitparser import Failure, JUnitXml
 
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.cli import main as cli
 from harness.cli import wording
-from harness.cli.main import FAILED, INTERRUPTED, USAGE_ERROR, app
+from harness.cli.main import INTERRUPTED, app
 from harness.config.persona import Persona
-from harness.errors import SimulationError
-from tests.support.tiny import CAREFUL, MERGE, TABLES, harness, learned_run, tables, write_campaign, write_persona
+from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
+from harness.evaluation.tables import read_csv
+from harness.evaluation.worst_first import FAILURES
+from tests.support.tiny import (
+    CAREFUL,
+    MERGE,
+    TABLES,
+    harness,
+    learned_run,
+    sumo_run,
+    tables,
+    write_campaign,
+    write_persona,
+)
 
 
 class Result:
@@ -84,7 +97,7 @@ def test_help__describes_the_command_and_its_parameters(
 def test_help__names_the_exit_codes(run_command: Callable[..., Result]) -> None:
     shown = words_of(run_command("--help").out)
     assert words_of(str(app.info.epilog)) in shown
-    for code in (FAILED, USAGE_ERROR, INTERRUPTED):
+    for code in (FAILED, USAGE_ERROR, NOT_ACCEPTED, INTERRUPTED):
         assert str(code) in str(app.info.epilog)
 
 
@@ -319,6 +332,27 @@ def test_report__reads_a_run_folder_with_earlier_names_of_keys(
     assert (run / card).read_bytes() == (learned_run() / card).read_bytes()
 
 
+@pytest.mark.parametrize(("bound", "code", "word"), [(1.0, 0, "PASS"), (0.0, NOT_ACCEPTED, "FAIL")])
+def test_report__judges_the_bounds_of_the_campaign(
+    bound: float, code: int, word: str, tmp_path: Path, run_command: Callable[..., Result]
+) -> None:
+    run = shutil.copytree(sumo_run(), tmp_path / "run")
+    manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
+    manifest["campaign"]["acceptance"] = {"failure_rate": bound, "failure_rate_alone": 1.0}
+    (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
+    result = run_command("report", run)
+    assert result.code == code, result.err
+    assert f"{word}  failures, speedy: " in result.out
+    assert "PASS  failures without the other driver, speedy: " in result.out
+    written = json.loads((run / "result.json").read_text(encoding="utf-8"))
+    assert (written["accepted"], written["exit_code"]) == (code == 0, code)
+    assert [each["passed"] for each in written["acceptance"]] == [code == 0, True]
+    cases = {f"{case.classname}: {case.name}": case for suite in JUnitXml.fromfile(run / "junit.xml") for case in suite}
+    judged = cases["acceptance.speedy.failure_rate: failures: naive_vs_speedy, seed 1"]
+    assert [type(each) for each in judged.result] == ([] if code == 0 else [Failure])
+    assert cases["stages.assessment: naive_vs_speedy-seed1"].is_passed
+
+
 @pytest.mark.parametrize("command", ["report", "replay"])
 def test_run_folder__other_folders_are_refused(
     command: str, tmp_path: Path, run_command: Callable[..., Result]
@@ -355,6 +389,20 @@ def test_replay__lists_the_games_worst_first(run_command: Callable[..., Result])
     assert result.code == 0
     assert result.out.count("naive_vs_speedy") == 4
     assert "naive_alone" not in result.out
+
+
+def test_replay__lists_a_page_of_the_games_of_an_outcome(run_command: Callable[..., Result]) -> None:
+    result = run_command("replay", learned_run(), "naive_alone", "--rows", 3, "--page", 2)
+    assert result.code == 0
+    assert "page 2 of 2, 4 games" in result.out
+    assert len(re.findall(r"^ *naive_alone ", result.out, flags=re.MULTILINE)) == 1
+    failures = run_command("replay", learned_run(), "--outcome", "failure", "--rows", 1000)
+    assert failures.code == 0
+    outcomes = read_csv(learned_run() / "episodes.csv")["ego_outcome"]
+    listed = re.findall(r"^ *\w+(?:_alone|_vs_)\w* ", failures.out, flags=re.MULTILINE)
+    assert len(listed) == outcomes.isin(FAILURES).sum()
+    wrong = run_command("replay", learned_run(), "--outcome", "colision")
+    assert (wrong.code, "did you mean 'collision'?" in wrong.err) == (2, True)
 
 
 def test_replay__arms_are_not_cut_off_in_a_narrow_terminal(

@@ -15,8 +15,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from harness.cli import wording
 from harness.cli.schema_files import write_schemas
-from harness.config.campaign import Training
 from harness.config.json_schema import DIALECT, DOCUMENTS, UNITS, file_of, schema_of, schema_text
+from harness.config.training import Training
 from harness.errors import UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS
 from tests.support.repository import REPOSITORY

@@ -104,6 +104,9 @@ PER_SECOND = [
     # 0.03711437 1/m * 100 = 3.711437 m/s2 (see test_bicycle): 0.3711437^2
     ("lateral_acceleration", None, car(50.0, steering_rad=-0.1), FAR, -0.13774765),
     ("time_pressure", None, car(50.0), FAR, -1.0),
+    ("waiting", None, car(50.0, speed_mps=0.0), FAR, -1.0),
+    ("waiting", None, car(50.0, speed_mps=0.2), FAR, 0.0),
+    ("on_carriageway", None, car(50.0), FAR, 0.0),  # not on foot; walkers: see tests/environments/test_on_foot.py
     ("wrong_way", None, car(50.0), FAR, 0.0),  # a one-way road; roads with oncoming lanes: see test_traffic_rules
 ]
 

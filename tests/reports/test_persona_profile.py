@@ -99,6 +99,8 @@ def test_profile__has_a_moment_for_every_term() -> None:
         "red_light": (-1.0, "at 1 s"),
         "stop_sign": (-1.0, "at 1 m/s"),
         "wrong_way": (-1.0, "per second on the wrong side"),
+        "on_carriageway": (-1.0, "per second on the carriageway"),
+        "waiting": (-1.0, "per second standing"),
         "yield": (-0.5, "at 0.5 s"),
         "gap": (-0.5, "per second at 0.5 s"),
         "goal": (1.0, "once"),

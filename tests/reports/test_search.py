@@ -12,7 +12,8 @@ import pandas as pd
 
 from harness.evaluation.strategies import ReconfiguredEgo, against_persona
 from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed
-from harness.reports.page_wording import changed_ego_alone, rounds
+from harness.reports.header import rounds
+from harness.reports.page_wording import changed_ego_alone
 from harness.reports.provenance import mixed_versions
 from harness.reports.search import searches
 from harness.reports.treatment import RECONFIGURED
@@ -69,7 +70,7 @@ def words_of(page: str) -> str:
 
 def test_page__shows_naive_against_reconfigured_as_it_does_naive_against_retrained() -> None:
     page = words_of(rendered(**reconfigured()))
-    assert f"RQ2: yes {QUESTIONS['RQ2'].format(doing=RECONFIGURED.doing)}" in page
+    assert f"{QUESTIONS['RQ2'].format(doing=RECONFIGURED.doing)} Yes RQ2: yes" in page
     assert "Reconfiguration reduces the ego's failures against the speedy driver from 18 of 60 games to 2 of 60" in page
     assert "reconfigured ego, against speedy" in page
     assert changed_ego_alone("reconfigured") in page

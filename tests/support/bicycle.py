@@ -21,6 +21,7 @@ def actuators(**changes: float) -> Actuators:
         "max_steering_rad": 0.6,
         "max_steering_rate_radps": 0.8,
         "wheelbase_m": 2.7,
+        "max_lateral_mps2": 15.0,
         **{name: value for name, value in changes.items() if name != "friction"},
     }
     arrays = {name: np.array([value]) for name, value in values.items()}

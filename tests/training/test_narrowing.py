@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from harness.config.campaign import Training
+from harness.config.training import Training
 from harness.training.narrowing import Narrowing
 
 SETTINGS = Training(steps=100_000, initial_deviation=0.4, max_deviation=0.4, final_deviation=0.1, narrowing_share=0.2)

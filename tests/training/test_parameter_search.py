@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import harness.training.parameter_search
-from harness.config.campaign import Reconfiguration
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
+from harness.config.training import Reconfiguration
 from harness.config.tunable import Tunable
 from harness.drivers.car import car_of
 from harness.drivers.mixture import Member, Mixture

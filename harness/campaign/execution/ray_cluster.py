@@ -40,7 +40,7 @@ def ray_cluster(address: str, jobs: int | None) -> Iterator[Any]:
     try:
         import ray
     except ImportError:
-        remedy = "pip install 'harness[ray]'"
+        remedy = "pip install 'safedriverl-harness[ray]'"
         raise UsageError.of(OPTION, address, "needs Ray, which is not installed", remedy) from None
     with contextlib.ExitStack() as stack:
         if address == LOCAL:

@@ -76,6 +76,7 @@ class _ManifestKeeper:
         self._manifest: dict[str, Any] = {
             "format": FORMAT,
             "name": campaign.document.name,
+            "file": campaign.file.name,
             "quick": campaign.quick,
             "campaign": campaign.document.recorded(),
             "personas": [persona.name for persona in campaign.personas],

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from harness.campaign.plan.planned_drivers import Crowd, members_of, persona_of
 from harness.campaign.plan.stages import TrainingStage
-from harness.config.campaign import Campaign, Training
+from harness.config.campaign import Campaign
+from harness.config.training import Training
 
 
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:

@@ -21,10 +21,11 @@ from pydantic import Field, ValidationError
 from harness.campaign.storage.checksums import checksums_of, mismatches, read_checksums
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import Document
+from harness.errors import FAILED, NOT_ACCEPTED
 from harness.files import write_atomically
 
 _SOURCES = {".py", ".jinja", ".css", ".js"}
-_DRAWN_WITH = ("jinja2", "markupsafe", "matplotlib", "shapely")
+_DRAWN_WITH = ("jinja2", "junitparser", "markupsafe", "matplotlib", "shapely")
 """Libraries that a report depends on, beside those that the manifest names."""
 
 Line = Annotated[str, Field(max_length=10_000, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
@@ -44,6 +45,13 @@ class ShownVerdict(Document):
     """Why the ego of the question failed, a line for each kind of cause."""
 
 
+class ShownCheck(Document):
+    """An acceptance check as the terminal shows it."""
+
+    passed: bool
+    text: Line
+
+
 class RunResult(Document):
     """The result of a run, for the terminal and the exit code."""
 
@@ -53,6 +61,20 @@ class RunResult(Document):
     error_games: int = Field(ge=0)
     did_not_learn: tuple[Line, ...] = ()
     """The trainings that made no player that can drive the scene, each with its share of goals and the bound."""
+    acceptance: tuple[ShownCheck, ...] = ()
+    """For each bound and persona the worst check; empty if the campaign has no bounds."""
+
+    @property
+    def accepted(self) -> bool | None:
+        """Whether every bound is kept; None if the campaign has no bounds."""
+        return all(check.passed for check in self.acceptance) if self.acceptance else None
+
+    @property
+    def exit_code(self) -> int:
+        """The exit code of the command. A run with failed stages or games is not judged by its bounds."""
+        if self.failed_stages or self.error_games:
+            return FAILED
+        return NOT_ACCEPTED if self.accepted is False else 0
 
 
 def kept_result(folder: RunFolder, manifest: Mapping[str, Any]) -> RunResult | None:
@@ -81,7 +103,8 @@ def _file(folder: RunFolder) -> Path:
 
 def _results(folder: RunFolder) -> Iterator[Path]:
     """Every file of the results: tables, report, model cards, replays."""
-    yield from (folder.path / "report.html", *sorted(folder.path.glob("*.csv")))
+    yield from (folder.path / name for name in ("report.html", "result.json", "junit.xml"))
+    yield from sorted(folder.path.glob("*.csv"))
     yield from sorted((folder.path / "policies").glob("*/README.md"))
     yield from (file for file in sorted(folder.replays.rglob("*")) if file.is_file())
 

@@ -15,7 +15,9 @@ from rich.progress import track
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
-from harness.campaign.results.kept_results import RunResult, ShownVerdict, keep_result
+from harness.campaign.results.acceptance import checks_of, shown_lines, write_ci_files
+from harness.campaign.results.judged_failures import preventability_tables
+from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownVerdict, keep_result
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
@@ -27,6 +29,7 @@ from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.trace_tables import cause_table, severity_table, with_severity
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
+from harness.evaluation.acceptance import Evidence
 from harness.evaluation.causes.columns import CAUSE_COLUMNS
 from harness.evaluation.comparison import compare, games_by_arm
 from harness.evaluation.competence import Goals, goals_alone
@@ -84,6 +87,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     tables["causes"] = causes
     game = _game(campaign, manifest, episodes)
     tables |= game.tables if game is not None else {}
+    prevented = preventability_tables(folder, done, episodes)
+    tables |= prevented
     populations = by_who_drove(campaign, episodes)
     tables |= {"populations": populations} if campaign.population else {}
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
@@ -94,6 +99,9 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         manoeuvres = _manoeuvres(folder, done, scene)
     write_csv(manoeuvres, folder.path / "manoeuvres.csv")
     replays = _write_replays(folder, scene, episodes, console)
+    gaps = game.gaps if game is not None else None
+    evidence = Evidence(arms=arms, episodes=episodes, summary=summary, gaps=gaps)
+    checks = checks_of(campaign, manifest["personas"], evidence)
     report = RunTables(
         manifest=manifest,
         arms=arms,
@@ -108,6 +116,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         game=game,
         replays=replays,
         populations=populations,
+        **prevented,
+        acceptance=checks,
     )
     with console.status("writing the report"):
         games = recorded_games(episodes, arms, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
@@ -126,7 +136,11 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         failed_stages=failed,
         error_games=int((episodes["error"] != "").sum()),
         did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(entries).items()),
+        acceptance=tuple(
+            ShownCheck(passed=each.passed, text=each.text) for each in shown_lines(checks, len(campaign.seeds))
+        ),
     )
+    write_ci_files(folder, manifest, checks, result)
     keep_result(folder, written, result)
     return result
 
@@ -232,6 +246,7 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
             title=f"{game.arm}, seed {game.seed}, episode {game.episode}",
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
+            obstacles=scene.obstacles,
         )
     _drop_stale(folder.replays, set(names))
     return names

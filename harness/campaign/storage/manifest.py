@@ -26,7 +26,7 @@ class _Record(Document):
 class StageEntry(_Record):
     """A stage in the manifest."""
 
-    kind: Literal["training", "assessment", "reconfiguration"]
+    kind: Literal["training", "assessment", "reconfiguration", "preventability"]
     name: Text
     persona: Name | Literal[""] = ""
     seed: Seed
@@ -35,6 +35,8 @@ class StageEntry(_Record):
     steps: Count | None = None
     budget_steps: Count | None = None
     stopped: Text | None = None
+    finished_on: Annotated[str, Field(pattern=r"^\d{4}-\d\d-\d\d$")] | None = None
+    """The date in UTC."""
     rule: Text | None = None
     seconds: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
     episodes: Count | None = None
@@ -57,6 +59,8 @@ class Manifest(_Record):
 
     format: int
     name: CampaignName
+    file: Text = ""
+    """The name of the campaign's file; empty in runs of earlier versions."""
     quick: bool = False
     campaign: dict[str, Any]
     personas: list[Name]

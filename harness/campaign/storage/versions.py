@@ -6,8 +6,10 @@ import importlib.metadata
 import platform
 from functools import cache
 
+from harness.version import __version__
+
 _PACKAGES = (
-    *("harness", "eclipse-sumo", "libsumo", "sumolib", "numpy", "scipy", "numba", "pandas", "torch"),
+    *("eclipse-sumo", "libsumo", "sumolib", "numpy", "scipy", "numba", "pandas", "torch"),
     *("stable-baselines3", "gymnasium", "pyarrow", "safetensors"),
 )
 NUMBERS_FORMAT = 3  # raised when the same inputs give other numbers, so that finished stages are carried out again
@@ -18,7 +20,7 @@ _OF_NUMBERS = ("python", "platform", "harness", "libsumo", "numpy", "numba", "to
 def versions() -> dict[str, str]:
     """The version of every program that a run uses, and the system it runs on."""
     system = " ".join((platform.system(), platform.machine(), *platform.libc_ver())).strip()
-    found = {"python": platform.python_version(), "platform": system}
+    found = {"python": platform.python_version(), "platform": system, "harness": __version__}
     return found | {name: importlib.metadata.version(name) for name in _PACKAGES}
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from scipy import stats
+import scipy  # loads `scipy.stats` at its first use: workers do without
 
 from harness.evaluation.comparison import (
     CONFIDENCE,
@@ -90,7 +90,7 @@ def wilson(failures: float, games: int) -> tuple[float, float]:
     """Wilson's 95 % interval of a rate; NaN, NaN without games."""
     if games == 0:
         return np.nan, np.nan
-    interval = stats.binomtest(round(failures), games).proportion_ci(CONFIDENCE, method="wilson")
+    interval = scipy.stats.binomtest(round(failures), games).proportion_ci(CONFIDENCE, method="wilson")
     return float(interval.low), float(interval.high)
 
 

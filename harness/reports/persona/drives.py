@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from harness.config.persona import Persona
-from harness.config.scene import Actuators
+from harness.config.road_user import Actuators
 from harness.game.attention import Attention, Lapses, draw_lapses, unseen_behind_m
 from harness.game.seeding import generator_of
 

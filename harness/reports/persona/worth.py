@@ -29,6 +29,8 @@ EXAMPLES: Mapping[str, tuple[str, str, float]] = {
     "acceleration": ("at 5 m/s²", "acceleration_mps2", 5.0),
     "lateral_acceleration": ("at 3 m/s²", "lateral_acceleration_mps2", 3.0),
     "time_pressure": ("always", "advanced_m", 0.0),
+    "on_carriageway": ("on the carriageway", "on_carriageway", 1.0),
+    "waiting": ("standing", "stands", 1.0),
 }
 """An example for each term without a limit: in words, with the quantity that is not as in a calm moment."""
 LIMITED: Mapping[str, str] = {
@@ -186,6 +188,8 @@ def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]
         advanced_m=array("advanced_m", 0.0),
         speed_over_permitted=array("speed_over_permitted", 0.0),
         wrong_way=array("wrong_way", 0.0),
+        on_carriageway=array("on_carriageway", 0.0),
+        stands=array("stands", 0.0),
         lane_offset_m=array("lane_offset_m", 0.0),
         lateral_acceleration_mps2=array("lateral_acceleration_mps2", 0.0),
         **far,

@@ -1,0 +1,99 @@
+"""The acceptance of a run: its bounds judged, and the files `junit.xml` and `result.json` for CI."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from harness.campaign.results.kept_results import RunResult
+from harness.campaign.storage.manifest import FINISHED
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.campaign import Campaign
+from harness.evaluation.acceptance import Check, Evidence, judge, worst_of_each
+from harness.files import write_atomically
+from harness.reports import junit
+from harness.reports.acceptance_wording import TITLES, Line, line
+from harness.reports.numbers import NO_SPACE
+
+RESULT, JUNIT = "result.json", "junit.xml"
+RESULT_FORMAT = 1
+"""Version of the keys of result.json."""
+
+
+def checks_of(campaign: Campaign, personas: Sequence[str], evidence: Evidence) -> list[Check] | None:
+    """Every acceptance check of a run; None if its campaign has no bounds."""
+    if campaign.acceptance is None:
+        return None
+    return judge(
+        campaign.acceptance.bounds,
+        campaign.acceptance.ego,
+        [*personas, *campaign.mixed_people],
+        campaign.seeds,
+        evidence,
+    )
+
+
+def shown_lines(checks: Sequence[Check] | None, seeds: int) -> list[Line]:
+    """A line for each bound and persona: that of its worst arm and seed."""
+    return [line(check, seeds) for check in worst_of_each(checks or ())]
+
+
+def write_ci_files(
+    folder: RunFolder, manifest: Mapping[str, Any], checks: Sequence[Check] | None, result: RunResult
+) -> None:
+    """Write `result.json` and `junit.xml`: the acceptance checks, and whether every stage was carried out."""
+    properties = {"harness": str(manifest.get("versions", {}).get("harness", "")), "campaign": manifest["name"]}
+    cases = [*map(_acceptance_case, checks or ()), *_stage_cases(manifest)]
+    junit.write_junit(folder.path / JUNIT, f"harness campaign {manifest['name']}", cases, properties)
+    document = {
+        "format": RESULT_FORMAT,
+        "campaign": manifest["name"],
+        "quick": manifest["quick"],
+        "accepted": result.accepted,
+        "exit_code": result.exit_code,
+        "acceptance": [_record(check) for check in checks or ()],
+        "verdicts": [
+            {name: getattr(verdict, name) for name in ("persona", "question", "label", "sentence")}
+            for verdict in result.verdicts
+        ],
+        "failed_stages": list(result.failed_stages),
+        "did_not_learn": list(result.did_not_learn),
+        "error_games": result.error_games,
+        "versions": manifest.get("versions", {}),
+    }
+    text = json.dumps(document, indent=1, ensure_ascii=False)
+    write_atomically(folder.path / RESULT, (text + "\n").encode("utf-8", errors="backslashreplace"))
+
+
+def _record(check: Check) -> dict[str, Any]:
+    numbers = {name: getattr(check, name) for name in ("value", "limit", "allowed")}
+    return {
+        "bound": check.bound,
+        "persona": check.persona,
+        "seed": check.seed,
+        "arm": check.arm,
+        "games": check.games,
+        **{name: number if math.isfinite(number) else None for name, number in numbers.items()},
+        "passed": check.passed,
+    }
+
+
+def _acceptance_case(check: Check) -> junit.Check:
+    name, words = f"{TITLES[check.bound]}: {check.arm}, seed {check.seed}", line(check).sentence.replace(NO_SPACE, " ")
+    group = f"acceptance.{check.persona}.{check.bound}"
+    return junit.Check(name=name, group=group, failure="" if check.passed else words, details=words)
+
+
+def _stage_cases(manifest: Mapping[str, Any]) -> list[junit.Check]:
+    cases = []
+    for name, entry in manifest["stages"].items():
+        finished = entry["status"] in FINISHED
+        error = "" if finished else entry.get("message") or "it is not finished"
+        if finished and entry.get("errors"):
+            error = f"{entry['errors']} of {entry['episodes']} games could not be played"
+        cases.append(
+            junit.Check(name=name, group=f"stages.{entry['kind']}", error=error, seconds=entry.get("seconds") or 0.0)
+        )
+    return cases

@@ -1,0 +1,50 @@
+"""`harness new`: a folder with a campaign, a scene and a persona of one's own, which run as they are."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from pydantic import TypeAdapter, ValidationError
+
+from harness.cli import wording
+from harness.cli.persona_template import create_persona
+from harness.config.campaign import CampaignName
+from harness.errors import UsageError
+from harness.files import write_atomically
+from harness.shipped_documents import shipped
+
+PERSONA = "my_driver"
+SCENE = "merge"
+_TEMPLATES = {"campaign.toml": "project_campaign.toml.jinja", "README.md": "project_readme.md.jinja"}
+
+
+def create_project(folder: Path) -> list[Path]:
+    """Write the files of a new project and return their paths. `folder` must not exist, or be empty.
+
+    The campaign is named after the folder. Raises UsageError if the folder holds files, its name is not that of a
+    campaign, or it can't be written.
+    """
+    name = folder.absolute().name
+    try:
+        TypeAdapter(CampaignName).validate_python(name)
+    except ValidationError:
+        raise UsageError.of(folder, "", *wording.BAD_PROJECT_NAME) from None
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise UsageError.of(folder, "", *wording.FOLDER_NOT_EMPTY)
+    if not folder.absolute().parent.is_dir():
+        raise UsageError.of(folder, "", *wording.no_folder(folder.absolute().parent))
+    try:
+        (folder / "personas").mkdir(parents=True)
+        shutil.copytree(shipped("networks") / SCENE, folder / "networks" / SCENE)
+        persona = create_persona(PERSONA, folder / "personas" / f"{PERSONA}.toml")
+        environment = Environment(
+            loader=PackageLoader("harness", "cli"), undefined=StrictUndefined, keep_trailing_newline=True
+        )
+        for file, template in _TEMPLATES.items():
+            text = environment.get_template(template).render(folder=name, persona=PERSONA, scene=SCENE)
+            write_atomically(folder / file, text.encode())
+    except OSError as error:
+        raise UsageError.of(folder, "", *wording.cannot_write(error)) from None
+    return [folder / "campaign.toml", folder / "networks" / SCENE / "scene.toml", persona, folder / "README.md"]

@@ -1,0 +1,34 @@
+"""The seats of an arena: who decides a player's actions, and what it wants."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from harness.drivers.ordinary_walker import OrdinaryWalker
+from harness.drivers.protocol import Driver
+from harness.game.payoff import Payoff
+from harness.game.world import World
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A player's seat in the arena: its driver and its payoff (None: the payoff is not computed)."""
+
+    driver: Driver | None
+    """None: a learner; its actions are an argument of `Arena.step`."""
+    payoff: Payoff | None = None
+
+
+def with_walkers(seats: Sequence[Sequence[Seat]], world: World) -> tuple[tuple[Seat, ...], ...]:
+    """The seats [P][n]; in the place of a pedestrian an ordinary walker replaces SUMO, which moves vehicles only."""
+    return tuple(
+        tuple(_on_foot(seat, world, player) for seat in of_player) if world.walks[player] else tuple(of_player)
+        for player, of_player in enumerate(seats)
+    )
+
+
+def _on_foot(seat: Seat, world: World, player: int) -> Seat:
+    if seat.driver is None or seat.driver.takes_over:
+        return seat
+    return replace(seat, driver=OrdinaryWalker(world, player))

@@ -1,0 +1,236 @@
+"""Acceptance: does an ego keep the bounds of its campaign?
+
+A bound is compared with the unfavourable end of a 95 % interval, not with the measured value: 0 failures in 10 games
+are compatible with a failure rate of 31 %, and don't show that it is below 10 %.
+
+| bound | measured in | interval |
+| --- | --- | --- |
+| `failure_rate` | every arm of the judged ego against the persona, of any round | Clopper-Pearson |
+| `failure_rate_alone` | the arm of the judged ego without the non-ego | Clopper-Pearson |
+| `near_miss_rate` | the same arms as `failure_rate`, by the column `near_miss` | Clopper-Pearson |
+| `speed_loss_mps` | games of the judged and the naive ego with the same start against the persona | paired t |
+| `gap_share` | the best-response gap of the judged ego (`gaps.csv`) | paired t |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+
+from harness.evaluation.comparison import games_by_arm, mean_interval, pairs_of, rate_interval
+from harness.evaluation.strategies import (
+    Arm,
+    EgoStrategy,
+    NaiveEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    RobustEgo,
+    against_persona,
+    round_of,
+    strategy_name,
+)
+
+JudgedEgo = Literal["last", "robust", "naive"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Check:
+    """One bound, judged for one persona and training seed in one arm."""
+
+    bound: str
+    """The key of the bound in the campaign."""
+    persona: str
+    seed: int
+    arm: str
+    value: float
+    """The measured value; NaN where it could not be measured."""
+    limit: float
+    """The unfavourable end of its 95 % interval."""
+    allowed: float
+    """The bound."""
+    games: int
+    """The games, or pairs of games, in which it was measured."""
+
+    @property
+    def measured(self) -> bool:
+        """Whether there is a value to judge."""
+        return bool(np.isfinite(self.limit))
+
+    @property
+    def passed(self) -> bool:
+        """Whether the bound is kept."""
+        return self.measured and self.limit <= self.allowed
+
+    @property
+    def excess(self) -> float:
+        """By how much the limit is above the bound: the larger, the worse. Infinite where it could not be measured."""
+        return self.limit - self.allowed if self.measured else np.inf
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evidence:
+    """The tables of a run that bounds are judged by, and its planned arms by name."""
+
+    arms: Mapping[str, Arm]
+    episodes: pd.DataFrame
+    summary: pd.DataFrame
+    gaps: pd.DataFrame | None = None
+
+    @cached_property
+    def rows(self) -> Mapping[tuple[str, int], Mapping[Any, Any]]:
+        """The rows of summary.csv by arm and seed."""
+        return {(row["arm"], row["seed"]): row for row in self.summary.to_dict("records")}
+
+    @cached_property
+    def games(self) -> Mapping[Any, pd.DataFrame]:
+        """The rows of episodes.csv by arm and seed."""
+        return games_by_arm(self.episodes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Subject:
+    """The ego that is judged about one persona and training seed."""
+
+    ego: EgoStrategy
+    persona: str
+    seed: int
+
+
+Measured = tuple[str, float, float, int]
+"""Arm, value, limit and number of games."""
+
+
+def judge(
+    bounds: Mapping[str, float], judged: JudgedEgo, personas: Sequence[str], seeds: Sequence[int], evidence: Evidence
+) -> list[Check]:
+    """Every bound for every persona and training seed: one check for each arm that it is measured in.
+
+    `bounds` are keys of `MEASURES` with their values. A bound that can't be measured has a check with NaN, which does
+    not pass.
+    """
+    checks = []
+    for name, allowed in bounds.items():
+        for persona in personas:
+            for seed in seeds:
+                subject = Subject(ego=judged_ego(judged, persona, seed, evidence), persona=persona, seed=seed)
+                for arm, value, limit, games in MEASURES[name](subject, evidence):
+                    check = Check(
+                        bound=name,
+                        persona=persona,
+                        seed=seed,
+                        arm=arm,
+                        value=value,
+                        limit=limit,
+                        allowed=allowed,
+                        games=games,
+                    )
+                    checks.append(check)
+    return checks
+
+
+def worst_of_each(checks: Sequence[Check]) -> list[Check]:
+    """For each bound and persona the check with the largest excess, in the order of the checks."""
+    worst: dict[tuple[str, str], Check] = {}
+    for check in checks:
+        key = (check.bound, check.persona)
+        if key not in worst or check.excess > worst[key].excess:
+            worst[key] = check
+    return list(worst.values())
+
+
+def judged_ego(judged: JudgedEgo, persona: str, seed: int, evidence: Evidence) -> EgoStrategy:
+    """The strategy that is judged: for `last` that of the last round that was assessed, or is planned, against the
+    persona."""
+    if judged == "robust":
+        return RobustEgo()
+    if judged == "naive":
+        return NaiveEgo()
+    planned = {
+        arm.ego: (arm.name, seed) in evidence.rows
+        for arm in evidence.arms.values()
+        if isinstance(arm.ego, RetrainedEgo | ReconfiguredEgo) and arm.ego.against == persona
+    }
+    assessed = [ego for ego, found in planned.items() if found]
+    later = sorted(assessed or planned, key=round_of)
+    if not later:
+        return NaiveEgo()
+    return later[-1] if assessed else later[0]
+
+
+def _failure_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    for arm in _arms_against(subject, evidence):
+        yield _rate(arm, subject.seed, evidence)
+
+
+def _near_miss_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    for arm in _arms_against(subject, evidence):
+        games = evidence.games.get((arm, subject.seed))
+        known = games["near_miss"].dropna() if games is not None and "near_miss" in games else []
+        near = int(sum(known))
+        _, high = rate_interval(near, len(known))
+        yield arm, near / len(known) if len(known) else np.nan, high, len(known)
+
+
+def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
+    """The arms of the ego against a non-ego of the persona, of any round."""
+    arms = [
+        arm.name
+        for arm in evidence.arms.values()
+        if arm.ego == subject.ego
+        and isinstance(arm.non_ego, PersonaNonEgo)
+        and arm.non_ego.persona == subject.persona
+        and arm.best_response_of is None
+    ]
+    return arms or [against_persona(subject.ego, subject.persona).name]
+
+
+def _failure_rate_alone(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    yield _rate(Arm(ego=subject.ego).name, subject.seed, evidence)
+
+
+def _rate(arm: str, seed: int, evidence: Evidence) -> Measured:
+    row = evidence.rows.get((arm, seed))
+    if row is None:
+        return arm, np.nan, np.nan, 0
+    return arm, row["failure_rate"], row["failure_rate_high"], row["episodes"] - row["errors"]
+
+
+def _speed_loss(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    naive, judged = (against_persona(ego, subject.persona).name for ego in (NaiveEgo(), subject.ego))
+    before, after, _ = pairs_of(evidence.games, subject.seed, naive, judged, ["ego_mean_speed_mps"])
+    losses = (before - after)[:, 0]
+    value = float(losses.mean()) if len(losses) else np.nan
+    _, high = mean_interval(losses)
+    yield judged, value, high if np.isfinite(high) else value, len(losses)
+
+
+def _gap_share(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    ego = strategy_name(subject.ego)
+    rows = [] if evidence.gaps is None else evidence.gaps.to_dict("records")
+    found = [
+        row
+        for row in rows
+        if (row["role"], row["ego"], row["persona"], row["seed"]) == ("ego", ego, subject.persona, subject.seed)
+    ]
+    for row in found:
+        scale = abs(row["payoff"]) or np.nan
+        high = row["ci_high"] if np.isfinite(row["ci_high"]) else row["gap"]
+        yield f"{ego}_vs_{row['non_ego']}", row["gap"] / scale, high / scale, row["pairs"]
+    if not found:
+        yield against_persona(subject.ego, subject.persona).name, np.nan, np.nan, 0
+
+
+MEASURES: Mapping[str, Callable[[Subject, Evidence], Iterator[Measured]]] = {
+    "failure_rate": _failure_rate,
+    "failure_rate_alone": _failure_rate_alone,
+    "near_miss_rate": _near_miss_rate,
+    "speed_loss_mps": _speed_loss,
+    "gap_share": _gap_share,
+}
+"""How each bound is measured."""

@@ -1,0 +1,68 @@
+"""The acceptance checks of a campaign in words."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from harness.evaluation.acceptance import Check
+from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, percent
+
+PASS, FAIL = "PASS", "FAIL"
+TITLES = {
+    "failure_rate": "failures",
+    "failure_rate_alone": "failures without the other driver",
+    "near_miss_rate": "near misses",
+    "speed_loss_mps": "average speed lost",
+    "gap_share": "best-response gap of the ego",
+}
+"""What each bound limits."""
+SPEEDS = ("speed_loss_mps",)
+NOT_MEASURED = "not measured: {arm} was not played"
+NO_GAMES = "not measured"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """One acceptance check as one line of text."""
+
+    passed: bool
+    title: str
+    """What is limited, and for which persona."""
+    sentence: str
+    """What was measured, and the bound."""
+
+    @property
+    def text(self) -> str:
+        """The line as the terminal and CI show it."""
+        return f"{PASS if self.passed else FAIL}  {self.title}: {self.sentence}".replace(NO_SPACE, " ")
+
+
+def line(check: Check, seeds: int = 1) -> Line:
+    """A check in words; with several training seeds it names its seed."""
+    seed = f", seed {check.seed}" if seeds > 1 else ""
+    return Line(passed=check.passed, title=f"{TITLES[check.bound]}, {check.persona}{seed}", sentence=sentence(check))
+
+
+def sentence(check: Check) -> str:
+    """What was measured and where, the end of the interval, and the bound."""
+    if not check.measured:
+        return NOT_MEASURED.format(arm=check.arm) if not check.games else NO_GAMES
+    value, limit, allowed = (_value(check.bound, each) for each in (check.value, check.limit, check.allowed))
+    return (
+        f"{value} in {check.games:,} games of {check.arm}; with {SURE} confidence at most {limit}; allowed: {allowed}"
+    )
+
+
+def headline(checks: Sequence[Check]) -> str:
+    """The verdict on all bounds."""
+    broken = sum(not check.passed for check in checks)
+    if not broken:
+        return f"{PASS}: the ego keeps every bound of the campaign"
+    return f"{FAIL}: the ego does not keep {broken} of {len(checks)} bounds"
+
+
+def _value(bound: str, value: float) -> str:
+    if value != value:
+        return MISSING
+    return f"{number(value, 2)}{NO_SPACE}m/s" if bound in SPEEDS else percent(value)

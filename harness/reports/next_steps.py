@@ -1,0 +1,80 @@
+"""What to do next with a run: a few sentences, each with the command to type in the run folder."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from harness.evaluation.acceptance import Check
+from harness.evaluation.strategies import NaiveEgo, against_persona
+from harness.reports.header import command_of
+from harness.reports.replays import most_severe
+from harness.reports.results import Results
+from harness.reports.wording import failures
+
+FINISH = "Some stages are not done. The same command continues; finished stages are skipped."
+WATCH_REMAINING = "See how the {made} ego still fails against {persona}: its worst game."
+WATCH_NAIVE = "See how {persona} makes the naive ego fail: its worst game."
+RETRAIN_AGAINST_SEVERAL = "Retrain one ego against several personas: add this to the campaign, and run it again."
+SET_BOUNDS = "State what this ego must achieve: add bounds to the campaign, and the command passes or fails."
+TIGHTEN = "Every bound is kept. Add a persona or a scene that this ego has not met."
+MOST_STEPS = 4
+
+
+@dataclass(frozen=True, kw_only=True)
+class NextStep:
+    """One thing to do, and what to type; `command` may be a line of a campaign's file."""
+
+    sentence: str
+    command: str = ""
+
+
+def next_steps(
+    manifest: Mapping[str, Any],
+    personas: Sequence[str],
+    found: Results,
+    checks: Sequence[Check] | None,
+    unfinished: int,
+) -> list[NextStep]:
+    """The first few steps that this run suggests, the most urgent first."""
+    steps = [
+        *_finish(manifest, unfinished),
+        *_watch(personas, found),
+        *_widen(personas, found, checks),
+    ]
+    return steps[:MOST_STEPS]
+
+
+def _finish(manifest: Mapping[str, Any], unfinished: int) -> Iterator[NextStep]:
+    if unfinished:
+        yield NextStep(sentence=FINISH, command=command_of(manifest))
+
+
+def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:
+    """The worst game of the persona against which the last ego fails most; else, of the naive ego's."""
+    for made, sentence in ((found.change.made, WATCH_REMAINING), ("naive", WATCH_NAIVE)):
+        arms = []
+        for persona in personas:
+            ego = NaiveEgo() if made == "naive" else found.change.ego(against=persona)
+            arm = against_persona(ego, persona).name
+            rows = found.of(arm)
+            arms += [(sum(map(failures, rows.values())), persona, arm)] if rows else []
+        if arms and max(arms)[0]:
+            _, persona, arm = max(arms)
+            game = most_severe(found.games[found.games["arm"] == arm])
+            command = f"harness replay . {shlex.quote(arm)} {game['episode']}"
+            command += f" --seed {game['seed']}" if len(found.seeds) > 1 else ""
+            yield NextStep(sentence=sentence.format(made=made, persona=persona), command=command)
+            return
+
+
+def _widen(personas: Sequence[str], found: Results, checks: Sequence[Check] | None) -> Iterator[NextStep]:
+    if checks is None:
+        yield NextStep(sentence=SET_BOUNDS, command="[acceptance] failure_rate = 0.1")
+    elif all(check.passed for check in checks):
+        yield NextStep(sentence=TIGHTEN, command="harness persona new NAME")
+    if len(personas) > 1 and any(found.asked("RQ2", persona) for persona in personas) and not found.is_reconfigured:
+        against = ", ".join(f'"{persona}"' for persona in personas)
+        yield NextStep(sentence=RETRAIN_AGAINST_SEVERAL, command=f"[retraining] against = [{against}]")

@@ -1,0 +1,86 @@
+"""The documents that come with the harness: scenes, personas, egos, policies and campaigns, found by their names.
+
+An installed package has them in `harness/shipped/`, a checkout at its top.
+"""
+
+from __future__ import annotations
+
+import difflib
+import os
+import re
+from pathlib import Path
+from typing import Literal
+
+from harness.errors import UsageError
+
+Kind = Literal["networks", "personas", "egos", "policies", "campaigns"]
+"""The folders of documents."""
+
+PACKAGE = Path(__file__).resolve().parent
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_FOLDERS: tuple[Kind, ...] = ("networks", "policies")  # a document of these is a folder, of the others a TOML file
+_ONE_OF: dict[Kind, str] = {
+    "networks": "scene",
+    "personas": "persona",
+    "egos": "ego",
+    "policies": "folder of policies",
+    "campaigns": "campaign",
+}
+
+
+def shipped(kind: Kind) -> Path:
+    """The folder of the shipped documents of a kind."""
+    packaged = PACKAGE / "shipped"
+    return (packaged if packaged.is_dir() else PACKAGE.parent) / kind
+
+
+def shipped_names(kind: Kind) -> list[str]:
+    """The names of the shipped documents of a kind."""
+    folder = shipped(kind)
+    if not folder.is_dir():
+        return []
+    found = (each for each in folder.iterdir() if each.is_dir() == (kind in _FOLDERS))
+    return sorted(each.stem for each in found if kind in _FOLDERS or each.suffix == ".toml")
+
+
+def is_name(written: str) -> bool:
+    """Whether a document is named as in `scene = "merge"`, not by a path."""
+    return _NAME.fullmatch(written) is not None
+
+
+def find_document(written: str, folder: Path, kind: Kind) -> Path:
+    """The absolute path of a document that a file in `folder` names; it may not exist.
+
+    A path is relative to the folder. A name, such as `merge`, is that of a document in the folder, in its subfolder of
+    the kind, or of a shipped document: the first that exists.
+    """
+    beside = Path(os.path.realpath(folder / written))
+    if not is_name(written) or beside.exists():
+        return beside
+    file = written if kind in _FOLDERS else f"{written}.toml"
+    for place in (folder, folder / kind, shipped(kind)):
+        if (place / file).exists():
+            return Path(os.path.realpath(place / file))
+    return beside
+
+
+def document_at(path: Path, kind: Kind) -> Path:
+    """A path of a command line as it is, or the path of the document of that name where there is no such file.
+
+    Raises UsageError if it is a name of no document.
+    """
+    if path.exists() or not is_name(str(path)):
+        return path
+    found = find_document(str(path), Path(), kind)
+    if not found.exists():
+        raise UsageError.of(path, "", *missing_document(str(path), Path(), kind))
+    return found
+
+
+def missing_document(written: str, folder: Path, kind: Kind) -> tuple[str, str]:
+    """Message and remedy for a name of which there is no document."""
+    names = {each.stem for place in (folder, folder / kind) if place.is_dir() for each in place.iterdir()}
+    close = difflib.get_close_matches(written[:200], sorted(names | set(shipped_names(kind))), n=1, cutoff=0.5)
+    shown = f"did you mean {close[0]!r}?" if close else f"shipped are {', '.join(shipped_names(kind))};"
+    return f"there is no {_ONE_OF[kind]} {written!r}", f"{shown} a path is relative to {folder.absolute()}"

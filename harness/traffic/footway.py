@@ -1,0 +1,197 @@
+"""A player on foot: its way, the surface on which it walks, and its body in SUMO.
+
+In SUMO a walker is a small vehicle with the shape of a pedestrian: persons that are placed end SUMO 1.28 in nets with
+crossings, and SUMO's cars do not see them beside crossings.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+from sumolib.net import Net
+from sumolib.net.edge import Edge
+
+from harness.config.road_user import WALKER_LENGTH_M, WALKER_RUN_MPS, WALKER_WIDTH_M, WALKING_MPS
+from harness.config.scene import Scene
+from harness.errors import UsageError
+from harness.game.arrays import FloatArray
+from harness.game.raster import CELL_M, Raster
+from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.traffic import surface
+from harness.traffic.network import car_lanes, lane_line
+from harness.traffic.player import OpenPlayer
+from harness.traffic.route_file import Departure, RouteFile, VehicleType
+from harness.traffic.route_table import extended, road_edges, sampled
+
+WALKER_TYPE = "harness_pedestrian"
+WALKER_ATTRIBUTES = {
+    "id": WALKER_TYPE,
+    "length": f"{WALKER_LENGTH_M:g}",
+    "width": f"{WALKER_WIDTH_M:g}",
+    "maxSpeed": f"{WALKER_RUN_MPS:g}",
+    "minGap": "0.25",
+    "guiShape": "pedestrian",
+}
+"""The SUMO `<vType>` of a walker. Its class is a car's: the edges of its route need not allow pedestrians."""
+_LEAST_M, _MOST_M = 2.0, 150.0  # of a way
+_STRAYS_M = 30.0  # beside a way, within which the carriageway is known
+_ROOM_M = 0.5 * (WALKER_LENGTH_M**2 + WALKER_WIDTH_M**2) ** 0.5  # a walker's centre keeps from the surface's edge
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ground:
+    """Where players on foot walk."""
+
+    surface: BaseGeometry
+    """Carriageway, pavements, walking areas and crossings."""
+    carriageway: BaseGeometry
+    """The part of it that cars can drive on."""
+    near_m: FloatArray
+    """[4] bounds of the surroundings of the ways: least x and y, greatest x and y."""
+
+    @cached_property
+    def raster(self) -> Raster:
+        """The carriageway's cells around the ways."""
+        low, high = self.near_m[:2] - CELL_M, self.near_m[2:] + CELL_M
+        counts = np.ceil((high - low) / CELL_M).astype(int)
+        x_m, y_m = (low[k] + CELL_M * (np.arange(counts[k]) + 0.5) for k in range(2))
+        cells = shapely.contains_xy(self.carriageway, *np.meshgrid(x_m, y_m, indexing="ij"))
+        return Raster(origin_m=low, cells=cells)
+
+    @property
+    def rail_lines(self) -> list[FloatArray]:
+        """The edges of the surface as polylines [n, 2]."""
+        outlines = shapely.get_parts(shapely.get_rings(shapely.get_parts(self.surface)))
+        return [shapely.get_coordinates(each) for each in outlines]
+
+
+def ground(net: Net, carriageway: BaseGeometry, ways: Sequence[FloatArray]) -> Ground:
+    """The ground around ways [n, 2]; `carriageway` is the net's drivable area."""
+    around = shapely.union_all([shapely.LineString(way) for way in ways]).buffer(MARGIN_M)
+    parts = [each for each in _pavements(net) if each.intersects(around)]
+    near = shapely.union_all([shapely.LineString(way) for way in ways]).buffer(_STRAYS_M)
+    return Ground(
+        surface=surface.without_slits(surface.joined([carriageway, *parts])),
+        carriageway=carriageway,
+        near_m=np.array(near.bounds),
+    )
+
+
+def _pavements(net: Net) -> list[BaseGeometry]:
+    """The areas for pedestrians: lanes, crossings and walking areas."""
+    shapes: list[BaseGeometry] = []
+    for edge in net.getEdges(withInternal=True):
+        for lane in edge.getLanes():
+            line = lane_line(lane)
+            if edge.getFunction() == "walkingarea":
+                if len(line) > 2:
+                    shapes.append(shapely.Polygon(line).buffer(0))
+            elif lane.allows("pedestrian") and np.ptp(line, axis=0).any():
+                shapes.append(surface.lane_shape(line, lane.getWidth()))
+    return shapes
+
+
+def with_walkers(routes: RouteFile, document: Scene, net: Net) -> RouteFile:
+    """The route file with a vehicle for each pedestrian among the players, on the road that is nearest to its way."""
+    walkers = {
+        name: np.array(player.way)
+        for name, player in zip(document.vehicles, document.players, strict=True)
+        if player.way is not None
+    }
+    if not walkers:
+        return routes
+    types = ElementTree.fromstring(routes.types_xml)
+    ElementTree.SubElement(types, "vType", WALKER_ATTRIBUTES)
+    vehicles = {
+        name: Departure(
+            name=name,
+            vehicle_type=WALKER_TYPE,
+            edges=(_nearest_road(net, way).getID(),),
+            depart_s=0.0,
+            lane="best",
+            position="base",
+            speed="0",
+        )
+        for name, way in walkers.items()
+    }
+    kind = VehicleType(name=WALKER_TYPE, length_m=WALKER_LENGTH_M, width_m=WALKER_WIDTH_M, max_speed_mps=WALKER_RUN_MPS)
+    return replace(
+        routes,
+        types={**routes.types, WALKER_TYPE: kind},
+        vehicles={**routes.vehicles, **vehicles},
+        types_xml=ElementTree.tostring(types, encoding="unicode"),
+    )
+
+
+def _nearest_road(net: Net, way: FloatArray) -> Edge:
+    roads = [edge for edge in net.getEdges(withInternal=False) if car_lanes(edge)]
+    line = shapely.LineString(way)
+    return min(roads, key=lambda edge: shapely.distance(line, shapely.LineString(lane_line(car_lanes(edge)[0]))))
+
+
+def open_walker(role: str, *, file: Path, document: Scene, routes: RouteFile, ground: Ground | None) -> OpenPlayer:
+    """The player of a name of a scene document, which was read from `file`, on foot.
+
+    Raises UsageError with every problem found.
+    """
+    way = np.array(document.player(role).way, dtype=float)
+    problem = partial(UsageError.of, file, f"{role}.way")
+    length_m = float(np.hypot(*np.diff(way, axis=0).T).sum())
+    if not _LEAST_M <= length_m <= _MOST_M:
+        message = f"is {length_m:.1f} m long, {_LEAST_M:g} to {_MOST_M:g} m are possible"
+        raise problem(message, "move its points")
+    assert ground is not None, "a scene with a way has a ground"
+    line = shapely.LineString(way)
+    outside = line.difference(ground.surface.buffer(-_ROOM_M, join_style="mitre"))
+    if not outside.is_empty:
+        x_m, y_m = shapely.get_coordinates(outside)[0]
+        message = f"leaves the surface for people on foot near [{x_m:.1f}, {y_m:.1f}]"
+        raise problem(message, f"keep it {_ROOM_M:.2f} m within pavements and roads, or add pavements to the net")
+    if shapely.intersects(ground.carriageway, shapely.Point(way[-1])):
+        message = f"ends on the carriageway, at [{way[-1][0]:.1f}, {way[-1][1]:.1f}]"
+        raise problem(message, "end it on a pavement")
+    vehicle = routes.vehicles[document.vehicles[document.roles.index(role)]]
+    return OpenPlayer(
+        route=way_table(way, ground.surface),
+        edges=vehicle.edges,
+        vehicle_type=routes.types[vehicle.vehicle_type],
+    )
+
+
+def way_table(way: FloatArray, area: BaseGeometry) -> Route:
+    """The table of a way [n, 2] over a surface: a single lane along the way, whose limit is a comfortable walk. The
+    goal is its end."""
+    line = shapely.LineString(way)
+    stations = np.arange(-MARGIN_M, line.length + MARGIN_M + SPACING_M, SPACING_M)
+    points, headings = sampled(line, stations)
+    left, right = road_edges(area, points, headings)
+    inside = (stations >= 0.0) & (stations <= line.length)
+    count = len(stations)
+    return Route(
+        x_m=points[:, 0],
+        y_m=points[:, 1],
+        heading_rad=headings,
+        left_edge_m=extended(left, inside),
+        right_edge_m=extended(right, inside),
+        own_left_m=np.full(count, np.inf),
+        own_right_m=np.full(count, -np.inf),
+        speed_limit_mps=np.full(count, WALKING_MPS),
+        lane_offset_m=np.zeros((count, 1)),
+        lane_end_m=np.full((count, 1), np.inf),
+        length_m=line.length,
+        goal_m=line.length,
+    )
+
+
+def opened_ground(document: Scene, net: Net, carriageway: BaseGeometry) -> Ground | None:
+    """The ground of a scene's players on foot; None without any."""
+    ways = [np.array(player.way, dtype=float) for player in document.players if player.way is not None]
+    usable = [way for way in ways if np.ptp(way, axis=0).any()]
+    return ground(net, carriageway, usable) if usable else None

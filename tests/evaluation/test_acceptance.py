@@ -1,0 +1,120 @@
+"""Acceptance: which ego is judged, by which numbers, and when a bound is kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+import pytest
+
+from harness.evaluation.acceptance import MEASURES, Evidence, judge, judged_ego, worst_of_each
+from harness.evaluation.strategies import (
+    NAIVE_ALONE,
+    Arm,
+    NaiveEgo,
+    PersonaNonEgo,
+    RetrainedEgo,
+    RobustEgo,
+    against_persona,
+)
+from harness.evaluation.summary import summarise
+from tests.support.game_tables import arm, table
+
+RETRAINED = RetrainedEgo(against="speedy")
+NAIVE_VS, RETRAINED_VS = against_persona(NaiveEgo(), "speedy"), against_persona(RETRAINED, "speedy")
+ALONE = Arm(ego=RETRAINED)
+
+
+def evidence(games: Mapping[Arm, Sequence[int]], speeds: Mapping[Arm, float] | None = None) -> Evidence:
+    """A run of one persona with these games: 1 is a failure."""
+    rows = [
+        arm(each.name, ego_failed=failed, persona="speedy", speed=(speeds or {}).get(each, 13.0))
+        for each, failed in games.items()
+    ]
+    episodes = table(*rows)
+    return Evidence(arms={each.name: each for each in games}, episodes=episodes, summary=summarise(episodes))
+
+
+def hundred(failures: int) -> list[int]:
+    return [1] * failures + [0] * (100 - failures)
+
+
+@pytest.mark.parametrize(
+    ("failures", "bound", "passed"),
+    [
+        (0, 0.03, False),  # 0 of 100 shows no less than 3.6 %
+        (0, 0.04, True),
+        (7, 0.10, False),
+        (7, 0.14, True),
+    ],
+)
+def test_failure_rate__is_judged_by_the_upper_end_of_its_interval(failures: int, bound: float, passed: bool) -> None:
+    run = evidence({NAIVE_VS: hundred(30), RETRAINED_VS: hundred(failures)})
+    (check,) = judge({"failure_rate": bound}, "last", ["speedy"], [1], run)
+    assert (check.arm, check.games, check.value) == ("retrained_vs_speedy", 100, failures / 100)
+    assert check.passed is passed
+
+
+def test_failure_rate__few_games_do_not_pass() -> None:
+    run = evidence({RETRAINED_VS: [0] * 10})
+    (check,) = judge({"failure_rate": 0.1}, "last", ["speedy"], [1], run)
+    assert check.limit == pytest.approx(0.3085, abs=1e-4)  # 1 - 0.025 ** (1 / 10)
+    assert not check.passed
+
+
+def test_failure_rate__covers_opponents_of_later_rounds() -> None:
+    later = Arm(ego=RETRAINED, non_ego=PersonaNonEgo(persona="speedy", round=3))
+    run = evidence({RETRAINED_VS: hundred(0), later: hundred(45)})
+    checks = judge({"failure_rate": 0.1}, "last", ["speedy"], [1], run)
+    assert [(check.arm, check.passed) for check in checks] == [(RETRAINED_VS.name, True), (later.name, False)]
+    assert [check.arm for check in worst_of_each(checks)] == [later.name]
+
+
+def test_near_miss_rate__is_a_bound_of_its_own() -> None:
+    run = evidence({RETRAINED_VS: hundred(0)})
+    episodes = run.episodes.assign(near_miss=pd.Series(hundred(95), dtype="Int64"))
+    run = Evidence(arms=run.arms, episodes=episodes, summary=run.summary)
+    (check,) = judge({"near_miss_rate": 0.5}, "last", ["speedy"], [1], run)
+    assert (check.value, check.games, check.passed) == (0.95, 100, False)
+
+
+def test_failure_rate_alone__is_what_the_ego_has_forgotten() -> None:
+    run = evidence({NAIVE_ALONE: hundred(0), RETRAINED_VS: hundred(0), ALONE: hundred(20)})
+    (check,) = judge({"failure_rate_alone": 0.05}, "last", ["speedy"], [1], run)
+    assert (check.arm, check.value, check.passed) == ("retrained_alone_speedy", 0.2, False)
+
+
+def test_speed_loss__is_that_of_games_with_the_same_start() -> None:
+    run = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)}, {NAIVE_VS: 13.5, RETRAINED_VS: 12.0})
+    strict, lenient = (judge({"speed_loss_mps": bound}, "last", ["speedy"], [1], run)[0] for bound in (1.0, 2.0))
+    assert (strict.value, strict.limit, strict.games) == (1.5, 1.5, 100)
+    assert (strict.passed, lenient.passed) == (False, True)
+
+
+def test_gap_share__is_judged_by_the_upper_end_of_the_gap() -> None:
+    row = {"role": "ego", "ego": "retrained_speedy", "non_ego": "speedy", "persona": "speedy", "seed": 1}
+    row |= {"payoff": -20.0, "gap": 2.0, "ci_high": 3.0, "pairs": 50}
+    run = evidence({RETRAINED_VS: hundred(0)})
+    run = Evidence(arms=run.arms, episodes=run.episodes, summary=run.summary, gaps=pd.DataFrame([row]))
+    (check,) = judge({"gap_share": 0.12}, "last", ["speedy"], [1], run)
+    assert (check.value, check.limit, check.games, check.passed) == (0.1, 0.15, 50, False)
+
+
+@pytest.mark.parametrize("bound", MEASURES)
+def test_bound__that_was_not_measured_is_not_kept(bound: str) -> None:
+    run = evidence({NAIVE_ALONE: hundred(0)})
+    run = Evidence(arms=run.arms | {RETRAINED_VS.name: RETRAINED_VS}, episodes=run.episodes, summary=run.summary)
+    (check,) = judge({bound: 1.0}, "last", ["speedy"], [1], run)
+    assert (check.measured, check.passed, check.excess) == (False, False, math.inf)
+
+
+def test_judged_ego__is_that_of_the_last_round_that_was_played() -> None:
+    later = Arm(ego=RetrainedEgo(against="speedy", round=4), non_ego=PersonaNonEgo(persona="speedy", round=3))
+    played = evidence({NAIVE_VS: [0], RETRAINED_VS: [0], later: [0]})
+    settled = Evidence(arms=played.arms, episodes=played.episodes[:2], summary=played.summary[:2])
+    assert judged_ego("last", "speedy", 1, played) == RetrainedEgo(against="speedy", round=4)
+    assert judged_ego("last", "speedy", 1, settled) == RETRAINED
+    assert judged_ego("last", "distracted", 1, played) == NaiveEgo()
+    assert judged_ego("naive", "speedy", 1, played) == NaiveEgo()
+    assert judged_ego("robust", "speedy", 1, played) == RobustEgo()
