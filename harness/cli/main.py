@@ -13,6 +13,7 @@ import typer
 from harness.cli import wording
 from harness.cli.comparison import compare
 from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
+from harness.cli.pinned_games import minimise, regression
 from harness.cli.replays import replay
 from harness.cli.scenes import scene_app
 from harness.cli.terminal import print_plain, print_version
@@ -167,6 +168,8 @@ app.command()(compare)
 app.command()(new)
 app.command()(check)
 app.command("check-driver")(check_driver)
+app.command()(minimise)
+app.command()(regression)
 app.add_typer(persona_app, name="persona")
 app.add_typer(scene_app, name="scene")
 app.command()(schema)

@@ -43,7 +43,7 @@ from harness.game.walking import walk
 from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.simulation import Reading, with_game
+from harness.traffic.simulation import Reading, Simulation, with_game
 
 _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # comparing arrays with members of an enumeration is slower
 
@@ -69,8 +69,9 @@ class Arena:
         seats: Sequence[Seat | Sequence[Seat]],
         seed: int = 0,
         recorded: bool = False,
+        simulation: Simulation | None = None,
     ) -> None:
-        """Load SUMO. Each game needs a `reset` before the first step.
+        """Load SUMO, or use another `simulation`. Each game needs a `reset` before the first step.
 
         `seats` has one entry per player: a seat, or several, of which `InitialState.member` selects one per game. SUMO
         drives all seats of a player or none. `recorded`: `reading` contains all background vehicles in every step, not
@@ -82,7 +83,7 @@ class Arena:
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
         self._on_wheels = self._taken_over & ~self.world.walks
         self._slack_m = slack_m(self._taken_over)
-        self.simulation = open_simulation(
+        self.simulation = simulation or open_simulation(
             scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
         )
         players = len(self.seats)

@@ -23,7 +23,7 @@ from harness.evaluation.people import COLLIDED_WITH, of_person
 from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, box_distance
-from harness.game.initial_state import StartDistribution, draw_initial_state
+from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.game.state import EGO, ROLES, Outcome
 from harness.traffic.scene import OpenScene
@@ -66,12 +66,13 @@ def assess(
     episodes: int | Iterable[int],
     on_start: Callable[[int], None] = lambda episode: None,
     abandoned: Mapping[int, str] = MappingProxyType({}),
+    start_from: Callable[[InitialState], InitialState] = lambda drawn: drawn,
 ) -> Iterator[Game]:
     """Play episodes: numbers 0 to `episodes` - 1, or the given numbers. A game that can't be played, or that has
     impossible numbers, is a record with outcome `error`.
 
     `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
-    has the reason as its error.
+    has the reason as its error. `start_from` may change the start that is drawn for a game.
     Raises SimulationError if SUMO can't load the scene.
     """
     players = [
@@ -89,7 +90,7 @@ def assess(
                 continue
             on_start(episode)
             try:
-                yield _play(arena, arm, start_distribution, episode)
+                yield _play(arena, arm, start_distribution, episode, start_from)
             except MemoryError:
                 raise
             except Exception as error:  # a driver may raise any exception: the other games are played
@@ -116,10 +117,16 @@ def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
     return ("assessment", seed, "episode", episode)
 
 
-def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode: int) -> Game:
+def _play(
+    arena: Arena,
+    arm: Arm,
+    start_distribution: StartDistribution,
+    episode: int,
+    start_from: Callable[[InitialState], InitialState],
+) -> Game:
     parts = parts_of(arm.seed, episode)
     present = [float(each) for each in arm.present_in(episode)]
-    start = draw_initial_state(replace(start_distribution, present_share=present), *parts)
+    start = start_from(draw_initial_state(replace(start_distribution, present_share=present), *parts))
     arena.reload(start.seed)
     arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
     trace = _Trace(arm, arena, episode)

@@ -21,6 +21,7 @@ from harness.errors import UsageError
 from harness.evaluation.comparison import COMPARISON_COLUMNS
 from harness.evaluation.game_theory.columns import GAME_TABLES
 from harness.evaluation.people import columns_for, people_in
+from harness.evaluation.reference_columns import REFERENCE_TABLES
 from harness.evaluation.severity.columns import SEVERITY_COLUMNS
 from harness.files import content_of, replace_durably, scratch_beside, write_atomically
 
@@ -165,6 +166,7 @@ TABLES = {
     "populations": POPULATION_COLUMNS,
     "reconfiguration": RECONFIGURATION_COLUMNS,
     **GAME_TABLES,
+    **REFERENCE_TABLES,
 }
 
 _MOST_BYTES = 500_000_000

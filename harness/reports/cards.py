@@ -168,11 +168,16 @@ def _rate(label: str, series: str, rows: Mapping[int, Row]) -> Rate:
 
 def _facts(persona: str, change: Change | None, found: Results) -> list[tuple[str, Sequence[str]]]:
     """The notes of a card, as titles and lines."""
-    against = found.of(against_persona(NaiveEgo(), persona).name)
+    arm = against_persona(NaiveEgo(), persona).name
+    against = found.of(arm)
     facts: list[tuple[str, Sequence[str]]] = []
     causes = {seed: page_wording.causes(row) for seed, row in against.items() if failures(row)}
     if causes:
         facts.append((page_wording.how_it_fails(persona), page_wording.by_seed(causes)))
+    prevented = {each.seed: each.sentences for each in found.preventability.get(arm, ()) if each.failures}
+    if prevented:
+        lines = {seed: " ".join(sentences) for seed, sentences in prevented.items()}
+        facts.append((page_wording.PREVENTABLE, page_wording.by_seed(lines)))
     facts.append((page_wording.ORDINARY_DRIVER, _ordinary_driver(persona, found)))
     by_driver = [row for row in found.by_driver if row["population"] == persona]
     if by_driver:

@@ -38,6 +38,7 @@ OUTCOMES = {"rail": "contact with the rail", "timeout": "out of time", "goal": "
 """Outcomes in words, where the name is not clear."""
 
 ORDINARY_DRIVER = "An ordinary SUMO driver in the persona's place"
+PREVENTABLE = "Could it have been prevented?"
 BY_DRIVER = "Results by the persona that drove"
 PERSONA_ALONE = "The persona alone on the road"
 CAUTION = "Caution"

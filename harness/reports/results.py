@@ -9,6 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.people import people_in
+from harness.evaluation.preventability import Preventability, preventability_of
 from harness.evaluation.strategies import Arm, ReconfiguredEgo
 from harness.reports import wording
 from harness.reports.differences import Row
@@ -38,6 +39,8 @@ class Results:
     """Non-egos of the scene."""
     crowds: Mapping[str, Sequence[str]]
     """The personas of each crowd, in the order of the scene's people."""
+    preventability: Mapping[str, Sequence[Preventability]]
+    """By arm: what reference drivers prevent, for each training seed."""
     persona_documents: Mapping[str, Mapping[str, Any]]
     """The documents of the personas, by name."""
     planned_arms: Mapping[str, Arm]
@@ -99,6 +102,10 @@ def results(tables: RunTables) -> Results:
         is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),
         people=len(people_in(tables.episodes.columns)),
         crowds={each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())},
+        preventability={
+            arm: preventability_of(tables.preventability, tables.reference_drivers, arm)
+            for arm in tables.preventability["arm"].unique()
+        },
         persona_documents=manifest.get("persona_documents", {}),
         planned_arms=tables.arms,
         by_driver=tables.populations.to_dict("records"),

@@ -16,6 +16,7 @@ from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
 from harness.campaign.results.acceptance import checks_of, shown_lines, write_ci_files
+from harness.campaign.results.judged_failures import preventability_tables
 from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownVerdict, keep_result
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.model_cards import write_model_cards
@@ -83,6 +84,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
     game = _game(campaign, manifest, episodes)
     tables |= game.tables if game is not None else {}
+    prevented = preventability_tables(folder, done, episodes)
+    tables |= prevented
     populations = by_who_drove(campaign, episodes)
     tables |= {"populations": populations} if campaign.population else {}
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
@@ -109,6 +112,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         game=game,
         replays=replays,
         populations=populations,
+        **prevented,
         acceptance=checks,
     )
     with console.status("writing the report"):
