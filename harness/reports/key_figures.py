@@ -14,6 +14,7 @@ from harness.reports.numbers import NO_SPACE, SURE, interval, number, percent
 from harness.reports.results import Results
 from harness.reports.worst_opponent import worst_opponent
 
+PREVENTABLE = "Preventable"
 NEAR_MISS = "near_miss"
 NEAR_MISSES = "Near misses"
 WORST_KNOWN_OPPONENT = "Against its worst known opponent"
@@ -33,7 +34,24 @@ class KeyFigure:
 
 def key_figures(persona: str, found: Results) -> list[KeyFigure]:
     """The lines of a persona's card, those that can be measured."""
-    return [*_near_misses(persona, found), *_worst_opponent(persona, found), *_price(persona, found)]
+    return [
+        *_preventable(persona, found),
+        *_near_misses(persona, found),
+        *_worst_opponent(persona, found),
+        *_price(persona, found),
+    ]
+
+
+def _preventable(persona: str, found: Results) -> Iterator[KeyFigure]:
+    lines = []
+    for each in found.preventability.get(against_persona(NaiveEgo(), persona).name, ()):
+        if each.failures:
+            seed = f"Seed {each.seed}: " if len(found.seeds) > 1 else ""
+            count = f"{each.from_start.by_any} of {each.from_start.judged} failures of the naive ego"
+            rate = f"{percent(each.rate)} of its games, {SURE}: {interval(each.rate_low, each.rate_high)}"
+            lines.append(f"{seed}{count} by a reference driver in its seat ({rate})")
+    if lines:
+        yield KeyFigure(title=PREVENTABLE, lines=tuple(lines))
 
 
 def _near_misses(persona: str, found: Results) -> Iterator[KeyFigure]:
