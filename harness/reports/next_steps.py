@@ -74,9 +74,9 @@ def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:
 
 def _widen(personas: Sequence[str], found: Results, checks: Sequence[Check] | None) -> Iterator[NextStep]:
     if checks is None:
-        yield NextStep(sentence=SET_BOUNDS, command="[acceptance] failure_rate = 0.1")
+        yield NextStep(sentence=SET_BOUNDS, command="[acceptance]\nfailure_rate = 0.1")
     elif all(check.passed for check in checks):
         yield NextStep(sentence=TIGHTEN, command="harness persona new NAME")
     if len(personas) > 1 and any(found.asked("RQ2", persona) for persona in personas) and not found.is_reconfigured:
         against = ", ".join(f'"{persona}"' for persona in personas)
-        yield NextStep(sentence=RETRAIN_AGAINST_SEVERAL, command=f"[retraining] against = [{against}]")
+        yield NextStep(sentence=RETRAIN_AGAINST_SEVERAL, command=f"[retraining]\nagainst = [{against}]")
