@@ -154,6 +154,21 @@ def schema(
         raise UsageError.of("harness schema", "DOCUMENT", *wording.no_document_kind(tuple(DOCUMENTS)))
 
 
+def columns(
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the page to this file.", show_default=False)
+    ] = None,
+) -> None:
+    """Print what the columns of episodes.csv are, as Markdown: unit, formula and source of each."""
+    from harness.files import write_atomically
+    from harness.reports.columns_page import columns_page
+
+    if out is None:
+        print(columns_page(), end="")
+    else:
+        write_atomically(out, columns_page().encode())
+
+
 def check_driver(
     driver: Annotated[
         str,

@@ -7,6 +7,7 @@ are compatible with a failure rate of 31 %, and don't show that it is below 10 %
 | --- | --- | --- |
 | `failure_rate` | every arm of the judged ego against the persona, of any round | Clopper-Pearson |
 | `failure_rate_alone` | the arm of the judged ego without the non-ego | Clopper-Pearson |
+| `near_miss_rate` | the same arms as `failure_rate`, by the column `near_miss` | Clopper-Pearson |
 | `speed_loss_mps` | games of the judged and the naive ego with the same start against the persona | paired t |
 | `gap_share` | the best-response gap of the judged ego (`gaps.csv`) | paired t |
 """
@@ -21,7 +22,7 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from harness.evaluation.comparison import games_by_arm, mean_interval, pairs_of
+from harness.evaluation.comparison import games_by_arm, mean_interval, pairs_of, rate_interval
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
@@ -163,6 +164,21 @@ def judged_ego(judged: JudgedEgo, persona: str, seed: int, evidence: Evidence) -
 
 
 def _failure_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    for arm in _arms_against(subject, evidence):
+        yield _rate(arm, subject.seed, evidence)
+
+
+def _near_miss_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    for arm in _arms_against(subject, evidence):
+        games = evidence.games.get((arm, subject.seed))
+        known = games["near_miss"].dropna() if games is not None and "near_miss" in games else []
+        near = int(sum(known))
+        _, high = rate_interval(near, len(known))
+        yield arm, near / len(known) if len(known) else np.nan, high, len(known)
+
+
+def _arms_against(subject: Subject, evidence: Evidence) -> list[str]:
+    """The arms of the ego against a non-ego of the persona, of any round."""
     arms = [
         arm.name
         for arm in evidence.arms.values()
@@ -171,8 +187,7 @@ def _failure_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
         and arm.non_ego.persona == subject.persona
         and arm.best_response_of is None
     ]
-    for arm in arms or [against_persona(subject.ego, subject.persona).name]:
-        yield _rate(arm, subject.seed, evidence)
+    return arms or [against_persona(subject.ego, subject.persona).name]
 
 
 def _failure_rate_alone(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
@@ -214,6 +229,7 @@ def _gap_share(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
 MEASURES: Mapping[str, Callable[[Subject, Evidence], Iterator[Measured]]] = {
     "failure_rate": _failure_rate,
     "failure_rate_alone": _failure_rate_alone,
+    "near_miss_rate": _near_miss_rate,
     "speed_loss_mps": _speed_loss,
     "gap_share": _gap_share,
 }

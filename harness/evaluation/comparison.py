@@ -135,6 +135,14 @@ def mean_interval(values: Floats) -> tuple[float, float]:
     return float(mean - half_width), float(mean + half_width)
 
 
+def rate_interval(successes: int, games: int) -> tuple[float, float]:
+    """Two-sided 95 % Clopper-Pearson interval of a rate; NaN, NaN without games."""
+    if games == 0:
+        return np.nan, np.nan
+    interval = scipy.stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
+    return float(interval.low), float(interval.high)
+
+
 def _row(
     question: Question, metric: Metric, games: Mapping[Any, pd.DataFrame], closed: Gate | None
 ) -> dict[str, object]:

@@ -66,7 +66,7 @@ def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tu
 
 def most_severe(episodes: pd.DataFrame) -> Mapping[Any, Any]:
     """The worst of these games, of which there is at least one."""
-    return worst_first(episodes).to_dict("records")[0]
+    return worst_first(episodes).head(1).to_dict("records")[0]
 
 
 def keys(episodes: pd.DataFrame) -> list[str]:

@@ -71,6 +71,14 @@ def test_failure_rate__covers_opponents_of_later_rounds() -> None:
     assert [check.arm for check in worst_of_each(checks)] == [later.name]
 
 
+def test_near_miss_rate__is_a_bound_of_its_own() -> None:
+    run = evidence({RETRAINED_VS: hundred(0)})
+    episodes = run.episodes.assign(near_miss=pd.Series(hundred(95), dtype="Int64"))
+    run = Evidence(arms=run.arms, episodes=episodes, summary=run.summary)
+    (check,) = judge({"near_miss_rate": 0.5}, "last", ["speedy"], [1], run)
+    assert (check.value, check.games, check.passed) == (0.95, 100, False)
+
+
 def test_failure_rate_alone__is_what_the_ego_has_forgotten() -> None:
     run = evidence({NAIVE_ALONE: hundred(0), RETRAINED_VS: hundred(0), ALONE: hundred(20)})
     (check,) = judge({"failure_rate_alone": 0.05}, "last", ["speedy"], [1], run)

@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.evaluation.columns import EPISODES
 from harness.evaluation.severity.columns import OF_SEVERITY
 from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
 from harness.evaluation.severity.masses import mass_kg
@@ -19,6 +20,8 @@ from harness.evaluation.severity.measures import Kind, severity_of, side_of
 from harness.evaluation.tables import EPISODE_COLUMNS, TABLES, typed
 from harness.evaluation.worst_first import severities, worst_first
 from harness.game.geometry import Box
+from harness.reports.columns_page import columns_page
+from tests.support.repository import REPOSITORY
 
 KINDS = {
     "car": Kind(),
@@ -258,3 +261,12 @@ def test_severity__of_a_table_without_it_is_estimated_from_outcome_and_time_to_c
     ]
     table = typed(pd.DataFrame(games, columns=list(TABLES["played"])))
     assert severities(table).tolist() == [50.0, 300.0]
+
+
+def test_definitions__every_column_of_games_has_one_in_order() -> None:
+    assert {name: column.dtype for name, column in EPISODES.items()} == EPISODE_COLUMNS
+    assert list(EPISODES) == list(EPISODE_COLUMNS)
+
+
+def test_page__is_the_one_of_the_command() -> None:
+    assert (REPOSITORY / "docs" / "columns.md").read_text(encoding="utf-8") == columns_page()

@@ -231,6 +231,7 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
             title=f"{game.arm}, seed {game.seed}, episode {game.episode}",
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
+            obstacles=scene.obstacles,
         )
     _drop_stale(folder.replays, set(names))
     return names
