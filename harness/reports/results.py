@@ -71,11 +71,11 @@ class Results:
             arms=self.arms,
             significance=self.significance,
             change=self.change,
-            who=self._who(persona),
+            who=self.who(persona),
         )
 
-    def _who(self, persona: str) -> str:
-        """What the ego meets, if it is not one driver with a persona."""
+    def who(self, persona: str) -> str:
+        """What the ego meets, if it is not one driver with a persona; else empty."""
         if persona in self.crowds:
             return f"the crowd {persona}"
         return f"the group of {self.people} {persona} drivers" if self.people > 1 else ""
