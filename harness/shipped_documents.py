@@ -52,8 +52,8 @@ def is_name(written: str) -> bool:
 def find_document(written: str, folder: Path, kind: Kind) -> Path:
     """The absolute path of a document that a file in `folder` names; it may not exist.
 
-    A path is relative to the folder; it may be one that no system accepts. A name, such as `merge`, is that of a document in the folder, in its subfolder of
-    the kind, or of a shipped document: the first that exists.
+    A path is relative to the folder; it may be one that no system accepts. A name, such as `merge`, is that of a
+    document in the folder, in its subfolder of the kind, or of a shipped document: the first that exists.
     """
     beside = Path(os.path.realpath(folder / written))
     if not is_name(written) or os.path.exists(beside):
