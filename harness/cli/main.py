@@ -123,8 +123,7 @@ def campaign(
         if ray is not None:  # the nodes of a cluster know no working folder
             file, out = file.absolute(), out.absolute() if out is not None else None
         opened = open_campaign(file, quick, allow_code)
-    name = opened.document.name + ("-quick" if opened.quick else "")
-    folder = RunFolder(out or Path("reports") / name)
+    folder = RunFolder(out or Path("reports") / opened.run_name)
     if quick and not opened.quick:
         console.print(wording.NOTHING_TO_SHORTEN)
     _handle_termination_signals()
@@ -200,7 +199,7 @@ def _show(outcome: RunResult, run: Path, console: Console) -> None:
     for verdict in outcome.verdicts:
         label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
         console.print(label, style=f"bold {styles[verdict.tone]}", highlight=False, markup=False)
-        for sentence in (verdict.sentence, verdict.speed):
+        for sentence in (verdict.sentence, *verdict.causes, verdict.speed):
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
     for bound in outcome.acceptance:

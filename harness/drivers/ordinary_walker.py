@@ -16,6 +16,7 @@ from harness.drivers.car import car_of
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.observation_layout import LAYOUT
+from harness.game.right_of_way import KERB_M
 from harness.game.walking import TURNS_AS_AT_MPS
 from harness.game.world import World
 
@@ -50,7 +51,7 @@ class OrdinaryWalker:
         motion, others = perceive(self._car, observation)
         front_m = self._goal_m - self._car.physical(observation)[:, _GOAL] + 0.5 * self._car.length_m
         ahead_m = self._kerbs_m - front_m[:, None]
-        room_m = np.where(ahead_m >= 0.0, ahead_m, np.inf).min(axis=1, initial=np.inf)
+        room_m = np.where(ahead_m >= -KERB_M, np.maximum(ahead_m, 0.0), np.inf).min(axis=1, initial=np.inf)
         waits = self._must_wait(others) & np.isfinite(room_m)
         target_mps = np.where(waits, np.sqrt(2.0 * _STOPPING_MPS2 * np.where(waits, room_m, 0.0)), WALKING_MPS)
         target_mps = np.minimum(target_mps, WALKING_MPS)
@@ -63,10 +64,11 @@ class OrdinaryWalker:
         """[N] whether a vehicle arrives before the walker has passed its lane, were it to go now."""
         passes_s = (others.own_to_conflict_m + self._zone_m + self._car.length_m) / WALKING_MPS
         speed_mps = np.hypot(others.speed_mps, others.approach_mps)
-        distance_m = others.other_to_conflict_s * speed_mps
+        arrives_s = np.where(others.seen, others.other_to_conflict_s, np.inf)
+        distance_m = np.where(np.isfinite(arrives_s), arrives_s, 0.0) * speed_mps
         stopping_m = _DRIVERS_REACT_S * speed_mps + speed_mps**2 / (2.0 * _DRIVERS_BRAKE_MPS2)
         gives_way = ~others.has_priority & (distance_m > stopping_m)
-        comes = others.seen & (others.other_to_conflict_s < passes_s + MARGIN_S)
+        comes = arrives_s < passes_s + MARGIN_S
         waits: BoolArray = np.any(comes & ~gives_way, axis=1)
         return waits
 

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.environments.nearby_bodies import nearby_bodies
+from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat as Seat
 from harness.environments.seats import with_walkers
 from harness.environments.sumo_players import read_sumo_players
@@ -35,9 +35,10 @@ from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
 from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
-from harness.game.quantities import Quantities, terminations
+from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
 from harness.game.state import Bodies, Outcome, State
+from harness.game.terminations import terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
 from harness.traffic.open_simulation import open_simulation
@@ -101,8 +102,7 @@ class Arena:
         self.reading: Reading | None = None
         self.signal_texts = [""] * games
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
-        self._players_length = np.tile(self.world.length_m, (games, 1))
-        self._players_width = np.tile(self.world.width_m, (games, 1))
+        self.nearby = NearbyBodies(self.world, scene.obstacles, games)
 
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
@@ -141,7 +141,10 @@ class Arena:
         state = self.state = before.copy()  # the quantities of the step before refer to the old state
         drove = state.running
         acceleration, steering = self._decide(actions, drove)
-        self._move(state, acceleration, steering, drove)
+        world = self.world
+        move(state, acceleration, steering, drove & self._on_wheels, world.actuators, world.step_s)
+        if world.on_foot:
+            walk(state, acceleration, steering, drove & world.walks, world.actuators, world.step_s)
         reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         self.reading = reading
         if reading.signals is not None:
@@ -169,12 +172,6 @@ class Arena:
         self.simulation.close()
 
     # --- the parts of a step -------------------------------------------------------------------------------------
-
-    def _move(self, state: State, acceleration: FloatArray, steering: FloatArray, drove: BoolArray) -> None:
-        world = self.world
-        move(state, acceleration, steering, drove & self._on_wheels, world.actuators, world.step_s)
-        if world.on_foot:
-            walk(state, acceleration, steering, drove & world.walks, world.actuators, world.step_s)
 
     def _decide(self, actions: FloatArray | None, drove: BoolArray) -> tuple[FloatArray, FloatArray]:
         state = self.state
@@ -230,8 +227,8 @@ class Arena:
         """Remove players that reached their goal, stop those that crashed, and observe."""
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
+        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
         if not ended.any():
-            self._observe(quantities)
             return
         for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
             if reached == _GOAL:
@@ -240,19 +237,20 @@ class Arena:
                 self.simulation.halt(game, player)
         self.state = self.state.copy()  # `quantities` refers to the old state
         self._stop(ended)
-        # Positions are unchanged: only speeds are, and which players are present.
+        self._observe_again(quantities, np.flatnonzero(ended.any(1)))
+
+    def _observe_again(self, before: Quantities, games: IntArray) -> None:
+        """Observe games [N] in which players have stopped or were removed. Their positions are those of `before`."""
+        state = self.state.of(games)
         after = Quantities(
             world=self.world,
-            state=self.state,
-            bodies=self._bodies(self.state),
-            advanced_m=quantities.advanced_m,
-            lateral_offset_m=quantities.lateral_offset_m,
+            state=state,
+            bodies=self._bodies(state, games),
+            advanced_m=before.advanced_m[games],
+            lateral_offset_m=before.lateral_offset_m[games],
         )
-        self._observe(after)
-
-    def _observe(self, quantities: Quantities) -> None:
-        """Observe, and keep what the next decisions need: the steering that follows the road."""
-        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
+        self._road_steering_rad = self._road_steering_rad.copy()  # `before` refers to the array
+        self.observation[games], self._road_steering_rad[games] = observe(after), after.road_steering_rad
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state
@@ -272,6 +270,7 @@ class Arena:
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
         state.unseen_behind_m[game], self._member[game] = start.unseen_behind_m, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
+        self.nearby.place(game, start)
         for player in range(len(self.seats)):
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
@@ -293,6 +292,5 @@ class Arena:
         )
 
     def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
-        """The players and the background vehicles near them in `games`; `state` is that of the same games."""
-        lengths_m, widths_m = self._players_length[games], self._players_width[games]
-        return nearby_bodies(state, self.reading, games, length_m=lengths_m, width_m=widths_m)
+        """The players and the bodies near them in `games`; `state` is that of the same games."""
+        return self.nearby.of(state, self.reading, games)

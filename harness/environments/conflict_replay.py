@@ -27,6 +27,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
+from harness.game.sanity_checks import slack_m
 from harness.game.state import EGO, Outcome
 from harness.traffic.scene import OpenScene
 
@@ -162,7 +163,7 @@ class ConflictReplay:
 
     def _arena(self, replays: Sequence[Replay], drivers: Sequence[Driver]) -> _Replayed:
         simulation = RecordedCourses(replays, [each.takes_over for each in drivers])
-        return _Replayed(self._scene, len(replays), [Seat(each) for each in drivers], simulation=simulation)
+        return _Replayed(self._scene, [Seat(each) for each in drivers], simulation, len(replays))
 
     def _start(self, game: int, replay: Replay) -> InitialState:
         """The state in which a replay begins; its road is as slippery as in the recorded game."""
@@ -173,7 +174,14 @@ class ConflictReplay:
 
 
 class _Replayed(Arena):
-    """An arena whose games begin in the middle of a drive."""
+    """An arena whose games begin in the middle of a drive. Seats of SUMO repeat a recording, also of pedestrians."""
+
+    def __init__(self, scene: OpenScene, seats: Sequence[Seat], simulation: RecordedCourses, games: int) -> None:
+        super().__init__(scene, games, seats, simulation=simulation)
+        self.seats = tuple((each,) for each in seats)
+        self._taken_over = np.array([each.driver is not None and each.driver.takes_over for each in seats])
+        self._on_wheels = self._taken_over & ~self.world.walks
+        self._slack_m = slack_m(self._taken_over)
 
     def take_over(self, starts: Sequence[InitialState], replays: Sequence[Replay]) -> None:
         """Reset every game to its start, with the ego's recorded acceleration and steering, and observe."""

@@ -131,14 +131,14 @@ def _play(
     arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
     trace = _Trace(arm, arena, episode)
     trace.add_players(arena.state.present[0])
-    trace.add_background()
+    trace.add_others()
     steps: list[Step] = []
     while arena.state.running.any():
         present = arena.state.present[0].copy()
         step = arena.step()
         steps.append(step)
         trace.add_players(present, step)
-        trace.add_background()
+        trace.add_others()
     encounters = _encounters(arm, trace.columns)
     return Game(record=_record(arm, arena, episode, steps, encounters), trace=trace.columns)
 
@@ -167,12 +167,12 @@ def _record(
             record[name] = metric(series) if series is not None else None
     record["ego_failed"] = int(outcomes[EGO] is not Outcome.GOAL) if present[EGO] else None
     if len(present) > len(ROLES):
-        record[COLLIDED_WITH] = _collided_with(steps) if outcomes[EGO] is Outcome.COLLISION else ""
+        record[COLLIDED_WITH] = _collided_with(arm, steps) if outcomes[EGO] is Outcome.COLLISION else ""
     return record
 
 
-def _collided_with(steps: Sequence[Step]) -> str:
-    """The name of the road user that the ego collided with: a person's, or `background`."""
+def _collided_with(arm: Arm, steps: Sequence[Step]) -> str:
+    """The name of what the ego collided with: a person's, an obstacle's, or `background`."""
     quantities = next(step.quantities for step in reversed(steps) if step.drove[0, EGO])
     bodies, roles = quantities.bodies, quantities.world.roles
     boxes = [
@@ -180,7 +180,9 @@ def _collided_with(steps: Sequence[Step]) -> str:
     ]
     others = [body for body in np.flatnonzero(bodies.present[0]).tolist() if body != EGO]
     nearest = min(others, key=lambda body: box_distance(boxes[EGO], boxes[body]))
-    return roles[nearest] if nearest < len(roles) else "background"
+    obstacles = [each.name for each in arm.scene.obstacles.each]
+    names = [*roles, *["background"] * (len(boxes) - len(roles) - len(obstacles)), *obstacles]
+    return names[nearest]
 
 
 def _series_of(
@@ -236,8 +238,13 @@ class _Trace:
                 Outcome(int(state.outcome[0, player])).word,
             )
 
-    def add_background(self) -> None:
-        """A row for each vehicle of the background traffic."""
+    def add_others(self) -> None:
+        """A row for each vehicle of the background traffic, and for each obstacle."""
+        self._add_background()
+        for pose, obstacle in zip(self._arena.nearby.poses[0].tolist(), self._arm.scene.obstacles.each, strict=True):
+            self._add(obstacle.name, obstacle.vehicle_type, *pose, 0.0, 0.0, 0.0, False, "")
+
+    def _add_background(self) -> None:
         reading = self._arena.reading
         if reading is None:
             return

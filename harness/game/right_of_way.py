@@ -18,6 +18,7 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 
 CELL_M = 8.0  # of the grid of a stream's samples
+KERB_M = 0.3  # a walker waits this far before the side of a lane
 _DTYPES = {
     **dict.fromkeys(("player", "stream", "own_link", "other_link", "control", "link"), np.int64),
     **dict.fromkeys(("crossing", "yields", "first_come", "across"), np.bool_),

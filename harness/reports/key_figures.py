@@ -1,4 +1,5 @@
-"""What a persona's card says beside the failure rates: near misses, the worst known opponent, the price in speed.
+"""What a persona's card says beside the failure rates: why the ego fails, near misses, the worst known
+opponent, the price in speed.
 
 An ego without failures may still come too close in most games, or fail against the next opponent: the card says so.
 """
@@ -15,6 +16,7 @@ from harness.reports.results import Results
 from harness.reports.worst_opponent import worst_opponent
 
 PREVENTABLE = "Preventable"
+CAUSES = "Why the {ego} ego fails"
 NEAR_MISS = "near_miss"
 NEAR_MISSES = "Near misses"
 WORST_KNOWN_OPPONENT = "Against its worst known opponent"
@@ -34,12 +36,15 @@ class KeyFigure:
 
 def key_figures(persona: str, found: Results) -> list[KeyFigure]:
     """The lines of a persona's card, those that can be measured."""
-    return [
-        *_preventable(persona, found),
-        *_near_misses(persona, found),
-        *_worst_opponent(persona, found),
-        *_price(persona, found),
-    ]
+    parts = (_causes, _preventable, _near_misses, _worst_opponent, _price)
+    return [figure for part in parts for figure in part(persona, found)]
+
+
+def _causes(persona: str, found: Results) -> Iterator[KeyFigure]:
+    for question, ego in (("RQ1", "naive"), ("RQ2", found.change.made)):
+        lines = found.causes(question, persona)
+        if lines:
+            yield KeyFigure(title=CAUSES.format(ego=ego), lines=lines)
 
 
 def _preventable(persona: str, found: Results) -> Iterator[KeyFigure]:

@@ -17,7 +17,7 @@ from sumolib.net.lane import Lane
 
 from harness.config.road_user import WALKER_WIDTH_M
 from harness.game.arrays import FloatArray
-from harness.game.right_of_way import Conflicts, Control, RightOfWay, StopLines, Streams
+from harness.game.right_of_way import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic.network import lane_line
 from harness.traffic.stream import CORRIDOR_M, USERS, Feeders, Piece, samples_on
@@ -25,7 +25,6 @@ from harness.traffic.stream import CORRIDOR_M, USERS, Feeders, Piece, samples_on
 WALKERS_STREAM_M = 3.0
 """Width of a way: a walker that is farther beside it is not in its stream."""
 _WALKER_M = WALKER_WIDTH_M + 0.5  # what a walker needs
-_KERB_M = 0.3  # a walker waits this far before the side of a lane
 _BEFORE_CROSSING_M = 1.0  # a vehicle waits this far before a way
 _CORRIDOR_STYLE: dict[str, Any] = {"cap_style": "flat", "join_style": "mitre"}
 
@@ -80,7 +79,7 @@ def with_walkers_conflicts(
                 other_m=0.0,
                 other_end_m=crossing.other_end_m - crossing.other_m,
             )
-            kerb_m = _KERB_M + max(0.5 * (lane.getWidth() - CORRIDOR_M), 0.0)
+            kerb_m = KERB_M + max(0.5 * (lane.getWidth() - CORRIDOR_M), 0.0)
             rows.append(_row(way.player, stream, shifted, yields=not way.marked, before_m=kerb_m))
         stream = add(iter([Piece(0.0, shapely.get_coordinates(way.line), WALKERS_STREAM_M)]), ("", ""))
         for player, route in enumerate(routes):

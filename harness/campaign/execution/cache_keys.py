@@ -37,11 +37,13 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
     """Each stage's key. It covers what the stage reads itself, and the keys of the stages that it needs."""
     scene = campaign.scene.document
     files = {name: campaign.hash_of(campaign.scene.folder / name) for name in scene.files}
-    shared = {
+    shared: dict[str, Any] = {
         "format": NUMBERS_FORMAT,
         "scene": files,
         "given": campaign.ego_driver.identity if campaign.ego_driver is not None else "",
     }
+    if campaign.scene.world.hiding.vehicles:  # scenes without tall vehicles keep the keys of earlier versions
+        shared["sight"] = "tall vehicles hide"
     keys: dict[str, str] = {}
     for stage in stages:
         inputs = {**shared, **_inputs(campaign, stage), "needs": [keys[name] for name in stage.needs]}

@@ -25,6 +25,7 @@ from harness.config.persona import Persona
 from harness.config.pinned_game import FORMAT, PinnedGame, PinnedPerson, PinnedStart
 from harness.config.toml_writing import toml_of
 from harness.drivers.policy_file import policy_files
+from harness.environments.rollout import parts_of
 from harness.environments.start_trials import StartTrials
 from harness.errors import UsageError
 from harness.evaluation.manoeuvres import pairs_in
@@ -32,6 +33,8 @@ from harness.evaluation.minimising import minimise
 from harness.evaluation.tables import read_csv
 from harness.files import make_folder, write_atomically
 from harness.game.arrays import FloatArray
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import draw_initial_state
 
 TOLERANCE_M, TOLERANCE_MPS = 0.05, 0.05
 """How close the two starts found are to each other in every position and speed."""
@@ -140,10 +143,6 @@ class PinnedGames:
 
     def _start_of(self, stage: AssessmentStage, episode: int) -> FloatArray:
         """[2 P] the start that is drawn for an episode."""
-        from harness.environments.rollout import parts_of
-        from harness.game.attention import HumanFactors
-        from harness.game.initial_state import draw_initial_state
-
         scene = self._players.scene
         players = len(scene.world.roles)
         distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
