@@ -2,7 +2,7 @@
 
     python docs/scenes/drawings.py
 
-writes docs/scenes/<scene>.png for every junction in `networks/`. It needs Chromium and the extra `dev`.
+writes docs/scenes/<scene>.png for every scene in `networks/` but the merge. It needs Chromium and the extra `dev`.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).parents[2]
-SCENES = ("left_across", "priority_crossing", "red_light", "roundabout")
+SCENES = ("left_across", "priority_crossing", "red_light", "roundabout", "crossing", "zebra", "cyclist")
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 
 
