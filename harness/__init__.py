@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from harness.environments.gymnasium_env import DrivingEnv, ParallelDrivingEnv
     from harness.environments.vector_env import ArenaVecEnv
     from harness.errors import HarnessError, SimulationError, UsageError
+    from harness.library import Results, load, run
     from harness.traffic.scene import OpenScene, open_scene
 
 __all__ = [
@@ -39,14 +40,17 @@ __all__ = [
     "ParallelDrivingEnv",
     "Persona",
     "Policy",
+    "Results",
     "Seat",
     "SimulationError",
     "Step",
     "SumoDriver",
     "UsageError",
+    "load",
     "open_scene",
     "read_document",
     "read_policy",
+    "run",
 ]
 
 _MODULES = {
@@ -60,6 +64,7 @@ _MODULES = {
     "environments.gymnasium_env": ("DrivingEnv", "ParallelDrivingEnv"),
     "environments.vector_env": ("ArenaVecEnv",),
     "errors": ("HarnessError", "SimulationError", "UsageError"),
+    "library": ("Results", "load", "run"),
     "traffic.scene": ("OpenScene", "open_scene"),
 }
 

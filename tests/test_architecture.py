@@ -47,8 +47,9 @@ ROOMS: dict[str, set[str]] = {
     | {"traffic", "drivers", "evaluation", "environments", "reports", "training"}
     | CAMPAIGN,
     "cli": GROUND | {"traffic", "environments", "reports"} | CAMPAIGN,
+    "library": GROUND | {"drivers", "evaluation"} | CAMPAIGN,
     "__main__": {"cli"},
-    "harness": GROUND | {"traffic", "drivers", "environments"},
+    "harness": GROUND | {"traffic", "drivers", "environments", "library"},
 }
 
 SUMO = {"libsumo", "sumo", "sumolib", "traci"}
@@ -223,7 +224,7 @@ def test_slow_tests__each_line_names_a_test_and_every_room_keeps_fast_ones() -> 
     assert sorted(slow_tests() - known) == []
     fast = {path for path, names in tests.items() if label(path) not in slow_tests() and names - slow_in(path)}
     folders = {path.relative_to(REPOSITORY / "tests").parts[0] for path in fast}
-    modules = {"errors", "files", "version", "shipped_documents", "harness", "__main__"}
+    modules = {"library", "errors", "files", "version", "shipped_documents", "harness", "__main__"}
     assert {room.split(".")[0] for room in ROOMS} - modules <= folders
 
 

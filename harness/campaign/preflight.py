@@ -56,6 +56,11 @@ class OpenCampaign:
     """SHA-256 of every file that the campaign rests on, by its path from the campaign's folder."""
 
     @property
+    def run_name(self) -> str:
+        """The name of its run folder in `reports/`."""
+        return self.document.name + ("-quick" if self.quick else "")
+
+    @property
     def tunable(self) -> bool:
         """Whether the ego is external and has tunable parameters."""
         return _is_tunable(self.ego_driver)

@@ -119,7 +119,7 @@ def check(
     opened = open_campaign(file, allow_code=allow_code)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
     console = Console()
-    print_plain([wording.in_order(file)], console)
+    print_plain([wording.in_order(file), *opened.scene.warnings], console)
     if opened.document.ego.driver != LEARNED:
         print_plain([plain(wording.ego(opened))], console)
     print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
@@ -152,6 +152,21 @@ def schema(
         print(schema_text(document), end="")
     else:
         raise UsageError.of("harness schema", "DOCUMENT", *wording.no_document_kind(tuple(DOCUMENTS)))
+
+
+def columns(
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the page to this file.", show_default=False)
+    ] = None,
+) -> None:
+    """Print what the columns of episodes.csv are, as Markdown: unit, formula and source of each."""
+    from harness.files import write_atomically
+    from harness.reports.columns_page import columns_page
+
+    if out is None:
+        print(columns_page(), end="")
+    else:
+        write_atomically(out, columns_page().encode())
 
 
 def check_driver(

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from harness.cli import wording
-from harness.cli.documents import AllowCode, check, check_driver, new, persona_app, schema
+from harness.cli.comparison import compare
+from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
+from harness.cli.pinned_games import minimise, regression
+from harness.cli.replays import replay
 from harness.cli.scenes import scene_app
 from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
@@ -120,8 +123,7 @@ def campaign(
         if ray is not None:  # the nodes of a cluster know no working folder
             file, out = file.absolute(), out.absolute() if out is not None else None
         opened = open_campaign(file, quick, allow_code)
-    name = opened.document.name + ("-quick" if opened.quick else "")
-    folder = RunFolder(out or Path("reports") / name)
+    folder = RunFolder(out or Path("reports") / opened.run_name)
     if quick and not opened.quick:
         console.print(wording.NOTHING_TO_SHORTEN)
     _handle_termination_signals()
@@ -160,54 +162,17 @@ def report(run: RunPath) -> None:
     _exit_as(outcome, console)
 
 
-@app.command()
-def replay(
-    run: RunPath,
-    arm: Annotated[
-        str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.", show_default=False)
-    ] = None,
-    episode: Annotated[
-        int | None, typer.Argument(metavar="EPISODE", help="The number of the episode.", show_default=False)
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="The training seed.  [default: the first of the campaign]", show_default=False)
-    ] = None,
-    list_games: Annotated[bool, typer.Option("--list", help="List the recorded games, worst first.")] = False,
-    film_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--film",
-            metavar="FILE",
-            help="Write the game as a .gif or .mp4 film instead; this needs no screen.",
-            show_default=False,
-        ),
-    ] = None,
-) -> None:
-    """Watch a recorded game in SUMO-GUI. Without ARM or EPISODE, list the recorded games."""
-    from rich.console import Console
-
-    from harness.campaign.results.replay_game import film, found_game, game_table, watch
-    from harness.errors import UsageError
-
-    console = Console()
-    if film_file is not None and (list_games or arm is None or episode is None):
-        raise UsageError.of("--film", str(film_file), *wording.FILM_NEEDS_A_GAME)
-    if list_games or arm is None or episode is None:
-        console.print(game_table(run, arm))
-        return
-    with found_game(run, arm, episode, seed) as game:
-        if film_file is None:
-            watch(game, console)
-        else:
-            film(game, film_file, console)
-
-
+app.command()(replay)
+app.command()(compare)
 app.command()(new)
 app.command()(check)
 app.command("check-driver")(check_driver)
+app.command()(minimise)
+app.command()(regression)
 app.add_typer(persona_app, name="persona")
 app.add_typer(scene_app, name="scene")
 app.command()(schema)
+app.command()(columns)
 
 
 class _Terminated(KeyboardInterrupt):
@@ -234,7 +199,7 @@ def _show(outcome: RunResult, run: Path, console: Console) -> None:
     for verdict in outcome.verdicts:
         label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
         console.print(label, style=f"bold {styles[verdict.tone]}", highlight=False, markup=False)
-        for sentence in (verdict.sentence, verdict.speed):
+        for sentence in (verdict.sentence, *verdict.causes, verdict.speed):
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
     for bound in outcome.acceptance:

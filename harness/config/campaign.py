@@ -95,6 +95,8 @@ class Assessment(Document):
     """Games of each arm. Game k has the same start in every arm."""
     significance: float = Field(0.01, gt=0.0, lt=1.0)
     """A difference is called real if its p-value, after Holm's correction, is below this."""
+    reference_drivers: bool = True
+    """Whether each failure of an ego against a persona is judged: would a reference driver have prevented it?"""
 
 
 class Competence(Document):

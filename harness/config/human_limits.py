@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, field_validator, model_serializer, model_validator
 
-from harness.config.scene import Interval
-from harness.config.toml_reading import Document
+from harness.config.toml_reading import Document, Interval
 from harness.game.attention import Attention, NoBlindSpotCheck
 from harness.game.human_limits import (
     ALL_NOTICED,
@@ -24,6 +23,7 @@ LATER = (
     "looked_but_failed_to_see_share",
     "noticed_within_m",
     "range_m",
+    "opening_deg",
     "distance_error",
     "closing_error_per_s",
     "error_correlation_time_s",
@@ -99,6 +99,9 @@ class Perception(Document):
     """In such a drive, other cars are seen only within this distance, from centre to centre."""
     range_m: float | None = Field(None, gt=0.0, le=100.0)
     """Other cars farther away than this, from centre to centre, are never seen."""
+    opening_deg: float | None = Field(None, gt=0.0, le=360.0)
+    """Angle of view, ahead of the car and half of it to each side: other cars whose centre is outside it are never
+    seen. Left out: all around, as with mirrors."""
     distance_error: float = Field(0.0, ge=0.0, le=1.0)
     """Error in the estimated distance of other cars: standard deviation of the logarithm of the factor, so 0.1 is about
     10 %."""
@@ -146,6 +149,7 @@ class Perception(Document):
         """How far and how exactly the person sees, as the game uses it."""
         return Sight(
             range_m=np.inf if self.range_m is None else self.range_m,
+            opening_rad=np.inf if self.opening_deg is None else np.deg2rad(self.opening_deg),
             distance_error=self.distance_error,
             closing_error_per_s=self.closing_error_per_s,
             error_s=self.error_correlation_time_s,

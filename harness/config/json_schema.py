@@ -26,7 +26,7 @@ DOCUMENTS: Mapping[str, Any] = {"campaign": Campaign, "persona": Persona, "scene
 """All kinds of documents that users write, with their types."""
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-UNITS = {"mps2": "m/s²", "mps": "m/s", "radps": "rad/s", "rad": "rad", "m": "m", "s": "s"}
+UNITS = {"mps2": "m/s²", "mps": "m/s", "radps": "rad/s", "rad": "rad", "deg": "°", "m": "m", "s": "s"}
 """Units by the ending of a key."""
 
 

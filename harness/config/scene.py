@@ -7,15 +7,10 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
+from harness.config.obstacle import Obstacle
 from harness.config.road_user import WALKER_RUN_MPS, Actuators, Kind
-from harness.config.toml_reading import TABLE, TABLES, Document, Mistakes
+from harness.config.toml_reading import TABLE, TABLES, Document, Interval, Mistakes
 from harness.game.state import MOST_PEOPLE, roles_of
-
-
-def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
-    if interval[0] > interval[1]:
-        raise ValueError(f"the interval [{interval[0]:g}, {interval[1]:g}] is empty: write the lower end first")
-    return interval
 
 
 def _positive(interval: tuple[float, float]) -> tuple[float, float]:
@@ -25,7 +20,6 @@ def _positive(interval: tuple[float, float]) -> tuple[float, float]:
 
 
 _LARGEST = 10.0
-Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
 PlainFile = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[A-Za-z0-9][A-Za-z0-9._ -]*$")]
 Point = tuple[float, float]
 Name = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
@@ -120,8 +114,9 @@ def _one_alone(people: Player | tuple[Player, ...]) -> Player | tuple[Player, ..
     return people[0] if isinstance(people, tuple) and len(people) == 1 else people
 
 
+_COUNTS = Field(json_schema_extra={"minItems": 1, "maxItems": MOST_PEOPLE})  # `_one_to_four` words the mistake
 NonEgos = Annotated[
-    Annotated[Player, Tag(TABLE)] | Annotated[tuple[Player, ...], AfterValidator(_one_to_four), Tag(TABLES)],
+    Annotated[Player, Tag(TABLE)] | Annotated[tuple[Player, ...], AfterValidator(_one_to_four), _COUNTS, Tag(TABLES)],
     Discriminator(lambda value: TABLES if isinstance(value, list | tuple) else TABLE),
     AfterValidator(_one_alone),
 ]
@@ -179,6 +174,8 @@ class Scene(Document):
     non_ego: NonEgos
     """The person that the ego meets, or `[[non_ego]]` for each of several: up to four, named `non_ego_1`, `non_ego_2`
     and so on."""
+    obstacle: tuple[Obstacle, ...] = Field((), max_length=50)
+    """What stands on the road or beside it: `[[obstacle]]` for each, named `obstacle_1`, `obstacle_2` and so on."""
 
     @model_validator(mode="after")
     def _players_fit(self) -> Scene:
@@ -200,6 +197,8 @@ class Scene(Document):
         match location:
             case ["non_ego", int(place), *rest]:
                 return [f"non_ego_{place + 1}", *rest]
+            case ["obstacle", int(place), *rest]:
+                return [f"obstacle_{place + 1}", *rest]
             case _:
                 return location
 

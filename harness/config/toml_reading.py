@@ -8,9 +8,9 @@ import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from typing_extensions import Self
 
 from harness.errors import Problem, UsageError
@@ -56,6 +56,16 @@ class Document(BaseModel):
     def identity(self) -> dict[str, Any]:
         """The document as JSON values under the earlier names of its keys: hashes of it outlast a renaming."""
         return self.model_dump(mode="json", by_alias=True)
+
+
+def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
+    if interval[0] > interval[1]:
+        raise ValueError(f"the interval [{interval[0]:g}, {interval[1]:g}] is empty: write the lower end first")
+    return interval
+
+
+Interval = Annotated[tuple[float, float], AfterValidator(_ordered)]
+"""A range, the lower end first."""
 
 
 class Mistakes(ValueError):

@@ -71,6 +71,14 @@ class RulesDriver:
         steering = steering_rad(motion, law=rules.lane_keeping, wheelbase_m=wheelbase, step_s=car.step_s)
         return car.actions(requested, steering, observation)
 
+    def sees_danger(self, observation: FloatArray) -> BoolArray:
+        """[N] whether the rules say danger for observations [N, SIZE], with no reaction under way."""
+        if self._reaction is None:
+            return np.zeros(len(observation), dtype=bool)
+        motion, encounters = perceive(self._car, observation)
+        nothing = ReactionState(*np.zeros((3, len(observation))))
+        return np.any(self._dangers(motion, encounters, nothing)[0], axis=1)
+
     def _react(
         self, games: IntArray, motion: OwnMotion, encounters: Encounters, cruising_mps2: FloatArray
     ) -> FloatArray:

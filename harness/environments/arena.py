@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.environments.nearby_bodies import nearby_bodies
+from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat as Seat
 from harness.environments.seats import with_walkers
 from harness.environments.sumo_players import read_sumo_players
@@ -35,15 +35,16 @@ from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
 from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
-from harness.game.quantities import Quantities, terminations
+from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
 from harness.game.state import Bodies, Outcome, State
+from harness.game.terminations import terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
 from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.simulation import Reading, with_game
+from harness.traffic.simulation import Reading, Simulation, with_game
 
 _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # comparing arrays with members of an enumeration is slower
 
@@ -69,8 +70,9 @@ class Arena:
         seats: Sequence[Seat | Sequence[Seat]],
         seed: int = 0,
         recorded: bool = False,
+        simulation: Simulation | None = None,
     ) -> None:
-        """Load SUMO. Each game needs a `reset` before the first step.
+        """Load SUMO, or use another `simulation`. Each game needs a `reset` before the first step.
 
         `seats` has one entry per player: a seat, or several, of which `InitialState.member` selects one per game. SUMO
         drives all seats of a player or none. `recorded`: `reading` contains all background vehicles in every step, not
@@ -82,7 +84,7 @@ class Arena:
         self._taken_over = np.array([driver is None or driver.takes_over for driver in first_drivers])
         self._on_wheels = self._taken_over & ~self.world.walks
         self._slack_m = slack_m(self._taken_over)
-        self.simulation = open_simulation(
+        self.simulation = simulation or open_simulation(
             scene, games, taken_over=self._taken_over.tolist(), seed=seed, recorded=recorded
         )
         players = len(self.seats)
@@ -100,8 +102,7 @@ class Arena:
         self.reading: Reading | None = None
         self.signal_texts = [""] * games
         """States of the traffic lights as `Reading.signal_texts`; up to date if games are recorded."""
-        self._players_length = np.tile(self.world.length_m, (games, 1))
-        self._players_width = np.tile(self.world.width_m, (games, 1))
+        self.nearby = NearbyBodies(self.world, scene.obstacles, games)
 
     def reset(
         self, starts: Mapping[int, InitialState], departures: Mapping[int, list[Departure]] | None = None
@@ -268,6 +269,7 @@ class Arena:
         state.acceleration_mps2[game] = state.steering_rad[game] = 0.0
         state.unseen_behind_m[game], self._member[game] = start.unseen_behind_m, start.member
         state.outcome[game], state.lapsed[game], state.step[game] = _RUNNING, False, 0
+        self.nearby.place(game, start)
         for player in range(len(self.seats)):
             self._lapsed[game, player] = start.lapses[player].lapsed
             self._lapsed_steering_rad[game, player] = start.lapses[player].steering_rad
@@ -289,6 +291,5 @@ class Arena:
         )
 
     def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
-        """The players and the background vehicles near them in `games`; `state` is that of the same games."""
-        lengths_m, widths_m = self._players_length[games], self._players_width[games]
-        return nearby_bodies(state, self.reading, games, length_m=lengths_m, width_m=widths_m)
+        """The players and the bodies near them in `games`; `state` is that of the same games."""
+        return self.nearby.of(state, self.reading, games)

@@ -1,40 +1,68 @@
-"""The bodies of a game: its players, and the background vehicles near them."""
+"""The bodies of a game: its players, the background vehicles near them, and its obstacles."""
 
 from __future__ import annotations
 
+import numpy as np
+
 from harness.game.arrays import FloatArray, IntArray
+from harness.game.initial_state import InitialState
 from harness.game.neighbours import NOTICED_M
+from harness.game.obstacles import Obstacles
 from harness.game.state import Bodies, State
+from harness.game.world import World
 from harness.traffic.simulation import Reading
 
 NEAREST = 16  # background vehicles in a game's bodies
 
 
-def nearby_bodies(
-    state: State, reading: Reading | None, games: IntArray | slice, *, length_m: FloatArray, width_m: FloatArray
-) -> Bodies:
-    """The players [N, P], then up to `NEAREST` background vehicles nearest to them.
+class NearbyBodies:
+    """The bodies of G games: the players, then background vehicles, then the obstacles of the scene."""
 
-    `state`, and the players' `length_m` and `width_m` [N, P], are those of `games`; `reading` is that of all games.
-    """
-    players = Bodies(
-        x_m=state.x_m,
-        y_m=state.y_m,
-        heading_rad=state.heading_rad,
-        speed_mps=state.speed_mps,
-        length_m=length_m,
-        width_m=width_m,
-        present=state.present.copy(),
-    )
-    if reading is None or not reading.present.size:
-        return players
-    background = Bodies(
-        x_m=reading.x_m[games],
-        y_m=reading.y_m[games],
-        heading_rad=reading.heading_rad[games],
-        speed_mps=reading.speed_mps[games],
-        length_m=reading.length_m[games],
-        width_m=reading.width_m[games],
-        present=reading.present[games],
-    )
-    return players.with_nearest(background, NEAREST, NOTICED_M)
+    def __init__(self, world: World, obstacles: Obstacles, games: int) -> None:
+        self._length_m, self._width_m = (np.tile(each, (games, 1)) for each in (world.length_m, world.width_m))
+        self._obstacles = obstacles
+        shape = (games, len(obstacles.each))
+        self.poses: FloatArray = np.zeros((*shape, 3))
+        """[G, O, 3] x_m, y_m and heading_rad of the obstacles."""
+        sizes_m = (np.broadcast_to(each, shape) for each in (obstacles.length_m, obstacles.width_m))
+        self._at_rest = (np.zeros(shape), *sizes_m, np.ones(shape, dtype=bool))
+
+    def place(self, game: int, start: InitialState) -> None:
+        """Put the obstacles of a game where it has them."""
+        if self._obstacles.each:
+            self.poses[game] = self._obstacles.poses(*start.parts)
+
+    def of(self, state: State, reading: Reading | None, games: IntArray | slice = slice(None)) -> Bodies:
+        """The players [N, P], up to `NEAREST` background vehicles nearest to them, and the obstacles [N, O].
+
+        `state` is that of `games`; `reading` is that of all games.
+        """
+        bodies = self._moving(state, reading, games)
+        if not self._obstacles.each:
+            return bodies
+        standing = (*np.moveaxis(self.poses[games], -1, 0), *(each[games] for each in self._at_rest))
+        columns = zip(vars(bodies).values(), standing, strict=True)
+        return Bodies(*(np.concatenate(pair, axis=1) for pair in columns))
+
+    def _moving(self, state: State, reading: Reading | None, games: IntArray | slice) -> Bodies:
+        players = Bodies(
+            x_m=state.x_m,
+            y_m=state.y_m,
+            heading_rad=state.heading_rad,
+            speed_mps=state.speed_mps,
+            length_m=self._length_m[games],
+            width_m=self._width_m[games],
+            present=state.present.copy(),
+        )
+        if reading is None or not reading.present.size:
+            return players
+        background = Bodies(
+            x_m=reading.x_m[games],
+            y_m=reading.y_m[games],
+            heading_rad=reading.heading_rad[games],
+            speed_mps=reading.speed_mps[games],
+            length_m=reading.length_m[games],
+            width_m=reading.width_m[games],
+            present=reading.present[games],
+        )
+        return players.with_nearest(background, NEAREST, NOTICED_M)

@@ -23,7 +23,7 @@ from harness.evaluation.people import COLLIDED_WITH, of_person
 from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, box_distance
-from harness.game.initial_state import StartDistribution, draw_initial_state
+from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.game.state import EGO, ROLES, Outcome
 from harness.traffic.scene import OpenScene
@@ -66,12 +66,13 @@ def assess(
     episodes: int | Iterable[int],
     on_start: Callable[[int], None] = lambda episode: None,
     abandoned: Mapping[int, str] = MappingProxyType({}),
+    start_from: Callable[[InitialState], InitialState] = lambda drawn: drawn,
 ) -> Iterator[Game]:
     """Play episodes: numbers 0 to `episodes` - 1, or the given numbers. A game that can't be played, or that has
     impossible numbers, is a record with outcome `error`.
 
     `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
-    has the reason as its error.
+    has the reason as its error. `start_from` may change the start that is drawn for a game.
     Raises SimulationError if SUMO can't load the scene.
     """
     players = [
@@ -89,7 +90,7 @@ def assess(
                 continue
             on_start(episode)
             try:
-                yield _play(arena, arm, start_distribution, episode)
+                yield _play(arena, arm, start_distribution, episode, start_from)
             except MemoryError:
                 raise
             except Exception as error:  # a driver may raise any exception: the other games are played
@@ -116,22 +117,28 @@ def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
     return ("assessment", seed, "episode", episode)
 
 
-def _play(arena: Arena, arm: Arm, start_distribution: StartDistribution, episode: int) -> Game:
+def _play(
+    arena: Arena,
+    arm: Arm,
+    start_distribution: StartDistribution,
+    episode: int,
+    start_from: Callable[[InitialState], InitialState],
+) -> Game:
     parts = parts_of(arm.seed, episode)
     present = [float(each) for each in arm.present_in(episode)]
-    start = draw_initial_state(replace(start_distribution, present_share=present), *parts)
+    start = start_from(draw_initial_state(replace(start_distribution, present_share=present), *parts))
     arena.reload(start.seed)
     arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
     trace = _Trace(arm, arena, episode)
     trace.add_players(arena.state.present[0])
-    trace.add_background()
+    trace.add_others()
     steps: list[Step] = []
     while arena.state.running.any():
         present = arena.state.present[0].copy()
         step = arena.step()
         steps.append(step)
         trace.add_players(present, step)
-        trace.add_background()
+        trace.add_others()
     encounters = _encounters(arm, trace.columns)
     return Game(record=_record(arm, arena, episode, steps, encounters), trace=trace.columns)
 
@@ -160,12 +167,12 @@ def _record(
             record[name] = metric(series) if series is not None else None
     record["ego_failed"] = int(outcomes[EGO] is not Outcome.GOAL) if present[EGO] else None
     if len(present) > len(ROLES):
-        record[COLLIDED_WITH] = _collided_with(steps) if outcomes[EGO] is Outcome.COLLISION else ""
+        record[COLLIDED_WITH] = _collided_with(arm, steps) if outcomes[EGO] is Outcome.COLLISION else ""
     return record
 
 
-def _collided_with(steps: Sequence[Step]) -> str:
-    """The name of the road user that the ego collided with: a person's, or `background`."""
+def _collided_with(arm: Arm, steps: Sequence[Step]) -> str:
+    """The name of what the ego collided with: a person's, an obstacle's, or `background`."""
     quantities = next(step.quantities for step in reversed(steps) if step.drove[0, EGO])
     bodies, roles = quantities.bodies, quantities.world.roles
     boxes = [
@@ -173,7 +180,9 @@ def _collided_with(steps: Sequence[Step]) -> str:
     ]
     others = [body for body in np.flatnonzero(bodies.present[0]).tolist() if body != EGO]
     nearest = min(others, key=lambda body: box_distance(boxes[EGO], boxes[body]))
-    return roles[nearest] if nearest < len(roles) else "background"
+    obstacles = [each.name for each in arm.scene.obstacles.each]
+    names = [*roles, *["background"] * (len(boxes) - len(roles) - len(obstacles)), *obstacles]
+    return names[nearest]
 
 
 def _series_of(
@@ -229,8 +238,13 @@ class _Trace:
                 Outcome(int(state.outcome[0, player])).word,
             )
 
-    def add_background(self) -> None:
-        """A row for each vehicle of the background traffic."""
+    def add_others(self) -> None:
+        """A row for each vehicle of the background traffic, and for each obstacle."""
+        self._add_background()
+        for pose, obstacle in zip(self._arena.nearby.poses[0].tolist(), self._arm.scene.obstacles.each, strict=True):
+            self._add(obstacle.name, obstacle.vehicle_type, *pose, 0.0, 0.0, 0.0, False, "")
+
+    def _add_background(self) -> None:
         reading = self._arena.reading
         if reading is None:
             return

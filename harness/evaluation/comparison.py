@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from scipy import stats
+import scipy  # loads `scipy.stats` at its first use: workers do without
 
 from harness.evaluation.competence import Gate, gate
 from harness.evaluation.research_questions import Question, ResearchQuestion, Verdict
@@ -131,8 +131,16 @@ def mean_interval(values: Floats) -> tuple[float, float]:
     if len(values) < 2 or _all_equal(values, largest=float(np.abs(values).max())):
         return np.nan, np.nan
     mean, error = values.mean(), values.std(ddof=1) / np.sqrt(len(values))
-    half_width = stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1) * error
+    half_width = scipy.stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1) * error
     return float(mean - half_width), float(mean + half_width)
+
+
+def rate_interval(successes: int, games: int) -> tuple[float, float]:
+    """Two-sided 95 % Clopper-Pearson interval of a rate; NaN, NaN without games."""
+    if games == 0:
+        return np.nan, np.nan
+    interval = scipy.stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
+    return float(interval.low), float(interval.high)
 
 
 def _row(
@@ -208,7 +216,7 @@ def paired_t_test(low: Floats, high: Floats, closed: Gate | None = None) -> dict
     if closed is not None or len(differences) < 2 or _all_equal(differences, largest):
         return {"mean_difference": 0.0 if abs(mean) <= ROUNDING * largest else mean}
     ci_low, ci_high = mean_interval(differences)
-    test = stats.ttest_rel(high, low, alternative="greater")
+    test = scipy.stats.ttest_rel(high, low, alternative="greater")
     return {
         "mean_difference": mean,
         "ci_low": ci_low,
@@ -228,7 +236,7 @@ def _mcnemar(low: Floats, high: Floats) -> float:
     in_favour, against = int((high > low).sum()), int((high < low).sum())
     if in_favour + against == 0:
         return 1.0
-    return float(stats.binomtest(in_favour, in_favour + against, 0.5, alternative="greater").pvalue)
+    return float(scipy.stats.binomtest(in_favour, in_favour + against, 0.5, alternative="greater").pvalue)
 
 
 def verdict_of(row: Mapping[Any, Any], significance: float) -> Verdict:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pandas as pd
-from scipy import stats
 
-from harness.evaluation.comparison import CONFIDENCE, mean_interval
+from harness.evaluation.comparison import mean_interval, rate_interval
 from harness.evaluation.people import of_people
 from harness.evaluation.tables import SUMMARY_COLUMNS, typed
 
@@ -77,11 +76,5 @@ def _goal_rate(goals: int, people: int, games: int) -> dict[str, float]:
 
 def _rate(column: str, successes: int, games: int) -> dict[str, float]:
     """The rate and its Clopper-Pearson interval, as three columns; empty without games."""
-    if games == 0:
-        return {column: np.nan, f"{column}_low": np.nan, f"{column}_high": np.nan}
-    interval = stats.binomtest(successes, games).proportion_ci(CONFIDENCE, method="exact")
-    return {
-        column: successes / games,
-        f"{column}_low": float(interval.low),
-        f"{column}_high": float(interval.high),
-    }
+    low, high = rate_interval(successes, games)
+    return {column: successes / games if games else np.nan, f"{column}_low": low, f"{column}_high": high}

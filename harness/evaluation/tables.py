@@ -18,9 +18,11 @@ import numpy as np
 import pandas as pd
 
 from harness.errors import UsageError
+from harness.evaluation.causes.columns import CAUSE_COLUMNS
 from harness.evaluation.comparison import COMPARISON_COLUMNS
 from harness.evaluation.game_theory.columns import GAME_TABLES
 from harness.evaluation.people import columns_for, people_in
+from harness.evaluation.reference_columns import REFERENCE_TABLES
 from harness.evaluation.severity.columns import SEVERITY_COLUMNS
 from harness.files import content_of, replace_durably, scratch_beside, write_atomically
 
@@ -158,6 +160,7 @@ TABLES = {
     "episodes": EPISODE_COLUMNS,
     "played": PLAYED_COLUMNS,
     "severity": SEVERITY_TABLE,
+    "causes": CAUSE_COLUMNS,
     "summary": SUMMARY_COLUMNS,
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,
@@ -165,6 +168,7 @@ TABLES = {
     "populations": POPULATION_COLUMNS,
     "reconfiguration": RECONFIGURATION_COLUMNS,
     **GAME_TABLES,
+    **REFERENCE_TABLES,
 }
 
 _MOST_BYTES = 500_000_000

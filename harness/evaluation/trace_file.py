@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -104,49 +105,73 @@ def read_traces(path: Path) -> Iterator[tuple[int, pd.DataFrame]]:
 
 
 class TraceReader:
-    """Reads many games, of several files: a segment is read and checked once for all its games, and kept in memory as
-    long as the segments that were read last have no more than `MOST_KEPT_ROWS` rows."""
+    """Reads many games, of several files, in any order. A file's footer is read once, and a segment is checked once for
+    all its games. A segment stays in memory as long as the segments that were read last have no more than
+    `MOST_KEPT_ROWS` rows; it is kept as it is in the file, since rows become a frame much faster for one game than for
+    all."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[tuple[Path, int], dict[int, pd.DataFrame]] = OrderedDict()
+        self._footers: dict[Path, _Footer] = {}
+        self._checked: set[tuple[Path, int]] = set()
+        self._kept: OrderedDict[tuple[Path, int], pa.Table] = OrderedDict()
         self._rows = 0
 
     def read(self, path: Path, episode: int) -> pd.DataFrame:
         """As `read_trace`. Damage to any game of the segment is raised."""
         try:
-            check_file(path, _MOST_BYTES)
-            with pq.ParquetFile(path) as file:
-                _check_schema(file.schema_arrow)
-                groups = _groups_with(file.metadata, episode)
-                if len(groups) > 1:
-                    return read_trace(path, episode)
-                games = self._segment(file, path, groups[0]) if groups else {}
+            if path not in self._footers:
+                self._footers[path] = _footer(path)
+            groups = self._footers[path].groups_with(episode)
+            if len(groups) > 1:
+                return read_trace(path, episode)
+            segment = self._segment(path, groups[0]) if groups else SCHEMA.empty_table()
         except (OSError, ValueError, MemoryError, pa.ArrowException) as error:
             raise _damaged(path, error) from None
-        return games[episode].copy() if episode in games else _frame(SCHEMA.empty_table())
+        return _frame(segment.filter(pa.array(segment["episode"].to_numpy() == episode)))
 
-    def _segment(self, file: pq.ParquetFile, path: Path, group: int) -> dict[int, pd.DataFrame]:
-        """The games of a row group, by episode."""
-        if (path, group) in self._kept:
-            self._kept.move_to_end((path, group))
-            return self._kept[path, group]
-        frame = file.read_row_group(group).to_pandas()
-        _check_game(frame, ["episode", "step", "player"])
-        rows = _with_strings(frame).groupby("episode", sort=False)
-        games = {int(episode): game.reset_index(drop=True) for episode, game in rows}
-        self._kept[path, group] = games
-        self._rows += len(frame)
+    def _segment(self, path: Path, group: int) -> pa.Table:
+        """The games of a row group."""
+        place = (path, group)
+        if place in self._kept:
+            self._kept.move_to_end(place)
+            return self._kept[place]
+        with pq.ParquetFile(path, metadata=self._footers[path].metadata) as file:
+            segment = file.read_row_group(group)
+        if place not in self._checked:
+            _check_game(segment.to_pandas(), ["episode", "step", "player"])
+            self._checked.add(place)
+        self._kept[place] = segment
+        self._rows += len(segment)
         while self._rows > MOST_KEPT_ROWS and len(self._kept) > 1:
-            self._rows -= sum(map(len, self._kept.popitem(last=False)[1].values()))
-        return games
+            self._rows -= len(self._kept.popitem(last=False)[1])
+        return segment
 
 
-def _groups_with(metadata: pq.FileMetaData, episode: int) -> list[int]:
-    """The row groups that may have rows of an episode."""
+@dataclass(frozen=True, kw_only=True)
+class _Footer:
+    """The footer of a file, with the lowest and highest episode [R] of each row group."""
+
+    metadata: pq.FileMetaData
+    lowest: FloatArray
+    highest: FloatArray
+
+    def groups_with(self, episode: int) -> list[int]:
+        """The row groups that may have rows of an episode."""
+        groups: list[int] = np.flatnonzero((self.lowest <= episode) & (episode <= self.highest)).tolist()
+        return groups
+
+
+def _footer(path: Path) -> _Footer:
+    """Raises ValueError, OSError or ArrowException unless this is a file of traces."""
+    check_file(path, _MOST_BYTES)
+    with pq.ParquetFile(path) as file:
+        _check_schema(file.schema_arrow)
+        metadata = file.metadata
     column = SCHEMA.get_field_index("episode")
-    groups = range(metadata.num_row_groups)
-    spans = [metadata.row_group(group).column(column).statistics for group in groups]
-    return [group for group, span in zip(groups, spans, strict=True) if span is None or span.min <= episode <= span.max]
+    groups = [metadata.row_group(group).column(column).statistics for group in range(metadata.num_row_groups)]
+    spans = [(each.min, each.max) if each is not None and each.has_min_max else (-np.inf, np.inf) for each in groups]
+    lowest, highest = np.array(spans, dtype=float).reshape(-1, 2).T
+    return _Footer(metadata=metadata, lowest=lowest, highest=highest)
 
 
 def _write(groups: Iterable[pa.Table], path: Path) -> None:

@@ -39,7 +39,7 @@ def box_distance(a: Box, b: Box) -> float:
 @compiled
 def _distance_in_frame(frame: Box, box: Box) -> tuple[float, bool]:
     """Distance of a box's nearest corner to the box `frame`, and whether an axis of `frame` separates the two boxes."""
-    u, v = _in_frame(frame, box.x_m, box.y_m)
+    u, v = in_frame(frame, box.x_m, box.y_m)
     turned = box.heading_rad - frame.heading_rad
     cosine, sine = cos(turned), sin(turned)
     half_length, half_width = 0.5 * frame.length_m, 0.5 * frame.width_m
@@ -68,8 +68,8 @@ def time_to_contact(a: Box, b: Box, velocity_x_mps: float, velocity_y_mps: float
 @compiled
 def _overlap_in_frame(frame: Box, box: Box, velocity_x_mps: float, velocity_y_mps: float) -> tuple[float, float]:
     """The time interval (s) in which no axis of `frame` separates it from a box moving relative to it."""
-    u, v = _in_frame(frame, box.x_m, box.y_m)
-    rate_u, rate_v = _in_frame(Box(0.0, 0.0, frame.heading_rad, 0.0, 0.0), velocity_x_mps, velocity_y_mps)
+    u, v = in_frame(frame, box.x_m, box.y_m)
+    rate_u, rate_v = in_frame(Box(0.0, 0.0, frame.heading_rad, 0.0, 0.0), velocity_x_mps, velocity_y_mps)
     turned = box.heading_rad - frame.heading_rad
     reach_u, reach_v = _reach(box, cos(turned), sin(turned))
     enter_u, leave_u = _overlap(u, rate_u, 0.5 * frame.length_m + reach_u)
@@ -87,7 +87,7 @@ def _overlap(place: float, rate: float, reach: float) -> tuple[float, float]:
 
 
 @compiled
-def _in_frame(frame: Box, x_m: float, y_m: float) -> tuple[float, float]:
+def in_frame(frame: Box, x_m: float, y_m: float) -> tuple[float, float]:
     """Coordinates u, v of a point in the frame of a box."""
     cosine, sine = cos(frame.heading_rad), sin(frame.heading_rad)
     dx, dy = x_m - frame.x_m, y_m - frame.y_m
@@ -152,7 +152,7 @@ def distance_to_nearest_box(own: Box, others: Box, among: BoolArray, limit_m: fl
     nearest_m = np.full(own.x_m.shape, limit_m)
     for n, p, b in np.ndindex(among.shape):
         if among[n, p, b]:
-            a, other = _own(own, n, p), _other(others, n, b)
+            a, other = _own(own, n, p), other_box(others, n, b)
             dx, dy = abs(a.x_m - other.x_m), abs(a.y_m - other.y_m)
             extents = 0.5 * (a.length_m + a.width_m + other.length_m + other.width_m)  # at least the radii below
             if max(dx, dy) - extents >= nearest_m[n, p]:
@@ -171,7 +171,7 @@ def time_to_first_contact(
     soonest_s = np.full(own.x_m.shape, inf)
     for n, p, b in np.ndindex(among.shape):
         if among[n, p, b]:
-            a, other = _own(own, n, p), _other(others, n, b)
+            a, other = _own(own, n, p), other_box(others, n, b)
             velocity_x = speed_mps[n, b] * cos(other.heading_rad) - own_speed_mps[n, p] * cos(a.heading_rad)
             velocity_y = speed_mps[n, b] * sin(other.heading_rad) - own_speed_mps[n, p] * sin(a.heading_rad)
             soonest_s[n, p] = min(soonest_s[n, p], time_to_contact(a, other, velocity_x, velocity_y))
@@ -202,7 +202,8 @@ def _own(own: Box, n: int, p: int) -> Box:
 
 
 @compiled
-def _other(others: Box, n: int, b: int) -> Box:
+def other_box(others: Box, n: int, b: int) -> Box:
+    """One of the boxes [N, B]."""
     return Box(
         others.x_m[n, b], others.y_m[n, b], others.heading_rad[n, b], others.length_m[n, b], others.width_m[n, b]
     )

@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.game.state import State
+from harness.game.state import ALL_AROUND, State
 
 PERSISTENCE_S = 20.0  # correlation time of estimation errors (Treiber, Kesting and Helbing 2006, table 1)
 
@@ -26,7 +26,7 @@ class Reaction:
 
 @dataclass(frozen=True, kw_only=True)
 class Sight:
-    """The range of sight, and the errors of estimated distances and closing speeds.
+    """The range and the opening angle of sight, and the errors of estimated distances and closing speeds.
 
     The errors are those of the human driver model (Treiber, Kesting and Helbing, Delays, inaccuracies and anticipation
     in microscopic traffic models, Physica A 360, 2006, section 2.2): a distance s is estimated as s exp(V w), and the
@@ -35,6 +35,8 @@ class Sight:
     """
 
     range_m: float = np.inf
+    opening_rad: float = np.inf
+    """Angle, ahead of the car and half of it to each side, within which the centres of road users are seen."""
     distance_error: float = 0.0
     closing_error_per_s: float = 0.0
     error_s: float = PERSISTENCE_S
@@ -67,6 +69,7 @@ class Limits:
 
     delay_steps: int = 0
     sight_m: float = np.inf
+    opening_rad: float = np.inf
     estimation_errors: FloatArray | None = None
     """[T, 2] errors of estimated distances (share of the distance) and closing speeds (per second of distance)."""
     actuator_shares: tuple[float, float, float] = (1.0, 1.0, 1.0)
@@ -126,6 +129,8 @@ class PlayersLimits:
         errors = limits.estimation_errors
         self._estimation_errors[game, player] = 0.0 if errors is None else errors
         state.sight_m[game, player] = limits.sight_m
+        all_around = limits.opening_rad >= 2.0 * np.pi
+        state.sight_cosine[game, player] = ALL_AROUND if all_around else np.cos(0.5 * limits.opening_rad)
         first = self._estimation_errors[game, player, 0]
         state.distance_error[game, player], state.closing_error_per_s[game, player] = first
         self.delays |= limits.delay_steps > 0

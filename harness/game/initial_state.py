@@ -27,6 +27,7 @@ from harness.game.human_limits import (
     draw_estimation_errors,
     draw_noticed_m,
 )
+from harness.game.obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
 from harness.game.route_starts import draw_along_route
 from harness.game.seeding import between, generator_of, seed_of
@@ -173,6 +174,7 @@ class StartDistribution:
     routes: Routes
     conditions: Conditions
     along_route_share: float = 0.0
+    obstacles: Obstacles = NO_OBSTACLES
 
     @cached_property
     def no_lapses(self) -> Lapses:
@@ -212,6 +214,7 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
             np.array(present),
             start_distribution.along_route_share,
             generator_of(*parts, "along route"),
+            start_distribution.obstacles.boxes(*parts),
         )
         if along is not None:
             x, y, heading, speeds, stations = along
@@ -289,6 +292,7 @@ def _limits(
     return Limits(
         delay_steps=delay_steps,
         sight_m=min(sight.range_m, noticed_m),
+        opening_rad=sight.opening_rad,
         estimation_errors=(
             None if exact else draw_estimation_errors(sight, start_distribution.steps, step_s, generator("sight"))
         ),

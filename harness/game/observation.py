@@ -47,9 +47,10 @@ def observe(q: Quantities) -> FloatArray:
     return _observe(
         *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
         *(state.station_m, q.lateral_offset_m, state.present),
-        (state.unseen_behind_m, state.sight_m, state.distance_error, state.closing_error_per_s),
+        (state.unseen_behind_m, state.sight_m, state.sight_cosine, state.distance_error, state.closing_error_per_s),
         *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
         bodies.present,
+        q.hidden,
         *(actuators.max_steering_rad, q.world.length_m, q.world.width_m, state.signal_s),
         *(q.rules.next_line, q.rules.posted_mps, state.signals),
         (tuple(q.world.road.routes), tuple(q.along), tuple(q.world.right_of_way.stop_lines), tuple(q.meetings)),
@@ -67,7 +68,7 @@ def _observe(
     station_m: FloatArray,
     offset_m: FloatArray,
     present: BoolArray,
-    sight: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
+    sight: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
     body_x_m: FloatArray,
     body_y_m: FloatArray,
     body_heading_rad: FloatArray,
@@ -75,6 +76,7 @@ def _observe(
     body_length_m: FloatArray,
     body_width_m: FloatArray,
     body_present: BoolArray,
+    hidden: BoolArray,
     max_steering_rad: FloatArray,
     length_m: FloatArray,
     width_m: FloatArray,
@@ -87,7 +89,7 @@ def _observe(
     """One compiled pass: for the few games of a reset, several calls would cost more than their work."""
     routes, here = Routes(*tables[0]), Along(*tables[1])
     stop_lines, meetings = StopLines(*tables[2]), Meetings(*tables[3])
-    unseen_behind_m, sight_m, distance_error, closing_error_per_s = sight
+    unseen_behind_m, sight_m, sight_cosine, distance_error, closing_error_per_s = sight
     observation = np.zeros((*present.shape, SIZE), dtype=np.float32)
     view = np.empty(SIZE)
     bodies = body_present.shape[1]
@@ -123,6 +125,7 @@ def _observe(
                 ahead_m[b], left_m[b] = dx * cosine + dy * sine, dy * cosine - dx * sine
                 distance = np.hypot(dx, dy)
                 in_view = ahead_m[b] >= unseen_behind_m[g, p] and distance <= min(sight_m[g, p], SEEN_M)
+                in_view = in_view and ahead_m[b] >= sight_cosine[g, p] * distance and not hidden[g, p, b]
                 seen[b] = body_present[g, b] and b != p and in_view
                 urgency_s[b] = distance / _NEARNESS_MPS
                 if seen[b]:

@@ -18,7 +18,8 @@ from harness.game.jit import compiled
 from harness.game.meetings import STANDING_MPS, Meetings, entered_before_s, least_gap_s, meetings
 from harness.game.road import Along
 from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
-from harness.game.state import Bodies, Outcome, State
+from harness.game.sight import hidden, nothing_hidden
+from harness.game.state import Bodies, State
 from harness.game.traffic_rules import Rules, rules
 from harness.game.world import World
 
@@ -165,6 +166,15 @@ class Quantities:
         return _visible(self.state.present, self.bodies.present)
 
     @cached_property
+    def hidden(self) -> BoolArray:
+        """[G, P, B] bodies that a player does not see because something hides them (`game.sight`)."""
+        state, bodies, hiding = self.state, self.bodies, self.world.hiding
+        if not hiding.anything:
+            return nothing_hidden((*state.present.shape, bodies.present.shape[1]))
+        of_bodies = (self._boxes, bodies.present)
+        return hidden(state.x_m, state.y_m, state.present, *of_bodies, hiding.obstacles, hiding.walls, hiding.vehicles)
+
+    @cached_property
     def on_path(self) -> OnPath:
         """Bodies in route coordinates, each in the nearest frame of the route at `PATH_M`."""
         bodies = self.bodies
@@ -257,30 +267,6 @@ class Quantities:
     def time_to_collision_s(self) -> FloatArray:
         """Seconds until contact with another body at constant headings and speeds; inf without a contact."""
         return time_to_first_contact(self._cars, self._boxes, self.state.speed_mps, self.bodies.speed_mps, self.visible)
-
-
-@compiled
-def terminations(
-    outcome: IntArray,
-    drove: BoolArray,
-    taken_over: BoolArray,
-    time_is_up: BoolArray,
-    goal_m: FloatArray,
-    vehicle_clearance_m: FloatArray,
-    rail_clearance_m: FloatArray,
-) -> None:
-    """Set the outcomes [G, P] of the players that drove [G, P], in place: contact before goal, goal before timeout
-    (time_is_up [G]). Contact with a rail counts only for players that the harness drives (taken_over [P])."""
-    for g, p in np.ndindex(outcome.shape):
-        if drove[g, p]:
-            if vehicle_clearance_m[g, p] <= 0.0:
-                outcome[g, p] = Outcome.COLLISION
-            elif rail_clearance_m[g, p] <= 0.0 and taken_over[p]:
-                outcome[g, p] = Outcome.RAIL
-            elif goal_m[g, p] <= 0.0:
-                outcome[g, p] = Outcome.GOAL
-            elif time_is_up[g]:
-                outcome[g, p] = Outcome.TIMEOUT
 
 
 @compiled

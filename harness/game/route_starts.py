@@ -9,27 +9,35 @@ from __future__ import annotations
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
+from harness.game.geometry import Box, box_distance
 from harness.game.road import Routes
 
 _BEFORE_GOAL_M = 10.0
 _APART_M = 6.0  # between the bumpers of two players, in any direction
+_CLEAR_WIDTH_M = 2.6  # of the way, `_APART_M` before and behind a car, that is free of obstacles
 _ATTEMPTS = 20
 _OFFSET_SD_M, _TURNED_SD_RAD = 0.2, 0.03  # from the centre of the lane, and from its direction
 
 
 def draw_along_route(
-    routes: Routes, length_m: FloatArray, present: BoolArray, share: float, generator: np.random.Generator
+    routes: Routes,
+    length_m: FloatArray,
+    present: BoolArray,
+    share: float,
+    generator: np.random.Generator,
+    obstacles: Box | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray] | None:
     """x_m, y_m, heading_rad, speed_mps and station_m [P] of the centres of players of `length_m` [P].
 
-    None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P]. A lane and
-    a station are drawn uniformly, the speed uniformly from 0 to the speed limit.
+    None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P], apart from
+    one another and from the `obstacles` [O]. A lane and a station are drawn uniformly, the speed uniformly from 0 to
+    the speed limit.
     """
     if generator.random() >= share:
         return None
     for _ in range(_ATTEMPTS):
         starts = np.array([_draw(routes, player, length_m[player], generator) for player in range(len(length_m))]).T
-        if _apart(starts[0], starts[1], length_m, present):
+        if _apart(starts[0], starts[1], length_m, present) and _clear(starts, length_m, present, obstacles):
             x_m, y_m, heading_rad, speed_mps, station_m = starts
             return x_m, y_m, heading_rad, speed_mps, station_m
     return None
@@ -59,4 +67,15 @@ def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: Bool
             least_m = 0.5 * (length_m[one] + length_m[other]) + _APART_M
             if present[one] and present[other] and np.hypot(x_m[one] - x_m[other], y_m[one] - y_m[other]) < least_m:
                 return False
+    return True
+
+
+def _clear(starts: FloatArray, length_m: FloatArray, present: BoolArray, obstacles: Box | None) -> bool:
+    """Whether no obstacle stands on the way just before, beside or behind a player that is present."""
+    boxes = [] if obstacles is None else [Box(*each) for each in np.array(obstacles).T.tolist()]
+    for player in np.flatnonzero(present).tolist():
+        x_m, y_m, heading_rad = starts[:3, player].tolist()
+        way = Box(x_m, y_m, heading_rad, float(length_m[player]) + 2.0 * _APART_M, _CLEAR_WIDTH_M)
+        if any(box_distance(way, box) <= 0.0 for box in boxes):
+            return False
     return True

@@ -17,6 +17,8 @@ ROLES = ("ego", "non_ego")
 """The two kinds of player."""
 MOST_PEOPLE = 4
 """Non-egos of a game."""
+ALL_AROUND = -2.0
+"""`State.sight_cosine` of a player that sees all around: below every cosine, whatever its rounding."""
 
 
 @cache
@@ -64,6 +66,7 @@ class State:
     lapsed: BoolArray  # has a lapse of attention in this step
     unseen_behind_m: FloatArray  # least distance ahead at which road users are seen; -inf: all around
     sight_m: FloatArray  # greatest distance at which road users are seen
+    sight_cosine: FloatArray  # of half the opening angle within which road users are seen; -2: all around
     distance_error: FloatArray  # error of estimated distances, as a share: + is farther than true
     closing_error_per_s: FloatArray  # error of closing speeds, per distance: + is moving away
     step: IntArray  # [G]
@@ -89,6 +92,7 @@ class State:
             lapsed=np.zeros(shape, dtype=bool),
             unseen_behind_m=np.full(shape, -np.inf),
             sight_m=np.full(shape, np.inf),
+            sight_cosine=np.full(shape, ALL_AROUND),
             distance_error=np.zeros(shape),
             closing_error_per_s=np.zeros(shape),
             step=np.zeros(games, dtype=np.int64),

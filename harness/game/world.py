@@ -11,6 +11,7 @@ from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import Actuators
 from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Road
+from harness.game.sight import NOTHING_HIDES, Hiding
 from harness.game.state import roles_of
 
 
@@ -27,6 +28,7 @@ class World:
     right_of_way: RightOfWay = NO_JUNCTIONS
     on_foot: tuple[bool, ...] = ()
     """Which players walk; empty if none does."""
+    hiding: Hiding = NOTHING_HIDES
 
     @cached_property
     def roles(self) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 scene.sumocfg      the configuration, which names the files below
 scene.net.xml      the scene's net, copied
-scene.add.xml      vehicle types in the colours of the game, traffic lights, rails, the place of contact
+scene.add.xml      vehicle types in the colours of the game, obstacles and buildings, traffic lights, rails, contacts
 episode.fcd.xml    every pose of every vehicle
 view.xml           zoom, speed, and the halts at contacts and at the end
 """
@@ -19,10 +19,12 @@ from xml.etree import ElementTree
 import pandas as pd
 
 from harness.game.arrays import FloatArray
+from harness.game.obstacles import NO_OBSTACLES, Obstacles
 from harness.replay.contact import Contact, contacts
 from harness.replay.floating_car_data import shown_at, write_recording, write_xml
 from harness.replay.gui_settings import WINDOW_PX, Viewport, choose_view, view_settings
 from harness.replay.lanes import Lanes
+from harness.replay.obstacles import shapes_of
 from harness.replay.signals import programmes
 from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
 from harness.traffic.xml_file import xml_bytes
@@ -39,17 +41,18 @@ def write_replay(
     title: str,
     step_length_s: float,
     rails: Sequence[FloatArray] = (),
+    obstacles: Obstacles = NO_OBSTACLES,
 ) -> None:
     """Write one game's replay to `folder`, which is replaced. The folder appears only when it is complete.
 
     `trace` is the game's rows (columns as in `traces/`), `route_files` define its vehicle types, `rails` are
-    polylines [n, 2] in net coordinates. The same arguments give the same bytes. Raises ValueError for a trace
-    with no row or with more than one game.
+    polylines [n, 2] in net coordinates, `obstacles` are those of the scene. The same arguments give the same bytes.
+    Raises ValueError for a trace with no row or with more than one game.
     """
     if trace["episode"].nunique() != 1:
         raise ValueError(f"a replay is of one game; the trace has {trace['episode'].nunique()}")
     trace = trace.astype({"player": str, "vehicle_type": str, "outcome": str})
-    types = types_of_vehicles(trace, route_files)
+    types = types_of_vehicles(trace, route_files, obstacles)
     lanes = Lanes.read(net_file)
     touches = contacts(trace, types, rails)
     view = choose_view(trace, touches)
@@ -61,10 +64,11 @@ def write_replay(
     try:
         (partial / "scene.net.xml").write_bytes(xml_bytes(net_file))
         scenery = _scenery(types=types, rails=rails, touches=touches, view=view, title=title)
+        scenery.extend(shapes_of(trace, types, obstacles))
         scenery.extend(programmes(trace, step_length_s))
         write_xml(scenery, partial / "scene.add.xml")
         write_recording(
-            trace=trace,
+            trace=trace[[bool(types[name].shape) for name in trace["player"]]],
             types=types,
             lanes=lanes,
             step_length_s=step_length_s,
@@ -119,7 +123,7 @@ def _scenery(
     title: str,
 ) -> ElementTree.Element:
     root = ElementTree.Element("additional")
-    for _, drawn in sorted({drawn.name: drawn for drawn in types.values()}.items()):
+    for _, drawn in sorted({drawn.name: drawn for drawn in types.values() if drawn.shape}.items()):
         ElementTree.SubElement(root, "vType", drawn.attributes())
     for number, rail in enumerate(rails):
         _line(root, f"rail_{number}", rail, colour="24,26,32", width_m=0.4, layer=5)

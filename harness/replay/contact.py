@@ -29,11 +29,11 @@ def contacts(trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], rails: Sequ
     """Every contact of one game, in order of time; a collision of two players is one contact."""
     hit = trace[trace["outcome"].isin(["collision", "rail"])].sort_values("step", kind="stable")
     hit = hit.drop_duplicates("player")
-    several = trace["player"].str.fullmatch(r"non_ego_\d").any()
+    several = len(hit) > 0 and trace["player"].drop_duplicates().str.fullmatch(r"non_ego_\d").any()
     touches = []
     for (step, outcome), rows in hit.groupby(["step", "outcome"]):
         frame = trace[trace["step"] == step]
-        bodies = {row.player: _box(row, types[row.player]) for row in frame.itertuples()}
+        bodies = {row.player: box_of(row, types[row.player]) for row in frame.itertuples()}
         first = rows["player"].iloc[0]
         if outcome == "collision":
             against = [body for player, body in bodies.items() if player != first]
@@ -53,8 +53,8 @@ def _players_in_it(players: pd.Series, several: bool) -> str:
     return " of " + " and ".join(name.replace("non_ego", "non-ego").replace("_", " ") for name in sorted(players))
 
 
-def _box(row: Any, drawn: DrawnVehicle) -> shapely.Polygon:
-    """The body of a vehicle at a row of the trace."""
+def box_of(row: Any, drawn: DrawnVehicle) -> shapely.Polygon:
+    """The body of a vehicle or obstacle at a row of the trace."""
     half_length, half_width = 0.5 * drawn.length_m, 0.5 * drawn.width_m
     box = rotate(
         shapely.box(-half_length, -half_width, half_length, half_width),

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pandas as pd
 
+from harness.game.obstacles import NO_OBSTACLES, Obstacle, Obstacles
+from harness.traffic.class_sizes import CAR_SIZE_M, SIZES_M
 from harness.traffic.footway import WALKER_ATTRIBUTES, WALKER_TYPE
 from harness.traffic.xml_file import parse_xml
 
@@ -20,27 +22,18 @@ PLAYER_COLOURS = {
     "non_ego_3": "148,103,189",
     "non_ego_4": "140,86,75",
 }
+OBSTACLE_COLOUR = "110,110,120"
+_OBSTACLE_SHAPES = {
+    "car": "passenger/sedan",
+    "broken_down_car": "passenger/sedan",
+    "van": "delivery",
+    "truck": "truck",
+    "bus": "bus",
+}
 _BACKGROUND_COLOUR = "190,190,190"
 
-# Length and width (m) of a vType without them: the defaults of SUMO 1.28 for its vehicle classes.
-_DEFAULT_SIZES_M = {
-    "pedestrian": (0.215, 0.478),
-    "wheelchair": (1.2, 0.72),
-    "scooter": (1.2, 0.5),
-    "bicycle": (1.6, 0.65),
-    "moped": (2.1, 0.78),
-    "motorcycle": (2.2, 0.9),
-    "truck": (7.1, 2.4),
-    "trailer": (16.5, 2.55),
-    "bus": (12.0, 2.5),
-    "coach": (14.0, 2.6),
-    "delivery": (6.5, 2.16),
-    "emergency": (6.5, 2.16),
-    "tram": (22.0, 2.4),
-}
-_CAR_SIZE_M = (5.0, 1.8)
 _DEFAULT_CLASSES = {"DEFAULT_PEDTYPE": "pedestrian", "DEFAULT_BIKETYPE": "bicycle"}
-_SHAPES = {name: name for name in _DEFAULT_SIZES_M} | {
+_SHAPES = {name: name for name in SIZES_M} | {
     "wheelchair": "pedestrian",
     "trailer": "truck/trailer",
     "coach": "bus/coach",
@@ -56,6 +49,7 @@ class DrawnVehicle:
     length_m: float
     width_m: float
     shape: str
+    """SUMO's guiShape; empty: an obstacle that is drawn as a polygon."""
     colour: str
 
     def attributes(self) -> dict[str, str]:
@@ -76,8 +70,10 @@ class DrawnVehicle:
         }
 
 
-def types_of_vehicles(trace: pd.DataFrame, route_files: Sequence[Path]) -> dict[str, DrawnVehicle]:
-    """The drawing of each vehicle of one game, by the vehicle's id.
+def types_of_vehicles(
+    trace: pd.DataFrame, route_files: Sequence[Path], obstacles: Obstacles = NO_OBSTACLES
+) -> dict[str, DrawnVehicle]:
+    """The drawing of each vehicle and obstacle of one game, by its id.
 
     The players get types of their own. Background vehicles keep their type, in grey where it has no colour. A type that
     the route files do not define is SUMO's default.
@@ -93,7 +89,7 @@ def types_of_vehicles(trace: pd.DataFrame, route_files: Sequence[Path]) -> dict[
             name = f"{name}_type"
         builtin = {"vClass": _DEFAULT_CLASSES.get(type_id, "passenger")}
         types[vehicle] = _drawn(name, defined.get(type_id, builtin))
-    return types
+    return types | {each.name: _standing(each) for each in obstacles.each if each.name in types}
 
 
 @lru_cache(maxsize=8)
@@ -103,9 +99,19 @@ def _defined_types(route_file: Path, modified_ns: int) -> dict[str, dict[str, st
     return {str(element.get("id")): dict(element.attrib) for element in root.iter("vType")}
 
 
+def _standing(obstacle: Obstacle) -> DrawnVehicle:
+    return DrawnVehicle(
+        name=obstacle.vehicle_type,
+        length_m=obstacle.length_m,
+        width_m=obstacle.width_m,
+        shape=_OBSTACLE_SHAPES.get(obstacle.kind, ""),
+        colour=OBSTACLE_COLOUR,
+    )
+
+
 def _drawn(name: str, attributes: Mapping[str, str]) -> DrawnVehicle:
     vehicle_class = attributes.get("vClass", "passenger")
-    length_m, width_m = _DEFAULT_SIZES_M.get(vehicle_class, _CAR_SIZE_M)
+    length_m, width_m = SIZES_M.get(vehicle_class, CAR_SIZE_M)
     return DrawnVehicle(
         name=name,
         length_m=float(attributes.get("length", length_m)),

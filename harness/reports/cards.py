@@ -18,8 +18,9 @@ from harness.reports.key_figures import KeyFigure, key_figures
 from harness.reports.numbers import MISSING, p_number, percent
 from harness.reports.portrait import portrait
 from harness.reports.results import Results
+from harness.reports.shown_verdict import ShownVerdict, shown_verdict
 from harness.reports.treatment import Change
-from harness.reports.wording import QUESTIONS, Conclusion, failures
+from harness.reports.wording import QUESTIONS, failures
 
 LONGEST_LABEL = 12
 """Letters of a persona's name that fit under a column of a figure."""
@@ -57,8 +58,7 @@ class Card:
 
     persona: str
     anchor: str
-    verdicts: Sequence[tuple[str, Conclusion]]
-    """Each with its question in plain words."""
+    verdicts: Sequence[ShownVerdict]
     rates: Sequence[Rate]
     facts: Sequence[tuple[str, Sequence[str]]]
     tests: Sequence[Test]
@@ -89,13 +89,13 @@ class ArmColumn(NamedTuple):
 def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None) -> Card:
     """The card of a persona; `place` makes the ids of its figures unique, `worst` is the game to show."""
     change = found.change if found.asked("RQ2", persona) else None
-    columns = _columns(persona, change)
+    columns, figures = _columns(persona, change), key_figures(persona, found)
     paired, paired_note = _paired(persona, place, found) if change is not None else (None, "")
     return Card(
         persona=persona,
         anchor=f"persona-{place}",
         verdicts=[
-            (question.format(doing=found.change.doing), found.verdicts(name, persona))
+            shown_verdict(question.format(doing=found.change.doing), found.verdicts(name, persona), figures)
             for name, question in QUESTIONS.items()
         ],
         rates=[_rate(label, series, found.of(arm)) for label, series, arm in page_wording.arm_labels(persona, change)],
@@ -119,7 +119,7 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
             page_wording.spread_alternative(_values(columns, found, "min_ttc_s")),
         ),
         portrait=portrait(found.persona_documents.get(persona, {})),
-        key_figures=key_figures(persona, found),
+        key_figures=figures,
         statistics=_statistics(persona, found),
         worst=worst,
     )
@@ -168,11 +168,16 @@ def _rate(label: str, series: str, rows: Mapping[int, Row]) -> Rate:
 
 def _facts(persona: str, change: Change | None, found: Results) -> list[tuple[str, Sequence[str]]]:
     """The notes of a card, as titles and lines."""
-    against = found.of(against_persona(NaiveEgo(), persona).name)
+    arm = against_persona(NaiveEgo(), persona).name
+    against = found.of(arm)
     facts: list[tuple[str, Sequence[str]]] = []
     causes = {seed: page_wording.causes(row) for seed, row in against.items() if failures(row)}
     if causes:
         facts.append((page_wording.how_it_fails(persona), page_wording.by_seed(causes)))
+    prevented = {each.seed: each.sentences for each in found.preventability.get(arm, ()) if each.failures}
+    if prevented:
+        lines = {seed: " ".join(sentences) for seed, sentences in prevented.items()}
+        facts.append((page_wording.PREVENTABLE, page_wording.by_seed(lines)))
     facts.append((page_wording.ORDINARY_DRIVER, _ordinary_driver(persona, found)))
     by_driver = [row for row in found.by_driver if row["population"] == persona]
     if by_driver:

@@ -15,7 +15,7 @@ async function clip(figure) {
     const { context, ratio, width, height } = sheet;
     const shown = Math.min(time, game.duration);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    camera.look(game, shown, width, height);
+    camera.look([game], shown, width, height);
     drawRoad(context, camera, ratio);
     drawGame(context, camera, ratio, game, shown, true);
     figure.dataset.time = time.toFixed(3);

@@ -8,7 +8,9 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.causes.sentences import cause_lines
 from harness.evaluation.people import people_in
+from harness.evaluation.preventability import Preventability, preventability_of
 from harness.evaluation.strategies import Arm, ReconfiguredEgo
 from harness.reports import wording
 from harness.reports.differences import Row
@@ -38,12 +40,16 @@ class Results:
     """Non-egos of the scene."""
     crowds: Mapping[str, Sequence[str]]
     """The personas of each crowd, in the order of the scene's people."""
+    preventability: Mapping[str, Sequence[Preventability]]
+    """By arm: what reference drivers prevent, for each training seed."""
     persona_documents: Mapping[str, Mapping[str, Any]]
     """The documents of the personas, by name."""
     planned_arms: Mapping[str, Arm]
     """The arms of the campaign, by name."""
     by_driver: Sequence[Row]
     """Rows of `populations`: each arm against a population, by the persona that drove."""
+    failures: pd.DataFrame
+    """Rows of `causes`."""
 
     def of(self, arm: str) -> dict[int, Row]:
         """The arm's rows by seed, where there are games that could be played."""
@@ -71,11 +77,18 @@ class Results:
             arms=self.arms,
             significance=self.significance,
             change=self.change,
-            who=self._who(persona),
+            who=self.who(persona),
         )
 
-    def _who(self, persona: str) -> str:
-        """What the ego meets, if it is not one driver with a persona."""
+    def causes(self, question: str, persona: str) -> tuple[str, ...]:
+        """Why the ego failed against a persona in the arm that a question is about, a line for each kind of cause."""
+        if question not in ARMS:
+            return ()
+        _, treatment = ARMS[question](persona, self.change)
+        return tuple(cause_lines(self.failures[self.failures["arm"] == treatment]))
+
+    def who(self, persona: str) -> str:
+        """What the ego meets, if it is not one driver with a persona; else empty."""
         if persona in self.crowds:
             return f"the crowd {persona}"
         return f"the group of {self.people} {persona} drivers" if self.people > 1 else ""
@@ -99,9 +112,14 @@ def results(tables: RunTables) -> Results:
         is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),
         people=len(people_in(tables.episodes.columns)),
         crowds={each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())},
+        preventability={
+            arm: preventability_of(tables.preventability, tables.reference_drivers, arm)
+            for arm in tables.preventability["arm"].unique()
+        },
         persona_documents=manifest.get("persona_documents", {}),
         planned_arms=tables.arms,
         by_driver=tables.populations.to_dict("records"),
+        failures=tables.causes,
     )
 
 

@@ -88,6 +88,8 @@ class BackgroundTraffic:
         self._prefixes, self._offsets_m, self._step_s = prefixes, offsets_m, step_s
         self._fastest_player_mps, self._recorded, self._insertion = fastest_player_mps, recorded, insertion
         self._roads_m = roads_m
+        self.standing = 0
+        """Vehicles in SUMO that stand for obstacles."""
         self._step = 0
         self._first_step = [0] * len(prefixes)
         self._waiting: dict[int, list[Departure]] = {}  # by game, the next departure last
@@ -171,7 +173,8 @@ class BackgroundTraffic:
 
     def _sumo_has_all(self, players_present: BoolArray) -> bool:
         """Whether SUMO has as many vehicles as were inserted and have neither arrived nor been removed."""
-        return _libsumo.simulation_getMinExpectedNumber() == len(self._places) + np.count_nonzero(players_present)
+        others = np.count_nonzero(players_present) + self.standing
+        return _libsumo.simulation_getMinExpectedNumber() == len(self._places) + others
 
     def _depart(self, game: int) -> None:
         now = (self._step - self._first_step[game]) * self._step_s + 1e-9

@@ -67,13 +67,13 @@ class Insertion:
         if departure.speed_factor is not None:
             libsumo.vehicle.setSpeedFactor(name, departure.speed_factor)
         if motion is not None:  # at once: SUMO would wait for more room than cars leave one another
-            libsumo.vehicle.moveTo(name, _in_tile(prefix, departure.lane), float(departure.position))
+            libsumo.vehicle.moveTo(name, in_tile(prefix, departure.lane), float(departure.position))
             libsumo.vehicle.setPreviousSpeed(name, motion.speed_mps)
         for stop in departure.stops:
             _add_stop(prefix, name, stop, departure.depart_s)
 
 
-def _in_tile(prefix: str, lane: str) -> str:
+def in_tile(prefix: str, lane: str) -> str:
     """A lane's id in a tile. A lane inside a junction begins with a colon, and the prefix follows it."""
     return f":{prefix}{lane[1:]}" if lane.startswith(":") else prefix + lane
 

@@ -30,11 +30,13 @@ from harness.game.initial_state import InitialState
 from harness.traffic.angles import compass_deg_of, heading_rad_of
 from harness.traffic.background_traffic import BackgroundTraffic
 from harness.traffic.insertion import Insertion
+from harness.traffic.obstacles import clear_of_obstacles
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.signals import Signals
 from harness.traffic.simulation import NO_SIGNALS, AtReset, Reading
 from harness.traffic.speed_limits import SpeedLimits
+from harness.traffic.standing_vehicles import TYPE_XML, StandingVehicles
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.traffic.warm_up import clear_of_players
 
@@ -99,7 +101,7 @@ class LibsumoSimulation:
         self._offsets = offset * np.arange(games)
         folder = tempfile.TemporaryDirectory(prefix="harness-sumo-")
         types = Path(folder.name) / "types.rou.xml"
-        types.write_text(scene.routes.types_xml, encoding="utf-8")
+        types.write_text(scene.routes.types_xml.replace("</routes>", f"{TYPE_XML}</routes>"), encoding="utf-8")
         document = scene.document
         # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take
         # time only if SUMO drives a vehicle.
@@ -144,8 +146,10 @@ class LibsumoSimulation:
         prefixes = [tile.prefix for tile in self._tiles]
         self._signals = Signals(prefixes, world.right_of_way.signal_links)
         self._speed_limits = SpeedLimits(prefixes) if self._scene.document.varies.speed_limit_share else None
+        blocks = bool(self._scene.obstacles.each) and not self._players_only
+        self._standing = StandingVehicles(self._scene, prefixes, self._traffic) if blocks else None
         self._background = BackgroundTraffic(
-            prefixes=[tile.prefix for tile in self._tiles],
+            prefixes=prefixes,
             offsets_m=self._offsets,
             step_s=world.step_s,
             fastest_player_mps=float(world.actuators.max_speed_mps.max()),
@@ -168,7 +172,12 @@ class LibsumoSimulation:
                 self._remove_vehicle(game, player)
             for player in sorted(taking_part - staying):
                 self._add_player(game, player, start)
-            background = self._background.reset(game, clear_of_players(departures, start, self._scene.world.length_m))
+            departures = clear_of_players(departures, start, self._scene.world.length_m)
+            if self._standing is not None:
+                self._standing.reset(game, *start.parts)
+                self._background.standing = self._standing.count
+                departures = clear_of_obstacles(departures, self._scene.obstacles.boxes(*start.parts))
+            background = self._background.reset(game, departures)
             if self._speed_limits is not None:
                 self._speed_limits.reset(game, start.limit_share)
             at_reset = self._signals.reset(game, start.signal_place) if self._signals else NO_SIGNALS

@@ -10,6 +10,7 @@ from xml.etree import ElementTree
 
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
+from harness.traffic.class_sizes import CAR_SIZE_M, SIZES_M
 from harness.traffic.flows import LEAST_PERIOD_S
 from harness.traffic.route_file import DEFAULT_TYPE, Mix, RouteChoice, VehicleType
 from harness.traffic.stops import Stop, StopPlace, stop_in
@@ -147,10 +148,11 @@ def _shared(choices: tuple[RouteChoice, ...], share: float | None) -> list[Route
 
 
 def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
+    length_m, width_m = SIZES_M.get(element.get("vClass", ""), CAR_SIZE_M)
     return VehicleType(
         name=required(path, element, "id"),
-        length_m=ranged(path, element, "length", VehicleType.length_m),
-        width_m=ranged(path, element, "width", VehicleType.width_m),
+        length_m=ranged(path, element, "length", length_m),
+        width_m=ranged(path, element, "width", width_m),
         max_speed_mps=ranged(path, element, "maxSpeed", VehicleType.max_speed_mps),
         lane_changes=element.get("laneChangeModel", ""),
         vehicle_class=element.get("vClass", VehicleType.vehicle_class),

@@ -3,39 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 import shapely
-from pydantic import ConfigDict
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 
-from harness.config.scene import PlainFile, Scene, scene_file
-from harness.config.toml_reading import Document, nearest, read_document
+from harness.config.scene import Scene, scene_file
+from harness.config.toml_reading import read_document
 from harness.errors import Problem, UsageError, collect
-from harness.files import leads_out
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
 from harness.game.initial_state import Conditions, StartDistribution, StartRange
+from harness.game.obstacles import NO_OBSTACLES, Obstacles
 from harness.game.quantities import REACH_M
 from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.world import World
 from harness.traffic import network
+from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
 from harness.traffic.footway import open_walker, opened_ground, with_walkers
 from harness.traffic.levels import heights_of_players_roads
-from harness.traffic.net_file import check_net
+from harness.traffic.obstacles import check_clear_starts, hiding_in, open_obstacles, with_types
 from harness.traffic.player import OpenPlayer, open_player
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
-from harness.traffic.route_reading import read_route_file
-from harness.traffic.start_overlaps import check_starts
+from harness.traffic.scene_files import NamedFiles, check_within, checked_net, checked_routes
+from harness.traffic.start_overlaps import check_starts, start_warnings
 from harness.traffic.start_ranges import start_range
 from harness.traffic.trips import with_routes
 from harness.traffic.users_lanes import lanes_for
@@ -55,6 +55,8 @@ class OpenScene:
     edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
     rail_lines: tuple[FloatArray, ...]
     junctions: frozenset[str] | None = None  # those that games need; None: all of the net
+    obstacles: Obstacles = NO_OBSTACLES
+    lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
     roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
 
     @property
@@ -96,6 +98,17 @@ class OpenScene:
             density, on_road = snapshot.density, snapshot.vehicles
         return [*on_road, *self.routes.departures(players, end_s, generator, begin_s, density)]
 
+    @property
+    def usual_starts(self) -> StartDistribution:
+        """The distribution of initial states of attentive players, who all take part."""
+        players = len(self.places)
+        return self.start_distribution([HumanFactors()] * players, [1.0] * players)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is no mistake but makes games void: a sentence for each two players who may start in one another."""
+        return start_warnings(self.usual_starts, self.world)
+
     def start_distribution(
         self,
         human_factors: Sequence[HumanFactors | Sequence[HumanFactors]],
@@ -120,16 +133,8 @@ class OpenScene:
             routes=self.world.road.routes,
             conditions=_conditions(self.document),
             along_route_share=along_route_share,
+            obstacles=self.obstacles,
         )
-
-
-class _NamedFiles(Document):
-    """The files that a scene names. They are checked even if the rest of the document is invalid."""
-
-    model_config = ConfigDict(extra="ignore")
-    net: PlainFile
-    routes: PlainFile
-    additional: tuple[PlainFile, ...] = ()
 
 
 def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
@@ -139,16 +144,16 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     """
     document_file = scene_file(folder)
     problems: list[Problem] = []
-    collect(problems, lambda: _check_within(document_file, folder))
+    collect(problems, lambda: check_within(document_file, folder))
     if problems:
         raise UsageError(problems)
     document = collect(problems, lambda: read_document(document_file, Scene))
-    named = document or collect([], lambda: read_document(document_file, _NamedFiles))
+    named = document or collect([], lambda: read_document(document_file, NamedFiles))
     if named is None:
         raise UsageError(problems)
     net_file, route_files = folder / named.net, [folder / each for each in (named.routes, *named.additional)]
-    net = collect(problems, lambda: _checked_net(net_file, folder))
-    routes = collect(problems, lambda: _checked_routes(route_files, folder, document, ego_type))
+    net = collect(problems, lambda: checked_net(net_file, folder))
+    routes = collect(problems, lambda: checked_routes(route_files, folder, document, ego_type))
     if document is None or net is None or routes is None:
         raise UsageError(problems)
     routes = collect(problems, partial(_with_routes, routes, net_file, net, document))
@@ -176,13 +181,16 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     places = tuple(start for start in starts if start is not None)
     if problems:
         raise UsageError(problems)
+    ways = [player.route for player in players]
+    obstacles = open_obstacles(file=document_file, document=document, net=net, area=area, routes=routes, ways=ways)
+    background = _background_edges(vehicles, net, routes)
     lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
     walking = tuple(player.on_foot for player in document.players)
     world = World(
         road=Road(
             network.rails(lines, REACH_M + 10.0),
-            Routes.of([player.route for player in players]),
+            Routes.of(ways),
             None if ground is None else network.rails(ground.rail_lines, REACH_M + 10.0),
             None if ground is None else ground.raster,
         ),
@@ -193,6 +201,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         time_limit_s=document.time_limit_s,
         right_of_way=_right_of_way(document, net, players),
         on_foot=walking if any(walking) else (),
+        hiding=hiding_in(obstacles, routes, document),
     )
     if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:
         message, remedy = "no player's route passes a traffic light", "leave it out, or choose other routes"
@@ -201,15 +210,18 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         folder=folder,
         document=document,
         world=world,
-        routes=routes,
+        routes=with_types(routes, obstacles),
+        obstacles=obstacles,
+        lane_strips=strips_near(net, [*own, *background], obstacles),
         places=places,
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
-        junctions=network.junctions_near(net, [*own, *_background_edges(vehicles, net, routes)]),
+        junctions=network.junctions_near(net, [*own, *background]),
         roads_m=heights_of_players_roads(net, own),
     )
     factors, present = [HumanFactors()] * len(places), [1.0] * len(places)
     check_starts(document_file, scene.start_distribution(factors, present), world)
+    check_clear_starts(document_file, scene.start_distribution(factors, present), world)
     return scene
 
 
@@ -246,34 +258,6 @@ def _background_edges(players: Collection[str], net: Net, routes: RouteFile) -> 
     """The edges of all routes of background traffic, which games need whole."""
     names = {name for each in background_departures(routes, players) for name in each.edges}
     return [net.getEdge(name) for name in sorted(names)]
-
-
-def _with_ego_type(routes: RouteFile, document: Scene | None, ego_type: str | None) -> RouteFile:
-    if ego_type is None or document is None or document.ego.vehicle not in routes.vehicles:
-        return routes
-    if ego_type not in routes.types:
-        message, remedy = f"has no vehicle type {ego_type!r} for the ego", nearest(ego_type, routes.types)
-        raise UsageError.of(routes.path, "vType", message, remedy)
-    ego = replace(routes.vehicles[document.ego.vehicle], vehicle_type=ego_type)
-    return replace(routes, vehicles={**routes.vehicles, document.ego.vehicle: ego})
-
-
-def _check_within(path: Path, folder: Path) -> None:
-    if leads_out(path, folder):
-        message = "is a link that leads out of the scene's folder"
-        raise UsageError.of(path, "", message, "replace the link by a copy of its target")
-
-
-def _checked_net(path: Path, folder: Path) -> Net:
-    _check_within(path, folder)
-    check_net(path)
-    return network.read_net(path)
-
-
-def _checked_routes(paths: Sequence[Path], folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
-    for path in paths:
-        _check_within(path, folder)
-    return _with_ego_type(read_route_file(*paths), document, ego_type)
 
 
 def _with_routes(routes: RouteFile, net_file: Path, net: Net, document: Scene) -> RouteFile:

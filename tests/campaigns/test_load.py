@@ -254,12 +254,13 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
     file = tmp_path / "report.html"
     file.write_text(html, encoding="utf-8")
     with launched() as browser, opener(browser, file) as open_page:
-        taken_ms = []
         for _ in range(3):  # the best of three: what else the machine does is not the page's
             page = open_page()
             page.wait_for_selector(".player[data-ready]", timeout=300_000)
-            taken_ms.append(int(page.locator(".player").get_attribute("data-ready")))
-        assert min(taken_ms) < READY_MS
+            taken_ms = int(page.locator(".player").get_attribute("data-ready"))
+            if taken_ms < READY_MS:
+                break
+        assert taken_ms < READY_MS
         listed = page.locator("[data-is=game] option").all_inner_texts()
         assert len(listed) >= 100
         intro = page.locator("#player-intro").inner_text()

@@ -20,6 +20,8 @@ from harness.cli import wording
 from harness.cli.main import INTERRUPTED, app
 from harness.config.persona import Persona
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
+from harness.evaluation.tables import read_csv
+from harness.evaluation.worst_first import FAILURES
 from tests.support.tiny import (
     CAREFUL,
     MERGE,
@@ -387,6 +389,20 @@ def test_replay__lists_the_games_worst_first(run_command: Callable[..., Result])
     assert result.code == 0
     assert result.out.count("naive_vs_speedy") == 4
     assert "naive_alone" not in result.out
+
+
+def test_replay__lists_a_page_of_the_games_of_an_outcome(run_command: Callable[..., Result]) -> None:
+    result = run_command("replay", learned_run(), "naive_alone", "--rows", 3, "--page", 2)
+    assert result.code == 0
+    assert "page 2 of 2, 4 games" in result.out
+    assert len(re.findall(r"^ *naive_alone ", result.out, flags=re.MULTILINE)) == 1
+    failures = run_command("replay", learned_run(), "--outcome", "failure", "--rows", 1000)
+    assert failures.code == 0
+    outcomes = read_csv(learned_run() / "episodes.csv")["ego_outcome"]
+    listed = re.findall(r"^ *\w+(?:_alone|_vs_)\w* ", failures.out, flags=re.MULTILINE)
+    assert len(listed) == outcomes.isin(FAILURES).sum()
+    wrong = run_command("replay", learned_run(), "--outcome", "colision")
+    assert (wrong.code, "did you mean 'collision'?" in wrong.err) == (2, True)
 
 
 def test_replay__arms_are_not_cut_off_in_a_narrow_terminal(

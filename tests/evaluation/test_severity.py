@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.evaluation.columns import EPISODES
 from harness.evaluation.severity.columns import OF_SEVERITY
 from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
 from harness.evaluation.severity.masses import mass_kg
@@ -19,6 +20,9 @@ from harness.evaluation.severity.measures import Kind, severity_of, side_of
 from harness.evaluation.tables import EPISODE_COLUMNS, TABLES, typed
 from harness.evaluation.worst_first import severities, worst_first
 from harness.game.geometry import Box
+from harness.reports.columns_page import columns_page
+from tests.support.repository import REPOSITORY
+from tests.support.traces import along, rows
 
 KINDS = {
     "car": Kind(),
@@ -27,26 +31,6 @@ KINDS = {
     "foot": Kind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian"),
 }
 QUARTER = 0.5 * math.pi
-
-
-def rows(player: str, poses: list[tuple[float, float, float, float]], kind: str = "car", end: str = "") -> list[dict]:
-    """A player's rows of a trace from its poses (x, y, heading, speed) in each step; `end`: its outcome in the last."""
-    cells = {"episode": 0, "vehicle_type": kind, "steering_rad": 0.0, "lapsed": False, "signals": "", "player": player}
-    result = []
-    for step, (x, y, heading, speed) in enumerate(poses):
-        before = poses[max(step - 1, 0)][3]
-        motion = {"x_m": x, "y_m": y, "heading_rad": heading, "speed_mps": speed}
-        acceleration = (speed - before) / 0.1
-        outcome = end if step == len(poses) - 1 else ""
-        row = {**cells, **motion, "step": step, "time_s": 0.1 * step, "acceleration_mps2": acceleration}
-        result.append({**row, "outcome": outcome})
-    return result
-
-
-def along(x: float, y: float, heading: float, speed: float, steps: int) -> list[tuple[float, float, float, float]]:
-    """Poses at constant velocity."""
-    move = 0.1 * speed
-    return [(x + k * move * math.cos(heading), y + k * move * math.sin(heading), heading, speed) for k in range(steps)]
 
 
 def severity(merge: Any, *players: list[dict]) -> dict[str, Any]:
@@ -258,3 +242,12 @@ def test_severity__of_a_table_without_it_is_estimated_from_outcome_and_time_to_c
     ]
     table = typed(pd.DataFrame(games, columns=list(TABLES["played"])))
     assert severities(table).tolist() == [50.0, 300.0]
+
+
+def test_definitions__every_column_of_games_has_one_in_order() -> None:
+    assert {name: column.dtype for name, column in EPISODES.items()} == EPISODE_COLUMNS
+    assert list(EPISODES) == list(EPISODE_COLUMNS)
+
+
+def test_page__is_the_one_of_the_command() -> None:
+    assert (REPOSITORY / "docs" / "columns.md").read_text(encoding="utf-8") == columns_page()

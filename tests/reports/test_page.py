@@ -76,9 +76,17 @@ def test_page__every_shown_number_is_the_exact_one_rounded(page):
     assert checked > 1000
 
 
-def test_page__each_table_links_its_file(page):
+def test_page__each_table_names_its_file(page):
+    for name in ("episodes", "summary", "comparisons", "training"):
+        assert f"In the run folder: {name}.csv" in page.text
+
+
+def test_page__every_link_leads_to_a_part_of_the_page(page):
+    """A published page stands alone: what lies beside it in the run folder is not there."""
     links = {attributes["href"] for tag, attributes in page.tags if tag == "a"}
-    assert links >= {"episodes.csv", "summary.csv", "comparisons.csv", "training.csv"}
+    ids = {attributes["id"] for _, attributes in page.tags if "id" in attributes}
+    assert links
+    assert {link for link in links if not link.startswith("#game=") and link.removeprefix("#") not in ids} == set()
 
 
 def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatch):
@@ -227,6 +235,7 @@ def test_words__failures_alone_are_stated(page):
 def test_words__only_significant_is_a_yes(verdict, question, small):
     row = {"question": question, "seed": 1, "verdict": verdict.value, "pairs": 60, "pairs_left_out": 0}
     row |= {"p_value": 0.004, "p_holm": 0.02, "mcnemar_p": 0.004, "reason": "the speedy driver can't drive this scene"}
+    row |= {"mean_difference": 0.3, "ci_low": 0.1, "ci_high": 0.5}
     rows = [row | {"metric": metric} for metric in ("failure", "mean_speed")]
     arms = {(arm["arm"], arm["seed"]): arm for arm in small["summary"].to_dict("records")}
     answer = verdicts(question, "speedy", seeds=[1], rows=rows, arms=arms, significance=0.01)
@@ -507,7 +516,7 @@ def test_manoeuvres__failures_without_a_manoeuvre_are_last(small):
     found = recordings(small)["manoeuvres"]
     page = Page(without_curves(small | recordings(small) | {"manoeuvres": found[found["episode"] > 2]}))
     last = [cell["text"] for cell in page.tables["pairs"][-1]]
-    assert last[:2] == ["–", "–"]
+    assert last[:2] == ["nothing named", "no reaction"]
     assert int(last[2]) > 0
 
 

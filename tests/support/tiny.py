@@ -75,6 +75,7 @@ def write_campaign(folder: Path, **changes: Any) -> Path:
         "competence": UNGATED,
     }
     document |= changes
+    document["assessment"] = {"reference_drivers": False, **document["assessment"]}
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"{document['name']}.toml"
     file.write_text(toml({key: value for key, value in document.items() if value is not None}), encoding="utf-8")

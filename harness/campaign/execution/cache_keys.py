@@ -25,10 +25,11 @@ from harness.campaign.plan.planned_drivers import (
     members_of,
     persona_of,
 )
-from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, SearchStage, Stage, TrainingStage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.versions import NUMBERS_FORMAT
 from harness.drivers.policy_file import policy_files
+from harness.drivers.reference_drivers import reference_identity
 from harness.evaluation.strategies import BestResponse
 
 
@@ -36,11 +37,13 @@ def stage_keys(campaign: OpenCampaign, stages: Sequence[Stage]) -> dict[str, str
     """Each stage's key. It covers what the stage reads itself, and the keys of the stages that it needs."""
     scene = campaign.scene.document
     files = {name: campaign.hash_of(campaign.scene.folder / name) for name in scene.files}
-    shared = {
+    shared: dict[str, Any] = {
         "format": NUMBERS_FORMAT,
         "scene": files,
         "given": campaign.ego_driver.identity if campaign.ego_driver is not None else "",
     }
+    if campaign.scene.world.hiding.vehicles:  # scenes without tall vehicles keep the keys of earlier versions
+        shared["sight"] = "tall vehicles hide"
     keys: dict[str, str] = {}
     for stage in stages:
         inputs = {**shared, **_inputs(campaign, stage), "needs": [keys[name] for name in stage.needs]}
@@ -61,6 +64,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
             inputs["tunable"] = campaign.ego_driver.searched
         case AssessmentStage():
             inputs["episodes"] = document.assessment.episodes
+        case PreventabilityStage():
+            inputs["references"] = reference_identity()
     if campaign.policies is not None and stage.reads:
         read = {name: policy_files(campaign.policies / name) for name in stage.reads}
         inputs["policies"] = {name: [campaign.hash_of(file) for file in each] for name, each in read.items()}
@@ -79,7 +84,7 @@ def _personas(campaign: OpenCampaign, stage: Stage) -> list[Any]:
     """The documents of the ego's persona, the stage's own, and those of its drivers, each once."""
     personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
     own = [stage.persona] if stage.persona in personas else []
-    players = stage.drivers if isinstance(stage, AssessmentStage) else (stage.opponent,)
+    players = (stage.opponent,) if isinstance(stage, TrainingStage | SearchStage) else stage.drivers
     names = ["", *own, *(persona_of(each) for driver in players for each in members_of(driver))]
     return [personas[name].identity() for name in dict.fromkeys(names)]
 
@@ -109,6 +114,8 @@ def _stage(stage: Stage) -> dict[str, Any]:
             described |= {"arm": stage.name, "ego": _driver(stage.ego), "non_ego": _driver(stage.non_ego)}
         case SearchStage():
             described |= {"name": stage.name, "opponent": _driver(stage.opponent)}
+        case PreventabilityStage():
+            described |= {"name": stage.name}
     return described
 
 

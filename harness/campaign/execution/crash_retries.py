@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-from harness.campaign.plan.stages import AssessmentStage, Stage
+from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage
 
 OnProgress = Callable[[int, int], None]
 """Called with what is done of a stage, and with its total: steps, games or trials."""
@@ -75,7 +75,7 @@ class Crashes:
         if self._counts[stage.id, place] < MOST_CRASHES:
             return CrashResponse(message=cause)
         often = f"{cause}, {MOST_CRASHES} times"
-        if place is None or not isinstance(stage, AssessmentStage):
+        if place is None or not isinstance(stage, AssessmentStage | PreventabilityStage):
             return CrashResponse(message=often, stage_fails=True)
         abandoned = self._abandoned.setdefault(stage.id, {})
         abandoned[place] = often

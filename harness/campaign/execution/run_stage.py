@@ -9,7 +9,7 @@ import json
 import logging
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -19,8 +19,8 @@ from harness.campaign.execution.equilibrium_stop import equilibrium_before
 from harness.campaign.execution.people import learning_places, people_of
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.budgets import training_settings
-from harness.campaign.plan.planned_drivers import BestOf, description, persona_of
-from harness.campaign.plan.stages import AssessmentStage, SearchStage, Stage, TrainingStage
+from harness.campaign.plan.planned_drivers import BestOf, SumoDriven, description, persona_of
+from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, SearchStage, Stage, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.config.training import Training
@@ -100,6 +100,8 @@ def carry_out(
             info, files = _assess(stage, run)
         case SearchStage():
             info, files = _search(stage, run)
+        case PreventabilityStage():
+            info, files = _judge(stage, run)
     info["seconds"] = round(time.monotonic() - started, 1)
     info["finished_on"] = time.strftime("%Y-%m-%d", time.gmtime())
     folder.finish(stage.id, key, info, files)
@@ -214,7 +216,7 @@ def _search(stage: SearchStage, run: StageRun) -> Made:
 def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     from harness.campaign.execution.arm_segments import join_segments, play_segments, segments_of
     from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES
-    from harness.campaign.storage.severity_table import SEVERITY, severity_table
+    from harness.campaign.storage.trace_tables import make_tables
 
     context, folder = run.context, run.folder
     if run.people > 1:
@@ -227,12 +229,19 @@ def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     work = folder.work(stage.id)
     files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
     join_segments(segments, *files)
-    (work / SEVERITY).unlink(missing_ok=True)  # of games that could not be played in an earlier run
-    severity_table(folder, stage.id, run.scene)
-    files.append(work / SEVERITY)
+    files += make_tables(folder, stage.id, run.scene)
     episodes = segments[-1].episodes.stop
     facts = {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}
     return facts | _goals_alone(stage, work / EPISODES), files
+
+
+def _judge(stage: PreventabilityStage, run: StageRun) -> Made:
+    from harness.campaign.execution.preventability import JudgedArm, judge_failures  # imports statistics
+
+    seatless = replace(stage.of, ego=SumoDriven())  # the reference drivers have the ego's seat
+    arm = _arm_of_several(seatless, run) if run.people > 1 else _arm_of_two(seatless, run)[0]
+    work = JudgedArm(folder=run.folder, stage=stage, arm=arm, attempt=run.attempt)
+    return judge_failures(work, run.on_start, run.on_progress)
 
 
 def _arm_of_two(stage: AssessmentStage, run: StageRun) -> tuple[Arm, dict[str, Any]]:

@@ -11,7 +11,7 @@ from harness.campaign.plan.best_responses import plan_best_responses
 from harness.campaign.plan.iterated_rounds import Ego, PersonaRounds, pairing, persona_rounds
 from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust
 from harness.campaign.plan.search_rounds import plan_searches
-from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_drivers import crossplay_drivers, driver_of, ego_learns
 from harness.config.campaign import Campaign
 from harness.evaluation.strategies import OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
@@ -34,8 +34,10 @@ def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int, tunable: 
     stages = [*plan_paper_rounds(campaign, personas, seed), *plan_robust(campaign, personas, seed)]
     stages += plan_searches(campaign, personas, seed) if tunable else []
     stages += [stage for each in rounds for stage in each.stages]
+    judged = list(stages)
     stages += _plan_crossplay(campaign, rounds, seed) if campaign.crossplay is not None else []
     stages += _plan_responses(campaign, rounds, stages, seed)
+    stages += _plan_preventability(campaign, judged)
     return list(dict.fromkeys(stages))
 
 
@@ -50,6 +52,18 @@ def _plan_responses(
     names = dict.fromkeys((*last, *campaign.best_response.arms))
     pairs = [assessments[name] for name in names if name in assessments and assessments[name].is_pair]
     return [stage for pair in pairs for stage in plan_best_responses(campaign, pair)]
+
+
+def _plan_preventability(campaign: Campaign, stages: Iterable[Stage]) -> list[PreventabilityStage]:
+    """The judgement of the failures in each arm of an ego against a persona, but for those of the cross-play alone."""
+    if not campaign.assessment.reference_drivers:
+        return []
+    arms = [each for each in stages if isinstance(each, AssessmentStage) and each.persona and each.ego is not None]
+    return [
+        PreventabilityStage(seed=each.seed, persona=each.persona, gates=each.gates, of=each)
+        for each in dict.fromkeys(arms)
+        if each.non_ego is not None and each.arm.best_response_of is None
+    ]
 
 
 def _plan_crossplay(campaign: Campaign, rounds: Sequence[PersonaRounds], seed: int) -> list[AssessmentStage]:

@@ -164,7 +164,31 @@ class SearchStage(_Stage):
         return (self.opponent,)
 
 
-Stage = TrainingStage | AssessmentStage | SearchStage
+@dataclass(frozen=True, kw_only=True)
+class PreventabilityStage(_Stage):
+    """The judgement of an arm's failures: which of them the reference drivers prevent."""
+
+    of: AssessmentStage
+
+    kind, verb, unit = "preventability", "judge", "games"
+
+    @property
+    def name(self) -> str:
+        """The name of the arm, and that its failures are judged."""
+        return f"{self.of.name}_preventability"
+
+    @property
+    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+        """Those of the arm."""
+        return self.of.drivers
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The arm, and what it needs."""
+        return (self.of.id, *super().needs)
+
+
+Stage = TrainingStage | AssessmentStage | SearchStage | PreventabilityStage
 
 
 def stage_id(name: str, seed: int) -> str:

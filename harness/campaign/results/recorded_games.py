@@ -67,7 +67,7 @@ def _counterparts(arm: Arm | None) -> list[str]:
 
 def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedGame:
     """One game's trace as tracks; `game` is its row of `episodes`."""
-    types = types_of_vehicles(trace, scene.route_files)
+    types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
     sizes_m = {name: (kind.length_m, kind.width_m) for name, kind in types.items()}
     series = series_of(trace, scene.world, sizes_m)
     by_name = {str(name): rows.sort_values("step") for name, rows in trace.groupby("player", sort=True)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,40 +24,86 @@ from harness.evaluation.manoeuvres import pairs_in
 from harness.evaluation.people import people_in
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
-from harness.evaluation.worst_first import worst_first
+from harness.evaluation.worst_first import FAILURES, severities, worst_first
 from harness.replay import follow_in_sumo_gui, replay_name, write_film, write_replay
 from harness.traffic.scene import open_scene
 
+FAILURE = "failure"
+"""Stands for every outcome that is a failure."""
 
-def game_table(run: Path, arm: str | None) -> Table:
-    """The games of a run, or of one arm of it, worst first, with the pair of manoeuvres that led to the end."""
+
+@dataclass(frozen=True, kw_only=True)
+class GameList:
+    """Which games of a run to list: None leaves out a condition."""
+
+    arm: str | None = None
+    outcome: str | None = None
+    """Of the ego; `failure` stands for every failure."""
+    seed: int | None = None
+    rows: int | None = None
+    """The most games of a page of the list; None: all."""
+    page: int = 1
+
+
+def game_table(run: Path, chosen: GameList) -> Table:
+    """The games of a run, worst first, with the pair of manoeuvres that led to the end."""
     folder = RunFolder(run)
     episodes = _episodes(folder)
     manoeuvres = folder.path / "manoeuvres.csv"
     pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
     missing = "" if manoeuvres.is_file() else f"; to name the manoeuvres: harness report {run}"
-    if arm is not None:
-        episodes = _of_arm(run, episodes, arm)
+    episodes = _chosen(run, episodes, chosen)
+    shown, left = _page(worst_first(episodes.assign(severity=severities(episodes))), chosen)
+    more = f"{left}; " if left else ""
     table = Table(
         title=Text(f"Games of {run}, worst first"),
         title_justify="left",
-        caption=Text(f"to watch one: harness replay RUN ARM EPISODE{missing}"),
+        caption=Text(f"{more}to watch one: harness replay RUN ARM EPISODE{missing}"),
         box=SIMPLE,
         padding=0,
     )
     players = ("ego", *people_in(episodes.columns))
-    for name in ("arm", "seed", "episode", *players, "manoeuvres", "TTC (s)"):
+    for name in ("arm", "seed", "episode", *players, "manoeuvres", "TTC (s)", "severity"):
         heading = name.replace("non_ego", "non-ego").replace("_", " ")
         table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *players))
-    for game in worst_first(episodes).itertuples():
+    for game in shown.itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
+        severity = "" if math.isinf(game.severity) else f"{game.severity:.1f}"
         pair = pairs.get((game.arm, game.seed, game.episode))
         outcomes = [getattr(game, f"{name}_outcome") for name in players]
         words = (str(game.seed), str(game.episode), *outcomes, pair.words if pair else "")
         table.add_row(
-            *(Text(plain(cell)) for cell in (game.arm, *words, ttc))
+            *(Text(plain(cell)) for cell in (game.arm, *words, ttc, severity))
         )  # text without markup, whatever the table contains
     return table
+
+
+def _chosen(run: Path, episodes: pd.DataFrame, chosen: GameList) -> pd.DataFrame:
+    """The games that fulfil the conditions. Raises UsageError where one is of no game."""
+    if chosen.arm is not None:
+        episodes = _of_arm(run, episodes, chosen.arm)
+    if chosen.seed is not None:
+        seeds = sorted(set(episodes["seed"]))
+        if chosen.seed not in seeds:
+            raise UsageError.of(run, f"seed {chosen.seed}", "has no games", f"seeds are {', '.join(map(str, seeds))}")
+        episodes = episodes[episodes["seed"] == chosen.seed]
+    if chosen.outcome is not None:
+        known = sorted({*FAILURES, *episodes["ego_outcome"], FAILURE} - {""})
+        if chosen.outcome not in known:
+            raise UsageError.of(run, chosen.outcome, "is no outcome", nearest(chosen.outcome, known))
+        wanted = FAILURES if chosen.outcome == FAILURE else (chosen.outcome,)
+        episodes = episodes[episodes["ego_outcome"].isin(wanted)]
+    return episodes
+
+
+def _page(games: pd.DataFrame, chosen: GameList) -> tuple[pd.DataFrame, str]:
+    """The games of the page, and a remark on the others; empty if there are none."""
+    if chosen.rows is None or (len(games) <= chosen.rows and chosen.page == 1):
+        return games, ""
+    first = (chosen.page - 1) * chosen.rows
+    shown = games.iloc[first : first + chosen.rows]
+    pages = -(-len(games) // chosen.rows)
+    return shown, f"page {chosen.page} of {pages}, {len(games):,} games: --page, --rows, --outcome, ARM"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,6 +160,7 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
             title=title,
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
+            obstacles=scene.obstacles,
         )
         yield FoundGame(replay=replay, trace=trace, title=title, step_length_s=scene.world.step_s)
 

@@ -26,7 +26,7 @@ class _Record(Document):
 class StageEntry(_Record):
     """A stage in the manifest."""
 
-    kind: Literal["training", "assessment", "reconfiguration"]
+    kind: Literal["training", "assessment", "reconfiguration", "preventability"]
     name: Text
     persona: Name | Literal[""] = ""
     seed: Seed

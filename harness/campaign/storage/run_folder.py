@@ -38,6 +38,8 @@ from harness.files import content_of, drop_scratch, leads_out, make_folder, writ
 
 FORMAT = 1
 MANIFEST = "manifest.json"
+JUDGED = "reference_drivers.csv"
+"""The table that the judgement of an arm's failures makes."""
 _PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
 _MOST_SCENE_BYTES = 1_000_000_000
@@ -136,7 +138,7 @@ class RunFolder:
         its files are missing or damaged."""
         record = self.done(stage)
         made = any((self.policy(stage) / name).is_file() for name in ("policy.safetensors", "driver.toml"))
-        made = made or self.traces(stage).is_file()
+        made = made or self.traces(stage).is_file() or (self.work(stage) / JUDGED).is_file()
         if record is None or record.get("key") != key or record["info"].get("errors"):
             return None
         if not made and not record["info"].get("settled"):

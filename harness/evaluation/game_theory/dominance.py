@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linprog
+import scipy  # loads its parts at their first use: a worker that solves nothing does without
 
 Floats = npt.NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def _dominator(payoffs: Floats, strategy: int, names: Sequence[str]) -> str:
     if len(better):
         return names[better[0]]
     E, N = payoffs.shape
-    answer = linprog(
+    answer = scipy.optimize.linprog(
         np.append(np.zeros(E), -1.0),
         A_ub=np.hstack([-payoffs.T, np.ones((N, 1))]),
         b_ub=-payoffs[strategy],
@@ -67,7 +67,7 @@ def safest_mixture(failure_rates: Floats) -> Floats:
     worst = failure_rates.max(axis=1)
     rates, ones = failure_rates.T, np.ones((N, 1))
     simplex = {"A_eq": np.append(np.ones(E), 0.0)[None], "b_eq": [1.0]}
-    least = linprog(
+    least = scipy.optimize.linprog(
         np.append(np.zeros(E), 1.0),
         A_ub=np.hstack([rates, -ones]),
         b_ub=np.zeros(N),
@@ -78,7 +78,7 @@ def safest_mixture(failure_rates: Floats) -> Floats:
     pure = np.eye(E)[best_pure]
     if least.status != 0 or worst[best_pure] <= least.fun + MARGIN:
         return pure
-    mean = linprog(
+    mean = scipy.optimize.linprog(
         np.append(failure_rates.mean(axis=1), 0.0),
         A_ub=np.hstack([rates, -ones]),
         b_ub=np.zeros(N),

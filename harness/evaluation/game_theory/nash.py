@@ -21,8 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import Bounds, LinearConstraint, linprog, milp
-from scipy.spatial import QhullError
+import scipy  # loads its parts at their first use: a worker that solves nothing does without
 
 from harness.errors import HarnessError
 
@@ -187,7 +186,7 @@ def _by_vertices(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterator[tuple
 
     try:  # its polytopes must be bounded: payoffs above 0
         yield from vertex_enumeration(ego_payoffs + 1.0, non_ego_payoffs + 1.0)
-    except (QhullError, np.linalg.LinAlgError, ValueError, IndexError):
+    except (scipy.spatial.QhullError, np.linalg.LinAlgError, ValueError, IndexError):
         return
 
 
@@ -208,26 +207,32 @@ def _by_integer_program(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterato
 
     sums = np.zeros((2, size))
     sums[0, x], sums[1, y] = 1.0, 1.0
-    constraints = [LinearConstraint(sums, 1.0, 1.0)]
+    constraints = [scipy.optimize.LinearConstraint(sums, 1.0, 1.0)]
     for count, own, chosen, value, other, payoffs in (
         (E, x, p, v, y, ego_payoffs.round(COARSE_DIGITS)),
         (N, y, q, w, x, non_ego_payoffs.T.round(COARSE_DIGITS)),
     ):
         unplayed, regret = np.zeros((count, size)), np.zeros((count, size))
         unplayed[:, own], unplayed[:, chosen] = np.eye(count), -np.eye(count)
-        constraints.append(LinearConstraint(unplayed, -np.inf, 0.0))  # a share only where it may be played
+        constraints.append(
+            scipy.optimize.LinearConstraint(unplayed, -np.inf, 0.0)
+        )  # a share only where it may be played
         regret[:, other], regret[:, value] = -payoffs, 1.0
-        constraints.append(LinearConstraint(regret, 0.0, np.inf))  # nothing earns more than the value
+        constraints.append(scipy.optimize.LinearConstraint(regret, 0.0, np.inf))  # nothing earns more than the value
         bounded = regret.copy()
         bounded[:, chosen] = np.eye(count)
-        constraints.append(LinearConstraint(bounded, -np.inf, 1.0 + SLACK))  # what may be played earns it
+        constraints.append(
+            scipy.optimize.LinearConstraint(bounded, -np.inf, 1.0 + SLACK)
+        )  # what may be played earns it
     objective = np.zeros(size)
     objective[v] = -1.0
     integral = np.zeros(size)
     integral[p] = integral[q] = 1
     highest = -np.inf
     for _ in range(MOST_CHOICES):
-        answer = milp(objective, integrality=integral, bounds=Bounds(0.0, 1.0), constraints=constraints)
+        answer = scipy.optimize.milp(
+            objective, integrality=integral, bounds=scipy.optimize.Bounds(0.0, 1.0), constraints=constraints
+        )
         if answer.x is None or highest >= answer.x[v] - VALUE_ACCURACY:
             return
         yield answer.x[x], answer.x[y]
@@ -241,7 +246,7 @@ def _by_integer_program(ego_payoffs: Floats, non_ego_payoffs: Floats) -> Iterato
                 return
         choice = np.zeros(size)
         choice[p], choice[q] = np.where(rows, 1.0, -1.0), np.where(columns, 1.0, -1.0)
-        constraints.append(LinearConstraint(choice, -np.inf, float(rows.sum() + columns.sum()) - 1.0))
+        constraints.append(scipy.optimize.LinearConstraint(choice, -np.inf, float(rows.sum() + columns.sum()) - 1.0))
 
 
 def _indifferent(
@@ -251,7 +256,7 @@ def _indifferent(
     `TOLERANCE`; None where there are none. With `highest`, the shares at which the best responses earn most."""
     count = payoffs.shape[1]
     gains = np.hstack([payoffs, -np.ones((len(payoffs), 1))])
-    answer = linprog(
+    answer = scipy.optimize.linprog(
         np.append(np.zeros(count), -float(highest)),
         A_ub=np.vstack([gains, -gains[own]]),
         b_ub=np.append(np.zeros(len(payoffs)), np.full(int(own.sum()), TOLERANCE)),

@@ -103,7 +103,7 @@ OF_SEVERITY: Mapping[str, Column] = {
         "",
         "1 if the ego touched no road user and came as close as one of: time to collision at most "
         f"{at.CONFLICT_TTC_S:g} s, PET at most {at.CONFLICT_PET_S:g} s, headway below {at.CONFLICT_HEADWAY_S:g} s.",
-        "FHWA-HRT-08-051 (TTC); Peesapati, Hunter and Rodgers 2018 (PET); headway: our own",
+        "FHWA-HRT-08-051 (TTC); Peesapati, Hunter and Rodgers 2013 (PET); headway: our own",
     ),
     "severity": Column(
         "float64",

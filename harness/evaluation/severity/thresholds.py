@@ -8,9 +8,8 @@ CONFLICT_TTC_S = 1.5
 """A time to collision up to this is a conflict. Surrogate Safety Assessment Model, its default (Gettman, Pu, Sayed and
 Shelby 2008, FHWA-HRT-08-051); the same number in Van der Horst 1990, "A time-based analysis of road user behaviour"."""
 CONFLICT_PET_S = 1.0
-"""A post-encroachment time up to this is a conflict. Peesapati, Hunter and Rodgers 2018 ("Can post encroachment time
-substitute intersection characteristics in crash prediction models?"): of the thresholds from 0.5 to 3.5 s, 1 s
-correlates best with crashes."""
+"""A post-encroachment time up to this is a conflict. Peesapati, Hunter and Rodgers 2013 ("Evaluation of
+postencroachment time as surrogate for opposing left-turn crashes"): this threshold correlates best with crashes."""
 CONFLICT_HEADWAY_S = 0.5
 """A time headway below this is a conflict. Our own: half of the least time gap of UN Regulation No. 157 (5.2.3.3)."""
 SHORT_HEADWAY_S = 1.0

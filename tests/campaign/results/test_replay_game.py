@@ -13,7 +13,7 @@ from PIL import Image
 from rich.console import Console
 
 import tests.support.tiny as tiny
-from harness.campaign.results.replay_game import film, found_game, game_table, watch
+from harness.campaign.results.replay_game import GameList, film, found_game, game_table, watch
 from harness.errors import UsageError
 from harness.evaluation.manoeuvres import pairs_in
 from harness.evaluation.tables import MANOEUVRE_COLUMNS, read_csv, typed, write_csv
@@ -29,7 +29,7 @@ def run(tmp_path: Path) -> Path:
 
 def printed(run: Path, arm: str | None = None, width: int = 160) -> str:
     console = Console(file=io.StringIO(), width=width)
-    console.print(game_table(run, arm))
+    console.print(game_table(run, GameList(arm=arm)))
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
 

@@ -1,0 +1,217 @@
+"""Writing pinned games: failures of a run, each reduced to the mildest start that still fails, in a folder of its own.
+
+<folder>/<arm>-seed<seed>-<episode>.toml    a pinned game
+<folder>/scene/                             a copy of the scene
+<folder>/policies/<stage>/                  a copy of each policy that drives a person
+<folder>/personas/<name>.toml               the personas
+
+So the folder can be moved, committed and played without the run.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from harness.campaign.execution.run_players import RunPlayers, Seated, seated_arm
+from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.storage.run_folder import RunFolder
+from harness.config.persona import Persona
+from harness.config.pinned_game import FORMAT, PinnedGame, PinnedPerson, PinnedStart
+from harness.config.toml_writing import toml_of
+from harness.drivers.policy_file import policy_files
+from harness.environments.rollout import parts_of
+from harness.environments.start_trials import StartTrials
+from harness.errors import UsageError
+from harness.evaluation.manoeuvres import pairs_in
+from harness.evaluation.minimising import minimise
+from harness.evaluation.tables import read_csv
+from harness.files import make_folder, write_atomically
+from harness.game.arrays import FloatArray
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import draw_initial_state
+
+TOLERANCE_M, TOLERANCE_MPS = 0.05, 0.05
+"""How close the two starts found are to each other in every position and speed."""
+_MOST_STARTS = 12  # starts of other episodes that are tried until one does not fail
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """A failed game of a run."""
+
+    arm: str
+    seed: int
+    episode: int
+    alike: int = 1
+    """Failures of its arm that it stands for."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pinned:
+    """A pinned game that was written, and what was found."""
+
+    file: Path
+    game: PinnedGame
+    games: int
+    """Games played to find it."""
+
+
+class PinnedGames:
+    """Pins failures of one run in a folder."""
+
+    def __init__(self, folder: RunFolder, players: RunPlayers, out: Path) -> None:
+        self._players, self._out = players, out
+        self._episodes = read_csv(folder.path / "episodes.csv")
+        manoeuvres = folder.path / "manoeuvres.csv"
+        self._pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
+
+    def failures(self, arm: str | None = None) -> list[Failure]:
+        """One failure for each kind of failure of each arm (of one arm, if named) and seed.
+
+        Failures are of one kind if they have the same outcome and the same pair of manoeuvres led to it. The one with
+        the shortest time to collision stands for them all.
+        """
+        known = {(each.name, each.seed) for each in self._players.arms()}
+        failed = self._failed()
+        failed = failed[[(game.arm, game.seed) in known and arm in (None, game.arm) for game in failed.itertuples()]]
+        order = failed.sort_values(["arm", "seed", "ego_min_ttc_s", "episode"], kind="stable")
+        kinds: dict[tuple[str, int, str, str], list[int]] = {}
+        for game in order.itertuples():
+            pair = self._pairs.get((game.arm, game.seed, game.episode))
+            kind = (str(game.arm), int(game.seed), str(game.ego_outcome), pair.words if pair else "")
+            kinds.setdefault(kind, []).append(int(game.episode))
+        return [
+            Failure(arm=name, seed=seed, episode=episodes[0], alike=len(episodes))
+            for (name, seed, _, _), episodes in kinds.items()
+        ]
+
+    def failure(self, arm: str, seed: int, episode: int) -> Failure:
+        """One failed game. Raises UsageError if the run has no such game, or if the ego does not fail in it."""
+        self._players.arm(arm, seed)
+        failed = self._failed()
+        episodes = failed.loc[(failed["arm"] == arm) & (failed["seed"] == seed), "episode"].tolist()
+        if episode not in episodes:
+            some = ", ".join(str(each) for each in episodes[:10])
+            remedy = f"it fails in {some}" if episodes else "the ego fails in no game of this arm"
+            raise UsageError.of(self._out, f"{arm} {episode}", "the ego does not fail in this game", remedy)
+        return Failure(arm=arm, seed=seed, episode=episode)
+
+    def pin(self, failure: Failure) -> Pinned:
+        """Minimise a failure and write it. Raises UsageError if the game can't be repeated, SimulationError."""
+        stage = self._players.arm(failure.arm, failure.seed)
+        ego, people = self._players.ego(stage), self._players.people(stage, failure.episode)
+        arm = seated_arm(self._players.scene, failure.arm, failure.seed, ego, people)
+        with StartTrials(arm, failure.episode) as trials:
+            game = trials.drawn()
+            if not game.record.get("ego_failed"):
+                message = "played again, the ego does not fail: the run was made by another version or machine"
+                raise UsageError.of(self._out, f"{failure.arm} {failure.episode}", message, "run the campaign again")
+            failing = drawn = trials.last_start
+
+            def fails(start: FloatArray) -> bool:
+                return bool(trials.play(start).record.get("ego_failed", 1))
+
+            passing = next((each for each in self._passing(stage, failing) if not fails(each)), None)
+            games = 1
+            if passing is not None:
+                found = minimise(fails, failing, passing, _tolerance(failing))
+                failing, passing, games = found.fails, found.passes, found.games
+            last = trials.play(failing)
+        starts = {"drawn_start": drawn, "start": failing, "no_failure_from": passing}
+        pinned = self._document(failure, stage, str(last.record["ego_outcome"]), starts, people)
+        file = self._out / f"{failure.arm}-seed{failure.seed}-{failure.episode:04d}.toml"
+        write_atomically(file, toml_of(pinned, [_COMMENT]).encode())
+        return Pinned(file=file, game=pinned, games=games)
+
+    def _failed(self) -> pd.DataFrame:
+        return self._episodes[(self._episodes["error"] == "") & (self._episodes["ego_failed"] == 1)]
+
+    def _passing(self, stage: AssessmentStage, failing: FloatArray) -> Iterator[FloatArray]:
+        """The starts of the arm's games without a failure, nearest to a failing start first."""
+        games = self._episodes
+        of_arm = (games["arm"] == stage.name) & (games["seed"] == stage.seed)
+        passed = games.loc[of_arm & (games["error"] == "") & (games["ego_failed"] == 0), "episode"]
+        starts = [self._start_of(stage, int(episode)) for episode in passed]
+        starts.sort(key=lambda start: float(np.abs((start - failing) / _tolerance(failing)).max()))
+        yield from starts[:_MOST_STARTS]
+
+    def _start_of(self, stage: AssessmentStage, episode: int) -> FloatArray:
+        """[2 P] the start that is drawn for an episode."""
+        scene = self._players.scene
+        players = len(scene.world.roles)
+        distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)
+        drawn = draw_initial_state(distribution, *parts_of(stage.seed, episode))
+        return np.concatenate((drawn.position_m, drawn.speed_mps))
+
+    def _document(
+        self,
+        failure: Failure,
+        stage: AssessmentStage,
+        outcome: str,
+        starts: Mapping[str, FloatArray | None],
+        people: Sequence[Seated],
+    ) -> PinnedGame:
+        ego = self._players.ego(stage)
+        return PinnedGame.model_validate(
+            {
+                "format": FORMAT,
+                "scene": "scene",
+                "scene_sha256": self._copied_scene(),
+                "arm": failure.arm,
+                "seed": failure.seed,
+                "episode": failure.episode,
+                "outcome": outcome,
+                "found_with": ego.policy.name if ego.policy is not None else stage.name.partition("_vs_")[0],
+                "alike": failure.alike,
+                "ego_persona": self._copied_persona(ego.persona),
+                "people": [self._person(each) for each in people],
+                **{name: _start(each) for name, each in starts.items() if each is not None},
+            }
+        )
+
+    def _copied_scene(self) -> Mapping[str, str]:
+        scene = self._players.scene
+        hashes = {}
+        for name in scene.document.files:
+            content = (scene.folder / name).read_bytes()
+            make_folder(self._out / "scene")
+            write_atomically(self._out / "scene" / name, content)
+            hashes[name] = hashlib.sha256(content).hexdigest()
+        return hashes
+
+    def _copied_persona(self, persona: Persona) -> str:
+        written = f"personas/{persona.name}.toml"
+        make_folder(self._out / "personas")
+        write_atomically(self._out / written, toml_of(persona).encode())
+        return written
+
+    def _person(self, seated: Seated) -> PinnedPerson:
+        persona = self._copied_persona(seated.persona)
+        if seated.policy is None:
+            return PinnedPerson(persona=persona)
+        folder = self._out / "policies" / seated.policy.name
+        make_folder(folder)
+        for file in policy_files(seated.policy):
+            write_atomically(folder / file.name, file.read_bytes())
+        parameters = policy_files(seated.policy)[1].read_bytes()
+        policy, digest = f"policies/{folder.name}", hashlib.sha256(parameters).hexdigest()
+        return PinnedPerson(persona=persona, policy=policy, policy_sha256=digest)
+
+
+_COMMENT = "A game that the ego failed, from the mildest start found. Play it: harness regression FOLDER --ego DRIVER"
+
+
+def _tolerance(start: FloatArray) -> FloatArray:
+    """[2 P] of positions and speeds."""
+    return np.repeat([TOLERANCE_M, TOLERANCE_MPS], len(start) // 2)
+
+
+def _start(start: FloatArray) -> PinnedStart:
+    position_m, speed_mps = np.split(start, 2)
+    return PinnedStart(position_m=position_m.tolist(), speed_mps=speed_mps.tolist())

@@ -1,0 +1,168 @@
+"""Judging an arm's failures: which of them the reference drivers prevent.
+
+<work>/segments/<driver>.json      the games that one reference driver has played, with the versions that played them
+<work>/reference_drivers.csv       a row for each failure and reference driver
+
+So the judgement continues with the next reference driver after an interruption. What a driver does in a game depends on
+nothing but itself: the table is the same bytes with and without interruptions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from harness.campaign.execution.crash_retries import Attempt, OnProgress, OnStart
+from harness.campaign.plan.stages import PreventabilityStage
+from harness.campaign.storage.checksums import read_checksums, write_checksums
+from harness.campaign.storage.manoeuvre_table import EPISODES
+from harness.campaign.storage.run_folder import JUDGED, RunFolder
+from harness.campaign.storage.versions import versions_of_numbers
+from harness.drivers.car import car_of
+from harness.drivers.reference_drivers import REFERENCES, lane_width_of, reference_driver
+from harness.environments.conflict_replay import Chance, ConflictReplay, Takeover, collision_of
+from harness.environments.rollout import Arm, assess
+from harness.evaluation.reference_columns import REFERENCE_COLUMNS
+from harness.evaluation.tables import read_csv, typed, write_csv
+from harness.evaluation.trace_file import TraceReader
+from harness.files import make_folder
+from harness.game.state import EGO
+
+
+@dataclass(frozen=True, kw_only=True)
+class JudgedArm:
+    """An arm whose failures are judged."""
+
+    folder: RunFolder
+    stage: PreventabilityStage
+    arm: Arm
+    """The arm with any driver in the ego's seat."""
+    attempt: Attempt
+
+
+def judge_failures(work: JudgedArm, on_start: OnStart, on_progress: OnProgress) -> tuple[dict[str, Any], list[Path]]:
+    """Judge every failure of an arm. Returns facts for the manifest, and the file made.
+
+    `on_start` gets the episode before it is played, `on_progress` the games played and their number. Raises UsageError
+    for damaged files of the arm, SimulationError if SUMO can't load the scene.
+    """
+    folder, of = work.folder, work.stage.of
+    episodes = read_csv(folder.work(of.id) / EPISODES)
+    failures = episodes[(episodes["error"] == "") & (episodes["ego_failed"] == 1)]
+    numbers = [int(episode) for episode in failures["episode"]]
+    conflicts, failed_s = _from_conflict(work, numbers)
+    starts = _from_start(work, numbers, on_start, on_progress)
+    rows = [
+        _row(work, failure, name, starts[name][int(failure.episode)])
+        | {"failed_s": failed_s[int(failure.episode)]}
+        | conflicts.get((int(failure.episode), name), {})
+        for failure in failures.itertuples()
+        for name in REFERENCES
+    ]
+    table = folder.work(work.stage.id) / JUDGED
+    write_csv(typed(pd.DataFrame(rows, columns=list(REFERENCE_COLUMNS))), table)
+    errors = int((episodes["error"] != "").sum()) + sum(row["error"] != "" for row in rows)
+    facts = {"episodes": len(numbers), "errors": errors, "versions": [versions_of_numbers()]}
+    return facts, [table]
+
+
+def _row(work: JudgedArm, failure: Any, name: str, outcome: Mapping[str, str]) -> dict[str, Any]:
+    played = not outcome["error"]
+    return {
+        "arm": failure.arm,
+        "persona": failure.persona,
+        "seed": work.stage.seed,
+        "episode": failure.episode,
+        "driver": name,
+        "ego_outcome": failure.ego_outcome,
+        "outcome_from_start": outcome["outcome"] if played else "",
+        "prevented_from_start": int(outcome["outcome"] == "goal") if played else None,
+        "error": outcome["error"],
+    }
+
+
+def _from_conflict(
+    work: JudgedArm, episodes: Sequence[int]
+) -> tuple[dict[tuple[int, str], dict[str, Any]], dict[int, float]]:
+    """The cells of the verdict from the conflict on, by episode and driver; and when each game failed."""
+    scene, reader = work.arm.scene, TraceReader()
+    step_s, ego = scene.world.step_s, scene.world.roles[EGO]
+    collisions, failed_s = [], {}
+    for episode in episodes:
+        trace = reader.read(work.folder.traces(work.stage.of.id), episode)
+        ended = trace.loc[(trace["player"] == ego) & (trace["outcome"] != ""), "step"]
+        failed_s[episode] = float(ended.min()) * step_s
+        if (collision := collision_of(trace, scene, episode)) is not None:
+            collisions.append(collision)
+    replay = ConflictReplay(scene, collisions, work.stage.seed)
+    chances = replay.chances()
+    cells = {
+        (collision.episode, name): _conflict_cells(takeover, chance, step_s)
+        for name, takeovers in replay.takeovers().items()
+        for collision, takeover, chance in zip(collisions, takeovers, chances, strict=True)
+    }
+    return cells, failed_s
+
+
+def _conflict_cells(takeover: Takeover, chance: Chance, step_s: float) -> dict[str, Any]:
+    steps = {
+        "conflict_s": takeover.danger_step,
+        "preventable_from_s": chance.first_step,
+        "preventable_until_s": chance.last_step,
+    }
+    times = {name: None if step is None else step * step_s for name, step in steps.items()}
+    return {**times, "prevented_from_conflict": int(takeover.prevented)}
+
+
+def _from_start(
+    work: JudgedArm, episodes: Sequence[int], on_start: OnStart, on_progress: OnProgress
+) -> dict[str, dict[int, dict[str, str]]]:
+    """How each episode ends with each reference driver in the ego's seat: its outcome and its error."""
+    total, done = len(episodes) * len(REFERENCES), 0
+    found: dict[str, dict[int, dict[str, str]]] = {}
+
+    def on_game() -> None:
+        nonlocal done
+        done += 1
+        on_progress(done, total)
+
+    for name in REFERENCES:
+        file = work.folder.segments(work.stage.id) / f"{name}.json"
+        found[name] = _stored(file, work.attempt.first) or _play(work, name, episodes, on_start, on_game)
+        done = len(found) * len(episodes)
+        make_folder(file.parent)
+        outcomes = {str(episode): outcome for episode, outcome in found[name].items()}
+        write_checksums(file, file.parent, [], {"versions": versions_of_numbers(), "outcomes": outcomes})
+    return found
+
+
+def _play(
+    work: JudgedArm, name: str, episodes: Sequence[int], on_start: OnStart, on_game: Callable[[], None]
+) -> dict[int, dict[str, str]]:
+    scene = work.arm.scene
+    driver = reference_driver(name, car_of(scene.world, EGO), lane_width_of(scene.world))
+    arm = replace(work.arm, drivers=(driver, *work.arm.drivers[1:]))
+    outcomes = {}
+    for game in assess(arm, episodes, on_start, work.attempt.abandoned):
+        record = game.record
+        outcomes[int(record["episode"])] = {"outcome": str(record["ego_outcome"]), "error": str(record["error"])}
+        on_game()
+    return outcomes
+
+
+def _stored(file: Path, first: bool) -> dict[int, dict[str, str]] | None:
+    """The games that a driver has played; None if there are none of this version, or if some could not be played and
+    this is the command's first attempt, which plays them again."""
+    record = read_checksums(file)
+    if record is None or record.get("versions") != versions_of_numbers():
+        return None
+    try:
+        outcomes = {int(episode): {**outcome} for episode, outcome in record["outcomes"].items()}
+        failed = any(each["error"] for each in outcomes.values())
+    except (LookupError, AttributeError, TypeError, ValueError):
+        return None
+    return None if first and failed else outcomes

@@ -1,0 +1,139 @@
+"""Playing pinned games against an ego: each passes if the ego does not fail, as a test does."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from harness.campaign.execution.run_players import Seated, seated_arm
+from harness.config.campaign import SUMO, resolve
+from harness.config.persona import Persona
+from harness.config.pinned_game import PinnedGame, PinnedPerson
+from harness.config.toml_reading import read_document
+from harness.drivers.car import car_of
+from harness.drivers.external import ExternalDriver, find_driver
+from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import policy_files, read_policy
+from harness.drivers.sumo import SumoDriver
+from harness.environments.start_trials import StartTrials
+from harness.errors import Problem, UsageError, collect
+from harness.files import content_of
+from harness.game.state import EGO
+from harness.traffic.scene import OpenScene, open_scene
+
+_MOST_BYTES = 1_000_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlayedAgain:
+    """A pinned game, and how it ended for the ego."""
+
+    name: str
+    game: PinnedGame
+    outcome: str
+    error: str
+    """Why it could not be played; empty if it was."""
+    seconds: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the ego reached its goal."""
+        return self.outcome == "goal" and not self.error
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenedGame:
+    """A pinned game with everything it names."""
+
+    name: str
+    game: PinnedGame
+    scene: OpenScene
+    ego_persona: Persona
+    people: tuple[Seated, ...]
+
+
+class Regression:
+    """The pinned games of a folder. Raises UsageError with every problem found in them, and if there are none."""
+
+    def __init__(self, folder: Path, ego: str, allow_code: bool) -> None:
+        files = sorted(folder.glob("*.toml"))
+        if not files:
+            remedy = "write some: harness minimise RUN --all"
+            raise UsageError.of(folder, "", "contains no pinned game", remedy)
+        self._ego = None if ego == SUMO else find_driver(ego, Path("--ego"), "", allow_code)
+        problems: list[Problem] = []
+        self._scenes: dict[Path, OpenScene] = {}
+        opened = [collect(problems, lambda file=file: self._open(file)) for file in files]  # type: ignore[misc]
+        if problems:
+            raise UsageError(problems)
+        self.games = [each for each in opened if each is not None]
+
+    def play(self) -> Iterator[PlayedAgain]:
+        """Play the games one after the other. Raises SimulationError if SUMO can't load a scene."""
+        for each in self.games:
+            started = time.monotonic()
+            persona = each.ego_persona
+            ego = Seated(driver=self._driver(self._ego, each.scene, persona), persona=persona)
+            game = each.game
+            with StartTrials(seated_arm(each.scene, game.arm, game.seed, ego, each.people), game.episode) as trials:
+                record = trials.play(np.array([*game.start.position_m, *game.start.speed_mps])).record
+            yield PlayedAgain(
+                name=each.name,
+                game=game,
+                outcome=str(record["ego_outcome"]),
+                error=str(record["error"]),
+                seconds=time.monotonic() - started,
+            )
+
+    @staticmethod
+    def _driver(ego: ExternalDriver | None, scene: OpenScene, persona: Persona) -> SumoDriver | LearnedDriver:
+        if ego is None:
+            return SumoDriver()
+        return ego.make(car_of(scene.world, EGO), persona.decisions == "sampled")  # type: ignore[return-value]
+
+    def _open(self, file: Path) -> OpenedGame:
+        game = read_document(file, PinnedGame)
+        scene_folder = resolve(file, game.scene)
+        if scene_folder not in self._scenes:
+            vehicle_type = self._ego.vehicle_type if self._ego is not None else None
+            self._scenes[scene_folder] = open_scene(scene_folder, vehicle_type)
+        scene = self._scenes[scene_folder]
+        _check_scene(file, game.scene_sha256, scene)
+        if len(game.people) != len(scene.world.roles) - 1:
+            message = f"has {len(game.people)} people, but the scene has {len(scene.world.roles) - 1}"
+            raise UsageError.of(file, "people", message, "pin the game again")
+        ego_persona = read_document(resolve(file, game.ego_persona), Persona)
+        people = tuple(_person(file, each) for each in game.people)
+        return OpenedGame(name=file.stem, game=game, scene=scene, ego_persona=ego_persona, people=people)
+
+
+def _check_scene(file: Path, hashes: Mapping[str, str], scene: OpenScene) -> None:
+    found = {name: _sha256(scene.folder / name) for name in scene.document.files}
+    if found != dict(hashes):
+        changed = sorted(name for name in {*found, *hashes} if found.get(name) != hashes.get(name))
+        message = f"is not the scene of this game: {', '.join(changed)} differs"
+        raise UsageError.of(file, "scene", message, "pin the game again, or restore the scene")
+
+
+def _person(file: Path, person: PinnedPerson) -> Seated:
+    persona = read_document(resolve(file, person.persona), Persona)
+    if person.policy is None:
+        return Seated(driver=SumoDriver(), persona=persona)
+    folder = resolve(file, person.policy)
+    policy = read_policy(folder)
+    if _sha256(policy_files(folder)[1]) != person.policy_sha256:
+        message = f"{person.policy!r} is not the policy of this game"
+        raise UsageError.of(file, "people.policy_sha256", message, "pin the game again, or restore the policy")
+    return Seated(driver=LearnedDriver(policy, persona.decisions == "sampled"), persona=persona, policy=folder)
+
+
+def _sha256(file: Path) -> str:
+    try:
+        return hashlib.sha256(content_of(file, _MOST_BYTES)).hexdigest()
+    except OSError as error:
+        raise UsageError.of(file, "", str(error.strerror), "restore the file") from None

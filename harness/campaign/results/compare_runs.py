@@ -1,0 +1,52 @@
+"""The comparison of two run folders: a page, and lines for the terminal."""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from harness.campaign.storage.run_folder import RunFolder
+from harness.errors import UsageError
+from harness.evaluation.run_comparison import differences_of
+from harness.evaluation.tables import read_csv
+from harness.files import write_atomically
+from harness.reports.run_comparison import ComparedRow, ComparedRun, compared_rows, headline, render_comparison
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunComparison:
+    """What a comparison found."""
+
+    headline: str
+    rows: list[ComparedRow]
+    page: Path
+
+
+def compare_runs(before: Path, after: Path, page: Path) -> RunComparison:
+    """Compare the games of two run folders and write the page. Raises UsageError for a folder that is no run, one
+    without games, and a page that can't be written."""
+    if not page.absolute().parent.is_dir():
+        raise UsageError.of(page, "", f"there is no folder {page.parent}", "create it, or name another file with --out")
+    manifests = [RunFolder(run).manifest() for run in (before, after)]
+    games = [read_csv(run / "episodes.csv") for run in (before, after)]
+    scenes = [_scene(manifest) for manifest in manifests]
+    same_scene = bool(scenes[0]) and scenes[0] == scenes[1]
+    significance = manifests[1]["campaign"].get("assessment", {}).get("significance", 0.01)
+    rows = compared_rows(differences_of(games[0], games[1], same_scene), significance)
+    runs = [ComparedRun(name=str(run), manifest=each) for run, each in zip((before, after), manifests, strict=True)]
+    text = render_comparison(runs[0], runs[1], rows, same_scene=same_scene, significance=significance)
+    write_atomically(page, text.encode())
+    return RunComparison(headline=headline(rows), rows=rows, page=page)
+
+
+def _scene(manifest: Mapping[str, Any]) -> dict[str, str]:
+    """The hashes of the files of the run's scene."""
+    scene = posixpath.basename(posixpath.normpath(manifest["campaign"].get("scene", "")))
+    return {
+        posixpath.basename(name): digest
+        for name, digest in manifest.get("hashes", {}).items()
+        if posixpath.basename(posixpath.dirname(name)) == scene
+    }

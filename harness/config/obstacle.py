@@ -1,0 +1,136 @@
+"""An obstacle of a scene: what it is, how large it is, where it stands, and whether it hides what is behind it."""
+
+from __future__ import annotations
+
+from math import radians
+from typing import Annotated, Any, Literal, TypeAlias, get_args
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from harness.config.toml_reading import Document, Interval
+
+Kind: TypeAlias = Literal[
+    "car", "van", "truck", "bus", "broken_down_car", "cone", "debris", "wall", "closed_lane", "building"
+]
+VEHICLES = ("car", "van", "truck", "bus", "broken_down_car")
+"""Kinds of obstacles that are vehicles."""
+USUAL_SIZE_M = {
+    "car": (5.0, 1.8),
+    "broken_down_car": (5.0, 1.8),
+    "van": (6.5, 2.16),
+    "truck": (7.1, 2.4),
+    "bus": (12.0, 2.5),
+    "cone": (0.4, 0.4),
+    "debris": (1.0, 0.5),
+}
+"""Length and width by kind: of vehicles, SUMO's for its classes (passenger, delivery, truck, bus)."""
+HIDING = ("van", "truck", "bus", "wall", "building")
+"""Kinds that hide what is behind them unless `hides` says otherwise."""
+_FARTHEST_M = 1e7
+
+
+def _as_range(value: Any) -> Any:
+    """A number as a range without extent."""
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return value, value
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _possible(value: tuple[float, float]) -> tuple[float, float]:
+    if max(abs(value[0]), abs(value[1])) > _FARTHEST_M:
+        raise ValueError(f"lies outside -{_FARTHEST_M:g} to {_FARTHEST_M:g}")
+    return value
+
+
+NumberOrRange = Annotated[
+    Interval,
+    BeforeValidator(_as_range, json_schema_input_type=float | tuple[float, float]),
+    AfterValidator(_possible),
+]
+"""A number, or a range from which each game draws by its seed; read as a range."""
+Corner = tuple[
+    Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)], Annotated[float, Field(ge=-_FARTHEST_M, le=_FARTHEST_M)]
+]
+
+
+class Obstacle(Document):
+    """A body that stands in one place for a whole game. Cars that touch it have collided."""
+
+    kind: Kind
+    """What it is. A `closed_lane` is as wide as its lane; a `building` has an `outline` and stands off the road."""
+    lane: str | None = None
+    """The lane it stands on or beside, with `position_m`."""
+    position_m: NumberOrRange | None = None
+    """Of its centre, along the lane: a number, or a range."""
+    offset_m: NumberOrRange = (0.0, 0.0)
+    """Of its centre from the middle of the lane, to the left: a number, or a range."""
+    turned_deg: NumberOrRange = (0.0, 0.0)
+    """Of its direction from that of the lane, counter-clockwise: a number, or a range."""
+    x_m: NumberOrRange | None = None
+    """Instead of a lane: of its centre in the net's coordinates, a number or a range."""
+    y_m: NumberOrRange | None = None
+    """As `x_m`."""
+    heading_deg: NumberOrRange | None = None
+    """With `x_m` and `y_m`: its direction, 0 is east, 90 is north; a number, or a range."""
+    length_m: float | None = Field(None, ge=0.1, le=200.0)
+    """Its length; left out: that of its kind."""
+    width_m: float | None = Field(None, ge=0.1, le=200.0)
+    """Its width; left out: that of its kind."""
+    outline: list[Corner] | None = Field(None, min_length=2, max_length=100)
+    """Of a building: its corners [x, y] in the net's coordinates, in order. Two corners are a wall."""
+    hides: bool | None = None
+    """Whether it is higher than eyes, and hides what is behind it; left out: vans, trucks, buses, walls and buildings
+    do."""
+
+    @model_validator(mode="after")
+    def _one_place(self) -> Obstacle:
+        on_lane = [name for name in ("lane", "position_m") if getattr(self, name) is not None]
+        at_point = [name for name in ("x_m", "y_m", "heading_deg") if getattr(self, name) is not None]
+        if self.kind == "building":
+            self._check_building([*on_lane, *at_point])
+            return self
+        if self.outline is not None:
+            raise ValueError(f"only a building has an outline; give a {self.kind} a lane or x_m, y_m and heading_deg")
+        if bool(on_lane) == bool(at_point):
+            raise ValueError("give either lane and position_m, or x_m, y_m and heading_deg")
+        if len(on_lane) == 1 or 0 < len(at_point) < 3:
+            missing = "lane and position_m" if on_lane else "x_m, y_m and heading_deg"
+            raise ValueError(f"has a part of its place: give {missing}")
+        if at_point and {"offset_m", "turned_deg"} & self.model_fields_set:
+            raise ValueError("offset_m and turned_deg are relative to a lane: leave them out, or give lane")
+        return self
+
+    @model_validator(mode="after")
+    def _has_a_size(self) -> Obstacle:
+        if self.kind == "closed_lane":
+            if self.lane is None:
+                raise ValueError("a closed_lane needs its lane")
+            if self.width_m is not None or {"offset_m", "turned_deg"} & self.model_fields_set:
+                raise ValueError("a closed_lane fills its lane: leave out width_m, offset_m and turned_deg")
+        needed = {"closed_lane": ("length_m",), "wall": ("length_m", "width_m")}.get(self.kind, ())
+        for name in needed:
+            if getattr(self, name) is None:
+                raise ValueError(f"a {self.kind} needs its {name}")
+        return self
+
+    def _check_building(self, placed: list[str]) -> None:
+        if self.outline is None:
+            raise ValueError("a building needs its outline; a wall on the road is a wall")
+        surplus = [*placed, *(name for name in ("length_m", "width_m") if getattr(self, name) is not None)]
+        surplus += sorted({"offset_m", "turned_deg"} & self.model_fields_set)
+        if surplus or self.hides is False:
+            name = surplus[0] if surplus else "hides"
+            raise ValueError(f"a building is where its outline is, and hides: leave out {name}")
+
+    @property
+    def is_hiding(self) -> bool:
+        """Whether it hides what is behind it."""
+        return self.kind in HIDING if self.hides is None else self.hides
+
+    @property
+    def turned_rad(self) -> tuple[float, float]:
+        """`turned_deg` in radians."""
+        return radians(self.turned_deg[0]), radians(self.turned_deg[1])
+
+
+assert {*USUAL_SIZE_M, "wall", "closed_lane", "building"} == set(get_args(Kind)), "every kind has a size or needs one"

@@ -1,0 +1,131 @@
+"""Reference drivers: the yardsticks by which a failure counts as preventable.
+
+| name | driver | reaction |
+| --- | --- | --- |
+| `careful_and_competent` | the careful and competent human driver of UN R157 | 0.75 s, then up to 0.774 g or 0.85 g |
+| `fuzzy` | the fuzzy safety model of UN R157 | 0.75 s, then graded up to 0.774 g |
+| `rss` | responsibility-sensitive safety | 0.75 s, then 0.774 g |
+| `upper_bound` | brakes in the step in which the first of these rules says danger | none; as hard as the tyres allow |
+
+All cruise by the same adaptive cruise control and keep their lane by the same lane keeping, which are not part of the
+models. The upper bound is no driver that exists: braking alone can't do better with the same idea of danger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from harness.config.rule_driver import CarefulAndCompetent, Cruise, FuzzySafety, Rss, Rules
+from harness.drivers.car import Car
+from harness.drivers.protocol import Driver
+from harness.drivers.rules import RulesDriver
+from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.state import EGO
+from harness.game.world import World
+
+PERSONS = ("careful_and_competent", "fuzzy", "rss")
+"""The reference drivers with a reaction time."""
+UPPER_BOUND = "upper_bound"
+REFERENCES = (*PERSONS, UPPER_BOUND)
+"""All reference drivers, by name."""
+
+_DESCRIPTION = "A reference driver, which judges whether a failure could have been prevented."
+_USUAL_LANE_M = (2.0, 5.0)
+
+
+class ReferenceDriver(Driver, Protocol):
+    """A driver with a rule that says danger."""
+
+    def sees_danger(self, observation: FloatArray) -> BoolArray:
+        """[N] whether the rule says danger for observations [N, SIZE], with no reaction under way."""
+        ...
+
+
+def reference_driver(name: str, car: Car, lane_width_m: float) -> ReferenceDriver:
+    """A reference driver of `REFERENCES` for a car, on a road with lanes of this width."""
+    if name == UPPER_BOUND:
+        return StrongestBraking([RulesDriver(reference_rules(each, lane_width_m), car) for each in PERSONS], car)
+    return RulesDriver(reference_rules(name, lane_width_m), car)
+
+
+def reference_rules(name: str, lane_width_m: float) -> Rules:
+    """The rules of a reference driver of `PERSONS`, with the parameters of its source."""
+    reactions = {
+        "careful_and_competent": CarefulAndCompetent(lane_width_m=lane_width_m),
+        "fuzzy": FuzzySafety(),
+        "rss": Rss(),
+    }
+    cruise = Cruise(anticipates_s=0.0)
+    return Rules.model_validate(
+        {"kind": "rules", "name": name, "description": _DESCRIPTION, "cruise": cruise, name: reactions[name]}
+    )
+
+
+def reference_identity() -> dict[str, Any]:
+    """Everything that the decisions of the reference drivers depend on, but for the car and the road."""
+    usual_m = CarefulAndCompetent().lane_width_m
+    return {name: reference_rules(name, usual_m).model_dump(mode="json") for name in PERSONS}
+
+
+def lane_width_of(world: World, player: int = EGO) -> float:
+    """The usual width of the lanes of a player's road: the distance between the centres of neighbouring lanes. The
+    default of the careful and competent driver where the road has one lane."""
+    routes = world.road.routes
+    rows = slice(int(routes.first_row[player]), int(routes.last_row[player]) + 1)
+    apart_m = np.diff(np.sort(routes.lane_offset_m[rows], axis=1), axis=1)
+    apart_m = apart_m[np.isfinite(apart_m)]
+    if not len(apart_m):
+        return CarefulAndCompetent().lane_width_m
+    return float(np.clip(np.median(apart_m), *_USUAL_LANE_M))
+
+
+class StrongestBraking:
+    """Cruises and keeps its lane; brakes fully in every step in which one of several drivers' rules says danger."""
+
+    takes_over = True
+
+    def __init__(self, rules: Sequence[RulesDriver], car: Car) -> None:
+        self._rules, self._cruising = rules, RulesDriver(_cruising(), car)
+
+    def reset(self, games: IntArray) -> None:
+        """Reset games [N]: the cruise control requests no acceleration."""
+        self._cruising.reset(games)
+
+    def sees_danger(self, observation: FloatArray) -> BoolArray:
+        """[N] whether one of the rules says danger."""
+        return np.logical_or.reduce([each.sees_danger(observation) for each in self._rules])
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """Actions [N, 2] from observations [N, SIZE]."""
+        return braking_fully(self._cruising.decide(games, observation, noise), self.sees_danger(observation))
+
+
+class FullBraking:
+    """Keeps its lane and brakes as hard as tyres and brakes allow, until the car stands."""
+
+    takes_over = True
+
+    def __init__(self, car: Car) -> None:
+        self._steering = RulesDriver(_cruising(), car)
+
+    def reset(self, games: IntArray) -> None:
+        """Reset games [N]: nothing is under way."""
+        self._steering.reset(games)
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        """Actions [N, 2] from observations [N, SIZE]."""
+        return braking_fully(self._steering.decide(games, observation, noise), np.ones(len(games), dtype=bool))
+
+
+def braking_fully(actions: FloatArray, where: BoolArray) -> FloatArray:
+    """Actions [N, 2] with the brake pedal down where asked [N]; the motion clips it to what tyres and brakes give."""
+    braking = actions.copy()
+    braking[where, 0] = -1.0
+    return braking
+
+
+def _cruising() -> Rules:
+    return Rules(kind="rules", name="cruising", description=_DESCRIPTION, cruise=Cruise(anticipates_s=0.0))

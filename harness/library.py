@@ -1,0 +1,124 @@
+"""Campaigns from Python: `harness.run` carries one out, `harness.load` reads the run folder of one.
+
+results = harness.run("merge-demo")
+results.summary[["arm", "failure_rate"]]
+"""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from harness.campaign.storage.run_folder import RunFolder
+from harness.drivers.policy_file import Policy, read_policy
+from harness.errors import UsageError
+from harness.files import content_of
+from harness.shipped_documents import document_at
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_RESULT = "result.json"
+_MOST_BYTES = 50_000_000
+
+
+@dataclass(frozen=True)
+class Results:
+    """The results in a run folder. Tables are read when they are asked for."""
+
+    path: Path
+    """The run folder."""
+
+    def table(self, name: str) -> pd.DataFrame:
+        """A table of the run, by the name of its CSV file: `table("manoeuvres")`.
+
+        Names of columns end with their units. Raises UsageError if the run has no such table.
+        """
+        from harness.evaluation.tables import read_csv
+
+        return read_csv(self.path / f"{name}.csv")
+
+    @property
+    def episodes(self) -> pd.DataFrame:
+        """A row per game."""
+        return self.table("episodes")
+
+    @property
+    def summary(self) -> pd.DataFrame:
+        """A row per arm and training seed."""
+        return self.table("summary")
+
+    @property
+    def comparisons(self) -> pd.DataFrame:
+        """A row per question of the campaign, with its test."""
+        return self.table("comparisons")
+
+    @cached_property
+    def outcome(self) -> Mapping[str, Any]:
+        """The content of `result.json`. Raises UsageError if it can't be read."""
+        try:
+            return dict(json.loads(content_of(self.path / _RESULT, _MOST_BYTES)))
+        except (OSError, ValueError, TypeError) as error:
+            remedy = f"write it anew: harness report {self.path}"
+            raise UsageError.of(self.path / _RESULT, "", f"can't be read: {error}", remedy) from None
+
+    @property
+    def verdicts(self) -> list[dict[str, str]]:
+        """Persona, question, label and sentence of each verdict."""
+        return list(self.outcome["verdicts"])
+
+    @property
+    def accepted(self) -> bool | None:
+        """Whether every bound of the campaign's `[acceptance]` is kept; None without bounds."""
+        accepted: bool | None = self.outcome["accepted"]
+        return accepted
+
+    @property
+    def complete(self) -> bool:
+        """Whether every stage was carried out and every game was played."""
+        return not self.outcome["failed_stages"] and not self.outcome["error_games"]
+
+    def policy(self, stage: str) -> Policy:
+        """The policy of a training, such as "naive-seed1". Raises UsageError if the run has none."""
+        return read_policy(self.path / "policies" / stage)
+
+
+def run(
+    campaign: str | Path,
+    *,
+    out: str | Path | None = None,
+    quick: bool = False,
+    jobs: int | None = None,
+    allow_code: bool = False,
+    progress: bool = False,
+) -> Results:
+    """Carry out a campaign, or what is left of it, as `harness campaign` does.
+
+    `campaign` is a TOML file or the name of a shipped campaign, `out` the run folder (default: `reports/NAME` in the
+    working folder), `jobs` the number of stages carried out at once (default: one per core), and `progress` prints
+    what the command prints. Raises UsageError for mistakes in documents. A stage that fails is in the results, not
+    raised.
+    """
+    from rich.console import Console
+
+    from harness.campaign.execution.run_campaign import run_campaign
+    from harness.campaign.execution.worker_pool import WorkerPool, cores
+    from harness.campaign.preflight import open_campaign
+
+    opened = open_campaign(document_at(Path(campaign), "campaigns"), quick, allow_code)
+    folder = RunFolder(Path(out) if out is not None else Path("reports") / opened.run_name)
+    console = Console(file=None if progress else io.StringIO())
+    run_campaign(opened, folder, partial(WorkerPool, jobs=jobs or cores()), console)
+    return load(folder.path)
+
+
+def load(run: str | Path) -> Results:
+    """The results in a run folder. Raises UsageError if there is no run in it."""
+    folder = RunFolder(Path(run))
+    folder.manifest()
+    return Results(folder.path)

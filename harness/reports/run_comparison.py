@@ -1,0 +1,134 @@
+"""The comparison of two runs in words, and as a page that opens offline."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from harness.evaluation.run_comparison import Difference, Side
+from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
+from harness.reports.header import facts
+from harness.reports.numbers import NO_SPACE, interval, number, p_number, percent
+from harness.reports.page_template import environment_of
+
+BETTER, WORSE, SAME, UNKNOWN = "better", "worse", "no difference shown", "not the same games"
+TONES = {BETTER: "mended", WORSE: "harm"}
+NOTHING_IN_COMMON = "The runs have no arm and seed in common."
+DIFFERENT_SCENES = "The scenes differ, so games have different starts: there are no pairs and no tests."
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparedRow:
+    """One difference in words."""
+
+    arm: str
+    seed: int
+    measure: str
+    before: str
+    after: str
+    verdict: str
+    tone: str
+    sentence: str
+    statistics: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparedRun:
+    """One of the two runs."""
+
+    name: str
+    manifest: Mapping[str, Any]
+
+    @property
+    def facts(self) -> list[tuple[str, str]]:
+        """What was run, as label and value."""
+        return facts(self.manifest, (), len(self.manifest.get("personas", ())))
+
+
+def compared_rows(differences: Sequence[Difference], significance: float) -> list[ComparedRow]:
+    """Every difference in words, worse ones first, then better ones."""
+    rows = [_row(each, significance) for each in differences]
+    order = {WORSE: 0, BETTER: 1}
+    return sorted(rows, key=lambda row: order.get(row.verdict, 2))
+
+
+def headline(rows: Sequence[ComparedRow]) -> str:
+    """The result of the comparison in one line."""
+    if not rows:
+        return NOTHING_IN_COMMON
+    worse, better = (sum(row.verdict == verdict for row in rows) for verdict in (WORSE, BETTER))
+    return f"Worse: {worse} of {len(rows)} figures; better: {better}."
+
+
+def render_comparison(
+    before: ComparedRun, after: ComparedRun, rows: Sequence[ComparedRow], *, same_scene: bool, significance: float
+) -> str:
+    """The page as HTML. Equal input gives equal text."""
+    return (
+        environment_of("reports")
+        .get_template("compare.html.jinja")
+        .render(
+            before=before,
+            after=after,
+            rows=rows,
+            headline=headline(rows),
+            remark="" if same_scene else DIFFERENT_SCENES,
+            significance=significance,
+            several_seeds=len({row.seed for row in rows}) > 1,
+        )
+    )
+
+
+def _row(found: Difference, significance: float) -> ComparedRow:
+    verdict = _verdict(found, significance)
+    sentence = f"{found.arm}: {found.measure} {_value(found, found.before)} before, {_value(found, found.after)} after"
+    return ComparedRow(
+        arm=found.arm,
+        seed=found.seed,
+        measure=found.measure,
+        before=_with_interval(found, found.before),
+        after=_with_interval(found, found.after),
+        verdict=verdict,
+        tone=TONES.get(verdict, "open"),
+        sentence=f"{sentence}: {CHANCE if verdict == SAME else verdict}",
+        statistics=_statistics(found),
+    )
+
+
+def _verdict(found: Difference, significance: float) -> str:
+    if not found.pairs:
+        return UNKNOWN
+    if not found.is_rate and all(abs(end) < RELEVANT_SPEED_MPS for end in _ends(found)):
+        return NO_RELEVANT_DIFFERENCE
+    if not found.p_holm < significance:
+        return SAME
+    return BETTER if (found.mean > 0) != found.is_rate else WORSE
+
+
+def _ends(found: Difference) -> tuple[float, ...]:
+    return (found.low, found.high) if math.isfinite(found.low) else (found.mean,)
+
+
+def _value(found: Difference, side: Side) -> str:
+    if found.is_rate:
+        return f"{round(side.value * side.games)} of {side.games}" if side.games else percent(math.nan)
+    return f"{number(side.value, 2)}{NO_SPACE}m/s"
+
+
+def _with_interval(found: Difference, side: Side) -> str:
+    if found.is_rate:
+        return f"{_value(found, side)} ({interval(side.low, side.high)})"
+    ends = f" ({number(side.low, 2)}–{number(side.high, 2)})" if math.isfinite(side.low) else ""
+    return f"{_value(found, side)}{ends}"
+
+
+def _statistics(found: Difference) -> str:
+    if not found.pairs:
+        return ""
+    scale, digits, unit = (100.0, 1, " points") if found.is_rate else (1.0, 3, f"{NO_SPACE}m/s")
+    text = f"{number(found.mean * scale, digits)}{unit}"
+    if math.isfinite(found.low):
+        text += f" (95{NO_SPACE}%: {number(found.low * scale, digits)} to {number(found.high * scale, digits)})"
+    return f"{text}; p {p_number(found.p_value)}; after Holm {p_number(found.p_holm)}; {found.pairs} pairs"

@@ -1,0 +1,93 @@
+"""Counts of prevented failures and their sentences, by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pandas as pd
+import pytest
+from scipy import stats
+
+from harness.evaluation.preventability import ANY, count_prevented, no_games, preventability_of
+from harness.evaluation.reference_columns import PREVENTABILITY_COLUMNS, REFERENCE_COLUMNS
+from harness.evaluation.tables import TABLES, typed
+
+ARM = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1}
+
+
+def episodes(failed: list[int]) -> pd.DataFrame:
+    rows = [
+        {**ARM, "episode": place, "ego_outcome": "collision" if bad else "goal", "ego_failed": bad, "error": ""}
+        for place, bad in enumerate(failed)
+    ]
+    return typed(pd.DataFrame(rows, columns=list(TABLES["episodes"])))
+
+
+def judged(episode: int, driver: str, conflict: int | None, start: int | None, **cells: Any) -> dict[str, Any]:
+    verdicts = {"prevented_from_conflict": conflict, "prevented_from_start": start, "error": ""}
+    return {**ARM, "episode": episode, "driver": driver, "ego_outcome": "collision", **verdicts, **cells}
+
+
+GAMES = typed(
+    pd.DataFrame(
+        [
+            judged(0, "fuzzy", 0, 1, failed_s=4.0, preventable_until_s=3.5),
+            judged(0, "rss", 1, 0),
+            judged(0, "upper_bound", 1, 1),
+            judged(1, "fuzzy", 0, 0, failed_s=5.0, preventable_until_s=4.0),
+            judged(1, "rss", 0, 0),
+            judged(1, "upper_bound", 1, 0),
+            judged(2, "fuzzy", None, 1),
+            judged(2, "rss", None, 1),
+            judged(2, "upper_bound", None, None, error="it broke"),
+        ],
+        columns=list(REFERENCE_COLUMNS),
+    )
+)
+
+
+@pytest.fixture
+def counts() -> dict[str, dict[str, Any]]:
+    table = count_prevented(GAMES, episodes([1, 1, 1, 0, 0, 0, 0, 0, 0, 0]))
+    assert list(typed(table).columns) == list(PREVENTABILITY_COLUMNS)
+    return {row["driver"]: row for row in table.to_dict("records")}
+
+
+def test_count__each_driver_in_each_verdict(counts: dict[str, dict[str, Any]]) -> None:
+    names = ("from_conflict_judged", "from_conflict_prevented", "from_start_judged", "from_start_prevented")
+    assert {driver: [row[name] for name in names] for driver, row in counts.items()} == {
+        "fuzzy": [2, 0, 3, 2],
+        "rss": [2, 1, 3, 1],
+        "upper_bound": [2, 2, 2, 1],
+        ANY: [2, 1, 3, 2],
+    }
+
+
+def test_count__any_leaves_the_upper_bound_out(counts: dict[str, dict[str, Any]]) -> None:
+    assert counts[ANY]["from_conflict_prevented"] == 1
+
+
+def test_count__shares_are_of_failures_and_rates_of_games(counts: dict[str, dict[str, Any]]) -> None:
+    both = counts[ANY]
+    assert (both["episodes"], both["failures"]) == (10, 3)
+    assert both["from_start_share"] == pytest.approx(2 / 3)
+    assert both["from_start_rate"] == pytest.approx(0.2)
+    interval = stats.binomtest(2, 10).proportion_ci(0.95, method="exact")
+    assert (both["from_start_rate_low"], both["from_start_rate_high"]) == pytest.approx((interval.low, interval.high))
+
+
+def test_sentences__say_both_verdicts_apart(counts: dict[str, dict[str, Any]]) -> None:
+    table = pd.DataFrame(list(counts.values()))
+    (found,) = preventability_of(table, GAMES, "naive_vs_speedy")
+    assert found.sentences == [
+        "A reference driver in its place from the start prevents 2 of 3 failures (fuzzy safety model 2, RSS 1).",
+        "Taking over when the danger shows, it prevents 1 of 2 collisions (fuzzy safety model 0, RSS 1; full braking "
+        "in the first moment of danger 2).",
+        "Full braking prevents the collision until 0.8 s before it (median).",
+    ]
+    assert found.rate == pytest.approx(0.2)
+    assert not preventability_of(table, GAMES, "retrained_vs_speedy")
+
+
+def test_count__an_arm_without_failures_has_no_rows() -> None:
+    assert count_prevented(typed(no_games()), episodes([0, 0])).empty

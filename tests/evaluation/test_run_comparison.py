@@ -1,0 +1,52 @@
+"""Two runs compared game by game."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from harness.evaluation.run_comparison import differences_of
+from harness.reports.differences import NO_RELEVANT_DIFFERENCE
+from harness.reports.run_comparison import BETTER, SAME, UNKNOWN, WORSE, compared_rows, headline
+from tests.support.game_tables import arm, table
+
+
+def failing(count, speed=13.0):
+    return table(arm("naive_vs_speedy", ego_failed=[1] * count + [0] * (100 - count), speed=speed))
+
+
+def verdicts(before, after, same_scene=True):
+    rows = compared_rows(differences_of(before, after, same_scene), 0.01)
+    return {row.measure: row.verdict for row in rows}
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "verdict"), [(30, 5, BETTER), (5, 30, WORSE), (30, 28, SAME), (30, 30, SAME)]
+)
+def test_failures__are_compared_in_pairs(before, after, verdict):
+    assert verdicts(failing(before), failing(after))["failures"] == verdict
+
+
+def test_failures__mcnemars_test_is_two_sided():
+    (found,) = [each for each in differences_of(failing(30), failing(20), True) if each.measure == "failures"]
+    # the 10 pairs that differ all fail before only: 2 * 0.5 ** 10
+    assert found.p_value == pytest.approx(2 * 0.5**10)
+    assert (found.before.value, found.after.value, found.pairs) == (0.3, 0.2, 100)
+    assert found.mean == pytest.approx(-0.1)
+
+
+def test_failures__without_the_same_scene_there_are_rates_and_no_test():
+    (found,) = [each for each in differences_of(failing(30), failing(20), False) if each.measure == "failures"]
+    assert (found.before.value, found.after.value, found.pairs) == (0.3, 0.2, 0)
+    assert np.isnan(found.p_value)
+    assert verdicts(failing(30), failing(20), same_scene=False)["failures"] == UNKNOWN
+
+
+def test_speed__a_small_difference_is_not_relevant_however_certain():
+    assert verdicts(failing(0), failing(0, speed=13.1))["average speed"] == NO_RELEVANT_DIFFERENCE
+
+
+def test_headline__counts_what_is_better_and_worse():
+    rows = compared_rows(differences_of(failing(30), failing(5), True), 0.01)
+    assert headline(rows) == "Worse: 0 of 2 figures; better: 1."
+    assert headline([]) == "The runs have no arm and seed in common."

@@ -1,0 +1,86 @@
+"""A persona's card: its line about the persona, and the figures beside the failure rates."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+
+from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, RetrainedEgo, against_persona
+from harness.evaluation.summary import summarise
+from harness.reports.key_figures import NEAR_MISSES, PRICE, WORST_KNOWN_OPPONENT, key_figures
+from harness.reports.numbers import NO_SPACE
+from harness.reports.portrait import portrait
+from harness.reports.results import results
+from harness.reports.run_tables import RunTables
+from harness.reports.shown_verdict import PARTLY, shown_verdict
+from tests.support.game_tables import arm, table
+from tests.support.pages import campaign
+
+
+def found(arguments, near_misses=None):
+    """The looked-up tables of a made-up campaign; `near_misses` are the shares of an arm's games that come close."""
+    episodes = arguments["episodes"]
+    for name, share in (near_misses or {}).items():
+        rows = episodes["arm"] == name
+        marks = [int(place < share * rows.sum()) for place in range(int(rows.sum()))]
+        episodes.loc[rows, "near_miss"] = pd.Series(marks, index=episodes.index[rows], dtype="Int64")
+    return results(RunTables(**arguments))
+
+
+def figures_of(run):
+    return {each.title: each for each in key_figures("speedy", run)}
+
+
+def test_portrait__is_who_the_person_is_and_what_it_does_not_see():
+    perception, attention = {"no_blind_spot_check_share": 0.85}, {"lapse_s": [4.0, 6.0], "mean_attentive_s": 4.0}
+    document = {"description": "In a hurry.", "perception": perception, "attention": attention}
+    assert portrait(document).replace(NO_SPACE, " ") == (
+        "In a hurry. It does not check the blind spot in 85 % of drives. "
+        "Its eyes leave the road for 4 to 6 s at a time, about every 9 s."
+    )
+    assert portrait({"description": "In a hurry.", "perception": None, "attention": None}) == "In a hurry."
+    assert portrait({}) == ""
+
+
+def test_near_misses__of_an_ego_without_failures_are_on_its_card():
+    run = found(campaign(personas=["speedy"]), {"naive_vs_speedy": 0.1, "retrained_vs_speedy": 0.95})
+    figure = figures_of(run)[NEAR_MISSES]
+    assert [line.replace(NO_SPACE, " ") for line in figure.lines] == [
+        "6 of 60 games of the naive ego (10 %)",
+        "57 of 60 games of the retrained ego (95 %)",
+    ]
+    assert figure.warns
+
+
+@pytest.mark.parametrize(("share", "label", "tone"), [(0.95, PARTLY, "open"), (0.0, "Yes", "mended")])
+def test_verdict__an_ego_that_comes_too_close_is_mended_only_in_part(share, label, tone):
+    run = found(campaign(personas=["speedy"]), {"retrained_vs_speedy": share})
+    shown = shown_verdict("Did retraining fix it?", run.verdicts("RQ2", "speedy"), key_figures("speedy", run))
+    assert (shown.label, shown.tone, bool(shown.caution)) == (label, tone, label == PARTLY)
+
+
+def test_worst_known_opponent__is_the_one_of_a_later_round():
+    ego = RetrainedEgo(against="speedy")
+    later = Arm(ego=ego, non_ego=PersonaNonEgo(persona="speedy", round=3))
+    arms = [against_persona(NaiveEgo(), "speedy"), against_persona(ego, "speedy"), later]
+    failures = [30, 0, 45]
+    games = [
+        arm(each.name, ego_failed=[1] * count + [0] * (100 - count), persona="speedy")
+        for each, count in zip(arms, failures, strict=True)
+    ]
+    episodes = table(*games)
+    arguments = campaign(personas=["speedy"]) | {"episodes": episodes, "summary": summarise(episodes)}
+    figure = figures_of(found(arguments | {"arms": {each.name: each for each in arms}}))[WORST_KNOWN_OPPONENT]
+    assert "fails in 45" in figure.lines[0]
+    assert f"in {later.name}, the worst of 2 opponents" in figure.lines[0]
+    assert figure.warns
+
+
+def test_price__is_what_retraining_costs_in_speed():
+    title = PRICE.format(doing="retraining")
+    arguments = campaign(personas=["speedy"])
+    chosen = (arguments["comparisons"]["question"] == "RQ2") & (arguments["comparisons"]["metric"] == "mean_speed")
+    columns = ["mean_difference", "ci_low", "ci_high"]
+    for values, words in (((-0.5, -0.6, -0.4), "0.50 m/s slower"), ((-0.02, -0.03, -0.01), "no relevant difference")):
+        arguments["comparisons"].loc[chosen, columns] = values
+        assert figures_of(found(arguments))[title].lines[0].replace(NO_SPACE, " ").startswith(words)
