@@ -2,7 +2,8 @@
 
     python docs/scenes/drawings.py [SCENE...]
 
-writes docs/scenes/<scene>.png for the scenes that it names, or for every scene in `networks/` but the merge. It needs Chromium and the extra `dev`.
+writes docs/scenes/<scene>.png for the scenes that it names, or for every scene in `networks/` but the merge. It needs
+Chromium and the extra `dev`.
 """
 
 from __future__ import annotations
