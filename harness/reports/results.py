@@ -77,7 +77,7 @@ class Results:
             arms=self.arms,
             significance=self.significance,
             change=self.change,
-            who=self._who(persona),
+            who=self.who(persona),
         )
 
     def causes(self, question: str, persona: str) -> tuple[str, ...]:
@@ -87,8 +87,8 @@ class Results:
         _, treatment = ARMS[question](persona, self.change)
         return tuple(cause_lines(self.failures[self.failures["arm"] == treatment]))
 
-    def _who(self, persona: str) -> str:
-        """What the ego meets, if it is not one driver with a persona."""
+    def who(self, persona: str) -> str:
+        """What the ego meets, if it is not one driver with a persona; else empty."""
         if persona in self.crowds:
             return f"the crowd {persona}"
         return f"the group of {self.people} {persona} drivers" if self.people > 1 else ""

@@ -100,7 +100,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     write_csv(manoeuvres, folder.path / "manoeuvres.csv")
     replays = _write_replays(folder, scene, episodes, console)
     gaps = game.gaps if game is not None else None
-    evidence = Evidence(arms=arms, episodes=episodes, summary=summary, gaps=gaps)
+    judged_failures = prevented.get("preventability")
+    evidence = Evidence(arms=arms, episodes=episodes, summary=summary, gaps=gaps, preventability=judged_failures)
     checks = checks_of(campaign, manifest["personas"], evidence)
     report = RunTables(
         manifest=manifest,
