@@ -139,10 +139,7 @@ def campaign(
 
 @app.command()
 def demo(out: RunOut = None, jobs: Jobs = None) -> None:
-    """Play the paper's campaign with the shipped policies: a minute on two cores. Nothing is trained.
-
-    The same as `harness campaign merge-demo`.
-    """
+    """Play the paper's campaign with the shipped policies, a minute on two cores: the campaign merge-demo."""
     campaign(Path("merge-demo"), out=out, jobs=jobs)
 
 

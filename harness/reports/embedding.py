@@ -95,6 +95,7 @@ def _scene(scene: SceneDrawing | None) -> dict[str, Any] | None:
         "edgeLines": [_points(line) for line in scene.edge_lines],
         "rails": [_points(line) for line in scene.rails],
         "goal": [_points(line) for line in scene.goal],
+        **({"buildings": [_points(outline) for outline in scene.buildings]} if scene.buildings else {}),
     }
 
 

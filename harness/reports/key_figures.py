@@ -15,8 +15,8 @@ from harness.reports.numbers import NO_SPACE, SURE, interval, number, percent
 from harness.reports.results import Results
 from harness.reports.worst_opponent import worst_opponent
 
-CAUSES = "Why the {ego} ego fails"
 PREVENTABLE = "Preventable"
+CAUSES = "Why the {ego} ego fails"
 NEAR_MISS = "near_miss"
 NEAR_MISSES = "Near misses"
 WORST_KNOWN_OPPONENT = "Against its worst known opponent"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import (
@@ -20,9 +20,11 @@ from harness.evaluation.strategies import (
 )
 from harness.reports.differences import Row
 from harness.reports.numbers import MISSING, SURE, interval, number, percent, steps_text, trimmed
-from harness.reports.results import Results
 from harness.reports.treatment import Change
 from harness.reports.wording import failures_of, played
+
+if TYPE_CHECKING:
+    from harness.reports.results import Results  # imports pandas, and resuming does without
 
 QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 NOT_PLAYED = "not played"

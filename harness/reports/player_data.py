@@ -81,6 +81,8 @@ class SceneDrawing:
     goal: Sequence[FloatArray]
     edge_lines: Sequence[FloatArray] = ()
     """Solid lines between lanes and hard shoulders."""
+    buildings: Sequence[FloatArray] = ()
+    """Outlines of buildings."""
 
 
 def key(arm: str, seed: int, episode: int) -> str:

@@ -66,6 +66,7 @@ const ROAD = (() => {
     edges: path(scene.edgeLines),
     rails: path(scene.rails),
     goal: scene.goal,
+    buildings: path((scene.buildings ?? []).map(outline => [...outline, outline[0]])),
     left: most(xs, Math.min, Infinity), right: most(xs, Math.max, -Infinity),
     bottom: most(ys, Math.min, Infinity), top: most(ys, Math.max, -Infinity),
   };
@@ -141,6 +142,7 @@ function drawRoad(context, camera, ratio) {
   camera.inMetres(context, ratio, () => {
     context.fillStyle = palette.asphalt;
     context.fill(ROAD.surface, "evenodd");
+    drawBuildings(context, thin(2));
     context.strokeStyle = palette.mark;
     context.lineWidth = Math.max(0.13, thin(1));
     context.setLineDash([3, 3]);
@@ -155,6 +157,16 @@ function drawRoad(context, camera, ratio) {
     }
     drawGoal(context);
   });
+}
+
+/** Buildings, and walls without extent. */
+function drawBuildings(context, width) {
+  context.fillStyle = context.strokeStyle = palette.rail;
+  context.globalAlpha = 0.45;
+  context.fill(ROAD.buildings);
+  context.globalAlpha = 1;
+  context.lineWidth = Math.max(0.3, width);
+  context.stroke(ROAD.buildings);
 }
 
 /** The goal as a chequered band across the lanes. */

@@ -8,7 +8,7 @@ function drawGame(context, camera, ratio, game, time, labels) {
     for (const track of game.players) drawTrail(context, camera, game, track, time);
     for (const track of game.background) {
       const pose = poseAt(game, track, time);
-      if (pose) drawBody(context, camera, track, pose, { colour: palette.other });
+      if (pose) drawBody(context, camera, track, pose, { colour: palette.other, stands: track.name.startsWith("obstacle_") });
     }
     for (const track of [...game.players].reverse()) {
       const pose = poseAt(game, track, time), step = stepAt(game, track, time);
@@ -81,7 +81,7 @@ function drawBody(context, camera, track, pose, look) {
     context.stroke();
     context.setLineDash([]);
   }
-  if (fine && length > 3) {
+  if (fine && length > 3 && !look.stands) {
     context.fillStyle = "#15181c";
     for (const [x, side, turn] of [[0.3, 1, look.wheels], [0.3, -1, look.wheels], [-0.3, 1, 0], [-0.3, -1, 0]]) {
       context.save();
@@ -100,8 +100,8 @@ function drawBody(context, camera, track, pose, look) {
   context.strokeStyle = look.touched ? palette.contact : "#0009";
   if (look.touched) context.lineWidth = Math.max(0.2, 2 * thin);
   context.stroke();
-  if (fine && length > 3) drawGlass(context, length, width);
-  drawHeading(context, length, width);
+  if (fine && length > 3 && !look.stands) drawGlass(context, length, width);
+  if (!look.stands) drawHeading(context, length, width);
   if (look.brakes && !onFoot) {
     context.fillStyle = "#ff2a1f";
     for (const side of [1, -1]) context.fillRect(-length / 2 - 0.05, side * width * 0.36 - 0.22, Math.max(0.24, 2 * thin), 0.44);

@@ -41,7 +41,10 @@ _NO_EFFECT = {
 }
 
 Reason = tuple[str, str]
-_NO_PEOPLE: Reason = ("people on foot and passengers are not supported", "remove these elements")
+_NO_PEOPLE: Reason = (
+    "people on foot and passengers are not supported: libsumo 1.28 may crash with them",
+    'remove these elements; a player may be on foot, with kind = "pedestrian"',
+)
 _NO_CONTAINERS: Reason = ("containers are not supported", "remove these elements")
 _NOT_EDGES: Reason = ("routes are found between edges only", "give edges as from, to and via")
 _NO_STATION: Reason = ("a stop at such a place is not supported", "give the stop's lane, startPos and endPos instead")

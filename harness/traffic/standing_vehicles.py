@@ -13,8 +13,8 @@ from harness.traffic.blocked_lanes import Blockage, blockages
 from harness.traffic.insertion import Insertion, in_tile
 from harness.traffic.scene import OpenScene
 
-_TYPE = "harness_obstacle"
-TYPE_XML = f'<vType id="{_TYPE}" vClass="ignoring" minGap="0"/>'
+OBSTACLE_TYPE = "harness_obstacle"
+TYPE_XML = f'<vType id="{OBSTACLE_TYPE}" vClass="ignoring" minGap="0"/>'
 """Their vehicle type: no lane's permissions exclude it."""
 
 
@@ -40,11 +40,19 @@ class StandingVehicles:
 
     def _add(self, prefix: str, number: int, blockage: Blockage) -> str:
         name = f"{prefix}{self._scene.obstacles.each[blockage.obstacle].name}.{number}"
-        edges, vehicle = blockage.strip.edges, libsumo.vehicle
-        self._insertion.add(prefix, name, edges=edges, vehicle_type=_TYPE, lane="first", position="base", speed="0")
-        vehicle.setLength(name, blockage.length_m)
-        vehicle.moveTo(name, in_tile(prefix, blockage.strip.name), blockage.front_m)
-        vehicle.setSpeedMode(name, 0)
-        vehicle.setLaneChangeMode(name, 0)
-        vehicle.setSpeed(name, 0.0)
+        edges = blockage.strip.edges
+        self._insertion.add(
+            prefix, name, edges=edges, vehicle_type=OBSTACLE_TYPE, lane="first", position="base", speed="0"
+        )
+        stand(name, in_tile(prefix, blockage.strip.name), blockage.front_m, blockage.length_m)
         return name
+
+
+def stand(name: str, lane: str, front_m: float, length_m: float) -> None:
+    """Let a vehicle of this length that was just added stand on a lane for good."""
+    vehicle = libsumo.vehicle
+    vehicle.setLength(name, length_m)
+    vehicle.moveTo(name, lane, front_m)  # at once: SUMO would wait for room
+    vehicle.setSpeedMode(name, 0)
+    vehicle.setLaneChangeMode(name, 0)
+    vehicle.setSpeed(name, 0.0)

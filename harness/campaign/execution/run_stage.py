@@ -236,7 +236,7 @@ def _assess(stage: AssessmentStage, run: StageRun) -> Made:
 
 
 def _judge(stage: PreventabilityStage, run: StageRun) -> Made:
-    from harness.campaign.execution.preventability import JudgedArm, judge_failures  # imports statistics
+    from harness.campaign.execution.preventability import JudgedArm, judge_failures
 
     seatless = replace(stage.of, ego=SumoDriven())  # the reference drivers have the ego's seat
     arm = _arm_of_several(seatless, run) if run.people > 1 else _arm_of_two(seatless, run)[0]

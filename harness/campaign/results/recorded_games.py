@@ -130,4 +130,5 @@ def scene_drawing(scene: OpenScene) -> SceneDrawing:
         edge_lines=drawing.edge_lines(net),
         rails=scene.rail_lines,
         goal=drawing.goal_lines(scene, net),
+        buildings=scene.obstacles.outlines,
     )
