@@ -52,7 +52,7 @@ def test_way__is_the_walkers_route_up_to_its_end(crossing: OpenScene) -> None:
 
 
 def test_carriageway__is_the_road_between_the_pavements(crossing: OpenScene) -> None:
-    y_m = np.array([[-3.6, -3.4], [0.0, 3.4], [0.0, 3.6]])
+    y_m = np.array([[-3.7, -3.3], [0.0, 3.3], [0.0, 3.7]])  # in cells of 0.25 m
     x_m = np.full_like(y_m, 150.0)
     assert crossing.world.on_carriageway(x_m, y_m)[:, 1].tolist() == [1.0, 1.0, 0.0]
     assert crossing.world.on_carriageway(x_m, y_m)[:, 0].tolist() == [0.0, 0.0, 0.0]  # the ego is no walker
