@@ -21,7 +21,7 @@ help: ## list the targets
 install: $(INSTALLED) ## set up .venv from requirements.lock (again only when it or pyproject.toml changes)
 
 demo: install ## verify the figures in about a minute: the campaign's games, played by the shipped policies
-	$(BIN)/harness campaign $(DEMO) $(ARGS)
+	$(BIN)/harness campaign $(DEMO) $(ARGS) || test $$? -eq 3 # a bound is not kept: the report says which
 
 campaign: install ## run the paper's campaign: harness campaign campaigns/merge.toml
 	$(BIN)/harness campaign $(CAMPAIGN) $(ARGS)

@@ -52,15 +52,15 @@ def is_name(written: str) -> bool:
 def find_document(written: str, folder: Path, kind: Kind) -> Path:
     """The absolute path of a document that a file in `folder` names; it may not exist.
 
-    A path is relative to the folder. A name, such as `merge`, is that of a document in the folder, in its subfolder of
-    the kind, or of a shipped document: the first that exists.
+    A path is relative to the folder; it may be one that no system accepts. A name, such as `merge`, is that of a
+    document in the folder, in its subfolder of the kind, or of a shipped document: the first that exists.
     """
     beside = Path(os.path.realpath(folder / written))
-    if not is_name(written) or beside.exists():
+    if not is_name(written) or os.path.exists(beside):
         return beside
     file = written if kind in _FOLDERS else f"{written}.toml"
     for place in (folder, folder / kind, shipped(kind)):
-        if (place / file).exists():
+        if os.path.exists(place / file):
             return Path(os.path.realpath(place / file))
     return beside
 
@@ -70,10 +70,10 @@ def document_at(path: Path, kind: Kind) -> Path:
 
     Raises UsageError if it is a name of no document.
     """
-    if path.exists() or not is_name(str(path)):
+    if os.path.exists(path) or not is_name(str(path)):
         return path
     found = find_document(str(path), Path(), kind)
-    if not found.exists():
+    if not os.path.exists(found):
         raise UsageError.of(path, "", *missing_document(str(path), Path(), kind))
     return found
 

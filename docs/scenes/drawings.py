@@ -1,8 +1,9 @@
 """The drawings of the shipped scenes, as `harness scene show --html` shows them in a browser.
 
-    python docs/scenes/drawings.py
+    python docs/scenes/drawings.py [SCENE...]
 
-writes docs/scenes/<scene>.png for every junction in `networks/`. It needs Chromium and the extra `dev`.
+writes docs/scenes/<scene>.png for the scenes that it names, or for every scene in `networks/` but the merge. It needs
+Chromium and the extra `dev`.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 from playwright.sync_api import sync_playwright
 
 ROOT = Path(__file__).parents[2]
-SCENES = ("left_across", "priority_crossing", "red_light", "roundabout")
+SCENES = ("left_across", "priority_crossing", "red_light", "roundabout", "crossing", "zebra", "cyclist")
 CHROMIUM = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -28,7 +29,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=browser_file, args=["--no-sandbox"])
         tab = browser.new_page(viewport={"width": 900, "height": 560})
-        for scene in SCENES:
+        for scene in sys.argv[1:] or SCENES:
             page = Path(folder) / f"{scene}.html"
             show = [sys.executable, "-m", "harness.cli.main", "scene", "show", f"networks/{scene}", "--html", str(page)]
             subprocess.run(show, cwd=ROOT, check=True, stdout=subprocess.DEVNULL)

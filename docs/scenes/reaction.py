@@ -25,7 +25,8 @@ from harness.game.world import World
 from harness.traffic.scene import open_scene
 
 GAMES = 40
-_STOPS_WITHIN_M = 0.6
+_STOPS_WITHIN_M = 1.1
+_GENTLY = -0.4  # braking that ends at a stand
 _SPEED, _GOAL = LAYOUT.index("speed_mps"), LAYOUT.index("goal_m")
 
 
@@ -47,9 +48,7 @@ class Heedless:
         station_m = self._goal_m - 200.0 * observation[:, _GOAL]
         faster = 30.0 * observation[:, _SPEED] < WALKING_MPS
         actions[:, 0] = np.where(faster, 0.5, 0.0)
-        actions[:, 0] = np.where(
-            station_m >= self._until_m, np.where(30.0 * observation[:, _SPEED] > 0.1, -1.0, 0.0), actions[:, 0]
-        )
+        actions[:, 0] = np.where(station_m >= self._until_m, _GENTLY, actions[:, 0])
         return actions
 
 

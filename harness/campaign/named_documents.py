@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from pydantic import ConfigDict
@@ -40,7 +41,7 @@ def read_names(file: Path) -> NamedDocuments | None:
 def find_named(file: Path, key: str, written: str, kind: Kind) -> Path:
     """A document that a campaign names. Raises UsageError if a name is that of no document."""
     found = find_document(written, file.parent, kind)
-    if is_name(written) and not found.exists():
+    if is_name(written) and not os.path.exists(found):
         raise UsageError.of(file, key, *missing_document(written, file.parent, kind))
     return found
 

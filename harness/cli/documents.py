@@ -119,7 +119,7 @@ def check(
     opened = open_campaign(file, allow_code=allow_code)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
     console = Console()
-    print_plain([wording.in_order(file)], console)
+    print_plain([wording.in_order(file), *opened.scene.warnings], console)
     if opened.document.ego.driver != LEARNED:
         print_plain([plain(wording.ego(opened))], console)
     print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)

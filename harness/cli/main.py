@@ -139,10 +139,7 @@ def campaign(
 
 @app.command()
 def demo(out: RunOut = None, jobs: Jobs = None) -> None:
-    """Play the paper's campaign with the shipped policies: a minute on two cores. Nothing is trained.
-
-    The same as `harness campaign merge-demo`.
-    """
+    """Play the paper's campaign with the shipped policies, a minute on two cores: the campaign merge-demo."""
     campaign(Path("merge-demo"), out=out, jobs=jobs)
 
 
@@ -199,7 +196,7 @@ def _show(outcome: RunResult, run: Path, console: Console) -> None:
     for verdict in outcome.verdicts:
         label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
         console.print(label, style=f"bold {styles[verdict.tone]}", highlight=False, markup=False)
-        for sentence in (verdict.sentence, verdict.speed):
+        for sentence in (verdict.sentence, *verdict.causes, verdict.speed):
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
     for bound in outcome.acceptance:

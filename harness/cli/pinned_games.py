@@ -10,6 +10,7 @@ import typer
 from harness.cli import pinned_wording, wording
 from harness.cli.documents import AllowCode
 from harness.errors import FAILED, NOT_ACCEPTED, UsageError
+from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -62,7 +63,8 @@ def minimise(
     if all_failures and episode is not None:
         raise UsageError.of("--all", str(episode), *pinned_wording.ALL_AND_ONE)
     console, folder = Console(), RunFolder(run)
-    pinning = PinnedGames(folder, RunPlayers(folder, policies, ego, allow_code), out or run / "pinned")
+    found = None if policies is None else document_at(policies, "policies")
+    pinning = PinnedGames(folder, RunPlayers(folder, found, ego, allow_code), out or run / "pinned")
     if all_failures:
         chosen = pinning.failures(arm)
     else:

@@ -95,7 +95,7 @@ def check_scene(folder: Path) -> list[str]:
 
     scene = open_scene(folder)
     check_loads(scene)
-    return [wording.in_order(folder), *wording.scene_lines(scene)]
+    return [wording.in_order(folder), *wording.scene_lines(scene), *scene.warnings]
 
 
 def folder_of_scene(path: Path) -> Path | None:

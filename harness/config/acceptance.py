@@ -24,6 +24,9 @@ class Acceptance(Document):
     """Largest failure rate against a persona, in any arm of this ego against this persona."""
     failure_rate_alone: Share | None = None
     """Largest failure rate without the non-ego: what the ego could do before, it must not forget."""
+    preventable_failure_rate: Share | None = None
+    """Largest rate of failures against a persona that a reference driver prevents when it drives the game from its
+    start. Measured with assessment.reference_drivers."""
     near_miss_rate: Share | None = None
     """Largest share of games with a near miss against a persona: no contact, but closer than the bounds of the column
     `near_miss` of episodes.csv."""

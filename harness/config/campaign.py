@@ -159,6 +159,10 @@ class Campaign(Document):
             raise Mistakes([("rounds.stop_early", "without [best_response], no equilibrium can be found", add)])
         if self.acceptance is not None and self.acceptance.needs_gaps and not measures_gaps:
             raise Mistakes([("acceptance.gap_share", "without [best_response], no gap is measured", add)])
+        prevents = self.acceptance is not None and self.acceptance.preventable_failure_rate is not None
+        if prevents and not self.assessment.reference_drivers:
+            message = "with assessment.reference_drivers = false, it is not judged which failures are preventable"
+            raise Mistakes([("acceptance.preventable_failure_rate", message, "leave out one of these keys")])
         if not learns and self.rounds.count > Rounds().count:
             raise Mistakes([("rounds.count", "the ego does not learn, so there are no further rounds", leave_out)])
         if not learns and self.retraining.against:

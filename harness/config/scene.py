@@ -114,8 +114,9 @@ def _one_alone(people: Player | tuple[Player, ...]) -> Player | tuple[Player, ..
     return people[0] if isinstance(people, tuple) and len(people) == 1 else people
 
 
+_COUNTS = Field(json_schema_extra={"minItems": 1, "maxItems": MOST_PEOPLE})  # `_one_to_four` words the mistake
 NonEgos = Annotated[
-    Annotated[Player, Tag(TABLE)] | Annotated[tuple[Player, ...], AfterValidator(_one_to_four), Tag(TABLES)],
+    Annotated[Player, Tag(TABLE)] | Annotated[tuple[Player, ...], AfterValidator(_one_to_four), _COUNTS, Tag(TABLES)],
     Discriminator(lambda value: TABLES if isinstance(value, list | tuple) else TABLE),
     AfterValidator(_one_alone),
 ]

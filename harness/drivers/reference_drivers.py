@@ -8,7 +8,8 @@
 | `upper_bound` | brakes in the step in which the first of these rules says danger | none; as hard as the tyres allow |
 
 All cruise by the same adaptive cruise control and keep their lane by the same lane keeping, which are not part of the
-models. The upper bound is no driver that exists: braking alone can't do better with the same idea of danger.
+models. The upper bound is no driver that exists: none reacts sooner or brakes harder. It bounds what braking can do for
+a road user ahead. Where ways cross, a driver who brakes less may pass before the other.
 """
 
 from __future__ import annotations

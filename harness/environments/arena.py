@@ -227,8 +227,8 @@ class Arena:
         """Remove players that reached their goal, stop those that crashed, and observe."""
         outcome = self.state.outcome
         ended = drove & (outcome != _RUNNING)
-        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
         if not ended.any():
+            self._observe(quantities)
             return
         for (game, player), reached in zip(np.argwhere(ended).tolist(), outcome[ended].tolist(), strict=True):
             if reached == _GOAL:
@@ -237,20 +237,19 @@ class Arena:
                 self.simulation.halt(game, player)
         self.state = self.state.copy()  # `quantities` refers to the old state
         self._stop(ended)
-        self._observe_again(quantities, np.flatnonzero(ended.any(1)))
-
-    def _observe_again(self, before: Quantities, games: IntArray) -> None:
-        """Observe games [N] in which players have stopped or were removed. Their positions are those of `before`."""
-        state = self.state.of(games)
+        # Positions are unchanged: only speeds are, and which players are present.
         after = Quantities(
             world=self.world,
-            state=state,
-            bodies=self._bodies(state, games),
-            advanced_m=before.advanced_m[games],
-            lateral_offset_m=before.lateral_offset_m[games],
+            state=self.state,
+            bodies=self._bodies(self.state),
+            advanced_m=quantities.advanced_m,
+            lateral_offset_m=quantities.lateral_offset_m,
         )
-        self._road_steering_rad = self._road_steering_rad.copy()  # `before` refers to the array
-        self.observation[games], self._road_steering_rad[games] = observe(after), after.road_steering_rad
+        self._observe(after)
+
+    def _observe(self, quantities: Quantities) -> None:
+        """Observe, and keep what the next decisions need: the steering that follows the road."""
+        self.observation, self._road_steering_rad = observe(quantities), quantities.road_steering_rad
 
     def _stop(self, ended: BoolArray) -> None:
         state = self.state

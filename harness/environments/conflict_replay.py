@@ -34,6 +34,7 @@ from harness.traffic.scene import OpenScene
 AFTERWARDS_S = 3.0
 """How long the ego must go on without a contact after the time of the recorded collision."""
 _GRID_S = 0.5
+_GAMES_AT_ONCE = 512  # bounds the memory: a campaign may have thousands of failures
 _NEVER = -1
 
 
@@ -143,14 +144,19 @@ class ConflictReplay:
 
     def _prevented(self, games: IntArray, steps: IntArray, driver: Callable[[], Driver]) -> BoolArray:
         """[N] whether a driver that takes over in collisions `games` [N] in `steps` [N] prevents them."""
-        if not len(games):
-            return np.zeros(0, dtype=bool)
+        prevented = np.zeros(len(games), dtype=bool)
+        for first in range(0, len(games), _GAMES_AT_ONCE):
+            part = slice(first, first + _GAMES_AT_ONCE)
+            prevented[part] = self._prevented_at_once(games[part], steps[part], driver())
+        return prevented
+
+    def _prevented_at_once(self, games: IntArray, steps: IntArray, driver: Driver) -> BoolArray:
         replays = [
             Replay(course=self._collisions[game].course, first_step=step, without_followers=True)
             for game, step in zip(games.tolist(), steps.tolist(), strict=True)
         ]
         people = len(self._scene.world.roles) - 1
-        arena = self._arena(replays, [driver(), *[SumoDriver()] * people])
+        arena = self._arena(replays, [driver, *[SumoDriver()] * people])
         starts = [self._start(game, replay) for game, replay in zip(games.tolist(), replays, strict=True)]
         arena.take_over(starts, replays)
         lengths = np.array([len(each.course.players) - 1 - each.first_step for each in replays])

@@ -7,6 +7,7 @@ are compatible with a failure rate of 31 %, and don't show that it is below 10 %
 | --- | --- | --- |
 | `failure_rate` | every arm of the judged ego against the persona, of any round | Clopper-Pearson |
 | `failure_rate_alone` | the arm of the judged ego without the non-ego | Clopper-Pearson |
+| `preventable_failure_rate` | the same arms: failures a reference driver prevents from the start | Clopper-Pearson |
 | `near_miss_rate` | the same arms as `failure_rate`, by the column `near_miss` | Clopper-Pearson |
 | `speed_loss_mps` | games of the judged and the naive ego with the same start against the persona | paired t |
 | `gap_share` | the best-response gap of the judged ego (`gaps.csv`) | paired t |
@@ -23,6 +24,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparison import games_by_arm, mean_interval, pairs_of, rate_interval
+from harness.evaluation.preventability import ANY
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
@@ -81,6 +83,8 @@ class Evidence:
     episodes: pd.DataFrame
     summary: pd.DataFrame
     gaps: pd.DataFrame | None = None
+    preventability: pd.DataFrame | None = None
+    """None: no failure was judged by reference drivers."""
 
     @cached_property
     def rows(self) -> Mapping[tuple[str, int], Mapping[Any, Any]]:
@@ -168,6 +172,20 @@ def _failure_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
         yield _rate(arm, subject.seed, evidence)
 
 
+def _preventable_failure_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
+    judged = [] if evidence.preventability is None else evidence.preventability.to_dict("records")
+    found = {(row["arm"], row["seed"]): row for row in judged if row["driver"] == ANY}
+    for arm in _arms_against(subject, evidence):
+        _, failure_rate, failure_limit, games = _rate(arm, subject.seed, evidence)
+        row = found.get((arm, subject.seed))
+        if row is not None:
+            yield arm, row["from_start_rate"], row["from_start_rate_high"], games
+        elif evidence.preventability is not None and failure_rate == 0.0:
+            yield arm, 0.0, failure_limit, games
+        else:
+            yield arm, np.nan, np.nan, 0
+
+
 def _near_miss_rate(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
     for arm in _arms_against(subject, evidence):
         games = evidence.games.get((arm, subject.seed))
@@ -229,6 +247,7 @@ def _gap_share(subject: Subject, evidence: Evidence) -> Iterator[Measured]:
 MEASURES: Mapping[str, Callable[[Subject, Evidence], Iterator[Measured]]] = {
     "failure_rate": _failure_rate,
     "failure_rate_alone": _failure_rate_alone,
+    "preventable_failure_rate": _preventable_failure_rate,
     "near_miss_rate": _near_miss_rate,
     "speed_loss_mps": _speed_loss,
     "gap_share": _gap_share,

@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparison import rate_interval
-from harness.evaluation.reference_columns import PREVENTABILITY_COLUMNS, REFERENCE_COLUMNS
+from harness.evaluation.reference_columns import PREVENTABILITY_COLUMNS
 
 ANY = "any"
 """The row of `preventability.csv` on the games that at least one person among the reference drivers prevents."""
@@ -110,11 +110,6 @@ def preventability_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> li
             )
         )
     return found
-
-
-def no_games() -> pd.DataFrame:
-    """A table of no judged games, with `REFERENCE_COLUMNS`."""
-    return pd.DataFrame(columns=list(REFERENCE_COLUMNS)).astype(REFERENCE_COLUMNS)
 
 
 def _played(episodes: pd.DataFrame, arm: str, seed: int) -> pd.DataFrame:

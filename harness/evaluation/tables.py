@@ -18,6 +18,7 @@ import numpy as np
 import pandas as pd
 
 from harness.errors import UsageError
+from harness.evaluation.causes.columns import CAUSE_COLUMNS
 from harness.evaluation.comparison import COMPARISON_COLUMNS
 from harness.evaluation.game_theory.columns import GAME_TABLES
 from harness.evaluation.people import columns_for, people_in
@@ -159,6 +160,7 @@ TABLES = {
     "episodes": EPISODE_COLUMNS,
     "played": PLAYED_COLUMNS,
     "severity": SEVERITY_TABLE,
+    "causes": CAUSE_COLUMNS,
     "summary": SUMMARY_COLUMNS,
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,

@@ -12,6 +12,7 @@ PASS, FAIL = "PASS", "FAIL"
 TITLES = {
     "failure_rate": "failures",
     "failure_rate_alone": "failures without the other driver",
+    "preventable_failure_rate": "preventable failures",
     "near_miss_rate": "near misses",
     "speed_loss_mps": "average speed lost",
     "gap_share": "best-response gap of the ego",

@@ -11,6 +11,7 @@ import base64
 import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -46,14 +47,17 @@ class Embedded:
         games: Iterable[RecordedGame],
         marks: Mapping[str, Sequence[Mapping[str, Any]]],
         budget_bytes: int,
+        crowds: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ) -> None:
         """`games`, those to watch first at the front, are embedded until the budget is used up; `marks` are the
-        manoeuvres to mark in each, by `key`."""
+        manoeuvres to mark in each, by `key`; `crowds` are the personas of each crowd, in the order of its people."""
         self.games: list[RecordedGame] = []
         self._texts: list[str] = []
         size = 0
         for game in games if scene is not None else ():
-            text = _json(_game(game, marks.get(key(game.arm, game.seed, game.episode), ())))
+            text = _json(
+                _game(game, marks.get(key(game.arm, game.seed, game.episode), ()), crowds.get(game.persona, ()))
+            )
             size += len(text)
             if size > budget_bytes:
                 break
@@ -100,7 +104,7 @@ def _points(line: FloatArray) -> list[list[float]]:
     return points
 
 
-def _game(game: RecordedGame, marks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+def _game(game: RecordedGame, marks: Sequence[Mapping[str, Any]], crowd: Sequence[str] = ()) -> dict[str, Any]:
     times = [player.time_to_collision_s for player in game.players if player.name == "ego"]
     measured = [float(values[np.isfinite(values)].min()) for values in times if np.isfinite(values).any()]
     return {
@@ -113,7 +117,8 @@ def _game(game: RecordedGame, marks: Sequence[Mapping[str, Any]]) -> dict[str, A
         "outcome": game.outcome,
         "leastTime": round(measured[0], 2) if measured else None,
         "players": [
-            _track(player) | {"outcome": player.outcome, "ended": player.ended_step} for player in game.players
+            _track(player) | {"outcome": player.outcome, "ended": player.ended_step} | _persona(player, crowd)
+            for player in game.players
         ],
         "background": [_track(vehicle) for vehicle in game.background],
         "touches": [[round(each.time_s, 3), round(each.x_m, 2), round(each.y_m, 2)] for each in game.touches],
@@ -125,6 +130,12 @@ def _game(game: RecordedGame, marks: Sequence[Mapping[str, Any]]) -> dict[str, A
 def _track(track: Track) -> dict[str, Any]:
     size = [round(track.length_m, 3), round(track.width_m, 3)]
     return {"name": track.name, "size": size, "first": track.first_step, "count": len(track.x_m)}
+
+
+def _persona(player: Track, crowd: Sequence[str]) -> dict[str, str]:
+    """The persona of one of the people of a crowd: `non_ego_2` has the second."""
+    place = player.name.rpartition("_")[2]
+    return {"persona": crowd[int(place) - 1]} if crowd and place.isdecimal() else {}
 
 
 def columns_of(game: RecordedGame) -> list[FloatArray]:

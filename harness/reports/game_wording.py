@@ -294,6 +294,6 @@ def heat_caption(quantity: str, *, is_rate: bool, is_mean: bool, unpaid: bool) -
     """The caption of a heat map; `is_mean`: over seeds, `unpaid`: a column has no payoff."""
     spread = "least to most of the seeds that played it"
     if not is_mean:
-        spread = f"95 % interval ({'Wilson' if is_rate else 't'})"
+        spread = f"95 % interval ({'Clopper-Pearson' if is_rate else 't'})"
     note = " SUMO’s own driver has no payoff." if unpaid else ""
     return f"{_HEAT_CAPTIONS[quantity]}{note} Below each mean: {spread}."

@@ -1,4 +1,5 @@
-"""What a persona's card says beside the failure rates: near misses, the worst known opponent, the price in speed.
+"""What a persona's card says beside the failure rates: why the ego fails, near misses, the worst known
+opponent, the price in speed.
 
 An ego without failures may still come too close in most games, or fail against the next opponent: the card says so.
 """
@@ -14,6 +15,8 @@ from harness.reports.numbers import NO_SPACE, SURE, interval, number, percent
 from harness.reports.results import Results
 from harness.reports.worst_opponent import worst_opponent
 
+PREVENTABLE = "Preventable"
+CAUSES = "Why the {ego} ego fails"
 NEAR_MISS = "near_miss"
 NEAR_MISSES = "Near misses"
 WORST_KNOWN_OPPONENT = "Against its worst known opponent"
@@ -33,7 +36,27 @@ class KeyFigure:
 
 def key_figures(persona: str, found: Results) -> list[KeyFigure]:
     """The lines of a persona's card, those that can be measured."""
-    return [*_near_misses(persona, found), *_worst_opponent(persona, found), *_price(persona, found)]
+    parts = (_causes, _preventable, _near_misses, _worst_opponent, _price)
+    return [figure for part in parts for figure in part(persona, found)]
+
+
+def _causes(persona: str, found: Results) -> Iterator[KeyFigure]:
+    for question, ego in (("RQ1", "naive"), ("RQ2", found.change.made)):
+        lines = found.causes(question, persona)
+        if lines:
+            yield KeyFigure(title=CAUSES.format(ego=ego), lines=lines)
+
+
+def _preventable(persona: str, found: Results) -> Iterator[KeyFigure]:
+    lines = []
+    for each in found.preventability.get(against_persona(NaiveEgo(), persona).name, ()):
+        if each.failures:
+            seed = f"Seed {each.seed}: " if len(found.seeds) > 1 else ""
+            count = f"{each.from_start.by_any} of {each.from_start.judged} failures of the naive ego"
+            rate = f"{percent(each.rate)} of its games, {SURE}: {interval(each.rate_low, each.rate_high)}"
+            lines.append(f"{seed}{count} by a reference driver in its seat ({rate})")
+    if lines:
+        yield KeyFigure(title=PREVENTABLE, lines=tuple(lines))
 
 
 def _near_misses(persona: str, found: Results) -> Iterator[KeyFigure]:

@@ -8,11 +8,9 @@ from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.manoeuvres import Manoeuvre, Pair, pairs_in
+from harness.evaluation.manoeuvres import NO_CAUSE, NO_REACTION, Manoeuvre, Pair, pairs_in
 from harness.reports.player_data import key
 
-NONE_NAMED = "–"
-"""Stands for no manoeuvre that has a name."""
 RUN_UP_S = 1.5
 """The player opens a game this long before the manoeuvre that led to the failure."""
 MOST_LISTED = 50
@@ -73,7 +71,7 @@ def failures_by_pair(manoeuvres: pd.DataFrame, episodes: pd.DataFrame) -> tuple[
             time_s=max(begin_s - RUN_UP_S, 0.0),
             text="; ".join(_text(each) for each in named if each.text),
         )
-        grouped.setdefault((_name(pair.non_ego), _name(pair.ego)), []).append(failure)
+        grouped.setdefault((_name(pair.non_ego, NO_CAUSE), _name(pair.ego, NO_REACTION)), []).append(failure)
     rows = [
         Failures(
             non_ego=non_ego,
@@ -83,7 +81,7 @@ def failures_by_pair(manoeuvres: pd.DataFrame, episodes: pd.DataFrame) -> tuple[
         )
         for (non_ego, ego), games in grouped.items()
     ]
-    unnamed = (NONE_NAMED, NONE_NAMED)
+    unnamed = (NO_CAUSE, NO_REACTION)
     rows.sort(key=lambda row: ((row.non_ego, row.ego) == unnamed, -len(row.games), row.non_ego, row.ego))
     return arms, rows
 
@@ -94,8 +92,8 @@ def _text(manoeuvre: Manoeuvre) -> str:
     return f"non-ego {place} {manoeuvre.text}" if place.isdecimal() else manoeuvre.text
 
 
-def _name(manoeuvre: Manoeuvre | None) -> str:
-    return words(manoeuvre.manoeuvre) if manoeuvre else NONE_NAMED
+def _name(manoeuvre: Manoeuvre | None, otherwise: str) -> str:
+    return words(manoeuvre.manoeuvre) if manoeuvre else otherwise
 
 
 def marks_of(manoeuvres: pd.DataFrame | None) -> Mapping[str, Sequence[Mapping[str, Any]]]:

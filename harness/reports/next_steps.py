@@ -18,6 +18,7 @@ FINISH = "Some stages are not done. The same command continues; finished stages 
 WATCH_REMAINING = "See how the {made} ego still fails against {persona}: its worst game."
 WATCH_NAIVE = "See how {persona} makes the naive ego fail: its worst game."
 RETRAIN_AGAINST_SEVERAL = "Retrain one ego against several personas: add this to the campaign, and run it again."
+MINIMISE = "Find the mildest start at which this game still fails, and keep it as a test."
 SET_BOUNDS = "State what this ego must achieve: add bounds to the campaign, and the command passes or fails."
 TIGHTEN = "Every bound is kept. Add a persona or a scene that this ego has not met."
 MOST_STEPS = 4
@@ -67,14 +68,15 @@ def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:
             command = f"harness replay . {shlex.quote(arm)} {game['episode']}"
             command += f" --seed {game['seed']}" if len(found.seeds) > 1 else ""
             yield NextStep(sentence=sentence.format(made=made, persona=persona), command=command)
+            yield NextStep(sentence=MINIMISE, command=command.replace("harness replay", "harness minimise", 1))
             return
 
 
 def _widen(personas: Sequence[str], found: Results, checks: Sequence[Check] | None) -> Iterator[NextStep]:
     if checks is None:
-        yield NextStep(sentence=SET_BOUNDS, command="[acceptance] failure_rate = 0.1")
+        yield NextStep(sentence=SET_BOUNDS, command="[acceptance]\nfailure_rate = 0.1")
     elif all(check.passed for check in checks):
         yield NextStep(sentence=TIGHTEN, command="harness persona new NAME")
     if len(personas) > 1 and any(found.asked("RQ2", persona) for persona in personas) and not found.is_reconfigured:
         against = ", ".join(f'"{persona}"' for persona in personas)
-        yield NextStep(sentence=RETRAIN_AGAINST_SEVERAL, command=f"[retraining] against = [{against}]")
+        yield NextStep(sentence=RETRAIN_AGAINST_SEVERAL, command=f"[retraining]\nagainst = [{against}]")

@@ -49,7 +49,7 @@ def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: Sc
     tables = tables.with_types()
     found, section = results(tables), game_section(tables.game)
     listed = tables.episodes if len(tables.episodes) <= MOST_ROWS else tables.episodes[:0]
-    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), _room_for_games(len(listed), section))
+    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), _room_for_games(len(listed), section), found.crowds)
     environment = environment_of("reports")
     page = environment.get_template("report.html.jinja").render(
         **_header(tables, found),
@@ -191,6 +191,6 @@ def _method(tables: RunTables, found: Results) -> dict[str, Any]:
         "significance": found.significance,
         "asked_alone": page_wording.asked_alone(tables.manifest),
         "rules": sorted({stage["rule"] for stage in tables.stages.values() if stage.get("rule")}),
-        "glossary": page_wording.glossary(list(dict.fromkeys(tables.summary["arm"])), tables.arms),
+        "glossary": page_wording.glossary(list(dict.fromkeys(tables.summary["arm"])), tables.arms, found),
         "versions": tables.manifest.get("versions", {}),
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import (
@@ -22,6 +22,9 @@ from harness.reports.differences import Row
 from harness.reports.numbers import MISSING, SURE, interval, number, percent, steps_text, trimmed
 from harness.reports.treatment import Change
 from harness.reports.wording import failures_of, played
+
+if TYPE_CHECKING:
+    from harness.reports.results import Results  # imports pandas, and resuming does without
 
 QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
 NOT_PLAYED = "not played"
@@ -228,31 +231,36 @@ def worst_game(episode: int, outcome: str, least_time_s: float, partner: str = "
     return f"game {episode}: {OUTCOMES.get(outcome, outcome)}{partner}{nearest}"
 
 
-def glossary(arms: Sequence[str], records: Mapping[str, Arm]) -> list[tuple[str, str]]:
+def glossary(arms: Sequence[str], records: Mapping[str, Arm], found: Results) -> list[tuple[str, str]]:
     """Each arm that is planned, and what it pairs."""
-    return [(name, arm_in_words(records[name])) for name in arms if name in records]
+    return [(name, arm_in_words(records[name], found)) for name in arms if name in records]
 
 
-def arm_in_words(arm: Arm) -> str:
+def arm_in_words(arm: Arm, found: Results) -> str:
     """What an arm pairs."""
+    several = "s" if found.people > 1 else ""
     if arm.best_response_of is not None:
         player = ("the ego", "the non-ego")[arm.best_response_of]
         return f"{arm.pair.name}, {player} replaced by its best response"
     match arm:
         case Arm(ego=None, non_ego=non_ego) if non_ego is not None:
-            return f"the non-ego {strategy_name(non_ego)} without the ego"
+            name = strategy_name(non_ego)
+            return f"{f'one {name} driver at a time' if several else f'the non-ego {name}'} without the ego"
         case Arm(ego=NaiveEgo(), non_ego=None):
-            return "the naive ego on the road without the non-ego"
+            return f"the naive ego on the road without the non-ego{several}"
         case Arm(ego=ego, non_ego=None) if ego is not None:
-            return f"{_ego_in_words(ego)}, without the non-ego"
+            return f"{_ego_in_words(ego)}, without the non-ego{several}"
         case Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()):
+            if several:
+                return "the naive ego with ordinary law-abiding SUMO drivers in the non-egos' places"
             return "the naive ego with an ordinary law-abiding SUMO driver in the non-ego's place"
         case Arm(ego=RetrainedEgo(against=against) | ReconfiguredEgo(against=against) as ego, non_ego=non_ego) if (
             non_ego is not None and against == strategy_name(non_ego)
         ):
-            return f"{_ego_in_words(ego)}, against the same {against}"
+            return f"{_ego_in_words(ego)}, against the same {found.who(against).removeprefix('the ') or against}"
         case Arm(ego=ego, non_ego=non_ego) if ego is not None and non_ego is not None:
-            return f"{_ego_in_words(ego)} against the non-ego {strategy_name(non_ego)}"
+            name = strategy_name(non_ego)
+            return f"{_ego_in_words(ego)} against {found.who(name) or f'the non-ego {name}'}"
     raise ValueError("an arm has at least one player")
 
 

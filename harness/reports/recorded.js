@@ -102,7 +102,7 @@ const OUTCOMES = { goal: "goal reached", rail: "rail contact", collision: "colli
 function nameOf(game, track) {
   if (track.name === "ego") return "ego";
   const place = track.name.match(/\d+$/)?.[0];  // among several people
-  return (game.persona || "non-ego") + (place ? ` ${place}` : "");
+  return (track.persona || game.persona || "non-ego") + (place ? ` ${place}` : "");
 }
 
 /** A game in words. */

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shlex
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import pandas as pd
 from harness.evaluation.people import COLLIDED_WITH, judged, judged_outcomes
 from harness.evaluation.worst_first import FAILURES, worst_first
 from harness.reports import page_wording
-from harness.reports.numbers import MISSING, number
+from harness.reports.numbers import MISSING, NO_SPACE, number
 from harness.reports.player_data import key
 
 
@@ -61,7 +62,7 @@ def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tu
     if game is None:
         return None
     (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
-    return _key(game), page_wording.worst_game(game["episode"], outcome, ttc, _with(game))
+    return _key(game), page_wording.worst_game(game["episode"], outcome, ttc, _with(game) + _impact(game))
 
 
 def most_severe(episodes: pd.DataFrame) -> Mapping[Any, Any]:
@@ -88,7 +89,7 @@ def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: C
     return Replay(
         name=name,
         game=f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
-        outcome=f"{_in_words(who)}: {outcome}{_with(game)}",
+        outcome=f"{_in_words(who)}: {outcome}{_with(game)}{_impact(game)}",
         min_ttc=number(game["ego_min_ttc_s"], 2),
         command=f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
         scene=_scene(name),
@@ -104,6 +105,15 @@ def _with(game: Mapping[Any, Any]) -> str:
     """What the ego collided with, where a table of several people has it."""
     other = game.get(COLLIDED_WITH, "")
     return f" with {_in_words(other) if other != 'background' else 'background traffic'}" if other else ""
+
+
+def _impact(game: Mapping[Any, Any]) -> str:
+    """How hard a contact of the ego was, and on which side; empty without one, and in a run of an earlier version."""
+    speed = game.get("closing_speed_mps", math.nan)
+    if speed != speed:
+        return ""
+    delta_v = number(game["ego_delta_v_mps"], 1)
+    return f", {game['impact_side']} side at {number(speed, 1)}{NO_SPACE}m/s (delta-v {delta_v}{NO_SPACE}m/s)"
 
 
 def _scene(name: str) -> str:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.evaluation.causes.sentences import cause_lines
 from harness.evaluation.people import people_in
 from harness.evaluation.preventability import Preventability, preventability_of
 from harness.evaluation.strategies import Arm, ReconfiguredEgo
@@ -47,6 +48,8 @@ class Results:
     """The arms of the campaign, by name."""
     by_driver: Sequence[Row]
     """Rows of `populations`: each arm against a population, by the persona that drove."""
+    failures: pd.DataFrame
+    """Rows of `causes`."""
 
     def of(self, arm: str) -> dict[int, Row]:
         """The arm's rows by seed, where there are games that could be played."""
@@ -74,11 +77,18 @@ class Results:
             arms=self.arms,
             significance=self.significance,
             change=self.change,
-            who=self._who(persona),
+            who=self.who(persona),
         )
 
-    def _who(self, persona: str) -> str:
-        """What the ego meets, if it is not one driver with a persona."""
+    def causes(self, question: str, persona: str) -> tuple[str, ...]:
+        """Why the ego failed against a persona in the arm that a question is about, a line for each kind of cause."""
+        if question not in ARMS:
+            return ()
+        _, treatment = ARMS[question](persona, self.change)
+        return tuple(cause_lines(self.failures[self.failures["arm"] == treatment]))
+
+    def who(self, persona: str) -> str:
+        """What the ego meets, if it is not one driver with a persona; else empty."""
         if persona in self.crowds:
             return f"the crowd {persona}"
         return f"the group of {self.people} {persona} drivers" if self.people > 1 else ""
@@ -109,6 +119,7 @@ def results(tables: RunTables) -> Results:
         persona_documents=manifest.get("persona_documents", {}),
         planned_arms=tables.arms,
         by_driver=tables.populations.to_dict("records"),
+        failures=tables.causes,
     )
 
 

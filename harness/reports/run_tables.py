@@ -35,6 +35,7 @@ class RunTables:
     reconfiguration: pd.DataFrame = field(default_factory=_empty("reconfiguration"))
     """Empty: the report has no section on searches."""
     populations: pd.DataFrame = field(default_factory=_empty("populations"))
+    causes: pd.DataFrame = field(default_factory=_empty("causes"))
     reference_drivers: pd.DataFrame = field(default_factory=_empty("reference_drivers"))
     preventability: pd.DataFrame = field(default_factory=_empty("preventability"))
     """Empty: no failure was judged by reference drivers."""
@@ -57,6 +58,7 @@ class RunTables:
             training=typed(self.training),
             reconfiguration=typed(self.reconfiguration),
             populations=typed(self.populations),
+            causes=typed(self.causes),
             reference_drivers=typed(self.reference_drivers),
             preventability=typed(self.preventability),
             manoeuvres=None if self.manoeuvres is None else typed(self.manoeuvres),

@@ -112,14 +112,14 @@ function unfold(element) {
 
 // A link to a folded part opens it.
 function unfoldAddressed(hash) {
-  const target = hash.length > 1 && document.getElementById(decodeURIComponent(hash.slice(1)));
+  const target = document.getElementById(hash.slice(1));
   if (!target) return;
   unfold(target);
   if (target.matches("details")) target.open = true;
 }
 document.addEventListener("click", event => {
   const link = event.target.closest('a[href^="#"]');
-  if (link && !link.hash.startsWith("#game=")) unfoldAddressed(link.hash);
+  if (link) unfoldAddressed(link.hash);
 });
 window.addEventListener("hashchange", () => unfoldAddressed(location.hash));
 unfoldAddressed(location.hash);

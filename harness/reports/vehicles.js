@@ -62,6 +62,12 @@ function box(context, length, width, round) {
   context.roundRect(-length / 2, -width / 2, length, width, round);
 }
 
+/** The outline of a person on foot. */
+function disc(context, length, width) {
+  context.beginPath();
+  context.ellipse(0, 0, length / 2, width / 2, 0, 0, 2 * Math.PI);
+}
+
 function drawBody(context, camera, track, pose, look) {
   const [length, width] = track.size, thin = 1 / camera.scale, fine = camera.scale > 5;
   context.save();
@@ -85,7 +91,9 @@ function drawBody(context, camera, track, pose, look) {
       context.restore();
     }
   }
-  box(context, length, width, Math.min(0.45, width / 4));
+  const onFoot = length < 1;
+  if (onFoot) disc(context, length, width);
+  else box(context, length, width, Math.min(0.45, width / 4));
   context.fillStyle = look.colour;
   context.fill();
   context.lineWidth = Math.max(0.07, thin);
@@ -94,7 +102,7 @@ function drawBody(context, camera, track, pose, look) {
   context.stroke();
   if (fine && length > 3 && !look.stands) drawGlass(context, length, width);
   if (!look.stands) drawHeading(context, length, width);
-  if (look.brakes) {
+  if (look.brakes && !onFoot) {
     context.fillStyle = "#ff2a1f";
     for (const side of [1, -1]) context.fillRect(-length / 2 - 0.05, side * width * 0.36 - 0.22, Math.max(0.24, 2 * thin), 0.44);
   }

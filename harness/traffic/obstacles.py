@@ -204,7 +204,7 @@ def with_types(routes: RouteFile, obstacles: Obstacles) -> RouteFile:
 
 def hiding_in(obstacles: Obstacles, routes: RouteFile, document: Scene) -> Hiding:
     """What hides road users in a scene. A vehicle type counts if a vehicle of the route file may have it."""
-    players = [routes.vehicles[each.vehicle] for each in document.players]
+    players = [routes.vehicles[name] for name in document.vehicles]
     departures = [*players, *background_departures(routes, {each.name for each in players})]
     tall = any(routes.types[each.vehicle_type].width_m >= TALL_WIDTH_M for each in departures)
     return Hiding(obstacles=obstacles.hides, walls=obstacles.walls, vehicles=tall)

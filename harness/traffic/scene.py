@@ -35,7 +35,7 @@ from harness.traffic.player import OpenPlayer, open_player
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.scene_files import NamedFiles, check_within, checked_net, checked_routes
-from harness.traffic.start_overlaps import check_starts
+from harness.traffic.start_overlaps import check_starts, start_warnings
 from harness.traffic.start_ranges import start_range
 from harness.traffic.trips import with_routes
 from harness.traffic.users_lanes import lanes_for
@@ -97,6 +97,17 @@ class OpenScene:
             snapshot = self.warm_up[generator.integers(len(self.warm_up))]
             density, on_road = snapshot.density, snapshot.vehicles
         return [*on_road, *self.routes.departures(players, end_s, generator, begin_s, density)]
+
+    @property
+    def usual_starts(self) -> StartDistribution:
+        """The distribution of initial states of attentive players, who all take part."""
+        players = len(self.places)
+        return self.start_distribution([HumanFactors()] * players, [1.0] * players)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is no mistake but makes games void: a sentence for each two players who may start in one another."""
+        return start_warnings(self.usual_starts, self.world)
 
     def start_distribution(
         self,

@@ -20,8 +20,7 @@ _DRAWS = 200
 def check_starts(file: Path, starts: StartDistribution, world: World) -> None:
     """Raise UsageError if cars of players overlap in each of many drawn starts of the scene document `file`."""
     found: Counter[tuple[int, int]] = Counter()
-    for draw in range(_DRAWS):
-        pairs = list(_overlapping(draw_initial_state(starts, "start check", draw), world))
+    for pairs in _pairs_of_draws(starts, world):
         if not pairs:
             return
         found.update(pairs)
@@ -29,6 +28,22 @@ def check_starts(file: Path, starts: StartDistribution, world: World) -> None:
     names = world.roles
     message = f"{names[first]} and {names[second]} overlap in {count} of {_DRAWS} drawn starts, and no draw is free"
     raise UsageError.of(file, names[second], message, "give it another lane, or a wider range on a longer one")
+
+
+def start_warnings(starts: StartDistribution, world: World) -> list[str]:
+    """A sentence for each two players whose cars overlap in some drawn starts: such a game ends in its first step."""
+    found = Counter(pair for pairs in _pairs_of_draws(starts, world) for pair in pairs)
+    return [
+        f"warning: {world.roles[first]} and {world.roles[second]} overlap in {count} of {_DRAWS} drawn starts, and "
+        "these games end with a collision in the first step: give them ranges that are apart"
+        for (first, second), count in sorted(found.items())
+    ]
+
+
+def _pairs_of_draws(starts: StartDistribution, world: World) -> Iterator[list[tuple[int, int]]]:
+    """The players that overlap in each of many drawn starts."""
+    for draw in range(_DRAWS):
+        yield list(_overlapping(draw_initial_state(starts, "start check", draw), world))
 
 
 def _overlapping(start: InitialState, world: World) -> Iterator[tuple[int, int]]:

@@ -228,10 +228,10 @@ def test_campaign__naive_and_reconfigured_are_compared_as_naive_and_retrained_ar
 @pytest.mark.slow
 def test_campaign__the_report_and_the_terminal_say_reconfigured(campaign: Path, run: Path) -> None:
     page = html.unescape((run / "report.html").read_text())
-    assert "Does reconfiguration reduce the failures?" in page
+    assert "Did reconfiguration fix it?" in page
     assert "reconfigured ego, against speedy" in page
     assert "0, 1 and 2: this ego is not trained, but its parameters are tuned" in page
-    assert f'<a href="policies/{STAGE}/driver.toml">' in page
+    assert f"<code>policies/{STAGE}/driver.toml</code> in the run folder" in page
     assert re.search(
         r"<th scope=\"row\">cruise.time_gap_s</th><td>1.5</td><td>[\d.]+</td><td>0.8</td><td>2.5</td>", page
     )

@@ -73,7 +73,9 @@ def test_campaign__a_crowd_has_the_policies_of_its_personas(run: Path) -> None:
 def test_campaign__report_and_replays_name_the_people(run: Path) -> None:
     page = (run / "report.html").read_text(encoding="utf-8")
     assert "the group of 3 speedy drivers" in page
-    assert "the crowd mixed" in page
+    assert "the naive ego against the crowd mixed" in page
+    assert "one speedy driver at a time without the ego" in page
+    assert "the non-ego mixed" not in page
     listed = harness("replay", run, "--list")
     assert listed.returncode == 0, listed.stderr
     assert re.search(r"ego +non-ego 1 +non-ego 2 +non-ego 3", listed.stdout)

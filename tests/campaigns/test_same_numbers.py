@@ -60,15 +60,14 @@ def test_numbers__one_worker_or_four_with_a_display_or_without_from_anywhere(tmp
     campaign = campaign_in(tmp_path / "here", *personas)
     (tmp_path / "cwd").mkdir()
     one = harness("campaign", campaign, "--out", tmp_path / "one", "--jobs", 1)
-    two = harness("campaign", campaign, "--out", "../two", "--jobs", 2, cwd=tmp_path / "cwd")
     code, shown = on_a_terminal("campaign", campaign, "--out", tmp_path / "four", "--jobs", 4)
-    assert (one.returncode, two.returncode, code) == (0, 0, 0), one.stderr + two.stderr + shown
+    assert (one.returncode, code) == (0, 0), one.stderr + shown
     assert "\x1b[" in shown  # it did draw bars
     assert "\x1b[" not in one.stdout
-    assert numbers(tmp_path / "one") == numbers(tmp_path / "two") == numbers(tmp_path / "four")
+    assert numbers(tmp_path / "one") == numbers(tmp_path / "four")
 
     other_order = campaign_in(tmp_path / "there", *reversed(personas))
-    done = harness("campaign", other_order, "--out", tmp_path / "reversed", "--jobs", 2)
+    done = harness("campaign", other_order, "--out", "../reversed", "--jobs", 2, cwd=tmp_path / "cwd")
     assert done.returncode == 0, done.stderr
     for name in (*TABLES, "training.csv"):
         tables = [read_csv(tmp_path / run / name) for run in ("one", "reversed")]

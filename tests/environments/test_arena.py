@@ -14,13 +14,10 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat, Step
-from harness.environments.nearby_bodies import nearby_bodies
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
-from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.payoff import Payoff
-from harness.game.quantities import Quantities
 from harness.game.state import Outcome
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene, open_scene
@@ -342,31 +339,6 @@ def test_drivers__have_the_observations_of_learners(merge: OpenScene, opened: Op
     for _ in range(30):
         driven.step(COAST)
     np.testing.assert_array_equal(np.concatenate(received), np.array(seen))
-
-
-@pytest.mark.parametrize("scene_name", ["tests/data/merge", "networks/left_across"])
-def test_end__of_players_is_observed_as_if_all_games_were_observed_anew(
-    scene_name: str, repository: Any, opened: Open
-) -> None:
-    scene, games = open_scene(repository / scene_name), 8
-    arena, generator, ends = opened(scene, games), np.random.default_rng(0), 0
-    arena.reset({game: drawn(scene, "end", game) for game in range(games)})
-    lengths_m, widths_m = (np.tile(each, (games, 1)) for each in (scene.world.length_m, scene.world.width_m))
-    for _ in range(150):
-        running = arena.state.running.copy()
-        step = arena.step(generator.normal((0.4, 0.0), (0.4, 0.2), (games, 2, 2)))
-        before, state = step.quantities, arena.state
-        bodies = nearby_bodies(state, arena.reading, slice(None), length_m=lengths_m, width_m=widths_m)
-        anew = Quantities(scene.world, state, bodies, before.advanced_m, before.lateral_offset_m)
-        np.testing.assert_array_equal(arena.observation, observe(anew))
-        steering_rad = scene.world.road.routes.along(
-            *(before.state.station_m, before.lateral_offset_m, before.state.speed_mps),
-            limit_share=before.state.limit_share,
-            wheelbase_m=scene.world.actuators.wheelbase_m,
-        ).road_steering_rad
-        np.testing.assert_array_equal(before.road_steering_rad, steering_rad)  # what a step returned does not change
-        ends += int((running & ~state.running).any(1).sum())
-    assert ends >= games
 
 
 @pytest.mark.parametrize("net", ["straight", "zipper"])

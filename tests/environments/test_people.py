@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -184,6 +185,17 @@ def test_scene__people_that_can_not_all_stand_on_one_lane_are_refused(tmp_path: 
         build_scene(tmp_path / "crowded", places=places)
     assert "scene.toml: non_ego_3: non_ego_2 and non_ego_3 overlap in 200 of 200 drawn starts" in str(refused.value)
     assert len(str(refused.value).splitlines()) == 1
+
+
+def test_scene__people_that_sometimes_start_in_one_another_are_a_warning(scene: OpenScene, tmp_path: Path) -> None:
+    assert scene.warnings == []
+    starts = {"non_ego_2": ("road", "road_0", "[60.0, 80.0]"), "non_ego_3": ("road", "road_0", "[70.0, 90.0]")}
+    places = THREE_PEOPLE | starts
+    (warning,) = build_scene(tmp_path / "narrow", places=places).warnings
+    counted = re.match(r"warning: non_ego_2 and non_ego_3 overlap in (\d+) of 200 drawn starts", warning)
+    assert counted
+    # b - a is spread as a triangle from -10 to 30 m; it is below a car's 4.6 m in 0.23 of the draws.
+    assert int(counted[1]) == pytest.approx(0.23 * 200, abs=20)
 
 
 def test_scene__a_mistake_in_a_start_names_the_person(scene: OpenScene, tmp_path: Path) -> None:

@@ -118,3 +118,23 @@ def test_judged_ego__is_that_of_the_last_round_that_was_played() -> None:
     assert judged_ego("last", "distracted", 1, played) == NaiveEgo()
     assert judged_ego("naive", "speedy", 1, played) == NaiveEgo()
     assert judged_ego("robust", "speedy", 1, played) == RobustEgo()
+
+
+def test_preventable_failure_rate__is_that_of_any_reference_driver_from_the_start() -> None:
+    run = evidence({RETRAINED_VS: hundred(7)})
+    row = {"arm": RETRAINED_VS.name, "seed": 1, "driver": "any", "from_start_rate": 0.02, "from_start_rate_high": 0.07}
+    judged = pd.DataFrame([row, row | {"driver": "rss", "from_start_rate": 0.01}])
+    run = Evidence(arms=run.arms, episodes=run.episodes, summary=run.summary, preventability=judged)
+    strict, lenient = (
+        judge({"preventable_failure_rate": bound}, "last", ["speedy"], [1], run)[0] for bound in (0.05, 0.08)
+    )
+    assert (strict.value, strict.limit, strict.games) == (0.02, 0.07, 100)
+    assert (strict.passed, lenient.passed) == (False, True)
+
+
+def test_preventable_failure_rate__without_failures_is_that_of_failures() -> None:
+    run = evidence({RETRAINED_VS: hundred(0)})
+    none = pd.DataFrame(columns=["arm", "seed", "driver"])
+    run = Evidence(arms=run.arms, episodes=run.episodes, summary=run.summary, preventability=none)
+    (check,) = judge({"preventable_failure_rate": 0.05}, "last", ["speedy"], [1], run)
+    assert (check.value, check.limit) == (0.0, pytest.approx(0.0362, abs=1e-4))

@@ -454,24 +454,24 @@ DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4
 @pytest.mark.parametrize(
     ("found", "expected"),
     [
-        ([], "- -> - -> rail"),
-        ([DRIFT], "drift -> - -> rail"),
-        ([SWERVE], "- -> swerve -> rail"),
+        ([], "nothing named -> no reaction -> rail"),
+        ([DRIFT], "drift -> no reaction -> rail"),
+        ([SWERVE], "nothing named -> swerve -> rail"),
         ([DRIFT, SWERVE], "drift -> swerve -> rail"),
         ([SWERVE, DRIFT], "drift -> swerve -> rail"),
         # begins after the ego's response: it is not the cause
         ([DRIFT, SWERVE, done("non_ego", "hard_brake", 4.8, 5.2)], "drift -> swerve -> rail"),
         # a new cause after the end of the response
-        ([DRIFT, SWERVE, done("non_ego", "cut_in", 6.6, 7.0)], "cut in -> - -> rail"),
+        ([DRIFT, SWERVE, done("non_ego", "cut_in", 6.6, 7.0)], "cut in -> no reaction -> rail"),
         # a response that had begun before the cause counts
         (
             [done("ego", "tailgate", 1.0, 8.0), done("non_ego", "hard_brake", 7.0, 8.0)],
             "hard brake -> tailgate -> rail",
         ),
-        ([done("ego", "tailgate", 1.0, 3.0), done("non_ego", "cut_in", 7.0, 8.0)], "cut in -> - -> rail"),
+        ([done("ego", "tailgate", 1.0, 3.0), done("non_ego", "cut_in", 7.0, 8.0)], "cut in -> no reaction -> rail"),
         ([DRIFT, SWERVE, done("ego", "hard_brake", 5.0, 5.5)], "drift -> hard brake -> rail"),
         # an old manoeuvre is not a cause
-        ([done("non_ego", "overtake", 0.0, 1.0), done("ego", "swerve", 6.5, 7.0)], "- -> swerve -> rail"),
+        ([done("non_ego", "overtake", 0.0, 1.0), done("ego", "swerve", 6.5, 7.0)], "nothing named -> swerve -> rail"),
     ],
 )
 def test_pair__cause_and_response(found: list[Manoeuvre], expected: str) -> None:
@@ -479,7 +479,7 @@ def test_pair__cause_and_response(found: list[Manoeuvre], expected: str) -> None
 
 
 def test_pair__nothing_after_the_end() -> None:
-    assert pair_of([DRIFT, SWERVE], ended_s=3.9).words == "drift -> -"
+    assert pair_of([DRIFT, SWERVE], ended_s=3.9).words == "drift -> no reaction"
 
 
 # --- the paper's figure 4, played -------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from harness.evaluation.preventability import ANY, count_prevented, no_games, preventability_of
+from harness.evaluation.preventability import ANY, count_prevented, preventability_of
 from harness.evaluation.reference_columns import PREVENTABILITY_COLUMNS, REFERENCE_COLUMNS
 from harness.evaluation.tables import TABLES, typed
 
@@ -90,4 +90,4 @@ def test_sentences__say_both_verdicts_apart(counts: dict[str, dict[str, Any]]) -
 
 
 def test_count__an_arm_without_failures_has_no_rows() -> None:
-    assert count_prevented(typed(no_games()), episodes([0, 0])).empty
+    assert count_prevented(GAMES.iloc[:0], episodes([0, 0])).empty

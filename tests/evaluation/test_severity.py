@@ -22,6 +22,7 @@ from harness.evaluation.worst_first import severities, worst_first
 from harness.game.geometry import Box
 from harness.reports.columns_page import columns_page
 from tests.support.repository import REPOSITORY
+from tests.support.traces import along, rows
 
 KINDS = {
     "car": Kind(),
@@ -30,26 +31,6 @@ KINDS = {
     "foot": Kind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian"),
 }
 QUARTER = 0.5 * math.pi
-
-
-def rows(player: str, poses: list[tuple[float, float, float, float]], kind: str = "car", end: str = "") -> list[dict]:
-    """A player's rows of a trace from its poses (x, y, heading, speed) in each step; `end`: its outcome in the last."""
-    cells = {"episode": 0, "vehicle_type": kind, "steering_rad": 0.0, "lapsed": False, "signals": "", "player": player}
-    result = []
-    for step, (x, y, heading, speed) in enumerate(poses):
-        before = poses[max(step - 1, 0)][3]
-        motion = {"x_m": x, "y_m": y, "heading_rad": heading, "speed_mps": speed}
-        acceleration = (speed - before) / 0.1
-        outcome = end if step == len(poses) - 1 else ""
-        row = {**cells, **motion, "step": step, "time_s": 0.1 * step, "acceleration_mps2": acceleration}
-        result.append({**row, "outcome": outcome})
-    return result
-
-
-def along(x: float, y: float, heading: float, speed: float, steps: int) -> list[tuple[float, float, float, float]]:
-    """Poses at constant velocity."""
-    move = 0.1 * speed
-    return [(x + k * move * math.cos(heading), y + k * move * math.sin(heading), heading, speed) for k in range(steps)]
 
 
 def severity(merge: Any, *players: list[dict]) -> dict[str, Any]:

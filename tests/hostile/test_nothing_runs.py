@@ -7,6 +7,7 @@ import os
 import pickle
 import subprocess
 from collections.abc import Iterator
+from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -176,6 +177,7 @@ class Shape(HTMLParser):
         self.text.append(data)
 
 
+@cache
 def page_of(names: tuple[str, ...]) -> str:
     """A report in which everything that a document or a run folder names is one of these texts."""
     arguments = campaign(personas=names[:2])

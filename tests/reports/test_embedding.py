@@ -3,6 +3,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,6 +72,15 @@ def test_embedded__games_are_read_only_until_the_page_is_full(games):
 
 def test_embedded__without_a_road_there_are_no_games(games):
     assert read(Embedded(None, games, {}, 10_000_000))["games"] == []
+
+
+def test_document__names_the_persona_of_each_of_a_crowd(games):
+    ego, person = games[0].players[:2]
+    people = [replace(person, name=f"non_ego_{place}") for place in (1, 2)]
+    game = replace(games[0], persona="rush", players=[ego, *people])
+    for crowds, expected in ({"rush": ["speedy", "anna"]}, [None, "speedy", "anna"]), ({}, [None, None, None]):
+        embedded = Embedded(SCENE, [game], {}, 10_000_000, crowds)
+        assert [player.get("persona") for player in read(embedded)["games"][0]["players"]] == expected
 
 
 def test_document__cannot_end_the_script(games):

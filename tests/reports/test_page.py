@@ -516,7 +516,7 @@ def test_manoeuvres__failures_without_a_manoeuvre_are_last(small):
     found = recordings(small)["manoeuvres"]
     page = Page(without_curves(small | recordings(small) | {"manoeuvres": found[found["episode"] > 2]}))
     last = [cell["text"] for cell in page.tables["pairs"][-1]]
-    assert last[:2] == ["–", "–"]
+    assert last[:2] == ["nothing named", "no reaction"]
     assert int(last[2]) > 0
 
 

@@ -306,6 +306,7 @@ def test_link__nonsense_is_harmless(opened, fragment):
 
 def test_link__the_rows_of_the_tables_open_their_games(opened):
     page = opened("")
+    page.locator("#manoeuvres > details > summary").click()
     page.locator("#pairs tbody a").first.click()
     page.locator(".pair[open] a").first.click()
     until(page, "() => location.hash.startsWith('#game=')")

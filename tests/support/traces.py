@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from typing import Any
+
 import pandas as pd
 
 
@@ -20,3 +24,37 @@ def drawn(**players: tuple[list[float], float, float, dict[int, str]]) -> pd.Dat
             cells |= {"x_m": x_m, "y_m": y_m, "heading_rad": 0.0, "speed_mps": speed_mps, "acceleration_mps2": 0.0}
             rows.append(cells | {"steering_rad": 0.0, "lapsed": False, "outcome": outcomes.get(step, "")})
     return pd.DataFrame(rows)
+
+
+Pose = tuple[float, float, float, float]
+"""x and y (m), heading (rad), speed (m/s)."""
+
+
+def rows(
+    player: str, poses: Sequence[Pose], kind: str = "car", end: str = "", lapsed: Sequence[int] = ()
+) -> list[dict[str, Any]]:
+    """A player's rows of a trace from its poses in each step; `end`: its outcome in the last; `lapsed`: steps of a
+    lapse of attention."""
+    cells = {"episode": 0, "vehicle_type": kind, "steering_rad": 0.0, "signals": "", "player": player}
+    result = []
+    for step, (x, y, heading, speed) in enumerate(poses):
+        before = poses[max(step - 1, 0)][3]
+        motion = {"x_m": x, "y_m": y, "heading_rad": heading, "speed_mps": speed}
+        acceleration = (speed - before) / 0.1
+        outcome = end if step == len(poses) - 1 else ""
+        row = {
+            **cells,
+            **motion,
+            "lapsed": step in lapsed,
+            "step": step,
+            "time_s": 0.1 * step,
+            "acceleration_mps2": acceleration,
+        }
+        result.append({**row, "outcome": outcome})
+    return result
+
+
+def along(x: float, y: float, heading: float, speed: float, steps: int) -> list[Pose]:
+    """Poses at constant velocity."""
+    move = 0.1 * speed
+    return [(x + k * move * math.cos(heading), y + k * move * math.sin(heading), heading, speed) for k in range(steps)]

@@ -15,7 +15,7 @@ from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 
 NETWORKS = REPOSITORY / "networks"
-WAY = "way = [[130.0, -5.5], [150.0, -5.5], [150.0, 6.0]]"
+WAY = "way = [[130.0, -7.6], [150.0, -7.6], [150.0, 6.0]]"
 
 
 @pytest.fixture(scope="module")
@@ -43,12 +43,12 @@ def problem(folder: Path) -> str:
 def test_way__is_the_walkers_route_up_to_its_end(crossing: OpenScene) -> None:
     world, routes = crossing.world, crossing.world.road.routes
     assert world.walks.tolist() == [False, True]
-    assert routes.goal_m[1] == pytest.approx(20.0 + 11.5)
+    assert routes.goal_m[1] == pytest.approx(20.0 + 13.6)
     row = routes.rows(np.array([[0.0, 10.0]]))[0, 1]
-    assert (routes.x_m[row], routes.y_m[row]) == pytest.approx((140.0, -5.5))
+    assert (routes.x_m[row], routes.y_m[row]) == pytest.approx((140.0, -7.6))
     assert routes.speed_limit_mps[row] == WALKING_MPS
-    # on the pavement, 2 m wide on either side, beside the carriageway: 5.5 + 7.5 m to the left, 2 m to the right
-    assert (routes.left_edge_m[row], routes.right_edge_m[row]) == pytest.approx((13.0, -2.0), abs=0.05)
+    # on the pavement: 7.6 + 8.5 m to the left edge of the other one, 0.9 m to the right edge
+    assert (routes.left_edge_m[row], routes.right_edge_m[row]) == pytest.approx((16.1, -0.9), abs=0.05)
 
 
 def test_carriageway__is_the_road_between_the_pavements(crossing: OpenScene) -> None:
@@ -63,12 +63,12 @@ def test_conflicts__are_where_the_way_crosses_the_lanes(crossing: OpenScene) -> 
     assert table.player.tolist() == [0, 1, 1]
     # the ego, 1.1 m of room on either side of its line at y = -1.75, and the walker, 0.5 m, at x = 150
     assert (table.begin_m[0], table.end_m[0]) == pytest.approx((149.5, 150.5))
-    assert (table.zone_m[0], table.length_m[0]) == pytest.approx((20.0 + 5.5 - 2.85, 2.2))
+    assert (table.zone_m[0], table.length_m[0]) == pytest.approx((20.0 + 7.6 - 2.85, 2.2))
     # the walker, lane by lane: y from -2.85 to -0.65, and from 0.65 to 2.85
-    assert table.begin_m[1:] == pytest.approx([22.65, 26.15])
+    assert table.begin_m[1:] == pytest.approx([24.75, 28.25])
     assert table.length_m[1:] == pytest.approx(1.0)
     # it waits 0.3 m before the lane's side at y = -3.5
-    assert table.stop_m[1] == pytest.approx(20.0 + 2.0 - 0.3)
+    assert table.stop_m[1] == pytest.approx(20.0 + 7.6 - 3.5 - 0.3)
     assert table.yields.tolist() == [False, True, True]  # where there is no marked crossing, the walker
 
 
@@ -94,7 +94,7 @@ def test_bicycle__rides_on_its_own_lane_and_the_turning_car_yields() -> None:
 @pytest.mark.parametrize(
     ("way", "words"),
     [
-        ("way = [[150.0, -9.0], [150.0, 6.0]]", ("leaves the surface", "[150.0, -9.0]", "pavements")),
+        ("way = [[150.0, -12.0], [150.0, 6.0]]", ("leaves the surface", "[150.0, -12.0]", "pavements")),
         ("way = [[150.0, -5.5], [150.0, 0.0]]", ("ends on the carriageway", "end it on a pavement")),
         ("way = [[150.0, -1.5], [250.0, -1.5]]", ("ends on the carriageway",)),  # along a lane, without a way off it
         ("way = [[150.0, 6.0], [150.0, 6.0]]", ("is 0.0 m long", "2 to 150 m")),

@@ -31,6 +31,7 @@ from harness.errors import UsageError
 from harness.evaluation.manoeuvres import pairs_in
 from harness.evaluation.minimising import minimise
 from harness.evaluation.tables import read_csv
+from harness.evaluation.worst_first import worst_first
 from harness.files import make_folder, write_atomically
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
@@ -74,15 +75,14 @@ class PinnedGames:
     def failures(self, arm: str | None = None) -> list[Failure]:
         """One failure for each kind of failure of each arm (of one arm, if named) and seed.
 
-        Failures are of one kind if they have the same outcome and the same pair of manoeuvres led to it. The one with
-        the shortest time to collision stands for them all.
+        Failures are of one kind if they have the same outcome and the same pair of manoeuvres led to it. The worst
+        stands for them all.
         """
         known = {(each.name, each.seed) for each in self._players.arms()}
         failed = self._failed()
         failed = failed[[(game.arm, game.seed) in known and arm in (None, game.arm) for game in failed.itertuples()]]
-        order = failed.sort_values(["arm", "seed", "ego_min_ttc_s", "episode"], kind="stable")
         kinds: dict[tuple[str, int, str, str], list[int]] = {}
-        for game in order.itertuples():
+        for game in worst_first(failed).itertuples():
             pair = self._pairs.get((game.arm, game.seed, game.episode))
             kind = (str(game.arm), int(game.seed), str(game.ego_outcome), pair.words if pair else "")
             kinds.setdefault(kind, []).append(int(game.episode))

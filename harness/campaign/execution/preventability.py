@@ -32,6 +32,8 @@ from harness.evaluation.trace_file import TraceReader
 from harness.files import make_folder
 from harness.game.state import EGO
 
+_COLLISIONS_AT_ONCE = 100  # what the ego sees in each of their steps is kept in memory
+
 
 @dataclass(frozen=True, kw_only=True)
 class JudgedArm:
@@ -98,13 +100,14 @@ def _from_conflict(
         failed_s[episode] = float(ended.min()) * step_s
         if (collision := collision_of(trace, scene, episode)) is not None:
             collisions.append(collision)
-    replay = ConflictReplay(scene, collisions, work.stage.seed)
-    chances = replay.chances()
-    cells = {
-        (collision.episode, name): _conflict_cells(takeover, chance, step_s)
-        for name, takeovers in replay.takeovers().items()
-        for collision, takeover, chance in zip(collisions, takeovers, chances, strict=True)
-    }
+    cells: dict[tuple[int, str], dict[str, Any]] = {}
+    for first in range(0, len(collisions), _COLLISIONS_AT_ONCE):
+        some = collisions[first : first + _COLLISIONS_AT_ONCE]
+        replay = ConflictReplay(scene, some, work.stage.seed)
+        chances = replay.chances()
+        for name, takeovers in replay.takeovers().items():
+            for collision, takeover, chance in zip(some, takeovers, chances, strict=True):
+                cells[collision.episode, name] = _conflict_cells(takeover, chance, step_s)
     return cells, failed_s
 
 

@@ -34,6 +34,7 @@ from harness.environments.rollout import Arm, parts_of
 from harness.errors import UsageError
 from harness.game.initial_state import draw_member
 from harness.game.state import EGO
+from harness.shipped_documents import is_name, shipped
 from harness.traffic.scene import OpenScene, open_scene
 
 
@@ -69,7 +70,7 @@ class RunPlayers:
             personas={name: Persona.from_record(each) for name, each in records.items()},
             ego_driver=driver,
             other_egos={},
-            policies=policies,
+            policies=policies or _shipped(document.policies),
             keys={},
         )
 
@@ -135,6 +136,12 @@ def seated_arm(scene: OpenScene, name: str, seed: int, ego: Seated, people: tupl
         personas=tuple(each.persona for each in seats),
         seed=seed,
     )
+
+
+def _shipped(written: str | None) -> Path | None:
+    """The shipped policies that a campaign names; None where it names a path: a manifest is not trusted with one."""
+    folder = shipped("policies") / written if written is not None and is_name(written) else None
+    return folder if folder is not None and folder.is_dir() else None
 
 
 def _chosen(stage: AssessmentStage) -> bool:

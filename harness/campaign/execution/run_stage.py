@@ -216,7 +216,7 @@ def _search(stage: SearchStage, run: StageRun) -> Made:
 def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     from harness.campaign.execution.arm_segments import join_segments, play_segments, segments_of
     from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES
-    from harness.campaign.storage.severity_table import SEVERITY, severity_table
+    from harness.campaign.storage.trace_tables import make_tables
 
     context, folder = run.context, run.folder
     if run.people > 1:
@@ -229,16 +229,14 @@ def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     work = folder.work(stage.id)
     files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
     join_segments(segments, *files)
-    (work / SEVERITY).unlink(missing_ok=True)  # of games that could not be played in an earlier run
-    severity_table(folder, stage.id, run.scene)
-    files.append(work / SEVERITY)
+    files += make_tables(folder, stage.id, run.scene)
     episodes = segments[-1].episodes.stop
     facts = {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}
     return facts | _goals_alone(stage, work / EPISODES), files
 
 
 def _judge(stage: PreventabilityStage, run: StageRun) -> Made:
-    from harness.campaign.execution.preventability import JudgedArm, judge_failures  # imports statistics
+    from harness.campaign.execution.preventability import JudgedArm, judge_failures
 
     seatless = replace(stage.of, ego=SumoDriven())  # the reference drivers have the ego's seat
     arm = _arm_of_several(seatless, run) if run.people > 1 else _arm_of_two(seatless, run)[0]

@@ -9,7 +9,7 @@ import pandas as pd
 
 from harness.campaign.storage.run_folder import JUDGED, RunFolder
 from harness.errors import UsageError
-from harness.evaluation.preventability import count_prevented, no_games
+from harness.evaluation.preventability import count_prevented
 from harness.evaluation.tables import read_csv, typed
 
 
@@ -24,7 +24,7 @@ def preventability_tables(
     if not judged:
         return {}
     frames = [_games_of(folder, name, done[name]) for name in judged]
-    games = typed(pd.concat([no_games(), *frames], ignore_index=True))
+    games = typed(pd.concat(frames, ignore_index=True))
     return {"reference_drivers": games, "preventability": count_prevented(games, episodes)}
 
 

@@ -41,6 +41,8 @@ class ShownVerdict(Document):
     tone: Line
     sentence: Line
     speed: Line
+    causes: tuple[Line, ...] = ()
+    """Why the ego of the question failed, a line for each kind of cause."""
 
 
 class ShownCheck(Document):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -23,7 +24,7 @@ from harness.evaluation.manoeuvres import pairs_in
 from harness.evaluation.people import people_in
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
-from harness.evaluation.worst_first import FAILURES, worst_first
+from harness.evaluation.worst_first import FAILURES, severities, worst_first
 from harness.replay import follow_in_sumo_gui, replay_name, write_film, write_replay
 from harness.traffic.scene import open_scene
 
@@ -52,7 +53,7 @@ def game_table(run: Path, chosen: GameList) -> Table:
     pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
     missing = "" if manoeuvres.is_file() else f"; to name the manoeuvres: harness report {run}"
     episodes = _chosen(run, episodes, chosen)
-    shown, left = _page(worst_first(episodes), chosen)
+    shown, left = _page(worst_first(episodes.assign(severity=severities(episodes))), chosen)
     more = f"{left}; " if left else ""
     table = Table(
         title=Text(f"Games of {run}, worst first"),
@@ -62,16 +63,17 @@ def game_table(run: Path, chosen: GameList) -> Table:
         padding=0,
     )
     players = ("ego", *people_in(episodes.columns))
-    for name in ("arm", "seed", "episode", *players, "manoeuvres", "TTC (s)"):
+    for name in ("arm", "seed", "episode", *players, "manoeuvres", "TTC (s)", "severity"):
         heading = name.replace("non_ego", "non-ego").replace("_", " ")
         table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *players))
     for game in shown.itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
+        severity = "" if math.isinf(game.severity) else f"{game.severity:.1f}"
         pair = pairs.get((game.arm, game.seed, game.episode))
         outcomes = [getattr(game, f"{name}_outcome") for name in players]
         words = (str(game.seed), str(game.episode), *outcomes, pair.words if pair else "")
         table.add_row(
-            *(Text(plain(cell)) for cell in (game.arm, *words, ttc))
+            *(Text(plain(cell)) for cell in (game.arm, *words, ttc, severity))
         )  # text without markup, whatever the table contains
     return table
 

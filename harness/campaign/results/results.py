@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +26,11 @@ from harness.campaign.storage.learned import did_not_learn, judged
 from harness.campaign.storage.manifest import FINISHED, is_tuned
 from harness.campaign.storage.manoeuvre_table import manoeuvres_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
-from harness.campaign.storage.severity_table import severity_table, with_severity
+from harness.campaign.storage.trace_tables import cause_table, severity_table, with_severity
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
 from harness.evaluation.acceptance import Evidence
+from harness.evaluation.causes.columns import CAUSE_COLUMNS
 from harness.evaluation.comparison import compare, games_by_arm
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import find
@@ -70,8 +71,9 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     played = _gather(folder, done, "assessment", "episodes.csv", list(PLAYED_COLUMNS))
     _check_traces(folder, played)
     scene = open_scene(folder.scene)
-    with console.status("working out how severe each game is"):
+    with console.status("working out how severe each game is, and why the ego failed"):
         episodes = with_severity(played, [severity_table(folder, name, scene) for name in _arms(done)])
+        causes = _joined([cause_table(folder, name, scene) for name in _arms(done)], CAUSE_COLUMNS)
     entries = judged(written["stages"], campaign, stages, _goals(stages, episodes))
     manifest = {**written, "stages": entries}
     training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
@@ -82,6 +84,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     asked = _questions(campaign, manifest)
     comparisons = compare(asked, episodes, manifest["campaign"]["assessment"]["significance"])
     tables = {"episodes": episodes, "training": training, "summary": summary, "comparisons": comparisons}
+    tables["causes"] = causes
     game = _game(campaign, manifest, episodes)
     tables |= game.tables if game is not None else {}
     prevented = preventability_tables(folder, done, episodes)
@@ -97,7 +100,8 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     write_csv(manoeuvres, folder.path / "manoeuvres.csv")
     replays = _write_replays(folder, scene, episodes, console)
     gaps = game.gaps if game is not None else None
-    evidence = Evidence(arms=arms, episodes=episodes, summary=summary, gaps=gaps)
+    judged_failures = prevented.get("preventability")
+    evidence = Evidence(arms=arms, episodes=episodes, summary=summary, gaps=gaps, preventability=judged_failures)
     checks = checks_of(campaign, manifest["personas"], evidence)
     report = RunTables(
         manifest=manifest,
@@ -109,6 +113,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         training=training,
         reconfiguration=reconfiguration,
         manoeuvres=manoeuvres,
+        causes=causes,
         game=game,
         replays=replays,
         populations=populations,
@@ -126,7 +131,9 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     verdicts = [(persona, found.verdicts(question, persona)) for persona in personas for question in ARMS]
     verdicts += gap_verdicts(game.gaps) if game is not None else []
     result = RunResult(
-        verdicts=tuple(_shown(persona, verdict) for persona, verdict in verdicts),
+        verdicts=tuple(
+            _shown(persona, verdict, found.causes(verdict.question, persona)) for persona, verdict in verdicts
+        ),
         failed_stages=failed,
         error_games=int((episodes["error"] != "").sum()),
         did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(entries).items()),
@@ -139,9 +146,9 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     return result
 
 
-def _shown(persona: str, verdict: Conclusion) -> ShownVerdict:
+def _shown(persona: str, verdict: Conclusion, causes: tuple[str, ...] = ()) -> ShownVerdict:
     told = {name: getattr(verdict, name) for name in ("question", "label", "tone", "sentence", "speed")}
-    return ShownVerdict(persona=persona, **told)
+    return ShownVerdict(persona=persona, causes=causes, **told)
 
 
 def _goals(stages: Iterable[Stage], episodes: pd.DataFrame) -> dict[str, Goals]:
@@ -216,8 +223,13 @@ def _check_traces(folder: RunFolder, episodes: pd.DataFrame) -> None:
 
 
 def _manoeuvres(folder: RunFolder, done: Mapping[str, Any], scene: OpenScene) -> pd.DataFrame:
-    frames = [manoeuvres_of(folder, name, scene) for name in _arms(done)]
-    return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
+    return _joined([manoeuvres_of(folder, name, scene) for name in _arms(done)], MANOEUVRE_COLUMNS)
+
+
+def _joined(frames: Sequence[pd.DataFrame], columns: Mapping[str, str]) -> pd.DataFrame:
+    """Tables of arms as one; without arms an empty one with these columns."""
+    filled = [frame for frame in frames if len(frame)]
+    return typed(pd.concat(filled, ignore_index=True) if filled else pd.DataFrame(columns=list(columns)))
 
 
 def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, console: Console) -> list[str]:

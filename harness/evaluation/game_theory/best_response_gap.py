@@ -14,15 +14,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-import scipy  # loads `scipy.stats` at its first use: workers do without
 
 from harness.evaluation.comparison import (
-    CONFIDENCE,
     games_by_arm,
     holm,
     mean_interval,
     paired_t_test,
     pairs_of,
+    rate_interval,
 )
 from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.columns import GAP_COLUMNS
@@ -86,14 +85,6 @@ def nothing_to_gain(found: pd.DataFrame) -> bool:
     return both_sides and all(GapVerdict(verdict) in NOTHING_TO_GAIN for verdict in found["verdict"])
 
 
-def wilson(failures: float, games: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a rate; NaN, NaN without games."""
-    if games == 0:
-        return np.nan, np.nan
-    interval = scipy.stats.binomtest(round(failures), games).proportion_ci(CONFIDENCE, method="wilson")
-    return float(interval.low), float(interval.high)
-
-
 def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, object]:
     columns = [PAYOFF[response.role], "ego_failed"]
     pair, best, left_out = pairs_of(games, response.seed, response.pair_arm, response.response_arm, columns)
@@ -118,7 +109,7 @@ def _row(response: Response, games: Mapping[Any, pd.DataFrame]) -> dict[str, obj
     if payoff != 0:
         row["gap_share"] = test["mean_difference"] / abs(payoff)
     for name, failed in (("ego_failure_rate", pair[:, 1]), ("ego_failure_rate_best_response", best[:, 1])):
-        low, high = wilson(failed.sum(), len(failed))
+        low, high = rate_interval(int(failed.sum()), len(failed))
         row |= {name: float(failed.mean()), f"{name}_low": low, f"{name}_high": high}
     differences = best[:, 1] - pair[:, 1]
     low, high = mean_interval(differences)

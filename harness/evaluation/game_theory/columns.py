@@ -20,7 +20,7 @@ GAP_COLUMNS = {
     "p_value": "float64",  # paired t-test, one-tailed: the gap is > 0
     "p_holm": "float64",  # over all gaps of the table
     "ego_failure_rate": "float64",  # of the ego in the pair
-    "ego_failure_rate_low": "float64",  # 95 % Wilson interval
+    "ego_failure_rate_low": "float64",  # 95 % Clopper-Pearson interval
     "ego_failure_rate_high": "float64",
     "ego_failure_rate_best_response": "float64",  # where role is non_ego: induced by a best-responding persona
     "ego_failure_rate_best_response_low": "float64",
@@ -42,7 +42,7 @@ CROSSPLAY_COLUMNS = {
     "games": "int64",  # played and measured
     "left_out": "int64",  # of the episodes of this seed: not played, not measured, or missing
     "failure_rate": "float64",
-    "failure_rate_low": "float64",  # 95 % Wilson interval
+    "failure_rate_low": "float64",  # 95 % Clopper-Pearson interval
     "failure_rate_high": "float64",
     "ego_payoff": "float64",
     "ego_payoff_low": "float64",  # 95 % t interval
@@ -81,7 +81,7 @@ GENERALISATION_COLUMNS = {
     "pairs": "int64",
     "pairs_left_out": "int64",
     "failure_rate": "float64",  # of this ego against this non-ego, over the pairs
-    "failure_rate_low": "float64",  # 95 % Wilson interval
+    "failure_rate_low": "float64",  # 95 % Clopper-Pearson interval
     "failure_rate_high": "float64",
     "naive_failure_rate": "float64",  # of the naive ego against the same non-ego, over the same episodes
     "share_of_naive": "float64",  # failure_rate / naive_failure_rate; empty where the naive ego never fails

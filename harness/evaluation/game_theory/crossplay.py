@@ -9,8 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from harness.evaluation.comparison import games_by_arm, mean_interval, measured_values
-from harness.evaluation.game_theory.best_response_gap import wilson
+from harness.evaluation.comparison import games_by_arm, mean_interval, measured_values, rate_interval
 from harness.evaluation.game_theory.columns import CROSSPLAY_COLUMNS
 from harness.evaluation.game_theory.records import Pairing
 
@@ -46,7 +45,7 @@ def crossplay(pairings: Iterable[Pairing], episodes: pd.DataFrame) -> pd.DataFra
 def _row(pairing: Pairing, values: pd.DataFrame, episodes: int) -> dict[str, object]:
     known = values[np.isfinite(values["ego_failed"])]
     failures, count = known["ego_failed"].sum(), len(known)
-    low, high = wilson(failures, count)
+    low, high = rate_interval(int(failures), count)
     row: dict[str, object] = {
         "seed": pairing.seed,
         "ego": pairing.ego,

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.evaluation.comparison import games_by_arm, holm, paired_t_test, pairs_of, verdict_of
+from harness.evaluation.comparison import games_by_arm, holm, paired_t_test, pairs_of, rate_interval, verdict_of
 from harness.evaluation.competence import gate
-from harness.evaluation.game_theory.best_response_gap import wilson
 from harness.evaluation.game_theory.columns import GENERALISATION_COLUMNS
 from harness.evaluation.game_theory.records import Pairing
 
@@ -68,7 +67,7 @@ def _row(
     }
     if not len(now):
         return row
-    low, high = wilson(now.sum(), len(now))
+    low, high = rate_interval(int(now.sum()), len(now))
     row |= {"failure_rate": now.mean(), "failure_rate_low": low, "failure_rate_high": high}
     row |= {"naive_failure_rate": was.mean()}
     if was.sum():

@@ -12,19 +12,22 @@ from harness.evaluation.manoeuvres.naming import Manoeuvre, manoeuvres_in
 from harness.evaluation.manoeuvres.thresholds import AFTERMATH_S, ANSWER_WITHIN_S
 from harness.game.state import EGO, ROLES
 
+NO_CAUSE, NO_REACTION = "nothing named", "no reaction"
+"""Stand for no named manoeuvre of the non-ego and of the ego."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Pair:
-    """A manoeuvre of the non-ego and the ego's response; None: no named manoeuvre."""
+    """A manoeuvre of the non-ego and the ego's response; None: none that has a name."""
 
     non_ego: Manoeuvre | None
     ego: Manoeuvre | None
 
     @property
     def words(self) -> str:
-        """E.g. "drift -> swerve"; "-" stands for no named manoeuvre."""
-        names = (each.manoeuvre.replace("_", " ") if each else "-" for each in (self.non_ego, self.ego))
-        return " -> ".join(names)
+        """E.g. "drift -> swerve"."""
+        cause, response = (each.manoeuvre.replace("_", " ") if each else "" for each in (self.non_ego, self.ego))
+        return f"{cause or NO_CAUSE} -> {response or NO_REACTION}"
 
 
 def pair_of(found: Sequence[Manoeuvre], ended_s: float = math.inf) -> Pair:

@@ -23,10 +23,10 @@ def rows(pairings, *arms):
 def test_crossplay__a_cell_is_the_rates_and_means_of_its_arm():
     (row,) = rows([NAIVE], arm("naive_vs_speedy", ego_failed=[1, 0, 0, 0], ego_payoff=[1, 2, 3, 4], speed=12.5))
     assert (row["games"], row["left_out"], row["failure_rate"]) == (4, 0, 0.25)
-    # Wilson's interval of 1 in 4 (Newcombe 1998's formula): 0.0456 to 0.6994
+    # Clopper-Pearson's interval of 1 in 4: 1 - 0.975 ** (1 / 4) = 0.0063, and p with 5 % / 2 below: 0.8059
     assert (row["failure_rate_low"], row["failure_rate_high"]) == (
-        pytest.approx(0.0456, abs=1e-4),
-        pytest.approx(0.6994, abs=1e-4),
+        pytest.approx(0.0063, abs=1e-4),
+        pytest.approx(0.8059, abs=1e-4),
     )
     # mean 2.5, standard error sqrt(5/3)/2, 97.5 % quantile of t with 3 degrees of freedom 3.182446
     half = 3.182446 * math.sqrt(5 / 3) / 2

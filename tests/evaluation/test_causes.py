@@ -1,0 +1,185 @@
+"""Causes of failures: a game drawn by hand for each rule.
+
+The road of the merge runs east, with lanes of 3.2 m centred on y = -1.6 (left) and -4.8 m; the mark between them is at
+-3.2 m. Cars are 5 m long and 1.8 m wide, so that a car's side touches the mark with its centre 0.9 m beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.storage.trace_tables import CAUSES, SEVERITY, cause_table, severity_table
+from harness.evaluation.causes.columns import CAUSE_COLUMNS, cells_of
+from harness.evaluation.causes.find import Cause, cause_of
+from harness.evaluation.causes.sentences import cause_lines
+from harness.evaluation.severity.measures import Kind
+from harness.evaluation.tables import read_csv, typed
+from harness.traffic.scene import open_scene
+from tests.support.tiny import sumo_run
+from tests.support.traces import Pose, along, rows
+
+KINDS = {"car": Kind(), "foot": Kind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian")}
+STEPS = 21
+NORTH = 1.5707963
+
+
+def cause(merge: Any, *players: list[dict[str, Any]]) -> Cause:
+    found = cause_of(pd.DataFrame([row for player in players for row in player]), merge.world, KINDS)
+    assert found is not None
+    return found
+
+
+def ego(
+    end: str = "collision", poses: Sequence[Pose] | None = None, lapsed: Sequence[int] = ()
+) -> list[dict[str, Any]]:
+    """The ego in the right lane at 10 m/s for 2 s."""
+    return rows("ego", poses or along(20.0, -4.8, 0.0, 10.0, STEPS), end=end, lapsed=lapsed)
+
+
+def sideways(x: float, from_y: float, to_y: float, speed: float = 8.0) -> list[Pose]:
+    """A car that moves across from step 5 to step 20 while it drives east."""
+    shares = [min(max((k - 5) / 15, 0.0), 1.0) for k in range(STEPS)]
+    return [(x + 0.1 * speed * k, from_y + (to_y - from_y) * share, 0.0, speed) for k, share in enumerate(shares)]
+
+
+def test_cut_in__begins_when_the_body_crosses_the_lane_mark(merge: Any) -> None:
+    # from y = -1.6 to -4.1 m in 15 steps: its right side, 0.9 m beside the centre, is at -3.2 m when the centre is at
+    # -2.3 m: 0.7 / 2.5 * 15 = 4.2 steps after step 5; the first step beyond it is step 10, 1.0 s before the end
+    found = cause(merge, ego(), rows("non_ego", sideways(25.0, -1.6, -4.1)))
+    assert (found.other, found.deed) == ("non_ego", "cuts in from the left")
+    assert (found.time_s, found.time_left_s) == (1.0, 1.0)
+    assert (found.ego_saw, found.reaction, found.braking_mps2) == (True, "no reaction", 0.0)
+
+
+def test_drift__is_a_body_that_crosses_the_mark_in_a_lapse(merge: Any) -> None:
+    found = cause(merge, ego(), rows("non_ego", sideways(25.0, -1.6, -4.1), lapsed=range(4, STEPS)))
+    assert found.deed == "drifts into the ego's lane from the left, inattentive"
+
+
+@pytest.mark.parametrize(
+    ("lapsed", "saw"), [(range(STEPS), False), (range(10, STEPS), False), (range(10, STEPS - 1), True), ((), True)]
+)
+def test_ego__saw_it_if_it_was_attentive_in_some_step(merge: Any, lapsed: Sequence[int], saw: bool) -> None:
+    found = cause(merge, ego(lapsed=lapsed), rows("non_ego", sideways(25.0, -1.6, -4.1)))
+    assert found.ego_saw is saw
+
+
+def test_reaction__braking_is_one(merge: Any) -> None:
+    speeds = [10.0] * 15 + [9.7, 9.4, 9.1, 8.8, 8.5, 8.2]
+    poses = [(20.0 + k, -4.8, 0.0, speed) for k, speed in enumerate(speeds)]
+    found = cause(merge, ego(poses=poses), rows("non_ego", sideways(25.0, -1.6, -4.1)))
+    assert (found.reaction, found.braking_mps2) == ("brakes", pytest.approx(3.0))
+
+
+def test_reaction__braking_earlier_is_none(merge: Any) -> None:
+    speeds = [14.0] * 3 + [12.0] + [10.0] * 31  # 20 m/s2 until 0.4 s; the mark is crossed at 2.4 s
+    poses = [(10.0 + k, -4.8, 0.0, speed) for k, speed in enumerate(speeds)]
+    other = [(14.0 + 0.8 * k, -1.6, 0.0, 8.0) for k in range(14)] + sideways(25.2, -1.6, -4.1)
+    assert cause(merge, ego(poses=poses), rows("non_ego", other)).reaction == "no reaction"
+
+
+def test_crossing__from_the_right_on_foot_and_by_car(merge: Any) -> None:
+    north = along(40.0, -9.8, NORTH, 2.0, STEPS)
+    assert cause(merge, ego(), rows("non_ego", north)).deed == "crosses the ego's way from the right"
+    assert cause(merge, ego(), rows("walker", north, "foot")).deed == (
+        "background traffic: walks into the ego's lane from the right"
+    )
+
+
+def test_oncoming__in_the_ego_s_lane(merge: Any) -> None:
+    found = cause(merge, ego(), rows("non_ego", along(65.0, -4.8, 2 * NORTH, 10.0, STEPS)))
+    # the centres are 45 m apart and close at 20 m/s: 40 m between the bumpers, so danger in all 2 s
+    assert (found.deed, found.time_left_s) == ("comes towards the ego in its lane", 2.0)
+
+
+def test_in_lane__ahead_and_behind(merge: Any) -> None:
+    ahead = rows("non_ego", along(41.0, -4.8, 0.0, 2.0, STEPS))
+    assert cause(merge, ego(), ahead).deed == "drives ahead of the ego"
+    braking = [(41.0 + 0.2 * k, -4.8, 0.0, 2.0 if k < 10 else 1.0) for k in range(STEPS)]
+    assert cause(merge, ego(), rows("non_ego", braking)).deed == "brakes ahead of the ego"
+    standing = rows("non_ego", along(44.0, -4.8, 0.0, 0.0, STEPS))
+    assert cause(merge, ego(), standing).deed == "stands in the ego's lane"
+    behind = rows("non_ego", along(-4.0, -4.8, 0.0, 20.0, STEPS))
+    assert cause(merge, ego(), behind).deed == "hits the ego from behind"
+
+
+def test_ego__that_changes_into_the_other_s_lane(merge: Any) -> None:
+    found = cause(merge, ego(poses=sideways(20.0, -1.6, -4.1)), rows("non_ego", along(22.0, -5.2, 0.0, 8.0, STEPS)))
+    assert found.deed == "the ego changes into its lane, to the right"
+
+
+def test_rail__with_and_without_a_road_user_near(merge: Any) -> None:
+    alone = cause(merge, ego("rail"))
+    assert (alone.other, alone.deed, alone.ego_saw) == ("", "the ego leaves the road with no road user near", None)
+    near = cause(merge, ego("rail"), rows("non_ego", along(41.0, -4.8, 0.0, 2.0, STEPS)))
+    assert (near.other, near.deed) == ("non_ego", "drives ahead of the ego")
+
+
+def test_goal__has_no_cause(merge: Any) -> None:
+    assert cause_of(pd.DataFrame(ego("goal")), merge.world, KINDS) is None
+    assert (
+        cause_of(pd.DataFrame(rows("non_ego", along(20.0, -4.8, 0.0, 9.0, 5), end="rail")), merge.world, KINDS) is None
+    )
+
+
+# --- sentences ----------------------------------------------------------------------------------------------------
+
+
+def table(*causes: dict[str, Any]) -> pd.DataFrame:
+    common = {"arm": "a", "persona": "p", "seed": 1, "ego_outcome": "collision", "other": "non_ego", "time_s": 1.0}
+    usual = {"deed": "cuts in from the left", "time_left_s": 0.4, "ego_saw": True, "reaction": "no reaction"}
+    rest = {"braking_mps2": 0.3, "ego_broke": ""}
+    games = [{**common, **usual, **rest, **each, "episode": k} for k, each in enumerate(causes)]
+    for game in games:
+        game["ego_saw"] = cells_of(Cause(**{name: game[name] for name in Cause.__dataclass_fields__}))["ego_saw"]
+    return typed(pd.DataFrame(games, columns=list(CAUSE_COLUMNS)))
+
+
+def test_lines__say_how_many_what_how_long_and_what_the_ego_did() -> None:
+    games = table({}, {"time_left_s": 0.9, "braking_mps2": 0.7}, {"deed": "brakes ahead of the ego", "ego_saw": False})
+    assert cause_lines(games) == [
+        "2 of 3: cuts in from the left, 0.4 to 0.9 s before contact; the ego sees it, no reaction "
+        "(braking up to 0.7 m/s²)",
+        "1 of 3: brakes ahead of the ego, 0.4 s before contact; the ego is inattentive, no reaction "
+        "(braking up to 0.3 m/s²)",
+    ]
+
+
+def test_lines__count_several_reactions_and_name_a_rule_that_the_ego_broke() -> None:
+    games = table({}, {}, {"reaction": "brakes", "braking_mps2": 5.0, "ego_saw": False})
+    assert cause_lines(games.assign(ego_broke="runs a red light")) == [
+        "3 of 3: cuts in from the left, 0.4 s before contact; the ego runs a red light; the ego sees it in 2: "
+        "no reaction in 2, brakes in 1 (braking up to 5.0 m/s²)"
+    ]
+
+
+def test_lines__of_many_kinds_the_rest_is_counted() -> None:
+    games = table({}, *({"deed": f"deed {k}"} for k in range(4)), {})
+    lines = cause_lines(games, most=2)
+    assert [line.split(":")[0] for line in lines] == ["2 of 6", "1 of 6", "3 of 6"]
+    assert lines[-1] == "3 of 6: other causes"
+    assert cause_lines(table()) == []
+
+
+# --- tables of an arm -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_tables__of_an_earlier_version_are_made_from_the_traces_again() -> None:
+    folder = RunFolder(sumo_run())
+    scene = open_scene(folder.scene)
+    for stage in sorted(file.stem for file in (folder.path / "traces").glob("*.parquet"))[:2]:
+        for name, make in ((SEVERITY, severity_table), (CAUSES, cause_table)):
+            file = folder.work(stage) / name
+            written = file.read_bytes()
+            file.unlink()
+            make(folder, stage, scene)
+            assert file.read_bytes() == written
+            file.write_text("damaged")
+            assert len(make(folder, stage, scene)) == len(read_csv(file))
+            assert file.read_bytes() == written
