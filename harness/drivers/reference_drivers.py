@@ -21,6 +21,7 @@ import numpy as np
 
 from harness.config.rule_driver import CarefulAndCompetent, Cruise, FuzzySafety, Rss, Rules
 from harness.drivers.car import Car
+from harness.drivers.perception import perceive
 from harness.drivers.protocol import Driver
 from harness.drivers.rules import RulesDriver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
@@ -89,7 +90,7 @@ class StrongestBraking:
     takes_over = True
 
     def __init__(self, rules: Sequence[RulesDriver], car: Car) -> None:
-        self._rules, self._cruising = rules, RulesDriver(_cruising(), car)
+        self._rules, self._car, self._cruising = rules, car, RulesDriver(_cruising(), car)
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N]: the cruise control requests no acceleration."""
@@ -97,7 +98,8 @@ class StrongestBraking:
 
     def sees_danger(self, observation: FloatArray) -> BoolArray:
         """[N] whether one of the rules says danger."""
-        return np.logical_or.reduce([each.sees_danger(observation) for each in self._rules])
+        perceived = perceive(self._car, observation)
+        return np.logical_or.reduce([each.is_danger(*perceived) for each in self._rules])
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """Actions [N, 2] from observations [N, SIZE]."""

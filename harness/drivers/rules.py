@@ -73,10 +73,14 @@ class RulesDriver:
 
     def sees_danger(self, observation: FloatArray) -> BoolArray:
         """[N] whether the rules say danger for observations [N, SIZE], with no reaction under way."""
+        return self.is_danger(*perceive(self._car, observation))
+
+    def is_danger(self, motion: OwnMotion, encounters: Encounters) -> BoolArray:
+        """[N] whether the rules say danger for what is perceived in N games, with no reaction under way."""
+        count = len(motion.speed_mps)
         if self._reaction is None:
-            return np.zeros(len(observation), dtype=bool)
-        motion, encounters = perceive(self._car, observation)
-        nothing = ReactionState(*np.zeros((3, len(observation))))
+            return np.zeros(count, dtype=bool)
+        nothing = ReactionState(*np.zeros((3, count)))
         return np.any(self._dangers(motion, encounters, nothing)[0], axis=1)
 
     def _react(

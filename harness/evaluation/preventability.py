@@ -143,6 +143,11 @@ def _sentences(found: Preventability) -> Iterator[str]:
     if start.judged:
         count, who = _of(start.by_any, start.judged), _by_driver(start.by_driver)
         yield f"A reference driver in its place from the start prevents {count} failures ({who})."
+        low, high = 100.0 * found.rate_low, 100.0 * found.rate_high
+        yield (
+            f"Preventable failure rate: {100.0 * found.rate:.1f} % of {found.episodes} games "
+            f"(95 %: {low:.1f}–{high:.1f} %)."
+        )
     if conflict.judged:
         count, who = _of(conflict.by_any, conflict.judged), _by_driver(conflict.by_driver)
         bound = f"full braking in the first moment of danger {conflict.by_upper_bound}"

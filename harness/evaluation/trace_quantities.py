@@ -49,6 +49,18 @@ def sizes_by_name(trace: pd.DataFrame, types_m: Mapping[str, tuple[float, float]
     }
 
 
+def obstacle_names(world: World) -> list[str]:
+    """The names of the obstacles in traces, in the order of the scene."""
+    return [f"obstacle_{number}" for number in range(1, len(world.hiding.obstacles) + 1)]
+
+
+def body_names(trace: pd.DataFrame, world: World) -> list[str]:
+    """The names of the bodies of `quantities_of`, in their order: players, other road users, obstacles."""
+    obstacles = obstacle_names(world)
+    others = set(trace["player"]) - {*world.roles, *obstacles}
+    return [*world.roles, *sorted(others), *obstacles]
+
+
 def quantities_of(
     trace: pd.DataFrame,
     world: World,
@@ -60,7 +72,7 @@ def quantities_of(
     crossing may be located on the other branch.
     """
     roles = world.roles
-    names = [*roles, *sorted(set(trace["player"]) - set(roles))]
+    names = body_names(trace, world)
     players, places = len(roles), _places(trace, names)
     present = _filled(places, np.ones(len(trace), dtype=bool))
     motion = {name: _filled(places, trace[name].to_numpy()) for name in _MOTION}

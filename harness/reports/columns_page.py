@@ -22,6 +22,11 @@ The measures are computed from oriented boxes at any angle, not along lanes. `py
 compares them with cases computed by hand. Masses are those of SUMO's vehicle classes
 (`harness/evaluation/severity/masses.py`); thresholds are in `harness/evaluation/severity/thresholds.py`. In a bend, a
 course of constant heading leaves the lane: TTC is that of a car that does not steer.
+
+`python -m benchmarks.criticality` compares them with commonroad-crime 0.4.5, whose measures follow lanes; the script
+says how. Of 511 moments in 50 games of `naive_vs_speedy`, training seed 1, commonroad-crime has a TTC at 4, all above a
+minute, and the boxes at 22, at no moment both: a measure along lanes does not see a car that comes from the side. Both
+have a time headway at 118 moments; the values differ by at most 0.10 s, to which commonroad-crime rounds.
 """
 
 

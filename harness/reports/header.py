@@ -24,14 +24,15 @@ def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> l
         ("Players", "trained before" if campaign.get("policies") else ""),
         ("Training budget", f"{steps_text(training['steps'])} steps" if "steps" in training else ""),
         ("Significance", f"{assessment['significance']:g}" if "significance" in assessment else ""),
-        ("Command", command_of(manifest)),
-        ("Harness", str(manifest.get("versions", {}).get("harness", ""))),
-        (
-            "Finished",
-            max((str(each.get("finished_on") or "") for each in manifest.get("stages", {}).values()), default=""),
-        ),
     ]
     return [(label, value) for label, value in found if value]
+
+
+def made_by(manifest: Mapping[str, Any]) -> list[str]:
+    """How the run was made: the version of the harness and the date of the last stage, where they are known."""
+    version = manifest.get("versions", {}).get("harness")
+    dates = [each["finished_on"] for each in manifest.get("stages", {}).values() if each.get("finished_on")]
+    return [*([f"harness {version}"] if version else []), *([f"finished on {max(dates)}"] if dates else [])]
 
 
 def command_of(manifest: Mapping[str, Any]) -> str:

@@ -17,7 +17,7 @@ from harness.reports.data_table import Table, table
 from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
 from harness.reports.game import GameSection, game_section
-from harness.reports.header import command_of, facts
+from harness.reports.header import command_of, facts, made_by
 from harness.reports.learning import learning
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
 from harness.reports.next_steps import next_steps
@@ -78,6 +78,7 @@ def _header(tables: RunTables, found: Results) -> dict[str, Any]:
     manifest = tables.manifest
     return {
         "command": command_of(manifest),
+        "made_by": made_by(manifest),
         "name": manifest.get("name", "campaign"),
         "facts": facts(manifest, found.seeds, len(tables.personas)),
         "quick": page_wording.QUICK if manifest.get("quick") else "",

@@ -9,7 +9,7 @@ from typing import Any
 
 from harness.evaluation.run_comparison import Difference, Side
 from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
-from harness.reports.header import facts
+from harness.reports.header import command_of, facts, made_by
 from harness.reports.numbers import NO_SPACE, interval, number, p_number, percent
 from harness.reports.page_template import environment_of
 
@@ -45,6 +45,16 @@ class ComparedRun:
     def facts(self) -> list[tuple[str, str]]:
         """What was run, as label and value."""
         return facts(self.manifest, (), len(self.manifest.get("personas", ())))
+
+    @property
+    def command(self) -> str:
+        """The command that makes the run."""
+        return command_of(self.manifest)
+
+    @property
+    def made_by(self) -> list[str]:
+        """The version of the harness and the date, where they are known."""
+        return made_by(self.manifest)
 
 
 def compared_rows(differences: Sequence[Difference], significance: float) -> list[ComparedRow]:

@@ -47,12 +47,12 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def obstacles_of(run: Path, arm: str, episode: int) -> pd.DataFrame:
-    trace = read_trace(run / "traces" / f"{arm}-1.parquet", episode)
+    trace = read_trace(run / "traces" / f"{arm}-seed1.parquet", episode)
     return trace[trace["player"].str.startswith("obstacle_")]
 
 
 def test_trace__has_the_obstacles_in_every_step(run: Path) -> None:
-    trace = read_trace(run / "traces" / "naive_alone-1.parquet", 0)
+    trace = read_trace(run / "traces" / "naive_alone-seed1.parquet", 0)
     steps = trace["step"].nunique()
     found = obstacles_of(run, "naive_alone", 0)
     assert found.groupby("player").size().to_dict() == {"obstacle_1": steps, "obstacle_2": steps}

@@ -6,7 +6,9 @@ The road of the merge runs east, with lanes of 3.2 m centred on y = -1.6 (left) 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
@@ -19,11 +21,16 @@ from harness.evaluation.causes.find import Cause, cause_of
 from harness.evaluation.causes.sentences import cause_lines
 from harness.evaluation.severity.measures import Kind
 from harness.evaluation.tables import read_csv, typed
+from harness.game.sight import Hiding
 from harness.traffic.scene import open_scene
 from tests.support.tiny import sumo_run
 from tests.support.traces import Pose, along, rows
 
-KINDS = {"car": Kind(), "foot": Kind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian")}
+KINDS = {
+    "car": Kind(),
+    "van": Kind(length_m=6.5, width_m=2.2, vehicle_class="delivery"),
+    "foot": Kind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian"),
+}
 STEPS = 21
 NORTH = 1.5707963
 
@@ -91,6 +98,17 @@ def test_crossing__from_the_right_on_foot_and_by_car(merge: Any) -> None:
     )
 
 
+def test_hidden__behind_a_van_until_it_is_past_it(merge: Any) -> None:
+    # a standing van, 2.2 m wide, on the left lane, hides a walker that comes from behind it at 2 m/s
+    van = rows("van", along(36.0, -2.4, 0.0, 0.0, STEPS), "van")
+    walker = rows("non_ego", along(40.2, -1.6, -NORTH, 2.0, STEPS), "foot")
+    world = replace(merge.world, hiding=Hiding(vehicles=True))
+    found = cause_of(pd.DataFrame([*ego(), *van, *walker]), world, KINDS)
+    assert found is not None
+    assert found.ego_saw is True
+    assert 0.0 < found.hidden_until_s < found.time_left_s
+
+
 def test_oncoming__in_the_ego_s_lane(merge: Any) -> None:
     found = cause(merge, ego(), rows("non_ego", along(65.0, -4.8, 2 * NORTH, 10.0, STEPS)))
     # the centres are 45 m apart and close at 20 m/s: 40 m between the bumpers, so danger in all 2 s
@@ -133,7 +151,7 @@ def test_goal__has_no_cause(merge: Any) -> None:
 def table(*causes: dict[str, Any]) -> pd.DataFrame:
     common = {"arm": "a", "persona": "p", "seed": 1, "ego_outcome": "collision", "other": "non_ego", "time_s": 1.0}
     usual = {"deed": "cuts in from the left", "time_left_s": 0.4, "ego_saw": True, "reaction": "no reaction"}
-    rest = {"braking_mps2": 0.3, "ego_broke": ""}
+    rest = {"braking_mps2": 0.3, "ego_broke": "", "hidden_until_s": math.nan}
     games = [{**common, **usual, **rest, **each, "episode": k} for k, each in enumerate(causes)]
     for game in games:
         game["ego_saw"] = cells_of(Cause(**{name: game[name] for name in Cause.__dataclass_fields__}))["ego_saw"]
@@ -145,7 +163,7 @@ def test_lines__say_how_many_what_how_long_and_what_the_ego_did() -> None:
     assert cause_lines(games) == [
         "2 of 3: cuts in from the left, 0.4 to 0.9 s before contact; the ego sees it, no reaction "
         "(braking up to 0.7 m/s²)",
-        "1 of 3: brakes ahead of the ego, 0.4 s before contact; the ego is inattentive, no reaction "
+        "1 of 3: brakes ahead of the ego, 0.4 s before contact; the ego does not see it, no reaction "
         "(braking up to 0.3 m/s²)",
     ]
 
@@ -155,6 +173,14 @@ def test_lines__count_several_reactions_and_name_a_rule_that_the_ego_broke() -> 
     assert cause_lines(games.assign(ego_broke="runs a red light")) == [
         "3 of 3: cuts in from the left, 0.4 s before contact; the ego runs a red light; the ego sees it in 2: "
         "no reaction in 2, brakes in 1 (braking up to 5.0 m/s²)"
+    ]
+
+
+def test_lines__say_until_when_the_other_was_hidden() -> None:
+    games = table({"hidden_until_s": 0.8}, {"hidden_until_s": 0.6}, {})
+    assert cause_lines(games) == [
+        "3 of 3: cuts in from the left, 0.4 s before contact; hidden from the ego until 0.6 to 0.8 s before (in 2); "
+        "the ego sees it, no reaction (braking up to 0.3 m/s²)"
     ]
 
 

@@ -81,6 +81,7 @@ def test_sentences__say_both_verdicts_apart(counts: dict[str, dict[str, Any]]) -
     (found,) = preventability_of(table, GAMES, "naive_vs_speedy")
     assert found.sentences == [
         "A reference driver in its place from the start prevents 2 of 3 failures (fuzzy safety model 2, RSS 1).",
+        "Preventable failure rate: 20.0 % of 10 games (95 %: 2.5–55.6 %).",
         "Taking over when the danger shows, it prevents 1 of 2 collisions (fuzzy safety model 0, RSS 1; full braking "
         "in the first moment of danger 2).",
         "Full braking prevents the collision until 0.8 s before it (median).",

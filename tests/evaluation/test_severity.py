@@ -6,6 +6,7 @@ The road of the merge runs east; its lanes are centred on y = -4.8 and -1.6 m. C
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from harness.evaluation.severity.measures import Kind, severity_of, side_of
 from harness.evaluation.tables import EPISODE_COLUMNS, TABLES, typed
 from harness.evaluation.worst_first import severities, worst_first
 from harness.game.geometry import Box
+from harness.game.sight import Hiding
 from harness.reports.columns_page import columns_page
 from tests.support.repository import REPOSITORY
 from tests.support.traces import along, rows
@@ -65,6 +67,14 @@ def test_contact__a_pedestrian_decides_how_severe_it_is(merge: Any) -> None:
     cells = severity(merge, ego, rows("walker", along(24.5, -1.6, QUARTER, 0.0, 3), kind="foot"))
     assert cells["other_delta_v_mps"] == pytest.approx(9.554, abs=1e-3)
     assert cells["severity"] == pytest.approx(309.554, abs=1e-3)
+
+
+def test_contact__an_obstacle_does_not_move(merge: Any) -> None:
+    ego = rows("ego", along(20.0, -1.6, 0.0, 10.0, 3), end="collision")
+    trace = pd.DataFrame([*ego, *rows("obstacle_1", along(26.5, -1.6, 0.0, 0.0, 3))])
+    world = replace(merge.world, hiding=Hiding(obstacles=np.array([False])))
+    cells = severity_of(trace, world, KINDS)
+    assert (cells["ego_delta_v_mps"], cells["other_delta_v_mps"]) == (pytest.approx(10.0), 0.0)
 
 
 def test_contact__a_crossing_car_adds_its_velocity_at_right_angles(merge: Any) -> None:

@@ -79,7 +79,8 @@ def test_report__a_person_that_cannot_drive_is_on_the_first_screen(width, opened
     assert page.get_by_text("RQ1: not answered: the person can't drive this scene").is_visible()
     banner.get_by_role("link", name="learning curves").click()
     assert page.evaluate("location.hash") == "#learning"
-    assert page.get_by_text("did not learn: goal in 0 of 60 games alone").last.is_visible()
+    learning = page.locator("#learning")
+    assert learning.get_by_text("did not learn: goal in 0 of 60 games alone").last.is_visible()
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 

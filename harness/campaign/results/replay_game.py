@@ -103,7 +103,10 @@ def _page(games: pd.DataFrame, chosen: GameList) -> tuple[pd.DataFrame, str]:
     first = (chosen.page - 1) * chosen.rows
     shown = games.iloc[first : first + chosen.rows]
     pages = -(-len(games) // chosen.rows)
-    return shown, f"page {chosen.page} of {pages}, {len(games):,} games: --page, --rows, --outcome, ARM"
+    return (
+        shown,
+        f"page {chosen.page} of {pages}, {len(games):,} games; --page, --rows, --outcome and ARM choose others",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -18,6 +18,7 @@ CAUSE_COLUMNS = {
     "time_s": "float64",
     "time_left_s": "float64",
     "ego_saw": "object",
+    "hidden_until_s": "float64",
     "reaction": "object",
     "braking_mps2": "float64",
     "ego_broke": "object",

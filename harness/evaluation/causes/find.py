@@ -9,7 +9,7 @@ The rules, in order:
    body that was in the ego's lane before brakes, stands or drives ahead, or hits the ego from behind: that begins with
    the last stretch at a time to collision of at most `DANGER_TTC_S`.
 3. A rule of the road that the other or the ego broke in that time is named besides.
-4. The ego saw it if it was not in a lapse of attention in every step from then to the end.
+4. The ego saw it if in some step from then to the end it was not in a lapse of attention and nothing hid the other.
 5. The ego reacted if it braked or steered away, from `BEFORE_S` before then on.
 """
 
@@ -27,8 +27,8 @@ from harness.evaluation.causes.rule_breaks import TURNS_ACROSS, WRONG_WAY, rule_
 from harness.evaluation.causes.way import InWay, in_way
 from harness.evaluation.manoeuvres.pairs import NO_REACTION
 from harness.evaluation.severity.measures import Kind
-from harness.evaluation.trace_quantities import drove_in, quantities_of
-from harness.game.arrays import FloatArray
+from harness.evaluation.trace_quantities import body_names, drove_in, obstacle_names, quantities_of
+from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, box_distance, time_to_contact
 from harness.game.quantities import Quantities
 from harness.game.route_coordinates import PATH_M
@@ -52,6 +52,8 @@ class Cause:
     """From then to the end of the ego's game."""
     ego_saw: bool | None
     """None where no other was involved."""
+    hidden_until_s: float
+    """Time before the end at which the other came into sight, if something hid it when its deed began; else NaN."""
     reaction: str
     """`brakes`, `swerves`, `brakes and swerves` or `no reaction`."""
     braking_mps2: float
@@ -110,20 +112,27 @@ def cause_of(trace: pd.DataFrame, world: World, kinds: Mapping[str, Kind]) -> Ca
         sizes = {name: (kind.length_m, kind.width_m) for name, kind in kinds.items()}
         players = [EGO] + ([other] if other < len(world.roles) else [])
         broke = rule_broken(trace, world, sizes, players, game.last)
-    left_out = "" if other < len(world.roles) else "background traffic: "
-    lapsed = game.q.state.lapsed[begin : game.last + 1, EGO]
-    near = _distances(game, other, begin) <= at.SEEN_M
+    subject = _subject(game, other)
+    seen = _seen(game, other, begin)
     reaction, braking = _reaction(game, begin)
     return Cause(
         other=game.names[other],
-        deed=left_out + _with_rule(broke.get(other, ""), deed),
+        deed=subject + _with_rule(broke.get(other, ""), deed),
         time_s=round(begin * game.step_s, 6),
         time_left_s=round((game.last - begin) * game.step_s, 6),
-        ego_saw=bool((~lapsed & near).any()),
+        ego_saw=bool(seen.any()),
+        hidden_until_s=_hidden_until_s(game, other, begin),
         reaction=reaction,
         braking_mps2=braking,
         ego_broke=broke.get(EGO, ""),
     )
+
+
+def _subject(game: _Game, other: int) -> str:
+    """Words for a road user that is not a person of the game; empty for a person."""
+    if other < len(game.q.world.roles):
+        return ""
+    return "an obstacle: " if game.names[other] in obstacle_names(game.q.world) else "background traffic: "
 
 
 def _with_rule(broken: str, deed: str) -> str:
@@ -139,7 +148,7 @@ def _game(trace: pd.DataFrame, world: World, kinds: Mapping[str, Kind]) -> _Game
         return None
     types = {str(row.player): str(row.vehicle_type) for row in trace.drop_duplicates("player").itertuples()}
     by_name = {name: kinds.get(kind, Kind()) for name, kind in types.items()}
-    names = (*world.roles, *sorted(set(types) - set(world.roles)))
+    names = tuple(body_names(trace, world))
     ends = trace.loc[(trace["player"] == world.roles[EGO]) & (trace["outcome"] != ""), "outcome"]
     return _Game(
         q=quantities_of(trace, world, {name: (kind.length_m, kind.width_m) for name, kind in by_name.items()}),
@@ -178,6 +187,7 @@ def _of_the_ego_alone(game: _Game) -> Cause:
         time_s=end_s,
         time_left_s=0.0,
         ego_saw=None,
+        hidden_until_s=math.nan,
         reaction=reaction,
         braking_mps2=braking,
         ego_broke="",
@@ -245,12 +255,27 @@ def _danger(game: _Game, other: int) -> int:
 def _reaction(game: _Game, begin: int) -> tuple[str, float]:
     """What the ego did about it, and its strongest braking (m/s^2)."""
     steps = slice(max(begin - game.steps(at.BEFORE_S), 1), game.last + 1)
-    braking = max(float((-game.q.state.acceleration_mps2[steps, EGO]).max(initial=0.0)), 0.0)
+    braking = max(0.0, float((-game.q.state.acceleration_mps2[steps, EGO]).max(initial=0.0)))
     sideways = float(np.abs(game.q.lateral_acceleration_mps2[steps, EGO]).max(initial=0.0))
     turned = game.q.state.heading_rad[steps, EGO] - game.q.path.heading_rad[steps, EGO, _HERE]
     swerves = sideways >= at.SWERVES_MPS2 and float(np.cos(turned).min(initial=1.0)) <= math.cos(at.SWERVES_RAD)
     did = [word for word, done in (("brakes", braking >= at.BRAKES_MPS2), ("swerves", swerves)) if done]
     return " and ".join(did) or NO_REACTION, braking
+
+
+def _seen(game: _Game, other: int, begin: int) -> BoolArray:
+    """[N] whether the ego looked and could see a body, from a step to the end."""
+    lapsed = game.q.state.lapsed[begin : game.last + 1, EGO]
+    hidden = game.q.hidden[begin : game.last + 1, EGO, other]
+    return np.asarray(~lapsed & ~hidden & (_distances(game, other, begin) <= at.SEEN_M))
+
+
+def _hidden_until_s(game: _Game, other: int, begin: int) -> float:
+    hidden = game.q.hidden[begin : game.last + 1, EGO, other]
+    if not hidden[0]:
+        return math.nan
+    free = np.flatnonzero(~hidden)
+    return round((len(hidden) - 1 - int(free[0])) * game.step_s, 6) if len(free) else 0.0
 
 
 def _distances(game: _Game, other: int, begin: int) -> FloatArray:

@@ -33,6 +33,10 @@ def kind_in_words(rows: pd.DataFrame) -> str:
         return str(first["deed"])
     end = "contact" if first["ego_outcome"] == "collision" else "the ego leaves the road"
     parts = [f"{first['deed']}, {_span(rows['time_left_s'].tolist())} s before {end}"]
+    hidden = rows["hidden_until_s"].dropna().tolist()
+    if hidden:
+        among = f" (in {len(hidden)})" if len(hidden) < len(rows) else ""
+        parts.append(f"hidden from the ego until {_span(hidden)} s before{among}")
     if first["ego_broke"]:
         parts.append(f"the ego {first['ego_broke']}")
     braking = f"braking up to {rows['braking_mps2'].max():.1f} m/s²"
@@ -43,7 +47,7 @@ def _seen(rows: pd.DataFrame) -> str:
     seen = int((rows["ego_saw"] == "yes").sum())
     if seen == len(rows):
         return "the ego sees it"
-    return f"the ego sees it in {seen}" if seen else "the ego is inattentive"
+    return f"the ego sees it in {seen}" if seen else "the ego does not see it"
 
 
 def _reactions(rows: pd.DataFrame) -> str:

@@ -34,7 +34,8 @@ OF_SEVERITY: Mapping[str, Column] = {
         "float64",
         "m/s",
         "Change of the ego's velocity in the contact, if both move on as one: closing_speed_mps * m_other / (m_ego + "
-        "m_other). An upper bound for a contact that scrapes. Masses are those of the vehicle classes.",
+        "m_other). An upper bound for a contact that scrapes. Masses are those of the vehicle classes; an obstacle "
+        "does not move.",
         _SHELBY,
     ),
     "other_delta_v_mps": Column(

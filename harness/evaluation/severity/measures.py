@@ -14,7 +14,7 @@ import pandas as pd
 from harness.evaluation.severity import thresholds as at
 from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
 from harness.evaluation.severity.masses import mass_kg
-from harness.evaluation.trace_quantities import drove_in, quantities_of
+from harness.evaluation.trace_quantities import body_names, drove_in, obstacle_names, quantities_of
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
 from harness.game.geometry import Box, box_distance
@@ -61,7 +61,7 @@ class _Drive:
     drove: BoolArray
     """[T] of all steps of the trace."""
     masses_kg: FloatArray
-    """[B]"""
+    """[B] inf: an obstacle, which does not move."""
 
     @classmethod
     def of(cls, trace: pd.DataFrame, world: World, kinds: Mapping[str, Kind], player: int) -> _Drive:
@@ -69,14 +69,15 @@ class _Drive:
         types = {str(row.player): str(row.vehicle_type) for row in trace.drop_duplicates("player").itertuples()}
         by_name = {name: kinds.get(kind, Kind()) for name, kind in types.items()}
         q = quantities_of(trace, world, {name: (kind.length_m, kind.width_m) for name, kind in by_name.items()})
-        names = [*world.roles, *sorted(set(types) - set(world.roles))]  # as the bodies of `quantities_of`
-        masses = np.array([mass_kg(by_name.get(name, Kind()).vehicle_class) for name in names])
+        names = body_names(trace, world)
+        fixed = obstacle_names(world)
+        masses = [np.inf if name in fixed else mass_kg(by_name.get(name, Kind()).vehicle_class) for name in names]
         own = trace.loc[trace["player"] == world.roles[player], "outcome"]
         ends = own[own != ""]
         drove = drove_in(trace, world.roles)[:, player].copy()
         drove[0] = False
         outcome = str(ends.iloc[0]) if len(ends) else Outcome.RUNNING.word
-        return cls(player=player, outcome=outcome, q=q, drove=drove, masses_kg=masses)
+        return cls(player=player, outcome=outcome, q=q, drove=drove, masses_kg=np.array(masses))
 
     # --- a contact -------------------------------------------------------------------------------------------------
 
@@ -93,8 +94,8 @@ class _Drive:
         angle = impact_angle_rad(self._box(step, self.player), self._box(step, other), *relative.tolist())
         return {
             "closing_speed_mps": closing,
-            "ego_delta_v_mps": closing * other_kg / (own_kg + other_kg),
-            "other_delta_v_mps": closing * own_kg / (own_kg + other_kg),
+            "ego_delta_v_mps": closing / (1.0 + own_kg / other_kg),
+            "other_delta_v_mps": closing / (1.0 + other_kg / own_kg),
             "impact_side": side_of(angle),
         }
 
@@ -129,7 +130,7 @@ class _Drive:
             "min_time_headway_s": _least(self._headway_s),
             "min_post_encroachment_time_s": None if math.isinf(self._pet_s) else self._pet_s,
             "needed_braking_mps2": float(needed.max()) if len(needed) else None,
-            "used_braking_mps2": max(float(braking[since[0] :].max()), 0.0) if len(since) else None,
+            "used_braking_mps2": max(0.0, float(braking[since[0] :].max())) if len(since) else None,
             "time_exposed_ttc_s": float(np.count_nonzero(below)) * step_s,
             "time_integrated_ttc_s2": float((at.CONFLICT_TTC_S - ttc[below]).sum()) * step_s,
             "time_headway_below_1_s": float(np.count_nonzero(self._headway_s < at.SHORT_HEADWAY_S)) * step_s,
