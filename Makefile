@@ -20,13 +20,13 @@ help: ## list the targets
 install: $(INSTALLED) ## set up .venv from requirements.lock (again only when it or pyproject.toml changes)
 
 demo: install ## verify the figures in a few minutes: the campaign's games, played by the shipped policies
-	$(BIN)/harness demo $(ARGS) || test $$? -eq 3 # a bound is not kept: the report says which
+	$(BIN)/harness demo $(ARGS)
 
 campaign: install ## run the paper's campaign: harness campaign campaigns/merge.toml
-	$(BIN)/harness campaign $(CAMPAIGN) $(ARGS)
+	$(BIN)/harness campaign $(CAMPAIGN) $(ARGS) || test $$? -eq 3 # a bound is not kept: the report says which
 
 quick: install ## the same campaign with a budget of minutes: every stage, fewer steps
-	$(BIN)/harness campaign $(CAMPAIGN) --quick $(ARGS)
+	$(BIN)/harness campaign $(CAMPAIGN) --quick $(ARGS) || test $$? -eq 3
 
 test: install ## run every test, in 20 to 25 minutes on two cores; `make test ARGS="-k payoff"` runs some
 	$(PYTEST) $(ARGS)

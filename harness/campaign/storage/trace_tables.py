@@ -46,9 +46,9 @@ def make_tables(folder: RunFolder, stage: str, scene: OpenScene) -> list[Path]:
 
 def with_severity(episodes: pd.DataFrame, tables: Sequence[pd.DataFrame]) -> pd.DataFrame:
     """The records of games with the columns of severity, from the tables of their arms."""
-    if not tables:
-        return typed(episodes.reindex(columns=[*episodes.columns, *(set(SEVERITY_TABLE) - set(_GAME))]))
-    return typed(episodes.merge(pd.concat(tables, ignore_index=True), on=_GAME, how="left"))
+    rows = [row for table in tables for row in table.to_dict("records")]
+    severity = typed(pd.DataFrame(rows, columns=list(SEVERITY_TABLE)))
+    return typed(episodes.merge(severity, on=_GAME, how="left"))
 
 
 def _kept_or_made(folder: RunFolder, stage: str, name: str, make: Callable[[], pd.DataFrame]) -> pd.DataFrame:
