@@ -114,6 +114,7 @@ def _plan(personas: Sequence[str], seeds: int, rounds: int) -> list[Stage]:
         "personas": [f"{name}.toml" for name in personas],
         "seeds": list(range(1, seeds + 1)),
         "rounds": {"count": rounds},
+        "assessment": {"reference_drivers": False},
     }
     return plan(Campaign.model_validate(document), list(personas))
 

@@ -37,15 +37,7 @@ class NearbyBodies:
 
         `state` is that of `games`; `reading` is that of all games.
         """
-        bodies = self._moving(state, reading, games)
-        if not self._obstacles.each:
-            return bodies
-        standing = (*np.moveaxis(self.poses[games], -1, 0), *(each[games] for each in self._at_rest))
-        columns = zip(vars(bodies).values(), standing, strict=True)
-        return Bodies(*(np.concatenate(pair, axis=1) for pair in columns))
-
-    def _moving(self, state: State, reading: Reading | None, games: IntArray | slice) -> Bodies:
-        players = Bodies(
+        bodies = Bodies(
             x_m=state.x_m,
             y_m=state.y_m,
             heading_rad=state.heading_rad,
@@ -54,15 +46,19 @@ class NearbyBodies:
             width_m=self._width_m[games],
             present=state.present.copy(),
         )
-        if reading is None or not reading.present.size:
-            return players
-        background = Bodies(
-            x_m=reading.x_m[games],
-            y_m=reading.y_m[games],
-            heading_rad=reading.heading_rad[games],
-            speed_mps=reading.speed_mps[games],
-            length_m=reading.length_m[games],
-            width_m=reading.width_m[games],
-            present=reading.present[games],
-        )
-        return players.with_nearest(background, NEAREST, NOTICED_M)
+        if reading is not None and reading.present.size:
+            background = Bodies(
+                x_m=reading.x_m[games],
+                y_m=reading.y_m[games],
+                heading_rad=reading.heading_rad[games],
+                speed_mps=reading.speed_mps[games],
+                length_m=reading.length_m[games],
+                width_m=reading.width_m[games],
+                present=reading.present[games],
+            )
+            bodies = bodies.with_nearest(background, NEAREST, NOTICED_M)
+        if not self._obstacles.each:
+            return bodies
+        standing = (*np.moveaxis(self.poses[games], -1, 0), *(each[games] for each in self._at_rest))
+        columns = zip(vars(bodies).values(), standing, strict=True)
+        return Bodies(*(np.concatenate(pair, axis=1) for pair in columns))

@@ -27,6 +27,7 @@ from harness.game.quantities import Quantities
 from harness.game.right_of_way import Control, Signal, StopLines
 from harness.game.road import AHEAD_M, Along, Routes, row_at
 from harness.game.route_coordinates import half_extents_m, place_along_route, row_ahead
+from harness.game.sight import nothing_hidden
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
 _COUNT = len(AHEAD_M)
@@ -50,7 +51,7 @@ def observe(q: Quantities) -> FloatArray:
         (state.unseen_behind_m, state.sight_m, state.sight_cosine, state.distance_error, state.closing_error_per_s),
         *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
         bodies.present,
-        q.hidden,
+        q.hidden if q.world.hiding.anything else nothing_hidden((*state.present.shape, bodies.present.shape[1])),
         *(actuators.max_steering_rad, q.world.length_m, q.world.width_m, state.signal_s),
         *(q.rules.next_line, q.rules.posted_mps, state.signals),
         (tuple(q.world.road.routes), tuple(q.along), tuple(q.world.right_of_way.stop_lines), tuple(q.meetings)),

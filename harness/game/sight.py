@@ -14,7 +14,7 @@ bus behind a van is hidden.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from math import cos, hypot, inf, sin
 
 import numpy as np
@@ -41,7 +41,7 @@ class Hiding:
     vehicles: bool = False
     """Whether a vehicle of the scene is tall."""
 
-    @property
+    @cached_property
     def anything(self) -> bool:
         """Whether anything hides. If not, no line of sight is computed."""
         return self.vehicles or bool(len(self.walls)) or bool(self.obstacles.any())

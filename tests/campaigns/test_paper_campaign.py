@@ -69,7 +69,17 @@ def files_in(folder: Path) -> dict[str, bytes]:
 def test_campaign__every_file_is_there(run: Path) -> None:
     assert {each.name for each in run.iterdir() if not each.name.startswith(".")} == {
         *("manifest.json", "policies", "training.csv", "episodes.csv", "summary.csv", "comparisons.csv"),
-        *("manoeuvres.csv", "traces", "replays", "report.html", "scene", "tensorboard"),
+        *(
+            "causes.csv",
+            "result.json",
+            "junit.xml",
+            "manoeuvres.csv",
+            "traces",
+            "replays",
+            "report.html",
+            "scene",
+            "tensorboard",
+        ),
     }
     assert {each.name for each in (run / "policies").iterdir()} == {f"{name}-seed1" for name in TRAININGS}
     assert {each.name for each in (run / "tensorboard").iterdir()} == {f"{name}-seed1" for name in TRAININGS}

@@ -43,6 +43,8 @@ def demo(repository: Path) -> Path:
     document["personas"] = [os.path.normpath(campaigns / each) for each in document["personas"]]
     document["ego"]["persona"] = os.path.normpath(campaigns / document["ego"]["persona"])
     document["assessment"]["episodes"] = EPISODES
+    document["assessment"]["reference_drivers"] = False
+    del document["acceptance"]
     return finished(**{"training": None, **document})
 
 

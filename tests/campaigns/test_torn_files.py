@@ -36,7 +36,8 @@ def is_vouched_for(run: Path, file: Path) -> bool:
     """Whether numbers are read from a file when the stages are done."""
     where = file.relative_to(run).parts
     if where[0] == ".stages":
-        return file.name in ("done.json", "episodes.csv", "manoeuvres.csv", "training.csv")
+        tables = ("episodes.csv", "manoeuvres.csv", "training.csv", "severity-1.csv", "causes-1.csv")
+        return file.name in ("done.json", *tables)
     return where[0] in ("policies", "traces", "scene") and file.name not in ANEW
 
 

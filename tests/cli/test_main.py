@@ -159,7 +159,7 @@ BAD: dict[str, tuple[Callable[[Path], dict[str, Any]], str, list[str]]] = {
     "persona with an unknown term": (lambda f: persona(f, "progress", "progres"), "anna.toml", ["'progress'"]),
     "persona without sources": (lambda f: persona(f, "[[sources]]", "[[surces]]"), "anna.toml", ["sources"]),
     "persona that is not TOML": (lambda f: persona(f, "name =", "name"), "anna.toml", ["not valid TOML", "line 1"]),
-    "missing scene": (lambda folder: {"scene": "mrege"}, "scene.toml", ["there is no"]),
+    "missing scene": (lambda folder: {"scene": "mrege"}, "tiny.toml", ["scene", "there is no scene", "'merge'"]),
     "unknown lane": (
         lambda folder: edited(folder, "scene.toml", lambda text: text.replace("approach_1", "aproach_1")),
         "scene.toml",

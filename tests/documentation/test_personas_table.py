@@ -202,5 +202,8 @@ def test_characteristics__every_persona_of_the_campaign_has_one() -> None:
     campaign = read_document(REPOSITORY / "campaigns" / "merge-personas.toml", Campaign)
     names = {Path(file).stem for file in campaign.personas}
     assert names == set(table.CHARACTERISTICS)
-    assert {each.name for each in shipped()} - names == {"impatient", "red_light_runner"}  # people of junctions
+    assert {each.name for each in shipped()} - names == {
+        *("impatient", "red_light_runner"),  # people of junctions
+        *("jaywalker", "phone_walker", "older_walker", "red_light_cyclist", "e_scooter"),
+    }
     assert campaign.training == read_document(REPOSITORY / "campaigns" / "merge.toml", Campaign).training

@@ -246,11 +246,11 @@ def test_arguments__wrong_ones_are_usage_errors(arguments: dict[str, Any], messa
     assert not libsumo.isLoaded()
 
 
-def test_paths__are_found_from_any_working_directory(
+def test_names__are_found_from_any_working_directory(
     opened: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    opened(DrivingEnv, scene="networks/merge").reset(seed=1)
+    opened(DrivingEnv, scene="merge", persona="speedy").reset(seed=1)
 
 
 def test_garbage__an_environment_that_was_not_closed_closes_sumo() -> None:

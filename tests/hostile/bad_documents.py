@@ -264,7 +264,7 @@ SCENES = [
         ("a person of several without a vehicle", "[non_ego]", PERSON + PERSON.replace('"non_ego"', '"nonego"') + "[[non_ego]]", ("non_ego_2.vehicle", "'non_ego'")),
         ("a pedestrian without a way", "[non_ego]", '[non_ego]\nkind = "pedestrian"', ("non_ego: a pedestrian needs a way",)),
         ("a car with a way", "[non_ego]", "[non_ego]\nway = [[0.0, 0.0], [9.0, 0.0]]", ("non_ego: way is a pedestrian's",)),
-        ("a bicycle of the type of a car", "[non_ego]", '[non_ego]\nkind = "bicycle"', ("vType", "vClass 'passenger'", "bicycle")),
+        ("a bicycle of the type of a car", "[non_ego]", '[non_ego]\nkind = "bicycle"', ("vType", "vClass 'passenger'", "a vClass of")),
         ("a kind misspelt", "[non_ego]", '[non_ego]\nkind = "pedestrain"', ("non_ego.kind", "'pedestrian'")),
         ("a list of nets", 'net = "merge.net.xml"', 'net = ["merge.net.xml"]', ("net",)),
     ),

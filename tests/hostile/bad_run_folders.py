@@ -155,7 +155,7 @@ OF_REPORT: dict[str, tuple[Spoil, tuple[str, ...]]] = {
 }
 HEADER = "arm,persona,seed,episode"
 TABLES: dict[str, tuple[Callable[[str], Spoil], tuple[str, ...]]] = {
-    "a column misspelt": (lambda file: edit(file, "episode,", "episod,"), ("missing ['episode']",)),
+    "a column misspelt": (lambda file: edit(file, "episode,", "episod,"), ("not a table of a run",)),
     "a column too many": (lambda file: edit(file, HEADER, f"extra,{HEADER}"), ("extra",)),
     "a column twice": (lambda file: edit(file, HEADER, f"arm,{HEADER}"), ()),
     "a row too short": (lambda file: inserted(file, b"a,b\n", 1.0), ()),

@@ -212,7 +212,7 @@ def test_report__runs_nothing_that_data_says_in_a_real_browser(tmp_path: Path) -
     with launched() as browser, opener(browser, file) as open_page:
         page = open_page()
         for details in page.locator("details").all():
-            details.locator("summary").click()
+            details.locator(":scope > summary").click()
         page.wait_for_timeout(300)
         assert page.seen == []
         assert page.locator("iframe, svg[onload], img[onerror], [onmouseover]").count() == 0
