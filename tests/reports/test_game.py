@@ -188,7 +188,7 @@ def test_words__both_sides_could_gain():
     assert label == "no"
     assert sentence == f"The ego could still gain 2 % of its payoff; the speedy driver 31 %: {MEANINGS[NO]}."
     assert induced == (
-        "A speedy driver newly trained against this ego makes it fail in 12 of 100 games (12 %; 95 %: 7–19.8 %) "
+        "A speedy driver newly trained against this ego makes it fail in 12 of 100 games (12 %; 95 %: 6.4–20 %) "
         "instead of 3."
     )
     assert tone == "harm"
