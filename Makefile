@@ -28,7 +28,7 @@ campaign: install ## run the paper's campaign: harness campaign campaigns/merge.
 quick: install ## the same campaign with a budget of minutes: every stage, fewer steps
 	$(BIN)/harness campaign $(CAMPAIGN) --quick $(ARGS) || test $$? -eq 3
 
-test: install ## run every test, in 20 to 25 minutes on two cores; `make test ARGS="-k payoff"` runs some
+test: install ## run every test, in about 27 minutes on two cores; `make test ARGS="-k payoff"` runs some
 	$(PYTEST) $(ARGS)
 
 test-fast: install ## run the tests of every room that take a moment, in about a minute: after each edit
