@@ -13,7 +13,7 @@ _PAYOFF = Column("float64", "", "The player's own payoff, summed over the game."
 _OUTCOME = "`goal`, `collision` (with a road user), `rail` (with the edge of the drivable area), `timeout` or `error`"
 
 EPISODES: Mapping[str, Column] = {
-    "arm": Column("object", "", "The arm: who plays against whom.", ""),
+    "arm": Column("object", "", "The name of the arm, such as naive_vs_speedy.", ""),
     "persona": Column("object", "", "The persona of the non-ego; of an arm with one.", ""),
     "seed": Column("int64", "", "The training seed.", ""),
     "episode": Column("int64", "", "The game. Equal numbers begin alike in every arm.", ""),
