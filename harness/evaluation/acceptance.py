@@ -15,7 +15,7 @@ are compatible with a failure rate of 31 %, and don't show that it is below 10 %
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -85,6 +85,8 @@ class Evidence:
     gaps: pd.DataFrame | None = None
     preventability: pd.DataFrame | None = None
     """None: no failure was judged by reference drivers."""
+    unanswered: Collection[tuple[str, int]] = ()
+    """Personas and seeds with a question that is not answered, because a player can't drive the scene."""
 
     @cached_property
     def rows(self) -> Mapping[tuple[str, int], Mapping[Any, Any]]:
@@ -116,7 +118,7 @@ def judge(
     """Every bound for every persona and training seed: one check for each arm that it is measured in.
 
     `bounds` are keys of `MEASURES` with their values. A bound that can't be measured has a check with NaN, which does
-    not pass.
+    not pass; so has every bound about players of which one can't drive the scene.
     """
     checks = []
     for name, allowed in bounds.items():
@@ -124,6 +126,8 @@ def judge(
             for seed in seeds:
                 subject = Subject(ego=judged_ego(judged, persona, seed, evidence), persona=persona, seed=seed)
                 for arm, value, limit, games in MEASURES[name](subject, evidence):
+                    if (persona, seed) in evidence.unanswered:
+                        value = limit = np.nan
                     check = Check(
                         bound=name,
                         persona=persona,
@@ -136,6 +140,12 @@ def judge(
                     )
                     checks.append(check)
     return checks
+
+
+def unanswered(comparisons: pd.DataFrame) -> frozenset[tuple[str, int]]:
+    """Personas and seeds with a question that is not answered: those rows of comparisons.csv that state a reason."""
+    rows = comparisons[comparisons["reason"] != ""]
+    return frozenset(zip(rows["persona"], rows["seed"], strict=True))
 
 
 def worst_of_each(checks: Sequence[Check]) -> list[Check]:

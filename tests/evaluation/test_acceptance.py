@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
-from harness.evaluation.acceptance import MEASURES, Evidence, judge, judged_ego, worst_of_each
+from harness.evaluation.acceptance import MEASURES, Evidence, judge, judged_ego, unanswered, worst_of_each
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,
@@ -54,6 +55,15 @@ def test_failure_rate__is_judged_by_the_upper_end_of_its_interval(failures: int,
     (check,) = judge({"failure_rate": bound}, "last", ["speedy"], [1], run)
     assert (check.arm, check.games, check.value) == ("retrained_vs_speedy", 100, failures / 100)
     assert check.passed is passed
+
+
+def test_bound__of_players_that_cannot_drive_the_scene_is_not_kept() -> None:
+    run = evidence({NAIVE_VS: hundred(0), RETRAINED_VS: hundred(0)})
+    asked = pd.DataFrame({"persona": ["speedy", "calm"], "seed": [1, 1], "reason": ["speedy can't drive it", ""]})
+    assert unanswered(asked) == {("speedy", 1)}
+    (check,) = judge({"failure_rate": 0.5}, "last", ["speedy"], [1], replace(run, unanswered=unanswered(asked)))
+    assert not check.measured
+    assert not check.passed
 
 
 def test_failure_rate__few_games_do_not_pass() -> None:

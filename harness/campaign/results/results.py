@@ -29,7 +29,7 @@ from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.trace_tables import cause_table, severity_table, with_severity
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
-from harness.evaluation.acceptance import Evidence
+from harness.evaluation.acceptance import Evidence, unanswered
 from harness.evaluation.causes.columns import CAUSE_COLUMNS
 from harness.evaluation.comparison import compare, games_by_arm
 from harness.evaluation.competence import Goals, goals_alone
@@ -101,7 +101,14 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     replays = _write_replays(folder, scene, episodes, console)
     gaps = game.gaps if game is not None else None
     judged_failures = prevented.get("preventability")
-    evidence = Evidence(arms=arms, episodes=episodes, summary=summary, gaps=gaps, preventability=judged_failures)
+    evidence = Evidence(
+        arms=arms,
+        episodes=episodes,
+        summary=summary,
+        gaps=gaps,
+        preventability=judged_failures,
+        unanswered=unanswered(comparisons),
+    )
     checks = checks_of(campaign, manifest["personas"], evidence)
     report = RunTables(
         manifest=manifest,
