@@ -110,6 +110,7 @@ def check(
         print_plain(check_scene(folder), Console())
         return
 
+    from harness.campaign.execution.repeat_check import varying_drivers
     from harness.campaign.plan.plan import plan
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
@@ -117,11 +118,13 @@ def check(
 
     file = document_at(file, "campaigns")
     opened = open_campaign(file, allow_code=allow_code)
+    varying = varying_drivers(opened)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
     console = Console()
     print_plain([wording.in_order(file), *opened.scene.warnings], console)
     if opened.document.ego.driver != LEARNED:
         print_plain([plain(wording.ego(opened))], console)
+    print_plain([plain(f"{driver}: {difference}") for driver, difference in varying.items()], console)
     print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
 
 

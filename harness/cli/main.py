@@ -80,6 +80,13 @@ RunOut = Annotated[
         metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]", show_default=False
     ),
 ]
+KeepGoing = Annotated[
+    bool,
+    typer.Option(
+        "--keep-going",
+        help="Play all games of an arm, even if its first ten can't be played for one reason.",
+    ),
+]
 Jobs = Annotated[
     int | None,
     typer.Option(
@@ -104,6 +111,7 @@ def campaign(
     out: RunOut = None,
     jobs: Jobs = None,
     allow_code: AllowCode = False,
+    keep_going: KeepGoing = False,
     ray: Ray = None,
 ) -> None:
     """Run a campaign: train, assess, retrain and compare.
@@ -129,7 +137,7 @@ def campaign(
     _handle_termination_signals()
     try:
         with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
-            outcome = run_campaign(opened, folder, start_workers, console)
+            outcome = run_campaign(opened, folder, start_workers, console, keep_going)
     except KeyboardInterrupt as interrupt:
         console.print(wording.INTERRUPTED)
         raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
@@ -216,7 +224,8 @@ def _exit_as(outcome: RunResult, console: Console) -> None:
     if outcome.failed_stages:
         console.print(wording.failed_stages(outcome.failed_stages), style="red", highlight=False)
     if outcome.error_games:
-        console.print(wording.error_games(outcome.error_games), style="red")
+        for line in wording.error_games(outcome.error_games, outcome.error_reasons):
+            console.print(line, style="red", highlight=False, markup=False, soft_wrap=True)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
 

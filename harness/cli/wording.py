@@ -92,8 +92,9 @@ def failed_stages(names: Sequence[str]) -> str:
     return f"Not finished: {', '.join(names)}"
 
 
-def error_games(count: int) -> str:
-    return f"{count} games could not be played; their pairs are left out"
+def error_games(count: int, reasons: Sequence[str]) -> list[str]:
+    """How many games could not be played, and a line for each reason."""
+    return [f"{count} games could not be played; their pairs are left out", *(f"  {each}" for each in reasons)]
 
 
 # --- harness check ---

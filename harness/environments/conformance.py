@@ -177,6 +177,18 @@ def check_conformance(driver: Driver, scene: OpenScene, games: int) -> Findings:
     return findings
 
 
+def difference_of(driver: Driver, scene: OpenScene) -> str:
+    """Play one game twice: what a driver decided otherwise the second time, in words; empty if nothing, and if the game
+    can't be played. Raises SimulationError if SUMO fails."""
+    findings = Findings()
+    try:
+        first = _play(driver, scene, 1, findings=findings, activity="playing")
+        _check_determinism(first, _play(driver, scene, 1, findings=findings, activity="playing again"), findings)
+    except _Violation:
+        return ""
+    return "".join(findings.violations)
+
+
 def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, activity: str) -> list[_PlayedGame]:
     players = len(scene.world.roles)
     start_distribution = scene.start_distribution([HumanFactors()] * players, [1.0] * players)

@@ -329,6 +329,7 @@ def test_campaign__games_in_which_a_program_crashes_are_errors(tmp_path: Path) -
     assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo"}
     assert set(episodes["ego_outcome"]) == {"error"}
     assert episodes["error"].str.contains("DriverError: .*too fast").all()
+    assert "too fast" in done.stdout.partition("games could not be played")[2].splitlines()[1]
 
 
 # --- the page about egos ---
