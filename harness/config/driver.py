@@ -94,12 +94,13 @@ class Fmu(Adjustable, WithFiles):
     file: DocumentPath
     """The FMU, relative to this document's folder."""
     inputs: dict[VariableName, str] = Field({}, max_length=200)
-    """The entry of the observation that each input of the FMU receives. An input that is not listed must have the name
-    of an entry."""
+    """The entry of the observation that each input of the FMU receives. An input that is not listed receives the entry
+    of its name; without such an entry it keeps its start value."""
     outputs: dict[str, VariableName] = Field({}, max_length=2)
     """The names of the FMU's outputs for `acceleration_mps2` and `steering_rad`, if they differ from these."""
-    start: dict[VariableName, float] = Field({}, max_length=1000)
-    """Start values of parameters, and of inputs that receive no entry."""
+    start: dict[VariableName, bool | int | float | str] = Field({}, max_length=1000)
+    """Start values of parameters, and of inputs that receive no entry: numbers, texts, true or false; of an enumeration
+    the name or the number of an item."""
     deadline_s: DeadlineS = 10.0
     """Longest time of a decision. It only detects programs that hang: a busy machine must not change a game."""
     start_deadline_s: DeadlineS = 60.0
