@@ -125,6 +125,7 @@ class OpenScene:
         return StartDistribution(
             places=self.places,
             length_m=self.world.length_m,
+            max_speed_mps=self.world.actuators.max_speed_mps,
             human_factors=factors_of,
             shares=shares or [[1.0] * len(each) for each in factors_of],
             present_share=present_share,
