@@ -41,6 +41,7 @@ from harness.traffic.trips import with_routes
 from harness.traffic.users_lanes import lanes_for
 from harness.traffic.walker_conflicts import Way, with_walkers_conflicts
 from harness.traffic.warm_up import Snapshot, snapshots
+from harness.traffic.zebra import stripes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +58,7 @@ class OpenScene:
     junctions: frozenset[str] | None = None  # those that games need; None: all of the net
     obstacles: Obstacles = NO_OBSTACLES
     lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
+    stripes: tuple[FloatArray, ...] = ()  # [5, 2] each, of the marked crossings
     roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
 
     @property
@@ -218,6 +220,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
         junctions=network.junctions_near(net, [*own, *background]),
+        stripes=tuple(stripes([np.array(each.way) for each in document.players if each.marked_crossing], area)),
         roads_m=heights_of_players_roads(net, own),
     )
     factors, present = [HumanFactors()] * len(places), [1.0] * len(places)

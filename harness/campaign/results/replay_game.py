@@ -164,6 +164,7 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
             obstacles=scene.obstacles,
+            stripes=scene.stripes,
         )
         yield FoundGame(replay=replay, trace=trace, title=title, step_length_s=scene.world.step_s)
 

@@ -255,6 +255,7 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
             obstacles=scene.obstacles,
+            stripes=scene.stripes,
         )
     _drop_stale(folder.replays, set(names))
     return names
