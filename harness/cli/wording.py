@@ -20,6 +20,7 @@ KEPT = "finished work is kept"
 
 # --- errors: message and remedy ---
 FILM_NEEDS_A_GAME = ("shows one game", "name the game: harness replay RUN ARM EPISODE")
+JSON_IS_OF_A_LIST = ("lists games", "leave out the episode, or add --list")
 NOT_A_FOLDER = ("is not a folder", "name a folder")
 NOT_A_TOML_FILE = ("is not the name of a TOML file", "the name must end with .toml")
 FOLDER_NOT_EMPTY = ("is there already, and not empty", "name a new folder")
@@ -156,3 +157,18 @@ def stage_lines(stages: Sequence[Stage]) -> Iterator[str]:
         reads = () if isinstance(stage, TrainingStage) else stage.reads
         after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
         yield f"  {stage.verb:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else "")
+
+
+def stage_records(stages: Sequence[Stage]) -> list[dict[str, object]]:
+    """A record for each stage, as `stage_lines` tells it."""
+    return [
+        {
+            "stage": stage.id,
+            "kind": stage.kind,
+            "persona": stage.persona,
+            "seed": stage.seed,
+            "after": list(stage.needs),
+            "reads": list(stage.reads),
+        }
+        for stage in stages
+    ]
