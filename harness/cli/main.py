@@ -13,6 +13,7 @@ import typer
 from harness.cli import wording
 from harness.cli.comparison import compare
 from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
+from harness.cli.exports import export
 from harness.cli.pinned_games import minimise, regression
 from harness.cli.replays import replay
 from harness.cli.scenes import scene_app
@@ -167,6 +168,7 @@ def report(run: RunPath) -> None:
 
 
 app.command()(replay)
+app.command()(export)
 app.command()(compare)
 app.command()(new)
 app.command()(check)
