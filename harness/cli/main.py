@@ -13,6 +13,7 @@ import typer
 from harness.cli import wording
 from harness.cli.comparison import compare
 from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
+from harness.cli.exports import export
 from harness.cli.output import AsJson, Quiet, Verbose, output
 from harness.cli.pinned_games import minimise, regression
 from harness.cli.replays import replay
@@ -166,6 +167,7 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
 
 
 app.command()(replay)
+app.command()(export)
 app.command()(compare)
 app.command()(new)
 app.command()(check)

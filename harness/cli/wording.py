@@ -21,6 +21,12 @@ KEPT = "finished work is kept"
 # --- errors: message and remedy ---
 FILM_NEEDS_A_GAME = ("shows one game", "name the game: harness replay RUN ARM EPISODE")
 JSON_IS_OF_A_LIST = ("lists games", "leave out the episode, or add --list")
+EXPORT_A_GAME = (
+    "is not an arm, an episode and a new folder",
+    "harness export RUN ARM EPISODE DIR, or harness export RUN --failures DIR",
+)
+EXPORT_FAILURES = ("is more than an arm and a new folder", "harness export RUN [ARM] --failures DIR")
+NO_EPISODE = ("is not the number of an episode", "harness replay RUN --list shows them")
 NOT_A_FOLDER = ("is not a folder", "name a folder")
 NOT_A_TOML_FILE = ("is not the name of a TOML file", "the name must end with .toml")
 FOLDER_NOT_EMPTY = ("is there already, and not empty", "name a new folder")
@@ -108,6 +114,10 @@ def run_campaign_next(campaign: Path) -> str:
 
 def page_written(file: Path) -> str:
     return f"Page: {file}"
+
+
+def exported(count: int, folder: Path) -> str:
+    return f"Wrote {count} {'game' if count == 1 else 'games'} to {folder}: games.csv lists them"
 
 
 def report_written(run: Path) -> str:
