@@ -277,7 +277,7 @@ def test_fmu__an_enumeration_takes_the_name_or_number_of_an_item(
 
 
 MIXED = """
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Integer, Real, String
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
 from pythonfmu.enums import Fmi2Status
 
 
@@ -289,15 +289,16 @@ class Mixed(Fmi2Slave):
         self.speed_mps, self.other0_seen, self.lanes, self.load_kg = 0.0, False, 0, 150.0
         self.gain, self.brisk, self.gear, self.weather = 1.0, False, 1, "dry"
         self.acceleration_mps2, self.steering_rad = 0.0, 0.0
-        inputs, parameters = Fmi2Causality.input, Fmi2Causality.parameter
+        inputs = Fmi2Causality.input
+        parameters = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
         self.register_variable(Real("speed_mps", causality=inputs))
-        self.register_variable(Boolean("other0_seen", causality=inputs))
-        self.register_variable(Integer("lanes", causality=inputs))
+        self.register_variable(Boolean("other0_seen", causality=inputs, variability=Fmi2Variability.discrete))
+        self.register_variable(Integer("lanes", causality=inputs, variability=Fmi2Variability.discrete))
         self.register_variable(Real("load_kg", causality=inputs))
-        self.register_variable(Real("gain", causality=parameters))
-        self.register_variable(Boolean("brisk", causality=parameters))
-        self.register_variable(Integer("gear", causality=parameters))
-        self.register_variable(String("weather", causality=parameters))
+        self.register_variable(Real("gain", **parameters))
+        self.register_variable(Boolean("brisk", **parameters))
+        self.register_variable(Integer("gear", **parameters))
+        self.register_variable(String("weather", **parameters))
         self.register_variable(Real("acceleration_mps2", causality=Fmi2Causality.output))
         self.register_variable(Real("steering_rad", causality=Fmi2Causality.output))
 
