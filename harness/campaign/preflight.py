@@ -52,6 +52,8 @@ class OpenCampaign:
     """The folder of policies trained in another run, where the campaign names one."""
     other_egos: Mapping[str, ExternalDriver]
     """The external drivers of the cross-play, by name."""
+    policy_drivers: Mapping[str, ExternalDriver]
+    """The policies of others in the folder `policies`, by name."""
     hashes: dict[str, str]
     """SHA-256 of every file that the campaign rests on, by its path from the campaign's folder."""
 
@@ -93,9 +95,11 @@ def open_campaign(
     check_people(file, document, len(found.scene.world.roles) - 1)
     check_names(file, document, names, tunable)
     _check_stage_names(file, document, names, tunable)
-    files = [file]
+    files, read = [file], None
     if found.policies is not None and policies_exist:
-        files += check_policies(file, document, ego_persona, personas, found.policies)
+        people = found.scene.world, allow_code
+        read = check_policies(file, document, ego_persona, personas, found.policies, *people)
+        files += read.files
     files += found.files()
     quick = quick and (found.policies is None or tunable)
     return OpenCampaign(
@@ -108,6 +112,7 @@ def open_campaign(
         ego_driver=found.ego_driver,
         policies=found.policies,
         other_egos=found.other_egos,
+        policy_drivers=read.drivers if read is not None else {},
         hashes={_relative(file, each): hashlib.sha256(each.read_bytes()).hexdigest() for each in files},
     )
 

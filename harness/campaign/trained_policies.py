@@ -1,19 +1,39 @@
-"""The policies of another run that a campaign reads instead of training: found, and checked against its personas."""
+"""The policies that a campaign reads instead of training: found, and checked against its personas.
+
+A policy's folder is that of another run, or it has a driver document, `driver.toml`: a policy that others trained, on
+`harness/NonEgo-v0` or with both players in `ParallelDrivingEnv`, drives as the person or ego of that name.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from harness.campaign.plan.plan import plan
 from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
+from harness.drivers.car import car_of
+from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy_file import Policy, check_no_archive, persona_hash, policy_files, read_policy
 from harness.errors import Problem, UsageError, collect
 from harness.game.state import EGO, ROLES
+from harness.game.world import World
 from harness.shipped_documents import find_document
+
+DRIVER = "driver.toml"
+"""The driver document in the folder of a policy that others trained."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadPolicies:
+    """The policies that a campaign reads."""
+
+    files: Sequence[Path]
+    drivers: Mapping[str, ExternalDriver]
+    """Those of others, by the name of their folder."""
 
 
 def find_policies(file: Path, written: str | None) -> Path | None:
@@ -29,17 +49,33 @@ def find_policies(file: Path, written: str | None) -> Path | None:
 
 
 def check_policies(
-    file: Path, document: Campaign, ego_persona: Persona, personas: Sequence[Persona], folder: Path
-) -> list[Path]:
-    """The files of every policy that a campaign reads. Raises UsageError for each that is missing or does not fit."""
+    file: Path,
+    document: Campaign,
+    ego_persona: Persona,
+    personas: Sequence[Persona],
+    folder: Path,
+    world: World,
+    allow_code: bool,
+) -> ReadPolicies:
+    """Every policy that a campaign reads. Raises UsageError for each that is missing or does not fit, and for each that
+    runs code in files without permission (`allow_code`)."""
     available = {each.name for each in folder.iterdir() if each.is_dir()}
     by_name = {each.name: each for each in personas}
     problems: list[Problem] = []
     files: list[Path] = []
+    drivers: dict[str, ExternalDriver] = {}
     for name in dict.fromkeys(name for stage in plan(document, list(by_name)) for name in stage.reads):
         if name not in available:
             message = f"{document.policies!r} holds no policy {name!r}"
             problems.append(Problem(str(file), "policies", message, _alternatives(name, available)))
+            continue
+        if (folder / name / DRIVER).is_file():
+            person = by_name.get(name.rpartition("-seed")[0])
+            of_others = _find_and_try(folder / name / DRIVER, person or ego_persona, person is not None, world)
+            driver = collect(problems, lambda of_others=of_others: of_others(allow_code))  # type: ignore[misc]
+            if driver is not None:
+                drivers[name] = driver
+                files += [folder / name / DRIVER, *map(Path, driver.files)]
             continue
         policy = collect(problems, lambda name=name: read_policy(folder / name))  # type: ignore[misc]
         if policy is not None:
@@ -47,7 +83,21 @@ def check_policies(
         files += policy_files(folder / name)
     if problems:
         raise UsageError(problems)
-    return files
+    return ReadPolicies(files=files, drivers=drivers)
+
+
+def _find_and_try(place: Path, persona: Persona, is_person: bool, world: World) -> Callable[[bool], ExternalDriver]:
+    """A function of the permission to run code, which finds a policy of others and tries it out."""
+
+    def find(allow_code: bool) -> ExternalDriver:
+        driver = find_driver(place.name, place, "", allow_code)
+        if driver.vehicle_type is not None:
+            message, remedy = "SUMO's models are no policy", "name them as the ego: [ego] driver"
+            raise UsageError.of(place, "kind", message, remedy)
+        driver.try_out(car_of(world, EGO + 1 if is_person else EGO), persona.decisions == "sampled")
+        return driver
+
+    return find
 
 
 def _problems_of(

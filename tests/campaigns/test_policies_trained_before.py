@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+import torch
 
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.plan.paper_rounds import questions
@@ -18,8 +20,10 @@ from harness.campaign.preflight import open_campaign
 from harness.cli import wording
 from harness.config.campaign import Campaign
 from harness.drivers.policy_file import write_policy
+from harness.environments.gymnasium_env import ParallelDrivingEnv
 from harness.errors import Problem, UsageError
 from harness.evaluation.tables import read_csv
+from harness.game.observation_layout import SIZE
 from tests.support.policies import some_policy
 from tests.support.shared import built_once
 from tests.support.tiny import CAREFUL, SPEEDY, TRAINING, harness, learned_run, tables, write_campaign, write_persona
@@ -89,6 +93,85 @@ def test_keys__do_not_depend_on_where_the_policies_lie(tmp_path: Path, policies:
 
     moved = shutil.copytree(policies, tmp_path / "elsewhere" / "mine")
     assert keys(write_played(tmp_path)) == keys(write_played(tmp_path / "there", policies=str(moved)))
+
+
+# --- policies that others trained -------------------------------------------------------------------------------------
+
+
+def of_others(folder: Path, network: torch.nn.Module) -> Path:
+    """A policy's folder with a network of others, as their own tools export it."""
+    folder.mkdir(parents=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        torch.onnx.export(network, (torch.zeros(1, SIZE),), str(folder / "mine.onnx"), dynamo=False)
+    (folder / "driver.toml").write_text('kind = "onnx"\nfile = "mine.onnx"\n')
+    return folder
+
+
+def small_network(seed: int) -> torch.nn.Module:
+    torch.manual_seed(seed)
+    return torch.nn.Sequential(torch.nn.Linear(SIZE, 8), torch.nn.Tanh(), torch.nn.Linear(8, 2), torch.nn.Tanh())
+
+
+def test_of_others__the_network_is_part_of_the_keys_of_its_arms(tmp_path: Path, policies: Path) -> None:
+    def keys() -> dict[str, str]:
+        campaign = open_campaign(write_played(tmp_path))
+        assert campaign.policy_drivers.keys() == {"speedy-seed1"}
+        assert "policies/speedy-seed1/mine.onnx" in campaign.hashes
+        return stage_keys(campaign, plan(campaign.document, ["speedy"]))
+
+    found = []
+    for seed in (1, 2):
+        shutil.rmtree(policies / "speedy-seed1")
+        of_others(policies / "speedy-seed1", small_network(seed))
+        found.append(keys())
+    changed = {name.removesuffix("-seed1") for name in found[0] if found[0][name] != found[1][name]}
+    assert changed == {"speedy_alone", "naive_vs_speedy", "retrained_vs_speedy"}
+
+
+def test_of_others__code_needs_permission_and_what_does_not_fit_is_refused(tmp_path: Path, policies: Path) -> None:
+    shutil.rmtree(policies / "speedy-seed1")
+    (policies / "speedy-seed1").mkdir()
+    for text, message in (
+        ('kind = "process"\ncommand = ["perl"]\n', "--allow-code"),
+        ('kind = "sumo"\nvehicle_type = "ego_car"\n', "SUMO's models are no policy"),
+        ('kind = "onnx"\nfile = "mine.onnx"\n', "'mine.onnx': there is no such file"),
+    ):
+        (policies / "speedy-seed1" / "driver.toml").write_text(text)
+        with pytest.raises(UsageError, match=message):
+            open_campaign(write_played(tmp_path))
+
+
+@pytest.mark.slow
+def test_of_others__both_players_trained_together_come_back_as_ego_and_person(tmp_path: Path) -> None:
+    """A trainer of its own: two networks, each with a step of REINFORCE, in the environment with both players."""
+    networks = {agent: small_network(seed) for seed, agent in enumerate(("ego", "non_ego"))}
+    game = ParallelDrivingEnv(ego_persona="careful", non_ego_persona="speedy")
+    try:
+        seen, _ = game.reset(seed=1)
+        chances, returns = {agent: [] for agent in networks}, dict.fromkeys(networks, 0.0)
+        for _ in range(20):
+            actions = {}
+            for agent in game.agents:
+                drawn = torch.distributions.Normal(networks[agent](torch.from_numpy(seen[agent])), 0.1)
+                sample = drawn.sample()
+                chances[agent].append(drawn.log_prob(sample).sum())
+                actions[agent] = sample.clamp(-1.0, 1.0).numpy()
+            seen, rewards, *_ = game.step(actions)
+            returns = {agent: returns[agent] + rewards.get(agent, 0.0) for agent in networks}
+    finally:
+        game.close()
+    for agent, network in networks.items():
+        (-torch.stack(chances[agent]).sum() * returns[agent]).backward()
+        torch.optim.SGD(network.parameters(), 1e-3).step()
+    ego = of_others(tmp_path / "egos", networks["ego"]) / "driver.toml"
+    of_others(tmp_path / "policies" / "speedy-seed1", networks["non_ego"])
+    campaign = write_played(tmp_path, ego={"driver": str(ego), "persona": str(CAREFUL)}, assessment={"episodes": 2})
+    done = harness("campaign", campaign, "--out", tmp_path / "run")
+    assert done.returncode == 0, done.stdout + done.stderr
+    episodes = read_csv(tmp_path / "run" / "episodes.csv")
+    assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo", "speedy_alone", "naive_vs_speedy"}
+    assert set(episodes["error"]) == {""}
 
 
 def test_open_campaign__an_ego_of_ones_own_needs_the_people_only(tmp_path: Path, policies: Path) -> None:

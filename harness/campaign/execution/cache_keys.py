@@ -67,11 +67,13 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
         case PreventabilityStage():
             inputs["references"] = reference_identity()
     if campaign.policies is not None and stage.reads:
-        read = {name: policy_files(campaign.policies / name) for name in stage.reads}
+        others = campaign.policy_drivers
+        read = {name: policy_files(campaign.policies / name) for name in stage.reads if name not in others}
         inputs["policies"] = {name: [campaign.hash_of(file) for file in each] for name, each in read.items()}
+        inputs["policies"] |= {name: others[name].identity for name in stage.reads if name in others}
     drivers = [each for driver in stage.drivers for each in members_of(driver)]
-    if others := sorted({each.name for each in drivers if isinstance(each, External) and each.name}):
-        inputs["others"] = {name: campaign.other_egos[name].identity for name in others}
+    if crossplay := sorted({each.name for each in drivers if isinstance(each, External) and each.name}):
+        inputs["others"] = {name: campaign.other_egos[name].identity for name in crossplay}
     if any(isinstance(each, BestOf) for each in stage.drivers) and document.best_response is not None:
         inputs["choice_episodes"] = document.best_response.choice_episodes
     if stage.gates:

@@ -139,6 +139,9 @@ class PlayerFactory:
 
                 found = read_found(self.context.external_driver(), self.folder.policy(stage))
                 return found.make(car_of(self.scene.world, EGO), sampled)
+            case TrainedBefore(stage=stage) if stage in self.context.policy_drivers:
+                car = car_of(self.scene.world, EGO + 1 if persona_of(planned) else EGO)
+                return self.context.policy_drivers[stage].make(car, sampled)
             case Trained() | TrainedBefore():
                 return LearnedDriver(read_policy(self.policy_folder(planned)), sampled)
 

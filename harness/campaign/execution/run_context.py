@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from harness.campaign.plan.planned_drivers import External
@@ -29,6 +29,8 @@ class RunContext:
     policies: Path | None
     keys: Mapping[str, str]
     """The cache key of every stage."""
+    policy_drivers: Mapping[str, ExternalDriver] = field(default_factory=dict)
+    """The policies of others in the folder `policies`, by name."""
     keep_going: bool = False
     """Whether an arm is played to its end even if its first games can't be played."""
 
@@ -74,5 +76,6 @@ def run_context_of(
         other_egos=campaign.other_egos,
         policies=campaign.policies,
         keys=keys,
+        policy_drivers=dict(campaign.policy_drivers),
         keep_going=keep_going,
     )
