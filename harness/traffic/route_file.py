@@ -7,6 +7,7 @@ game's generator: types and routes of distributions, and the times of random flo
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -31,6 +32,8 @@ class VehicleType:
     length_m: float = 5.0
     width_m: float = 1.8
     max_speed_mps: float = 55.55
+    desired_speed_mps: float = math.inf
+    """The vType's desiredMaxSpeed. SUMO inserts no vehicle that is faster than this times its speed factor."""
     lane_changes: str = ""
     """The vType's laneChangeModel; empty: SUMO's default."""
     vehicle_class: str = "passenger"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
 
 from harness.campaign.execution.cache_keys import stage_keys
-from harness.campaign.execution.progress import StageProgress
+from harness.campaign.execution.progress import StageProgress, event_line
 from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stages import StartWorkers, run_stages
 from harness.campaign.execution.stage_events import Event
@@ -19,6 +20,7 @@ from harness.campaign.results.kept_results import RunResult, kept_result
 from harness.campaign.storage.learned import Entries, did_not_learn, judged, recorded_goals
 from harness.campaign.storage.manifest import FINISHED
 from harness.campaign.storage.run_folder import FORMAT, RunFolder
+from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.versions import versions, versions_of_numbers
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.reports.provenance import mixed_versions, warn
@@ -41,10 +43,12 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: Start
             scene = campaign.scene.document
             folder.keep_scene(campaign.scene.folder, scene.files)
             finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
+            _log_plan(campaign, stages, finished)
             kept = kept_result(folder, manifest.content) if len(finished) == len(stages) else None
         if kept is not None:
             warn(mixed_versions(manifest.content["stages"]), console)
             console.print(NOTHING_TO_DO, highlight=False)
+            LOGGER.info(NOTHING_TO_DO)
             return kept
         if len(finished) < len(stages):
             manifest.warn_of_versions(console)
@@ -54,15 +58,31 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: Start
                     incapable = did_not_learn(manifest.content["stages"])
                     manifest.note(event)
                     progress.show(event)
+                    log_event(event)
                     for training, shortfall in did_not_learn(manifest.content["stages"]).items():
                         if training not in incapable:
                             progress.tell(training, DID_NOT_LEARN, shortfall)
+                            LOGGER.warning("%s: %s: %s", DID_NOT_LEARN, training, shortfall)
 
                 workers = start_workers(run_context_of(campaign, folder, keys), len(stages) - len(finished))
                 run_stages(stages, finished, workers, emit)
         from harness.campaign.results.results import write_results  # imports pandas and statistics
 
         return write_results(folder, console)
+
+
+def _log_plan(campaign: OpenCampaign, stages: Sequence[Stage], finished: Sequence[str]) -> None:
+    quick = ", quick" if campaign.quick else ""
+    LOGGER.info("campaign %s%s: %d stages, %d finished", campaign.document.name, quick, len(stages), len(finished))
+    for stage in stages:
+        LOGGER.debug("%s %s", "finished" if stage.id in finished else "to do   ", stage.id)
+
+
+def log_event(event: Event) -> None:
+    """Write an event of a stage into the run's log. Progress is not logged."""
+    levels = {"failed": logging.ERROR, "crashed": logging.WARNING, "skipped": logging.WARNING}
+    if event.kind != "progress":
+        LOGGER.log(levels.get(event.kind, logging.INFO), "%s", event_line(event))
 
 
 class _ManifestKeeper:

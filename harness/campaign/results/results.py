@@ -26,6 +26,7 @@ from harness.campaign.storage.learned import did_not_learn, judged
 from harness.campaign.storage.manifest import FINISHED, is_tuned
 from harness.campaign.storage.manoeuvre_table import manoeuvres_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.trace_tables import cause_table, severity_table, with_severity
 from harness.config.campaign import Campaign
 from harness.errors import UsageError
@@ -150,6 +151,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     )
     write_ci_files(folder, manifest, checks, result)
     keep_result(folder, written, result)
+    LOGGER.info("wrote the results of %d games; exit code %d", len(episodes), result.exit_code)
     return result
 
 
@@ -255,6 +257,7 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
             obstacles=scene.obstacles,
+            stripes=scene.stripes,
         )
     _drop_stale(folder.replays, set(names))
     return names
