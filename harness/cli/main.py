@@ -16,6 +16,7 @@ from harness.cli.documents import AllowCode, check, check_driver, columns, new, 
 from harness.cli.pinned_games import minimise, regression
 from harness.cli.replays import replay
 from harness.cli.scenes import scene_app
+from harness.cli.serving import serve
 from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
@@ -167,6 +168,7 @@ def report(run: RunPath) -> None:
 
 
 app.command()(replay)
+app.command()(serve)
 app.command()(compare)
 app.command()(new)
 app.command()(check)

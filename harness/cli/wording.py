@@ -30,6 +30,10 @@ BAD_PROJECT_NAME = (
 FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
 
 
+def serving(address: str) -> str:
+    return f"The report is at {address} until Ctrl-C."
+
+
 def reading(file: Path) -> str:
     return f"reading {escape(str(file))}"
 
