@@ -22,7 +22,7 @@ _CELL_BYTES = 60
 UNITS = (("_mps2", "m/s²"), ("_mps", "m/s"), ("_m", "m"), ("_s", "s"))
 RATES = (
     *("failure_rate", "non_ego_goal_rate", "ego_failure_rate", "naive_failure_rate", "solution_failure_rate"),
-    *("gap_share", "share"),
+    *("gap_share", "share", "near_miss_rate"),
 )
 POINTS = ("failure_difference", "fewer_failures")
 """Differences of rates."""
