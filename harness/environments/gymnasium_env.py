@@ -17,10 +17,9 @@ from pettingzoo import ParallelEnv
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest, read_document
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import ACTIONS, read_policy
-from harness.drivers.sumo import SumoDriver
+from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Seat
+from harness.environments.opponents import external_opponent, opponent_seats
 from harness.environments.single_game import Info, SingleGame
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
@@ -88,16 +87,21 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
         other: Place | None = None,
         other_persona: Place | None = None,
         render_mode: None = None,
+        allow_code: bool = False,
     ) -> None:
         """Open the scene and load SUMO.
 
         `player` (a name of the scene: "ego" or "non_ego", with several people "non_ego_1" and so on) is the learner; it
         has the payoff and the human factors of `persona`. `other` is the driver of every other player: None (the player
-        is alone), "sumo", or the folder of a policy, which has the human factors of `other_persona`. Paths are relative
-        to the working directory; scenes and personas also have names, as in a campaign ("merge", "speedy"). Raises
-        UsageError for arguments that are wrong and files that can't be read, SimulationError if SUMO fails.
+        is alone), "sumo", or what `[ego] driver` of a campaign may be: the folder of a policy, a driver document, the
+        name of a shipped driver or of an installed package. It has the human factors of `other_persona`. Code in files
+        runs only with `allow_code`. Paths are relative to the working directory; scenes and personas also have names,
+        as in a campaign ("merge", "speedy"). Raises UsageError for arguments that are wrong and files that can't be
+        read, SimulationError if SUMO fails.
         """
-        opened = scene if isinstance(scene, OpenScene) else open_scene(_find(scene, "networks"))
+        external = external_opponent(other, player, allow_code)
+        type_of_ego = external.vehicle_type if external is not None else None
+        opened = scene if isinstance(scene, OpenScene) else open_scene(_find(scene, "networks"), type_of_ego)
         roles = opened.world.roles
         if player not in roles:
             raise UsageError.of("DrivingEnv", "player", f"there is no player {player!r}", nearest(player, roles))
@@ -106,14 +110,11 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
         self._player = roles.index(player)
         own = _read_persona(persona)
         opponent_persona = _read_persona(other_persona or PERSONA)
-        if other is None or other == "sumo":
-            opponent = Seat(SumoDriver())
-        else:
-            sampled = opponent_persona.decisions == "sampled"
-            opponent = Seat(LearnedDriver(read_policy(Path(other)), sampled))
         opponent_factors = opponent_persona.human_factors if other_persona else HumanFactors()
         players, there = len(roles), float(other is not None)
-        seats, human_factors, present = [opponent] * players, [opponent_factors] * players, [there] * players
+        sampled = opponent_persona.decisions == "sampled"
+        seats = opponent_seats(external, opened.world, self._player, sampled)
+        human_factors, present = [opponent_factors] * players, [there] * players
         seats[self._player], human_factors[self._player] = Seat(None, own.payoff), own.human_factors
         present[self._player] = 1.0
         self._game = SingleGame(opened, seats, human_factors, present)
