@@ -29,7 +29,7 @@ from harness.traffic import network
 from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
 from harness.traffic.footway import open_walker, opened_ground, with_walkers
-from harness.traffic.levels import heights_of_players_roads
+from harness.traffic.levels import check_one_level, heights_of_players_roads
 from harness.traffic.obstacles import check_clear_starts, hiding_in, open_obstacles, with_types
 from harness.traffic.player import OpenPlayer, open_player
 from harness.traffic.right_of_way import right_of_way
@@ -163,6 +163,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     if routes is None:
         raise UsageError(problems)
     own = _edges_of_players(document, net, routes)
+    collect(problems, lambda: check_one_level(document_file, own))
     area = network.drivable_area(net, own)
     ground = opened_ground(document, net, area, own)
     paved = area if ground is None else ground.surface
