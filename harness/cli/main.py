@@ -20,6 +20,7 @@ from harness.cli.policies import policy_app
 from harness.cli.replays import replay
 from harness.cli.results import exit_as, show_result
 from harness.cli.scenes import scene_app
+from harness.cli.serving import serve
 from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
@@ -177,6 +178,7 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
 
 app.command()(replay)
 app.command()(export)
+app.command()(serve)
 app.command()(compare)
 app.command()(new)
 app.command()(check)

@@ -43,6 +43,10 @@ ONE_OR_ALL = ("--conflict and --all exclude each other", "give one of them")
 FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
 
 
+def serving(address: str) -> str:
+    return f"The report is at {address} until Ctrl-C."
+
+
 def reading(file: Path) -> str:
     return f"reading {escape(str(file))}"
 

@@ -1,7 +1,8 @@
 """A scene's net as OpenDRIVE 1.4, by netconvert.
 
 netconvert names the signals by light and link, such as `crossing_3`; programs such as esmini read numbers only. So
-signals get numbers, and keep netconvert's name as their `name`.
+signals get numbers, and keep netconvert's name as their `name`. At the ends of the net netconvert links roads to
+junctions that it does not write; these links are removed.
 """
 
 from __future__ import annotations
@@ -47,24 +48,33 @@ def road_file(net_file: Path, title: str) -> RoadFile:
     if header is not None:
         header.set("name", title)
         header.set("date", NO_DATE)
+    _remove_loose_links(root)
     lights = [light.get("id", "") for light in parse_xml(net_file).iter("tlLogic")]
     return RoadFile(signals=_numbered(root, lights), xml=xml_text(root))
 
 
+def _remove_loose_links(root: ElementTree.Element) -> None:
+    """Remove the links of roads to junctions that the document does not have."""
+    junctions = {junction.get("id") for junction in root.iter("junction")}
+    for links in root.iterfind("road/link"):
+        for link in list(links):
+            if link.get("elementType") == "junction" and link.get("elementId") not in junctions:
+                links.remove(link)
+
+
 def _numbered(root: ElementTree.Element, lights: list[str]) -> dict[str, dict[int, int]]:
-    """Number the signals of a document, and group those of a light as a controller; the numbers of each light."""
+    """Number the signals of a document, also where its controllers name them; the numbers of each light."""
     numbers: dict[str, dict[int, int]] = {}
+    number_of: dict[str, str] = {}
     for number, signal in enumerate(root.iter("signal"), start=1):
         name = signal.get("id", "")
         light, _, link = name.rpartition("_")  # an id may contain '_'
         signal.set("id", str(number))
         signal.set("name", name)
+        number_of[name] = str(number)
         if light in lights and link.isdecimal():
             numbers.setdefault(light, {})[int(link)] = number
-    places = [place for place, element in enumerate(root) if element.tag == "road"]
-    for number, (light, of_light) in enumerate(sorted(numbers.items()), start=1):
-        controller = ElementTree.Element("controller", id=str(number), name=light, sequence="0")
-        for _, signal_number in sorted(of_light.items()):
-            ElementTree.SubElement(controller, "control", signalId=str(signal_number), type="0")
-        root.insert(places[-1] + number, controller)
+    for control in root.iter("control"):
+        named = control.get("signalId", "")
+        control.set("signalId", number_of.get(named, named))
     return numbers

@@ -27,6 +27,9 @@ MINOR_VERSION = 2
 AUTHOR = "harness"
 _LIMITS = {"max_speed": 100.0, "max_acceleration": 50.0, "max_deceleration": 50.0}
 """Of every vehicle: wide enough for any recorded motion."""
+_FOR_ESMINI = {"plineInterpolation": "segment"}
+"""Property of every entity: esmini turns it evenly between two samples. By default it turns it around corners only, and
+does not show the heading of a sample at its time."""
 _WHEEL_M, _MAX_STEER_RAD = 0.6, 0.8
 _THINGS = {"obstacle": "obstacle", "building": "building"}
 
@@ -37,8 +40,7 @@ def scenario_file(game: ExportedGame, road: RoadFile | None) -> bytes:
     act = xosc.Act("recording", _at(0.0, "start of the recording"))
     network = xosc.RoadNetwork(ROAD_FILE if road is not None else None)
     for body in game.bodies:
-        controller = xosc.Controller(f"{body.name}_controller", xosc.Properties()) if body.is_player else None
-        entities.add_scenario_object(body.name, _entity(body), controller)
+        entities.add_scenario_object(body.name, _entity(body), _controller(body) if body.is_player else None)
         if body.first_step == 0:
             for action in _start(body):
                 init.add_init_action(body.name, action)
@@ -93,11 +95,20 @@ def _entity(body: Body) -> xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject:
         )
         category = getattr(xosc.VehicleCategory, kind.word)
         entity = xosc.Vehicle(name, category, box, front, rear, mass=kind.mass_kg, **_LIMITS)
+    for name, value in _FOR_ESMINI.items():
+        entity.add_property(name, value)
     if body.name == "ego":
         entity.add_property("type", "ego_vehicle")
     if body.original != body.name:
         entity.add_property("recorded_as", body.original)
     return entity
+
+
+def _controller(body: Body) -> xosc.Controller:
+    """The controller of a player, which esmini knows as one that another program steers."""
+    properties = xosc.Properties()
+    properties.add_property("esminiController", "ExternalController")
+    return xosc.Controller(f"{body.name}_controller", properties)
 
 
 def _start(body: Body) -> Iterator[Any]:
