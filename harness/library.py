@@ -128,13 +128,14 @@ def run(
     quick: bool = False,
     jobs: int | None = None,
     allow_code: bool = False,
+    keep_going: bool = False,
     progress: bool = False,
 ) -> Results:
     """Carry out a campaign, or what is left of it, as `harness campaign` does.
 
     `campaign` is a TOML file or the name of a shipped campaign, `out` the run folder (default: `reports/NAME` in the
-    working folder), `jobs` the number of stages carried out at once (default: one per core), and `progress` prints
-    what the command prints. Raises UsageError for mistakes in documents. A stage that fails is in the results, not
+    working folder), `jobs` the number of stages carried out at once (default: one per core), `allow_code` and
+    `keep_going` are those of the command, and `progress` prints what it prints. Raises UsageError for mistakes in documents. A stage that fails is in the results, not
     raised.
 
     >>> import harness
@@ -153,7 +154,7 @@ def run(
     opened = open_campaign(document_at(Path(campaign), "campaigns"), quick, allow_code)
     folder = RunFolder(Path(out) if out is not None else Path("reports") / opened.run_name)
     console = Console(file=None if progress else io.StringIO())
-    run_campaign(opened, folder, partial(WorkerPool, jobs=jobs or cores()), console)
+    run_campaign(opened, folder, partial(WorkerPool, jobs=jobs or cores()), console, keep_going)
     return load(folder.path)
 
 
