@@ -135,8 +135,8 @@ def run(
 
     `campaign` is a TOML file or the name of a shipped campaign, `out` the run folder (default: `reports/NAME` in the
     working folder), `jobs` the number of stages carried out at once (default: one per core), `allow_code` and
-    `keep_going` are those of the command, and `progress` prints what it prints. Raises UsageError for mistakes in documents. A stage that fails is in the results, not
-    raised.
+    `keep_going` are those of the command, and `progress` prints what it prints. Raises UsageError for mistakes in
+    documents. A stage that fails is in the results, not raised.
 
     >>> import harness
     >>> results = harness.run("two_games.toml", jobs=1)
