@@ -13,16 +13,16 @@ WHY = "Why does it fail?"
 PREVENTABLE = "Could it have been prevented?"
 NOW = "What now?"
 NO_FAILURE = "Against {persona} no ego fails."
-FAILS = "Against {persona} the {ego} ego fails in {failures} of {games} games."
-FAILS_NO_MORE = "The {ego} ego does not fail."
+FAILS = "Against {persona} the {ego} fails in {failures} of {games} games."
+FAILS_NO_MORE = "The {ego} does not fail."
 MOSTLY = "{share} failures: {cause}."
 ALL, SOME, NONE = "Yes.", "Partly.", "No."
 PREVENTED = (
-    "Against {persona} a reference driver (a model of a careful human driver) in the seat of the naive ego avoids "
+    "Against {persona} a reference driver (a model of a careful human driver) in the seat of the {naive} avoids "
     "{avoided} of its {failures} failures."
 )
 NOT_JUDGED = "Not known: reference drivers have judged no failure of this run."
-NOTHING_TO_PREVENT = "There is nothing to prevent: the naive ego does not fail."
+NOTHING_TO_PREVENT = "There is nothing to prevent: the {naive} does not fail."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,9 +50,9 @@ def first_answers(personas: Sequence[str], found: Results, steps: Sequence[NextS
 
 def _egos(persona: str, found: Results) -> Iterator[tuple[str, str, EgoStrategy]]:
     """The egos that a persona's card shows: the question about each, its word, and the strategy."""
-    yield "RQ1", "naive", NaiveEgo()
+    yield "RQ1", found.naive, NaiveEgo()
     if found.asked("RQ2", persona):
-        yield "RQ2", found.change.made, found.change.ego(against=persona)
+        yield "RQ2", f"{found.change.made} ego", found.change.ego(against=persona)
 
 
 def _why(persona: str, found: Results) -> Iterator[str]:
@@ -82,11 +82,11 @@ def _prevented(personas: Sequence[str], found: Results) -> list[str]:
         avoided = sum(each.from_start.by_any for each in judged)
         failures = sum(each.from_start.judged for each in judged)
         if failures:
-            lines.append(PREVENTED.format(persona=persona, avoided=avoided, failures=failures))
+            lines.append(PREVENTED.format(persona=persona, naive=found.naive, avoided=avoided, failures=failures))
         all_avoided, all_failures = all_avoided + avoided, all_failures + failures
     if not lines:
         arms = [against_persona(NaiveEgo(), persona).name for persona in personas]
         failed = found.games[found.games["arm"].isin(arms)]["ego_failed"].sum()
-        return [NOT_JUDGED if failed else NOTHING_TO_PREVENT]
+        return [NOT_JUDGED if failed else NOTHING_TO_PREVENT.format(naive=found.naive)]
     label = ALL if all_avoided == all_failures else SOME if all_avoided else NONE
     return [f"{label} {lines[0]}", *lines[1:]]

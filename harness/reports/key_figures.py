@@ -16,7 +16,7 @@ from harness.reports.results import Results
 from harness.reports.worst_opponent import worst_opponent
 
 PREVENTABLE = "Preventable"
-CAUSES = "Why the {ego} ego fails"
+CAUSES = "Why the {ego} fails"
 NEAR_MISS = "near_miss"
 NEAR_MISSES = "Near misses"
 WORST_KNOWN_OPPONENT = "Against its worst known opponent"
@@ -41,7 +41,7 @@ def key_figures(persona: str, found: Results) -> list[KeyFigure]:
 
 
 def _causes(persona: str, found: Results) -> Iterator[KeyFigure]:
-    for question, ego in (("RQ1", "naive"), ("RQ2", found.change.made)):
+    for question, ego in (("RQ1", found.naive), ("RQ2", f"{found.change.made} ego")):
         lines = found.causes(question, persona)
         if lines:
             yield KeyFigure(title=CAUSES.format(ego=ego), lines=lines)
@@ -62,16 +62,16 @@ def _preventable(persona: str, found: Results) -> Iterator[KeyFigure]:
 def _near_misses(persona: str, found: Results) -> Iterator[KeyFigure]:
     if NEAR_MISS not in found.games.columns:
         return
-    egos: list[tuple[str, EgoStrategy]] = [("naive", NaiveEgo())]
+    egos: list[tuple[str, EgoStrategy]] = [(found.naive, NaiveEgo())]
     if found.asked("RQ2", persona):
-        egos.append((found.change.made, found.change.ego(against=persona)))
+        egos.append((f"{found.change.made} ego", found.change.ego(against=persona)))
     lines, last = [], 0.0
     for made, ego in egos:
         games = found.games[found.games["arm"] == against_persona(ego, persona).name]
         marks = games[NEAR_MISS].dropna()
         if len(marks):
             last = float(marks.mean())
-            lines.append(f"{int(marks.sum())} of {len(marks)} games of the {made} ego ({percent(last)})")
+            lines.append(f"{int(marks.sum())} of {len(marks)} games of the {made} ({percent(last)})")
     if lines:
         yield KeyFigure(title=NEAR_MISSES, lines=tuple(lines), warns=last >= OFTEN)
 

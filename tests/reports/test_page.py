@@ -398,14 +398,14 @@ def test_banner__games_that_could_not_be_played_are_counted_by_arm(page):
 def test_verdicts__call_an_ego_of_others_by_its_own_name(driver, name):
     arguments = campaign(personas=["speedy"])
     arguments["manifest"]["campaign"]["ego"]["driver"] = driver
-    text = text_of(arguments).partition("What to do next")[0]
+    text = text_of(arguments).partition("Figures and tests")[0]
     assert f"the {name}" in text
     assert "naive ego" not in text
 
 
 def test_banner__an_ego_that_played_no_game_has_not_never_failed():
     arguments = campaign()
-    arguments["manoeuvres"] = arguments["manoeuvres"].iloc[:0]
+    arguments |= {"manoeuvres": recordings(arguments)["manoeuvres"].iloc[:0]}
     text = text_of(with_errors(arguments, arguments["episodes"]["episode"] >= 0))
     assert "The ego played no game." in text
     assert "never failed" not in text
