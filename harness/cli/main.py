@@ -13,6 +13,7 @@ import typer
 from harness.cli import wording
 from harness.cli.comparison import compare
 from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
+from harness.cli.exports import export
 from harness.cli.output import AsJson, Quiet, Verbose, output
 from harness.cli.pinned_games import minimise, regression
 from harness.cli.replays import replay
@@ -77,6 +78,13 @@ RunOut = Annotated[
         metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]", show_default=False
     ),
 ]
+KeepGoing = Annotated[
+    bool,
+    typer.Option(
+        "--keep-going",
+        help="Play all games of an arm, even if its first ten can't be played for one reason.",
+    ),
+]
 Jobs = Annotated[
     int | None,
     typer.Option(
@@ -101,6 +109,7 @@ def campaign(
     out: RunOut = None,
     jobs: Jobs = None,
     allow_code: AllowCode = False,
+    keep_going: KeepGoing = False,
     ray: Ray = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -127,7 +136,7 @@ def campaign(
         _handle_termination_signals()
         try:
             with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
-                outcome = run_campaign(opened, folder, start_workers, console)
+                outcome = run_campaign(opened, folder, start_workers, console, keep_going)
         except KeyboardInterrupt as interrupt:
             console.print(wording.INTERRUPTED)
             raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
@@ -166,6 +175,7 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
 
 
 app.command()(replay)
+app.command()(export)
 app.command()(compare)
 app.command()(new)
 app.command()(check)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +21,12 @@ KEPT = "finished work is kept"
 # --- errors: message and remedy ---
 FILM_NEEDS_A_GAME = ("shows one game", "name the game: harness replay RUN ARM EPISODE")
 JSON_IS_OF_A_LIST = ("lists games", "leave out the episode, or add --list")
+EXPORT_A_GAME = (
+    "is not an arm, an episode and a new folder",
+    "harness export RUN ARM EPISODE DIR, or harness export RUN --failures DIR",
+)
+EXPORT_FAILURES = ("is more than an arm and a new folder", "harness export RUN [ARM] --failures DIR")
+NO_EPISODE = ("is not the number of an episode", "harness replay RUN --list shows them")
 NOT_A_FOLDER = ("is not a folder", "name a folder")
 NOT_A_TOML_FILE = ("is not the name of a TOML file", "the name must end with .toml")
 FOLDER_NOT_EMPTY = ("is there already, and not empty", "name a new folder")
@@ -28,6 +34,11 @@ BAD_PROJECT_NAME = (
     "the folder's name is that of the campaign, too: letters, digits, _ and -, a letter first, at most 40",
     "name another folder",
 )
+BAD_SCENE_NAME = ("can't be the name of a scene", "use letters, digits and _, a letter first, at most 40")
+SCENE_EXISTS = ("is there already, and nothing is overwritten", "choose another NAME, or another folder with --out")
+MAKING_SCENES = "making and checking scenes"
+NO_CONFLICT_NEAR = ("there is no conflict near this edge", "give a larger --within")
+ONE_OR_ALL = ("--conflict and --all exclude each other", "give one of them")
 FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
 
 
@@ -45,6 +56,14 @@ def no_folder(folder: Path) -> tuple[str, str]:
 
 def no_document_kind(kinds: Sequence[str]) -> tuple[str, str]:
     return "is missing", f"name one of {', '.join(kinds)}, or write all of them with --out DIR"
+
+
+def no_such_conflict(count: int) -> tuple[str, str]:
+    return "there is no conflict of this number", f"choose one from 1 to {count}: --list lists them"
+
+
+def no_kind_of_conflict(kinds: Sequence[str]) -> tuple[str, str]:
+    return "is no kind of conflict of this map", f"its kinds are {', '.join(kinds)}"
 
 
 def bad_persona_name(name: str, suggestion: str) -> tuple[str, str]:
@@ -77,8 +96,28 @@ def project_created(folder: Path, files: Sequence[Path]) -> list[str]:
     return [*(f"wrote {file}" for file in files), f"Next: cd {folder} && harness campaign campaign.toml --quick"]
 
 
+def conflicts_found(counts: Iterable[tuple[str, int]], left_out: Mapping[str, int]) -> Iterator[str]:
+    """How many conflicts of each kind a map has, and why no scene can be made of others."""
+    kinds = [f"{count} {kind}" for kind, count in counts]
+    yield f"{', '.join(kinds)}."
+    for reason, count in sorted(left_out.items()):
+        yield f"left out: {count} ({reason})"
+
+
+def scene_made(number: int, place: str, folder: Path, campaign: Path) -> str:
+    return f"conflict {number}, {place}: wrote {folder} and {campaign}"
+
+
+def run_campaign_next(campaign: Path) -> str:
+    return f"Next: harness campaign {campaign} --quick"
+
+
 def page_written(file: Path) -> str:
     return f"Page: {file}"
+
+
+def exported(count: int, folder: Path) -> str:
+    return f"Wrote {count} {'game' if count == 1 else 'games'} to {folder}: games.csv lists them"
 
 
 def report_written(run: Path) -> str:
@@ -93,8 +132,9 @@ def failed_stages(names: Sequence[str]) -> str:
     return f"Not finished: {', '.join(names)}"
 
 
-def error_games(count: int) -> str:
-    return f"{count} games could not be played; their pairs are left out"
+def error_games(count: int, reasons: Sequence[str]) -> list[str]:
+    """How many games could not be played, and a line for each reason."""
+    return [f"{count} games could not be played; their pairs are left out", *(f"  {each}" for each in reasons)]
 
 
 # --- harness check ---

@@ -7,7 +7,7 @@ from markupsafe import Markup
 
 SCRIPTS = tuple(
     f"{name}.js"
-    for name in ("recorded", "road", "vehicles", "strips", "screen", "player", "controls", "clips", "tables")
+    for name in ("recorded", "road", "sight", "vehicles", "strips", "screen", "player", "controls", "clips", "tables")
 )
 """In the order in which they use one another."""
 

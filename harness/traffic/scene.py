@@ -30,7 +30,7 @@ from harness.traffic import network
 from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
 from harness.traffic.footway import open_walker, opened_ground, with_walkers
-from harness.traffic.levels import heights_of_players_roads
+from harness.traffic.levels import check_one_level, heights_of_players_roads
 from harness.traffic.obstacles import check_clear_starts, hiding_in, open_obstacles, with_types
 from harness.traffic.player import OpenPlayer, open_player
 from harness.traffic.right_of_way import right_of_way
@@ -42,6 +42,7 @@ from harness.traffic.trips import with_routes
 from harness.traffic.users_lanes import lanes_for
 from harness.traffic.walker_conflicts import Way, with_walkers_conflicts
 from harness.traffic.warm_up import Snapshot, snapshots
+from harness.traffic.zebra import stripes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +65,7 @@ class OpenScene:
     junctions: frozenset[str] | None = None  # those that games need; None: all of the net
     obstacles: Obstacles = NO_OBSTACLES
     lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
+    stripes: tuple[FloatArray, ...] = ()  # [5, 2] each, of the marked crossings
     roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
 
     @property
@@ -132,6 +134,7 @@ class OpenScene:
         return StartDistribution(
             places=self.places,
             length_m=self.world.length_m,
+            max_speed_mps=self.world.actuators.max_speed_mps,
             human_factors=factors_of,
             shares=shares or [[1.0] * len(each) for each in factors_of],
             present_share=present_share,
@@ -172,6 +175,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     if routes is None:
         raise UsageError(problems)
     own = _edges_of_players(document, net, routes)
+    collect(problems, lambda: check_one_level(document_file, own))
     area = network.drivable_area(net, own)
     ground = opened_ground(document, net, area)
     open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
@@ -229,6 +233,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
         junctions=network.junctions_near(net, [*own, *background]),
+        stripes=tuple(stripes([np.array(each.way) for each in document.players if each.marked_crossing], area)),
         roads_m=heights_of_players_roads(net, own),
     )
     factors, present = [HumanFactors()] * len(places), [1.0] * len(places)

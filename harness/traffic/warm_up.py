@@ -3,7 +3,7 @@
 SUMO runs the background traffic alone for the time of the warm-up, several times with different seeds, in separate
 processes. The vehicles at the end of each run are a snapshot. A game draws one of them and puts its vehicles on the
 road at once, each with its lane, place, speed, speed factor, remaining route and remaining stops. Vehicles that wait to
-depart, and parked ones, are left out. The snapshots are the same in training and in assessment, and are cached.
+depart, parked ones, and persons are left out. The snapshots are the same in training and in assessment, and are cached.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from harness.game.initial_state import InitialState
 from harness.game.seeding import between, generator_of, seed_of
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.route_file import Departure, Motion, RouteFile
-from harness.traffic.route_writing import vehicle_element
+from harness.traffic.route_writing import traveller_element
 from harness.traffic.stops import Stop
 from harness.traffic.sumo_program import run_program
 from harness.traffic.xml_file import parse_xml
@@ -105,7 +105,8 @@ def _drawn(document: Scene, routes: RouteFile, players: set[str], k: int) -> tup
     varied = document.varies.traffic_density
     density = 1.0 if varied is None else between(varied, generator.random())
     begin_s = document.traffic_begin_s
-    return density, routes.departures(players, begin_s + document.warm_up_s, generator, begin_s, density)
+    drawn = routes.departures(players, begin_s + document.warm_up_s, generator, begin_s, density)
+    return density, [each for each in drawn if not each.on_foot]
 
 
 def _options(document: Scene) -> tuple[str, ...]:
@@ -130,7 +131,7 @@ def _run(
         folder = Path(name)
         (folder / "types.rou.xml").write_text(routes.types_xml, encoding="utf-8")
         root = ElementTree.Element("routes")
-        root.extend(vehicle_element(each, each.name, each.depart_s) for each in departures)
+        root.extend(traveller_element(each, each.name, each.depart_s) for each in departures)
         ElementTree.ElementTree(root).write(folder / "vehicles.rou.xml", encoding="utf-8", xml_declaration=True)
         files = ("--net-file", str(net_file), "--route-files", "types.rou.xml,vehicles.rou.xml")
         _run_sumo([*files, *options, "--seed", str(seed_of("warm-up", k) % 2**31)], folder)

@@ -27,7 +27,7 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
 from harness.evaluation.worst_first import FAILURES, severities, worst_first
 from harness.replay import follow_in_sumo_gui, replay_name, write_film, write_replay
-from harness.traffic.scene import open_scene
+from harness.traffic.scene import OpenScene, open_scene
 
 _OTHERS = "--page, --rows, --outcome and ARM choose others"
 FAILURE = "failure"
@@ -65,7 +65,7 @@ class ListedGames:
 def listed_games(run: Path, chosen: GameList) -> ListedGames:
     """The chosen games of a run. Raises UsageError where no game is of an arm, a seed or an outcome."""
     folder = RunFolder(run)
-    episodes = _episodes(folder)
+    episodes = episodes_of(folder)
     manoeuvres = folder.path / "manoeuvres.csv"
     pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
     episodes = _chosen(run, episodes, chosen)
@@ -118,7 +118,7 @@ def game_records(run: Path, chosen: GameList) -> dict[str, Any]:
 def _chosen(run: Path, episodes: pd.DataFrame, chosen: GameList) -> pd.DataFrame:
     """The games that fulfil the conditions. Raises UsageError where one is of no game."""
     if chosen.arm is not None:
-        episodes = _of_arm(run, episodes, chosen.arm)
+        episodes = games_of_arm(run, episodes, chosen.arm)
     if chosen.seed is not None:
         seeds = sorted(set(episodes["seed"]))
         if chosen.seed not in seeds:
@@ -150,16 +150,26 @@ class FoundGame:
     step_length_s: float
 
 
-@contextmanager
-def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
-    """A game with a temporary replay folder, made from its trace. The folders under `replays/` are not opened here: a
-    changed configuration there could make SUMO read and write any file.
+@dataclass(frozen=True, kw_only=True)
+class PlayedGame:
+    """A recorded game: its trace, and the scene that it was played on."""
+
+    name: str
+    title: str
+    record: pd.DataFrame
+    """Its row of `episodes.csv`."""
+    trace: pd.DataFrame
+    scene: OpenScene
+
+
+def played_game(run: Path, arm: str, episode: int, seed: int | None) -> PlayedGame:
+    """The game of an arm and episode; `seed` None is the first training seed.
 
     Raises UsageError if there is no such game, or it could not be played.
     """
     folder = RunFolder(run)
     chosen_seed = folder.manifest()["seeds"][0] if seed is None else seed
-    games = _of_arm(run, _episodes(folder), arm)
+    games = games_of_arm(run, episodes_of(folder), arm)
     found = games[(games["episode"] == episode) & (games["seed"] == chosen_seed)]
     if found.empty:
         raise UsageError.of(
@@ -170,33 +180,56 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
         )
     if found.iloc[0]["error"]:
         raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {found.iloc[0]['error']}", "choose another")
-    if not folder.traces(stage_id(arm, chosen_seed)).is_file():
+    traces = traces_of(folder, arm, chosen_seed, episode)
+    scene = open_scene(folder.scene)
+    trace = read_trace(traces, episode)
+    if trace.empty:
+        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
+    return PlayedGame(
+        name=replay_name(arm, chosen_seed, episode),
+        title=f"{arm}, seed {chosen_seed}, episode {episode}",
+        record=found,
+        trace=trace,
+        scene=scene,
+    )
+
+
+def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
+    """The traces file of an arm and seed. Raises UsageError, which names the episode, if the folder lacks it."""
+    traces = folder.traces(stage_id(arm, seed))
+    if not traces.is_file():
         raise UsageError.of(
-            run,
+            folder.path,
             f"{arm} {episode}",
             "was recorded, but this folder does not contain the traces",
-            f"watch it in {run / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
+            f"watch it in {folder.path / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
         )
-    scene = open_scene(folder.scene)
-    trace = read_trace(folder.traces(stage_id(arm, chosen_seed)), episode)
-    title = f"{arm}, seed {chosen_seed}, episode {episode}"
-    name = replay_name(arm, chosen_seed, episode)
-    if trace.empty:
-        traces = folder.traces(stage_id(arm, chosen_seed))
-        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
+    return traces
+
+
+@contextmanager
+def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
+    """A game with a temporary replay folder, made from its trace. The folders under `replays/` are not opened here: a
+    changed configuration there could make SUMO read and write any file.
+
+    Raises UsageError if there is no such game, or it could not be played.
+    """
+    game = played_game(run, arm, episode, seed)
+    scene = game.scene
     with TemporaryDirectory(prefix="harness-replay-") as scratch:
-        replay = Path(scratch) / name
+        replay = Path(scratch) / game.name
         write_replay(
-            trace,
+            game.trace,
             scene.net_file,
             scene.route_files,
             replay,
-            title=title,
+            title=game.title,
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
             obstacles=scene.obstacles,
+            stripes=scene.stripes,
         )
-        yield FoundGame(replay=replay, trace=trace, title=title, step_length_s=scene.world.step_s)
+        yield FoundGame(replay=replay, trace=game.trace, title=game.title, step_length_s=scene.world.step_s)
 
 
 def watch(game: FoundGame, console: Console) -> None:
@@ -224,12 +257,14 @@ def film(game: FoundGame, file: Path, console: Console) -> None:
     console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
 
 
-def _episodes(folder: RunFolder) -> pd.DataFrame:
+def episodes_of(folder: RunFolder) -> pd.DataFrame:
+    """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run."""
     folder.manifest()
     return read_csv(folder.path / "episodes.csv")
 
 
-def _of_arm(run: Path, episodes: pd.DataFrame, arm: str) -> pd.DataFrame:
+def games_of_arm(run: Path, episodes: pd.DataFrame, arm: str) -> pd.DataFrame:
+    """The rows of an arm. Raises UsageError if there is none."""
     arms = sorted(set(episodes["arm"]))
     if arm not in arms:
         raise UsageError.of(run, arm, "has no such arm", nearest(arm, arms or ["(no arm is done yet)"]))
