@@ -97,16 +97,19 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
         other: Place | None = None,
         other_persona: Place | None = None,
         render_mode: str | None = None,
+        allow_code: bool = False,
     ) -> None:
         """Open the scene and load SUMO.
 
         `player` (a name of the scene: "ego" or "non_ego", with several people "non_ego_1" and so on) is the learner; it
         has the payoff and the human factors of `persona`. `other` is the driver of every other player: None (the player
-        is alone), "sumo", or the folder of a policy, which has the human factors of `other_persona`. Paths are relative
-        to the working directory; scenes and personas also have names, as in a campaign ("merge", "speedy"). Raises
-        UsageError for arguments that are wrong and files that can't be read, SimulationError if SUMO fails.
+        is alone), "sumo", or what `[ego] driver` of a campaign may be: the folder of a policy, a driver document, the
+        name of a shipped driver or of an installed package. It has the human factors of `other_persona`. Code in files
+        runs only with `allow_code`. Paths are relative to the working directory; scenes and personas also have names,
+        as in a campaign ("merge", "speedy"). Raises UsageError for arguments that are wrong and files that can't be
+        read, SimulationError if SUMO fails.
         """
-        seating = seating_of(scene, player, persona, other, other_persona)
+        seating = seating_of(scene, player, persona, other, other_persona, allow_code)
         self._player = seating.learner
         self._game = SingleGame(seating.scene, seating.seats, seating.human_factors, seating.present, render_mode)
         self.metadata = {**self.metadata, "render_fps": round(1.0 / seating.scene.world.step_s)}

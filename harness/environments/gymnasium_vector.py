@@ -56,10 +56,11 @@ class VectorDrivingEnv(LiveSimulation, gymnasium.vector.VectorEnv[Any, Any, Any]
         other: Place | None = None,
         other_persona: Place | None = None,
         render_mode: str | None = None,
+        allow_code: bool = False,
     ) -> None:
         """Open the scene and load SUMO with `num_envs` games. The other arguments and errors are those of
         `DrivingEnv`."""
-        seating = _seating(num_envs, seating_of(scene, player, persona, other, other_persona))
+        seating = _seating(num_envs, seating_of(scene, player, persona, other, other_persona, allow_code))
         if render_mode is not None:
             remedy = "gymnasium.make draws a single environment"
             raise UsageError.of("VectorDrivingEnv", "render_mode", f"is {render_mode!r}: there are no pictures", remedy)

@@ -8,9 +8,7 @@ from typing import TypeAlias
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import nearest, read_document
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import read_policy
-from harness.drivers.sumo import SumoDriver
+from harness.environments.opponents import external_opponent, opponent_seats
 from harness.environments.seats import Seat
 from harness.errors import UsageError
 from harness.game.attention import HumanFactors
@@ -42,11 +40,17 @@ class Seating:
 
 
 def seating_of(
-    scene: Place | OpenScene, player: str, persona: Place, other: Place | None, other_persona: Place | None
+    scene: Place | OpenScene,
+    player: str,
+    persona: Place,
+    other: Place | None,
+    other_persona: Place | None,
+    allow_code: bool = False,
 ) -> Seating:
     """The players, by the arguments of `DrivingEnv`. Raises UsageError for arguments that are wrong and files that
     can't be read."""
-    opened = opened_scene(scene)
+    external = external_opponent(other, player, allow_code)
+    opened = opened_scene(scene, None if external is None else external.vehicle_type)
     roles = opened.world.roles
     if player not in roles:
         raise UsageError.of("environment", "player", f"there is no player {player!r}", nearest(player, roles))
@@ -55,25 +59,19 @@ def seating_of(
     learner = roles.index(player)
     own = read_persona(persona)
     opponent_persona = read_persona(other_persona or PERSONA)
-    if other is None or other == "sumo":
-        opponent = Seat(SumoDriver())
-    else:
-        opponent = Seat(LearnedDriver(read_policy(Path(other)), opponent_persona.decisions == "sampled"))
     opponent_factors = opponent_persona.human_factors if other_persona else HumanFactors()
-    others = len(roles) - 1
-    seats, factors = [opponent] * others, [opponent_factors] * others
-    present = [float(other is not None)] * others
-    seats.insert(learner, Seat(None, own.payoff))
-    factors.insert(learner, own.human_factors)
-    present.insert(learner, 1.0)
+    seats = opponent_seats(external, opened.world, learner, opponent_persona.decisions == "sampled")
+    factors, present = [opponent_factors] * len(roles), [float(other is not None)] * len(roles)
+    seats[learner], factors[learner], present[learner] = Seat(None, own.payoff), own.human_factors, 1.0
     return Seating(
         scene=opened, learner=learner, seats=tuple(seats), human_factors=tuple(factors), present=tuple(present)
     )
 
 
-def opened_scene(written: Place | OpenScene) -> OpenScene:
-    """A scene by its path, its name, or as it is. Raises UsageError with every mistake in it."""
-    return written if isinstance(written, OpenScene) else open_scene(written)
+def opened_scene(written: Place | OpenScene, type_of_ego: str | None = None) -> OpenScene:
+    """A scene by its path, its name, or as it is; the ego may have another vehicle type. Raises UsageError with every
+    mistake in it."""
+    return written if isinstance(written, OpenScene) else open_scene(written, type_of_ego)
 
 
 def read_persona(written: Place) -> Persona:

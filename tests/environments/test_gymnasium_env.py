@@ -240,9 +240,20 @@ def test_other__a_policy_has_its_personas_attention(opened: Open, policy: Path) 
     assert min(speeds) == 0.0
 
 
+@pytest.mark.parametrize("other", ["rss", "egos/adas.toml", "egos/examples/process/perl.toml"])
+def test_other__may_be_what_a_campaign_takes_as_its_ego(opened: Open, other: str) -> None:
+    environment = opened(DrivingEnv, other=other, allow_code=True)
+    environment.reset(seed=1)
+    before = environment._game.arena.state.station_m[0, 1]
+    for _ in range(10):
+        environment.step(STRAIGHT_ON)
+    assert environment._game.arena.state.station_m[0, 1] > before + 1.0
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ({"other": "egos/examples/process/perl.toml"}, "--allow-code"),
         ({"player": "nonego"}, "did you mean 'non_ego'"),
         ({"scene": "networks/merg"}, "networks/merg"),
         ({"persona": "personas/carefull.toml"}, "carefull.toml"),
