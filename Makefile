@@ -10,7 +10,7 @@ PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo campaign quick test test-esmini test-fast coverage bench publish check lock clean
+.PHONY: help install demo campaign quick test test-esmini test-fast coverage bench publish docs check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
@@ -46,6 +46,9 @@ bench: install ## what the harness costs, as ratios measured side by side: bench
 
 publish: install ## make policies, published runs and tables of documents anew: hours; `ARGS=--cost` says how many
 	$(BIN)/python docs/publish/publish.py $(ARGS)
+
+docs: install ## build the documentation site into build/site; a warning ends it
+	$(BIN)/python docs/site/build.py build/site $(ARGS)
 
 check: install ## lint, formatting and types, in under half a minute
 	$(BIN)/ruff check .

@@ -22,7 +22,7 @@ persona = "careful"
 episodes = 2
 reference_drivers = false
 """
-IN_ANOTHER = {"Outcome": "DrivingEnv", "Step": "ArenaVecEnv"}
+IN_ANOTHER = {"Outcome": "DrivingEnv", "Persona": "read_document", "Step": "ArenaVecEnv"}
 """Names whose use the example of another name shows."""
 
 

@@ -159,4 +159,4 @@ def test_metadata__hints_name_the_distribution_and_its_extras() -> None:
     hints = {match for text in texts for match in re.findall(r"([\w-]*harness)\[(\w+)\]", text.read_text("utf-8"))}
     assert {name for name, _ in hints} == {DISTRIBUTION}
     assert {extra for _, extra in hints} <= set(extras)
-    assert {"fmi", "ray"} <= {extra for _, extra in hints}
+    assert {"fmi", "ray", "docs"} <= {extra for _, extra in hints}

@@ -10,7 +10,9 @@ import pytest
 
 from tests.support.repository import REPOSITORY
 
-PAGES = sorted([*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").glob("*.md"), *(REPOSITORY / ".github").rglob("*.md")])
+PAGES = sorted(
+    [*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").rglob("*.md"), *(REPOSITORY / ".github").rglob("*.md")]
+)
 NAMED_FILE = re.compile(r"\b(?:tests|harness|benchmarks)/[\w/.-]*\w+\.(?:py|toml|json|jinja)\b")
 NAMED_TEST = re.compile(r"\b(tests/[\w/]+\.py)::(test_\w+)")
 HISTORY = {"CHANGELOG.md"}  # it names files as they were called at the time

@@ -1,0 +1,58 @@
+"""The order of the site's pages: the first page, with the tree that Sphinx shows beside every page."""
+
+from __future__ import annotations
+
+SECTIONS = {
+    "Tutorials": (
+        "tutorials/first-campaign",
+        "tutorials/your-own-ego",
+        "tutorials/your-own-person",
+        "tutorials/your-own-junction",
+        "tutorials/reading-a-report",
+        "tutorials/from-a-failure-to-a-regression-test",
+    ),
+    "How-to guides": (
+        "installation",
+        "egos",
+        "egos-by-rules",
+        "egos-by-networks",
+        "personas",
+        "scenes",
+        "environments",
+        "acceptance",
+        "regression",
+        "export",
+        "scaling",
+    ),
+    "Concepts": (
+        "glossary",
+        "verdicts",
+        "causes",
+        "preventability",
+        "manoeuvres",
+        "game",
+        "architecture",
+        "testing",
+        "reliability",
+    ),
+    "Results": ("reproduction", "performance"),
+    "Reference": (
+        "reference/cli",
+        "reference/api",
+        "reference/campaign",
+        "reference/scene",
+        "reference/persona",
+        "reference/driver",
+        "columns",
+        "publications",
+    ),
+    "Project": ("changelog", "contributing", "site"),
+}
+
+
+def index() -> str:
+    """The first page: the README, and all pages by section."""
+    lines = ["```{include} readme.md", "```", ""]
+    for section, pages in SECTIONS.items():
+        lines += ["```{toctree}", ":hidden:", f":caption: {section}", "", *pages, "```", ""]
+    return "\n".join(lines)
