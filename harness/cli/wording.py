@@ -110,8 +110,7 @@ def project_created(folder: Path, files: Sequence[Path]) -> list[str]:
 
 def conflicts_found(counts: Iterable[tuple[str, int]], left_out: Mapping[str, int]) -> Iterator[str]:
     """How many conflicts of each kind a map has, and why no scene can be made of others."""
-    kinds = [f"{count} {kind}" for kind, count in counts]
-    yield f"{', '.join(kinds)}."
+    yield "in all: " + ", ".join(f"{count} {kind}" for kind, count in counts)
     for reason, count in sorted(left_out.items()):
         yield f"left out: {count} ({reason})"
 

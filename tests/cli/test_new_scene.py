@@ -14,8 +14,11 @@ from typer.testing import CliRunner
 
 from harness.campaign.preflight import open_campaign
 from harness.cli.main import app
+from harness.cli.scene_writing import write_scenes
 from harness.errors import UsageError
 from harness.game.initial_state import draw_initial_state
+from harness.traffic.maps.candidates import Kind
+from harness.traffic.maps.open_map import OpenMap, open_map
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 
@@ -38,6 +41,11 @@ def new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
         return result.output.splitlines()
 
     return run
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory: pytest.TempPathFactory) -> OpenMap:
+    return open_map(TOWN, tmp_path_factory.mktemp("town"), left_hand=False)
 
 
 def files_in(folder: Path) -> list[str]:
@@ -87,11 +95,12 @@ def test_new__from_opendrive_the_players_meet(tmp_path: Path, new: Run) -> None:
     assert min(apart) < -0.5 < 0.5 < max(apart)
 
 
-@pytest.mark.parametrize("kind", ["roundabout entry", "zebra crossing", "lane end"])
-def test_new__makes_a_scene_of_a_kind(kind: str, tmp_path: Path, new: Run) -> None:
-    new("town", "--from", TOWN, "--kind", kind)
-    scene = open_scene(tmp_path / "out" / "networks" / "town")
-    assert scene.document.players[1].on_foot == (kind == "zebra crossing")
+def test_write__scenes_of_other_kinds_are_in_order(town: OpenMap, tmp_path: Path) -> None:
+    kinds = {"ring": Kind.ROUNDABOUT, "zebra": Kind.ZEBRA, "ramp": Kind.LANE_END}
+    chosen = {name: next(plan for plan in town.plans if plan.candidate.kind is kind) for name, kind in kinds.items()}
+    assert write_scenes(town, chosen, tmp_path) == (list(kinds), [])
+    scenes = {name: open_scene(tmp_path / "networks" / name) for name in kinds}
+    assert [scene.document.players[1].on_foot for scene in scenes.values()] == [False, True, False]
 
 
 def test_new__of_a_number_makes_that_one(tmp_path: Path, new: Run) -> None:
@@ -117,11 +126,10 @@ def test_new__a_list_writes_nothing_but_the_page(tmp_path: Path, new: Run) -> No
     assert any("⠀" in line or "." in line for line in lines)
 
 
-def test_new__near_an_edge_keeps_the_numbers(new: Run) -> None:
-    everywhere = numbers_of(new("t", "--from", TOWN, "--list", "--rows", 100), "roundabout entry")
-    near = numbers_of(new("t", "--from", TOWN, "--list", "--near", "104#0", "--within", 1), "roundabout entry")
-    assert near
-    assert set(near) <= set(everywhere)
+def test_near__an_edge_the_conflicts_keep_their_numbers(town: OpenMap) -> None:
+    ring = town.near("104#0", 1.0)
+    assert {plan.candidate.kind for plan in ring} == {Kind.ROUNDABOUT}
+    assert ring == [town.plans[plan.number - 1] for plan in ring]
 
 
 BAD = {
@@ -140,7 +148,7 @@ def test_new__what_is_wrong_is_one_line_and_writes_nothing(
     arguments: tuple[list[Any], str], tmp_path: Path, new: Run
 ) -> None:
     given, message = arguments
-    with pytest.raises(UsageError, match=message.replace("--conflict: 99", "--conflict: 99")) as error:
+    with pytest.raises(UsageError, match=message) as error:
         new(*given, "--from", JUNCTION)
     assert len(str(error.value).splitlines()) == 1
     assert list((tmp_path / "out").iterdir()) == []
@@ -157,11 +165,11 @@ def test_new__nothing_that_is_there_is_touched(tmp_path: Path, new: Run) -> None
 
 
 def test_new__names_on_a_map_can_be_anything(tmp_path: Path, new: Run) -> None:
-    text = TOWN.read_text(encoding="utf-8").replace("Bahnhofstraße", '&lt;script&gt;[red]"""\\')
+    text = TOWN.read_text(encoding="utf-8").replace("Bahnhofstraße", "&lt;script&gt;[red]&quot;\\")
     (tmp_path / "odd [b].osm").write_text(text, encoding="utf-8")
     page = tmp_path / "map.html"
     lines = new("t", "--from", tmp_path / "odd [b].osm", "--html", page)
-    assert any('<script>[red]"""\\' in line for line in lines)
+    assert any('<script>[red]"\\' in line for line in lines)
     assert "<script>[red]" not in page.read_text(encoding="utf-8")
     assert open_scene(tmp_path / "out" / "networks" / "t").document.name == "t"
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import gzip
 import re
 import shutil
@@ -13,7 +14,8 @@ from sumolib.net import Net
 from sumolib.net.edge import Edge
 
 from harness.errors import UsageError
-from harness.traffic.maps.map_file import MapFacts, MapKind, facts_of, kind_of
+from harness.files import check_file
+from harness.traffic.maps.map_file import MOST_BYTES, MapFacts, MapKind, facts_of, kind_of
 from harness.traffic.net_file import check_net
 from harness.traffic.network import lane_line, read_net
 from harness.traffic.sumo_program import run_program
@@ -21,6 +23,8 @@ from harness.traffic.xml_file import parse_xml, xml_bytes
 
 _PATIENCE_S = 900.0
 _LAYER_M = 6.0  # of height between a road and the one that it passes over
+_NO_ROAD = ("has no road that cars may use", "export an area with roads for cars")
+_CUT = "cut out a part: netconvert -s FILE --keep-edges.in-boundary XMIN,YMIN,XMAX,YMAX -o part.net.xml"
 _OSM_TYPES = ("osmNetconvert", "osmNetconvertUrbanDe")
 _OSM_OPTIONS = (
     *("--geometry.remove", "--ramps.guess", "--junctions.join", "--no-turnarounds", "--remove-edges.isolated"),
@@ -49,13 +53,18 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> tuple[Path, Net]
     try:
         net = read_net(file)
     except UsageError:
-        raise UsageError.of(path, "", "has no road that cars may use", "export an area with roads for cars") from None
+        raise UsageError.of(path, "", *_NO_ROAD) from None
     _check_rotation(path, net, is_left)
     return file, net
 
 
 def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
     """A net in the folder, unpacked, and its content."""
+    try:
+        check_file(path, MOST_BYTES)
+    except OSError as error:
+        if error.errno == errno.EFBIG:
+            raise UsageError.of(path, "", str(error.strerror), _CUT) from None
     check_net(path)
     root = parse_xml(path)
     says_left = root.get("lefthand") in ("true", "1")
@@ -87,6 +96,8 @@ def _convert(path: Path, kind: MapKind, facts: MapFacts, net_file: Path, left_ha
     source.unlink()
     if finished is None:
         raise UsageError.of(path, "", f"netconvert takes longer than {_PATIENCE_S:g} s", "cut out a smaller part")
+    if "No edges loaded" in finished.stderr:
+        raise UsageError.of(path, "", *_NO_ROAD)
     if finished.returncode or not net_file.is_file():
         errors = re.findall(r"^Error: (.*)$", finished.stderr, re.MULTILINE) or ["it gives no reason"]
         message = f"netconvert can't convert it: {errors[0].replace(source.name, path.name)}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from html import unescape
 from pathlib import Path
 
 from sumolib.net import Net
@@ -38,7 +39,8 @@ class OpenMap:
         """Where a conflict is: the names of its streets, or its junction, and its coordinates in the net."""
         candidate = plan.candidate
         ways = [way for way in (candidate.first, candidate.second) if way is not None]
-        names = [self.net.getEdge(name).getName() for way in ways for name in way.edges]
+        # netconvert escapes names twice
+        names = [unescape(self.net.getEdge(name).getName() or "") for way in ways for name in way.edges]
         streets = " / ".join(dict.fromkeys(name for name in names if name)) or f"junction {candidate.junction}"
         return f"{streets} ({candidate.place[0]:.0f}, {candidate.place[1]:.0f})"
 

@@ -28,9 +28,10 @@ _APART_S = 1.5  # between the arrivals, at most
 _WALK_MPS, _WALK_APART_S = (1.0, 1.4), 2.0
 _FIRST_START_M = 6.0  # the front of a car whose body is on its route
 _BEFORE_S = 12.0  # of road before the place, at the highest speed of a start
-_NARROWEST_M, _CAR_M = 2.5, 1.8
+_NARROWEST_M = 2.5
 _NEAR_M = 25.0  # between the place of a candidate and that where the routes meet
 _BESIDE_M = 8.0
+_EXAMPLE = ", such as "
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,12 +87,14 @@ class Plans:
     def all(self) -> list[GamePlan]:
         """A plan of each candidate."""
         found: list[GamePlan] = []
+        reasons: dict[str, str] = {}  # the first of each with its example
         for candidate in candidates(self.net):
             plan = self._plan(candidate, len(found) + 1)
             if isinstance(plan, GamePlan):
                 found.append(plan)
             else:
-                self.left_out[plan] = self.left_out.get(plan, 0) + 1
+                reason = reasons.setdefault(plan.partition(_EXAMPLE)[0], plan)
+                self.left_out[reason] = self.left_out.get(reason, 0) + 1
         return found
 
     def _plan(self, candidate: Candidate, number: int) -> GamePlan | str:
@@ -240,7 +243,7 @@ def _narrow(ways: list[Way]) -> str:
     """The reason against a way on a lane that is too narrow for a car; empty if there is none."""
     for lane in (lane for way in ways for lane in (way.start, way.end)):
         if lane.getWidth() < _NARROWEST_M:
-            return f"lanes narrower than {_NARROWEST_M:g} m, such as {lane.getID()} of {lane.getWidth():.2f} m"
+            return f"lanes narrower than {_NARROWEST_M:g} m{_EXAMPLE}{lane.getID()} of {lane.getWidth():.2f} m"
     return ""
 
 

@@ -56,7 +56,7 @@ def test_plans__a_person_on_a_zebra_crossing_comes_along_the_pavement(town: Plan
     for plan in of_kind(town, Kind.ZEBRA):
         assert plan.way is not None
         assert plan.person_route is None
-        along, across = plan.way[1] - plan.way[0], plan.way[-2] - plan.way[-3]
+        along, across = plan.way[1] - plan.way[0], plan.way[3] - plan.way[2]
         assert abs(along @ across) < 0.2 * np.hypot(*along) * np.hypot(*across)
 
 

@@ -108,3 +108,11 @@ def test_import__roads_that_forbid_cars_are_no_roads(tmp_path: Path) -> None:
 def test_import__a_name_with_commas_and_blanks_is_one_name(tmp_path: Path) -> None:
     odd = written(tmp_path, "a, b=<c>.xodr", JUNCTION.read_text(encoding="utf-8"))
     assert import_map(odd, tmp_path, left_hand=False)[1].hasEdge("-1")
+
+
+def test_import__500_mb_of_a_net_are_refused_by_their_size(tmp_path: Path) -> None:
+    large = tmp_path / "country.net.xml"
+    with large.open("wb") as sparse:
+        sparse.truncate(500_000_000)
+    with pytest.raises(UsageError, match=r"too large: 500 MB.*keep-edges\.in-boundary"):
+        import_map(large, tmp_path, left_hand=False)
