@@ -50,6 +50,22 @@ def new_persona(
     print(wording.persona_created(file))
 
 
+@persona_app.command("check")
+def check_persona(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
+        ),
+    ],
+) -> None:
+    """Check a persona: its document, and that its sources are evidence and not the text of the template."""
+    from harness.cli import persona_check
+
+    file = document_at(file, "personas")
+    print(wording.persona_in_order(file, persona_check.check_persona(file)))
+
+
 @persona_app.command("show")
 def show_persona(
     file: Annotated[
@@ -120,14 +136,18 @@ def check(
 
 
 def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
+    from harness.campaign.execution.repeat_check import varying_drivers
     from harness.campaign.plan.plan import plan
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain
 
     opened = open_campaign(file, allow_code=allow_code)
+    varying = varying_drivers(opened)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
-    ego = [] if opened.document.ego.driver == LEARNED else [plain(wording.ego(opened))]
+    notes = opened.ego_driver.notes if opened.ego_driver is not None else ()
+    ego = [] if opened.document.ego.driver == LEARNED else [wording.ego(opened), *notes]
+    ego = [plain(each) for each in (*ego, *(f"{driver}: {told}" for driver, told in varying.items()))]
     print_plain([wording.in_order(file), *opened.scene.warnings, *ego], console)
     print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
     if as_json:

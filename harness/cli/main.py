@@ -16,9 +16,11 @@ from harness.cli.documents import AllowCode, check, check_driver, columns, new, 
 from harness.cli.exports import export
 from harness.cli.output import AsJson, Quiet, Verbose, output
 from harness.cli.pinned_games import minimise, regression
+from harness.cli.policies import policy_app
 from harness.cli.replays import replay
 from harness.cli.results import exit_as, show_result
 from harness.cli.scenes import scene_app
+from harness.cli.serving import serve
 from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
@@ -78,6 +80,13 @@ RunOut = Annotated[
         metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]", show_default=False
     ),
 ]
+KeepGoing = Annotated[
+    bool,
+    typer.Option(
+        "--keep-going",
+        help="Play all games of an arm, even if its first ten can't be played for one reason.",
+    ),
+]
 Jobs = Annotated[
     int | None,
     typer.Option(
@@ -102,6 +111,7 @@ def campaign(
     out: RunOut = None,
     jobs: Jobs = None,
     allow_code: AllowCode = False,
+    keep_going: KeepGoing = False,
     ray: Ray = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -128,7 +138,7 @@ def campaign(
         _handle_termination_signals()
         try:
             with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
-                outcome = run_campaign(opened, folder, start_workers, console)
+                outcome = run_campaign(opened, folder, start_workers, console, keep_going)
         except KeyboardInterrupt as interrupt:
             console.print(wording.INTERRUPTED)
             raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
@@ -168,6 +178,7 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
 
 app.command()(replay)
 app.command()(export)
+app.command()(serve)
 app.command()(compare)
 app.command()(new)
 app.command()(check)
@@ -175,6 +186,7 @@ app.command("check-driver")(check_driver)
 app.command()(minimise)
 app.command()(regression)
 app.add_typer(persona_app, name="persona")
+app.add_typer(policy_app, name="policy")
 app.add_typer(scene_app, name="scene")
 app.command()(schema)
 app.command()(columns)

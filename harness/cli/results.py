@@ -50,6 +50,7 @@ def exit_as(outcome: RunResult, console: Console) -> None:
     if outcome.failed_stages:
         console.print(wording.failed_stages(outcome.failed_stages), style="red", highlight=False)
     if outcome.error_games:
-        console.print(wording.error_games(outcome.error_games), style="red")
+        for line in wording.error_games(outcome.error_games, outcome.error_reasons):
+            console.print(line, style="red", highlight=False, markup=False, soft_wrap=True)
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)

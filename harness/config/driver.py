@@ -94,12 +94,13 @@ class Fmu(Adjustable, WithFiles):
     file: DocumentPath
     """The FMU, relative to this document's folder."""
     inputs: dict[VariableName, str] = Field({}, max_length=200)
-    """The entry of the observation that each input of the FMU receives. An input that is not listed must have the name
-    of an entry."""
+    """The entry of the observation that each input of the FMU receives. An input that is not listed receives the entry
+    of its name; without such an entry it keeps its start value."""
     outputs: dict[str, VariableName] = Field({}, max_length=2)
     """The names of the FMU's outputs for `acceleration_mps2` and `steering_rad`, if they differ from these."""
-    start: dict[VariableName, float] = Field({}, max_length=1000)
-    """Start values of parameters, and of inputs that receive no entry."""
+    start: dict[VariableName, bool | int | float | str] = Field({}, max_length=1000)
+    """Start values of parameters, and of inputs that receive no entry: numbers, texts, true or false; of an enumeration
+    the name or the number of an item."""
     deadline_s: DeadlineS = 10.0
     """Longest time of a decision. It only detects programs that hang: a busy machine must not change a game."""
     start_deadline_s: DeadlineS = 60.0
@@ -141,6 +142,38 @@ class StableBaselines3(WithFiles):
     """Of a policy with discrete actions, such as DQN: pedals and wheel, -1 to 1, of each action, in their order."""
 
 
+class Network(WithFiles):
+    """A network in a file: a function of the observation."""
+
+    keys_of_files: ClassVar[tuple[str, ...]] = ("file",)
+
+    file: DocumentPath
+    """The file, relative to this document's folder."""
+    units: Literal["scaled", "si"] = "scaled"
+    """`scaled`: observations and actions in -1 to 1, as for learned policies. `si`: observations in metres, seconds and
+    radians; outputs acceleration_mps2 and steering_rad."""
+    actions: list[PedalsAndWheel] = Field([], max_length=10_000)
+    """If the network decides the index of an action, or a score for each: pedals and wheel of each action."""
+
+
+class Onnx(Network):
+    """A network in the ONNX format, run by ONNX Runtime."""
+
+    kind: Literal["onnx"]
+    """The kind of driver, which determines the other keys."""
+    input: VariableName | None = None
+    """The input that receives the observation; none: the only input that is not called `noise`."""
+    output: VariableName | None = None
+    """The output with the decision; none: the first."""
+
+
+class TorchScript(Network):
+    """A module that `torch.jit.save` wrote."""
+
+    kind: Literal["torchscript"]
+    """The kind of driver, which determines the other keys."""
+
+
 class Python(Adjustable, WithFiles):
     """An entry point of an installed Python package, in the group `harness.drivers`, with arguments."""
 
@@ -154,7 +187,7 @@ class Python(Adjustable, WithFiles):
     """Keyword arguments of the entry point."""
 
 
-DriverDocument: TypeAlias = Sumo | Rules | Process | Fmu | StableBaselines3 | Python
+DriverDocument: TypeAlias = Sumo | Rules | Process | Fmu | StableBaselines3 | Onnx | TorchScript | Python
 
 KINDS: dict[str, type[Document]] = {
     get_args(model.model_fields["kind"].annotation)[0]: model for model in get_args(DriverDocument)

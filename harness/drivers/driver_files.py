@@ -8,7 +8,7 @@ import shutil
 from pathlib import Path
 
 from harness.config.campaign import resolve
-from harness.config.driver import Process, Python, WithFiles
+from harness.config.driver import Onnx, Process, Python, WithFiles
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 
@@ -34,6 +34,8 @@ def files_of(place: Path, document: WithFiles) -> list[Path]:
             remedy = nearest(Path(file).name, names_beside(resolve_in(folder, file)))
             raise UsageError.of(place, key, f"{file!r}: there is no such file", remedy)
     found = [resolve_in(folder, file) for _, file in named]
+    if isinstance(document, Onnx):  # exporters put large weights into a file beside it
+        found += [each for each in (path.with_name(f"{path.name}.data") for path in found) if each.is_file()]
     if isinstance(document, Process | Python):
         texts = [each for each in document.parameters.values() if isinstance(each, str) and each]
         # A package reads them relative to the working folder, a program relative to its own.

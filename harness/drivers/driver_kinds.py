@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from harness.config.driver import DriverDocument, Fmu, Process, Python, StableBaselines3, Sumo
+from harness.config.driver import DriverDocument, Fmu, Onnx, Process, Python, StableBaselines3, Sumo, TorchScript
 from harness.config.rule_driver import Rules
 from harness.drivers.car import Car
 from harness.drivers.driver_files import resolve_in
 from harness.drivers.entry_points import entry_point, installed_driver
 from harness.drivers.fmu import fmu_driver
+from harness.drivers.network_driver import NetworkDriver
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.process import ProcessDriver
@@ -34,6 +35,10 @@ def driver_in_words(document: DriverDocument | None, written: str, package: Mapp
             return f"the FMU {file} ({written})"
         case StableBaselines3(file=file, algorithm=algorithm):
             return f"the {algorithm} policy {file} of Stable-Baselines3 ({written})"
+        case Onnx(file=file):
+            return f"the ONNX network {file} ({written})"
+        case TorchScript(file=file):
+            return f"the TorchScript module {file} ({written})"
         case Python(entry_point=name):
             return f"{name} of the package {package['package']} {package['version']}"
 
@@ -67,5 +72,7 @@ def make_driver(
 
             scaling = resolve_in(place, normalize) if normalize is not None else None
             return Sb3Driver(document, resolve_in(place, file), sampled, scaling)
+        case Onnx(file=file) | TorchScript(file=file):
+            return NetworkDriver(document, resolve_in(place, file), car)
         case Python(entry_point=name, parameters=parameters):
             return installed_driver(entry_point(name, place, "entry_point"), car, parameters)

@@ -23,7 +23,17 @@ from typing import Any
 import numpy as np
 
 from harness.config.campaign import LEARNED, SUMO, resolve
-from harness.config.driver import DriverDocument, Fmu, Process, Python, StableBaselines3, Sumo, WithFiles, read_driver
+from harness.config.driver import (
+    DriverDocument,
+    Fmu,
+    Process,
+    Python,
+    StableBaselines3,
+    Sumo,
+    TorchScript,
+    WithFiles,
+    read_driver,
+)
 from harness.config.toml_reading import nearest
 from harness.config.tunable import Adjustable, Tunable
 from harness.drivers.car import Car
@@ -38,6 +48,7 @@ from harness.drivers.driver_files import (
 )
 from harness.drivers.driver_kinds import driver_in_words, make_driver
 from harness.drivers.entry_points import entry_point, installed_names, version_of
+from harness.drivers.fmu import unconnected_inputs
 from harness.drivers.policy_file import check_no_archive, policy_files, read_policy
 from harness.drivers.protocol import Driver
 from harness.errors import DriverError, UsageError
@@ -48,8 +59,10 @@ ALLOW_CODE = "--allow-code"
 _RUNS_CODE = {
     Process: "starts a program",
     Fmu: "runs an FMU, which is a program",
+    TorchScript: "runs a TorchScript module, which is a program",
     StableBaselines3: "reads a file of Stable-Baselines3, which may contain pickles: reading them can run any code",
 }
+_KIND_OF_SUFFIX = {".fmu": "fmu", ".onnx": "onnx", ".pt": "torchscript"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -139,6 +152,13 @@ class ExternalDriver:
         """A description of the driver for reports."""
         return driver_in_words(self.document, self.written, self.package)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a check tells about the driver beside its name. Raises UsageError as `make` does."""
+        if isinstance(self.document, Fmu):
+            return tuple(filter(None, [unconnected_inputs(self.document, resolve_in(self.place, self.document.file))]))
+        return ()
+
     def make(self, car: Car, sampled: bool) -> Driver:
         """Make the driver for a car. `sampled`: a policy samples its actions; other drivers ignore it.
 
@@ -175,7 +195,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
         read_policy(place)
         return _external(written, place, None, files=policy_files(place))
     if place.suffix.lower() != ".toml":
-        kind = "fmu" if place.suffix.lower() == ".fmu" else "stable_baselines3"
+        kind = _KIND_OF_SUFFIX.get(place.suffix.lower(), "stable_baselines3")
         remedy = f'; or name a TOML document with kind = "{kind}", file = "{place.name}"'
         check_no_archive(file, key, written, place, remedy=remedy)
     if not os.path.exists(place):

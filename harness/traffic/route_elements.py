@@ -24,6 +24,7 @@ RANGES = {
     "maxSpeed": (0.0, 200.0),
     "desiredMaxSpeed": (0.0, 200.0),
     "vehsPerHour": (0.0, 3600.0 / LEAST_PERIOD_S),
+    "personsPerHour": (0.0, 3600.0 / LEAST_PERIOD_S),
     "perHour": (0.0, 3600.0 / LEAST_PERIOD_S),
     "period": (LEAST_PERIOD_S * 0.999, 1e7),
     "probability": (-0.001, 1.0),

@@ -25,6 +25,7 @@ from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.world import World
+from harness.shipped_documents import find_document
 from harness.traffic import network
 from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
@@ -46,7 +47,13 @@ from harness.traffic.zebra import stripes
 
 @dataclass(frozen=True, kw_only=True)
 class OpenScene:
-    """A scene that was read completely and has no problems."""
+    """A scene that was read completely and has no problems.
+
+    >>> import harness
+    >>> scene = harness.open_scene("merge")
+    >>> scene.world.roles, scene.world.step_s
+    (('ego', 'non_ego'), 0.1)
+    """
 
     folder: Path
     document: Scene
@@ -140,11 +147,16 @@ class OpenScene:
         )
 
 
-def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
+def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     """Read a scene's folder. Raises UsageError with every problem found in it.
 
-    `ego_type` is a vehicle type of the route file that replaces the type of the ego's vehicle.
+    A text may also be the name of a shipped scene. `ego_type` is a vehicle type of the route file that replaces the
+    type of the ego's vehicle.
+
+    >>> open_scene("merge").document.name
+    'merge'
     """
+    folder = find_document(folder, Path(), "networks") if isinstance(folder, str) else folder
     document_file = scene_file(folder)
     problems: list[Problem] = []
     collect(problems, lambda: check_within(document_file, folder))
@@ -165,11 +177,17 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     own = _edges_of_players(document, net, routes)
     collect(problems, lambda: check_one_level(document_file, own))
     area = network.drivable_area(net, own)
-    ground = opened_ground(document, net, area)
-    open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
-    on_foot = partial(open_walker, file=document_file, document=document, routes=routes, ground=ground)
+    ground = opened_ground(document, net, area, own)
+    paved = area if ground is None else ground.surface
+    open_one = partial(open_player, file=document_file, document=document, net=net, routes=routes)
+    on_foot = partial(open_walker, file=document_file, document=document, net=net, routes=routes, ground=ground)
     opened = [
-        collect(problems, partial(on_foot if player.on_foot else open_one, role))
+        collect(
+            problems,
+            partial(on_foot, role)
+            if player.on_foot
+            else partial(open_one, role, area=paved if player.pavements else area),
+        )
         for role, player in zip(document.roles, document.players, strict=True)
     ]
     vehicles = set(document.vehicles)
@@ -190,7 +208,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     background = _background_edges(vehicles, net, routes)
     lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
-    walking = tuple(player.on_foot for player in document.players)
+    walking, riding = zip(*((player.on_foot, player.pavements) for player in document.players), strict=True)
     world = World(
         road=Road(
             network.rails(lines, REACH_M + 10.0),
@@ -205,6 +223,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         time_limit_s=document.time_limit_s,
         right_of_way=_right_of_way(document, net, players),
         on_foot=walking if any(walking) else (),
+        on_pavements=riding if any(riding) else (),
         hiding=hiding_in(obstacles, routes, document),
     )
     if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:

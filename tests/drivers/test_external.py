@@ -329,13 +329,14 @@ def test_campaign__games_in_which_a_program_crashes_are_errors(tmp_path: Path) -
     assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo"}
     assert set(episodes["ego_outcome"]) == {"error"}
     assert episodes["error"].str.contains("DriverError: .*too fast").all()
+    assert "too fast" in done.stdout.partition("games could not be played")[2].splitlines()[1]
 
 
 # --- the page about egos ---
 
 
 def test_page__has_a_valid_document_of_each_kind() -> None:
-    page = (REPOSITORY / "docs" / "egos.md").read_text()
+    page = "".join((REPOSITORY / "docs" / name).read_text() for name in ("egos.md", "egos-by-networks.md"))
     blocks = [block for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "kind =" in block]
     kinds = {KINDS[table["kind"]].model_validate(table).kind for table in map(tomllib.loads, blocks)}  # type: ignore[attr-defined]
     assert kinds == set(KINDS) - {"rules"}

@@ -10,6 +10,8 @@ from rich.console import Console
 
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.progress import StageProgress, event_line
+from harness.campaign.execution.repeat_check import CHECKING as REPEATING
+from harness.campaign.execution.repeat_check import varying_drivers
 from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stages import StartWorkers, run_stages
 from harness.campaign.execution.stage_events import Event
@@ -22,6 +24,7 @@ from harness.campaign.storage.manifest import FINISHED
 from harness.campaign.storage.run_folder import FORMAT, RunFolder
 from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.versions import versions, versions_of_numbers
+from harness.errors import plain
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.reports.provenance import mixed_versions, warn
 
@@ -29,17 +32,24 @@ CHECKING = "checking what is finished"
 NOTHING_TO_DO = "Nothing to do: every stage is finished, and the results are those of this version."
 
 
-def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console) -> RunResult:
-    """Carry out what is left of a campaign, and write its tables, replays and report.
+def run_campaign(
+    campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console, keep_going: bool = False
+) -> RunResult:
+    """Carry out what is left of a campaign, and write its tables, replays and report. `keep_going` is that of
+    `arm_segments.play_segments`.
 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
     """
     folder.claim(campaign.document.name, campaign.quick)
     with folder.held():
+        with console.status(REPEATING):
+            varying = varying_drivers(campaign, folder)
+        for driver, difference in varying.items():
+            console.print(plain(f"{driver}: {difference}"), style="bold yellow", highlight=False, markup=False)
         stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
         with console.status(CHECKING):
-            manifest = _ManifestKeeper(campaign, folder, stages, keys)
+            manifest = _ManifestKeeper(campaign, folder, stages, keys, varying)
             scene = campaign.scene.document
             folder.keep_scene(campaign.scene.folder, scene.files)
             finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
@@ -64,7 +74,8 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: Start
                             progress.tell(training, DID_NOT_LEARN, shortfall)
                             LOGGER.warning("%s: %s: %s", DID_NOT_LEARN, training, shortfall)
 
-                workers = start_workers(run_context_of(campaign, folder, keys), len(stages) - len(finished))
+                context = run_context_of(campaign, folder, keys, keep_going)
+                workers = start_workers(context, len(stages) - len(finished))
                 run_stages(stages, finished, workers, emit)
         from harness.campaign.results.results import write_results  # imports pandas and statistics
 
@@ -89,7 +100,12 @@ class _ManifestKeeper:
     """Keeps the manifest in step with what happens."""
 
     def __init__(
-        self, campaign: OpenCampaign, folder: RunFolder, stages: Sequence[Stage], keys: Mapping[str, str]
+        self,
+        campaign: OpenCampaign,
+        folder: RunFolder,
+        stages: Sequence[Stage],
+        keys: Mapping[str, str],
+        varying: Mapping[str, str],
     ) -> None:
         self._folder, self._campaign, self._plan = folder, campaign.document, stages
         self._stages: Entries = {stage.id: _entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages}
@@ -107,6 +123,8 @@ class _ManifestKeeper:
             "hashes": dict(campaign.hashes),
             "versions": versions(),
         }
+        if varying:
+            self._manifest["varying_drivers"] = dict(varying)
         self._write()
 
     @property

@@ -29,7 +29,7 @@ from harness.campaign.storage.run_folder import MANIFEST, RunFolder
 from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.trace_tables import cause_table, severity_table, with_severity
 from harness.config.campaign import Campaign
-from harness.errors import UsageError
+from harness.errors import UsageError, plain
 from harness.evaluation.acceptance import Evidence, unanswered
 from harness.evaluation.causes.columns import CAUSE_COLUMNS
 from harness.evaluation.comparison import compare, games_by_arm
@@ -49,6 +49,7 @@ from harness.evaluation.tables import (
     write_csv,
 )
 from harness.evaluation.trace_file import TraceReader, check_traces
+from harness.evaluation.unplayed_games import reasons_of
 from harness.evaluation.worst_first import worst_first
 from harness.files import write_atomically
 from harness.replay import choose_games, replay_name, write_replay
@@ -144,6 +145,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         ),
         failed_stages=failed,
         error_games=int((episodes["error"] != "").sum()),
+        error_reasons=tuple(map(plain, reasons_of(episodes["error"]))),
         did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(entries).items()),
         acceptance=tuple(
             ShownCheck(passed=each.passed, text=each.text) for each in shown_lines(checks, len(campaign.seeds))
