@@ -23,6 +23,7 @@ from harness.traffic.scene import OpenScene
 WHEELBASE_SHARE = 0.6
 """Wheelbase of a vehicle of the background traffic, as a share of its length; players have one in their scene."""
 _NOT_IN_NAMES = re.compile(r"[^\w.:#-]")
+_NOT_IN_FILES = re.compile(r"[^\w.-]|^\.+")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +71,7 @@ class ExportedGame:
     """A recorded game: the players first, then other road users by the time of their appearance, then buildings."""
 
     name: str
-    """The name of its files."""
+    """The name of its files, which is no path."""
     title: str
     arm: str
     seed: int
@@ -104,7 +105,7 @@ def exported_game(
     end_s = float(trace["time_s"].max())
     bodies = [*_bodies(trace, types, wheelbases_m, world.roles), *_buildings(scene.obstacles.outlines, end_s)]
     return ExportedGame(
-        name=name,
+        name=_NOT_IN_FILES.sub("_", name),
         title=f"{arm}, seed {seed}, episode {episode}: {outcome}",
         arm=arm,
         seed=seed,

@@ -3,6 +3,10 @@
 netconvert names the signals by light and link, such as `crossing_3`; programs such as esmini read numbers only. So
 signals get numbers, and keep netconvert's name as their `name`. At the ends of the net netconvert links roads to
 junctions that it does not write; these links are removed.
+
+Of a geographic net netconvert writes an `<offset>`, which OpenDRIVE 1.4 does not have: programs that know it from later
+versions move the roads, and others do not. The projection and the offset become `<userData>`, and coordinates stay
+those of the net for every program.
 """
 
 from __future__ import annotations
@@ -48,9 +52,21 @@ def road_file(net_file: Path, title: str) -> RoadFile:
     if header is not None:
         header.set("name", title)
         header.set("date", NO_DATE)
+        _keep_as_user_data(header)
     _remove_loose_links(root)
     lights = [light.get("id", "") for light in parse_xml(net_file).iter("tlLogic")]
     return RoadFile(signals=_numbered(root, lights), xml=xml_text(root))
+
+
+def _keep_as_user_data(header: ElementTree.Element) -> None:
+    """Replace the projection and the offset of a header by user data: SUMO's projection, and x and y (m) that lead from
+    the net's coordinates to projected ones."""
+    for name in ("geoReference", "offset"):
+        found = header.find(name)
+        if found is not None:
+            header.remove(found)
+            value = f"{found.get('x')} {found.get('y')}" if name == "offset" else " ".join((found.text or "").split())
+            ElementTree.SubElement(header, "userData", code=name, value=value)
 
 
 def _remove_loose_links(root: ElementTree.Element) -> None:

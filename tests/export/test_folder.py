@@ -35,6 +35,14 @@ def test_folder__has_a_file_per_game_and_a_list(merge: OpenScene, tmp_path: Path
     assert sorted(tmp_path.iterdir()) == [tmp_path / "out"]
 
 
+@pytest.mark.parametrize("name", ["../../out", "/tmp/out", "..", "a/b"])
+def test_folder__nothing_is_written_beside_it(name: str, merge: OpenScene, tmp_path: Path) -> None:
+    """Names of arms come from tables that may come from another machine."""
+    write_games(iter([exported(clean_game(), merge, name)]), merge, tmp_path / "out", BOTH, title="one game")
+    assert len(list((tmp_path / "out").glob("*.xosc"))) == 1
+    assert sorted(tmp_path.iterdir()) == [tmp_path / "out"]
+
+
 def test_folder__that_is_empty_is_used(merge: OpenScene, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     assert write_games(games(merge), merge, tmp_path / "out", BOTH, title="two games") == 2

@@ -47,6 +47,7 @@ def play(scenario: Path, step_s: float, scratch: Path) -> tuple[pd.DataFrame, st
     esmini = require_esmini()
     command = [str(esmini), "--osc", str(scenario.absolute()), "--headless", "--fixed_timestep", f"{step_s:g}"]
     command += ["--csv_logger", "played.csv", "--disable_stdout"]
+    command += ["--traj_filter", "0"]  # by default samples within 0.1 m of one another are joined
     done = subprocess.run(command, cwd=scratch, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     log = (scratch / "log.txt").read_text()
     assert done.returncode == 0, done.stdout + done.stderr + log

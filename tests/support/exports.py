@@ -36,7 +36,7 @@ def kinds_of_players(scene: OpenScene) -> tuple[str, str]:
 
 def walker_game() -> tuple[pd.DataFrame, OpenScene]:
     """On the scene `crossing`: a walker crosses in front of the ego."""
-    return _meeting("crossing", [(150.0, -8.0 + 0.15 * k, 0.5 * math.pi, 1.5) for k in range(60)])
+    return _meeting("crossing", [(150.0, -8.0 + 0.06 * k, 0.5 * math.pi + 0.01 * k, 0.6) for k in range(60)])
 
 
 def bicycle_game() -> tuple[pd.DataFrame, OpenScene]:
