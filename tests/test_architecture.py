@@ -48,7 +48,7 @@ ROOMS: dict[str, set[str]] = {
     "campaign.execution": GROUND
     | {"traffic", "drivers", "evaluation", "environments", "reports", "training"}
     | CAMPAIGN,
-    "cli": GROUND | {"traffic", "environments", "export", "reports"} | CAMPAIGN,
+    "cli": GROUND | {"traffic", "drivers", "environments", "export", "reports"} | CAMPAIGN,
     "library": GROUND | {"drivers", "evaluation"} | CAMPAIGN,
     "__main__": {"cli"},
     "harness": GROUND | {"traffic", "drivers", "environments", "library"},

@@ -50,6 +50,22 @@ def new_persona(
     print(wording.persona_created(file))
 
 
+@persona_app.command("check")
+def check_persona(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
+        ),
+    ],
+) -> None:
+    """Check a persona: its document, and that its sources are evidence and not the text of the template."""
+    from harness.cli import persona_check
+
+    file = document_at(file, "personas")
+    print(wording.persona_in_order(file, persona_check.check_persona(file)))
+
+
 @persona_app.command("show")
 def show_persona(
     file: Annotated[

@@ -16,9 +16,11 @@ from harness.cli.documents import AllowCode, check, check_driver, columns, new, 
 from harness.cli.exports import export
 from harness.cli.output import AsJson, Quiet, Verbose, output
 from harness.cli.pinned_games import minimise, regression
+from harness.cli.policies import policy_app
 from harness.cli.replays import replay
 from harness.cli.results import exit_as, show_result
 from harness.cli.scenes import scene_app
+from harness.cli.serving import serve
 from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
@@ -176,6 +178,7 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
 
 app.command()(replay)
 app.command()(export)
+app.command()(serve)
 app.command()(compare)
 app.command()(new)
 app.command()(check)
@@ -183,6 +186,7 @@ app.command("check-driver")(check_driver)
 app.command()(minimise)
 app.command()(regression)
 app.add_typer(persona_app, name="persona")
+app.add_typer(policy_app, name="policy")
 app.add_typer(scene_app, name="scene")
 app.command()(schema)
 app.command()(columns)

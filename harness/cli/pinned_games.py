@@ -42,7 +42,9 @@ def minimise(
     policies: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR", help="The folder of policies that the campaign read, if it trained none.", show_default=False
+            metavar="DIR",
+            help="The folder of policies that the campaign read.  [default: found by their checksums]",
+            show_default=False,
         ),
     ] = None,
     allow_code: AllowCode = False,

@@ -11,6 +11,7 @@ from rich.markup import escape
 if TYPE_CHECKING:
     from harness.campaign.plan.stages import Stage
     from harness.campaign.preflight import OpenCampaign
+    from harness.config.persona import Persona
     from harness.traffic.scene import OpenScene
 
 NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
@@ -40,6 +41,10 @@ MAKING_SCENES = "making and checking scenes"
 NO_CONFLICT_NEAR = ("there is no conflict near this edge", "give a larger --within")
 ONE_OR_ALL = ("--conflict and --all exclude each other", "give one of them")
 FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
+
+
+def serving(address: str) -> str:
+    return f"The report is at {address} until Ctrl-C."
 
 
 def reading(file: Path) -> str:
@@ -88,7 +93,14 @@ def machine_error(error: OSError) -> str:
 
 
 def persona_created(file: Path) -> str:
-    return f"{file}: a valid persona, a careful driver. To see what it means: harness persona show {file}"
+    show, check = f"harness persona show {file}", f"harness persona check {file}"
+    return f"{file}: a valid persona, a careful driver. To see what it means: {show}; what is left to write: {check}"
+
+
+def persona_in_order(file: Path, persona: Persona) -> str:
+    """A checked persona with the number of its sources."""
+    sources = f"{len(persona.sources)} source{'' if len(persona.sources) == 1 else 's'}"
+    return f"{file} is in order: {persona.name}, {sources}. To see what it means: harness persona show {file}"
 
 
 def project_created(folder: Path, files: Sequence[Path]) -> list[str]:
@@ -110,6 +122,12 @@ def scene_made(number: int, place: str, folder: Path, campaign: Path) -> str:
 
 def run_campaign_next(campaign: Path) -> str:
     return f"Next: harness campaign {campaign} --quick"
+
+
+def policy_exported(file: Path, document: Path, difference: float) -> str:
+    return (
+        f"{file}: decides as the policy does, within {difference:.1g} over random observations. As a driver: {document}"
+    )
 
 
 def page_written(file: Path) -> str:

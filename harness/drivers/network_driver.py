@@ -32,7 +32,7 @@ class NetworkDriver:
 
     def __init__(self, document: Onnx | TorchScript, file: Path, car: Car) -> None:
         """Read the network. Raises UsageError if it can't be read or does not fit."""
-        self._network: Network = _onnx(document, file) if isinstance(document, Onnx) else _torchscript(file)
+        self._network = read_network(document, file)
         self._car, self._file, self._si = car, file, document.units == "si"
         self._actions = np.array(document.actions, dtype=np.float64)
 
@@ -66,6 +66,11 @@ class NetworkDriver:
             return np.asarray(answer, dtype=np.int64)
         what = f"{self._file.name} decided an array {list(answer.shape)} of {answer.dtype}"
         raise DriverError(f"{what}, not the index or the scores of {count} actions in each of {games} games")
+
+
+def read_network(document: Onnx | TorchScript, file: Path) -> Network:
+    """The function in a file. Raises UsageError if it can't be read or does not fit."""
+    return _onnx(document, file) if isinstance(document, Onnx) else _torchscript(file)
 
 
 def _onnx(document: Onnx, file: Path) -> Network:

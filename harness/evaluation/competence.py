@@ -88,6 +88,15 @@ def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -
     )
 
 
+def broken_by(record: Mapping[str, Any]) -> str:
+    """The key of the rule of `RULES` that the ego broke in a game, from its cells of episodes.csv; empty if none."""
+    from harness.evaluation.manoeuvres.thresholds import WRONG_WAY_LEAST_S
+
+    if (record.get("ego_red_lights") or 0.0) >= 1.0:
+        return "on_red"
+    return "wrong_way" if (record.get("ego_wrong_way_s") or 0.0) >= WRONG_WAY_LEAST_S else ""
+
+
 def _at_least(games: pd.DataFrame, column: str, least: float) -> Any:
     """Which games have at least this in a column; none, in runs of earlier versions without the column."""
     return games[column].fillna(0.0) >= least if column in games else False

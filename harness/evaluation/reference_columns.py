@@ -21,8 +21,9 @@ REFERENCE_COLUMNS = {
 """Columns of `reference_drivers.csv`: a row for each failure of the ego and each reference driver.
 
 `conflict_s`: the first moment at which the driver's rule says danger. `outcome_from_start`: how the same game ends with
-this driver in the ego's seat. `preventable_from_s` and `preventable_until_s`: the first and the last moment from which
-braking as hard as friction allows prevents the collision (of the game, so the same for all drivers)."""
+this driver in the ego's seat; `on_red` or `wrong_way` for a goal that it reaches by breaking this rule.
+`preventable_from_s` and `preventable_until_s`: the first and the last moment from which braking as hard as friction
+allows prevents the collision (of the game, so the same for all drivers)."""
 
 
 def _of_verdict(verdict: str) -> dict[str, str]:

@@ -61,7 +61,14 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
         **_goal_rate(int((people == "goal").sum()), len(people), games=int((outcomes != "").any(axis=1).sum())),
         "non_ego_mean_speed_mps": _mean(of_people(played, "mean_speed_mps")),
         "non_ego_payoff": _mean(of_people(played, "payoff")),
+        **_near_misses(played),
     }
+
+
+def _near_misses(played: pd.DataFrame) -> dict[str, float]:
+    """The share of the games in which a near miss could be measured, and its interval; empty without the column."""
+    marks = played["near_miss"].dropna() if "near_miss" in played else pd.Series(dtype="float64")
+    return _rate("near_miss_rate", int(marks.sum()), len(marks))
 
 
 def _mean(cells: pd.DataFrame) -> float:

@@ -108,8 +108,14 @@ SUMMARY_COLUMNS = {
     "non_ego_goal_rate_high": "float64",
     "non_ego_mean_speed_mps": "float64",
     "non_ego_payoff": "float64",
+    "near_miss_rate": "float64",
+    "near_miss_rate_low": "float64",
+    "near_miss_rate_high": "float64",
 }
 """Columns of `summary.csv`."""
+
+EARLIER_SUMMARY_COLUMNS = {name: dtype for name, dtype in SUMMARY_COLUMNS.items() if not name.startswith("near_miss")}
+"""Of a run of an earlier version, whose games have no near misses."""
 
 TRAINING_COLUMNS = {
     "stage": "object",
@@ -162,6 +168,7 @@ TABLES = {
     "severity": SEVERITY_TABLE,
     "causes": CAUSE_COLUMNS,
     "summary": SUMMARY_COLUMNS,
+    "summary of an earlier version": EARLIER_SUMMARY_COLUMNS,
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,
     "manoeuvres": MANOEUVRE_COLUMNS,

@@ -20,6 +20,8 @@ from pathlib import Path
 
 from harness.errors import UsageError
 from harness.export.exported_game import ExportedGame
+from harness.export.highd import highd_tables
+from harness.export.lane_courses import LaneCourses
 from harness.export.opendrive import ROAD_FILE, RoadFile, road_file
 from harness.traffic.scene import OpenScene
 
@@ -73,11 +75,12 @@ def write_games(
     check_folder(folder)
     with _complete(folder) as partial:
         road = road_file(scene.net_file, title) if formats.opendrive else None
+        courses = LaneCourses.read(scene.net_file) if formats.csv else None
         if road is not None:
             (partial / ROAD_FILE).write_bytes(road.xml)
         rows = []
         for number, game in enumerate(games, start=1):
-            for name, content in _files(game, number, scene, road, formats).items():
+            for name, content in _files(game, number, road, courses, formats).items():
                 (partial / name).write_bytes(content)
             rows.append((number, game.name, game.arm, game.seed, game.episode, game.outcome))
             on_game(number)
@@ -89,7 +92,7 @@ def write_games(
 
 
 def _files(
-    game: ExportedGame, number: int, scene: OpenScene, road: RoadFile | None, formats: Formats
+    game: ExportedGame, number: int, road: RoadFile | None, courses: LaneCourses | None, formats: Formats
 ) -> Mapping[str, bytes]:
     """Contents of a game's files, by name."""
     files: dict[str, bytes] = {}
@@ -97,6 +100,8 @@ def _files(
         from harness.export.openscenario import scenario_file
 
         files[f"{game.name}.xosc"] = scenario_file(game, road)
+    if courses is not None:
+        files |= highd_tables(game, number, courses)
     return files
 
 

@@ -14,6 +14,7 @@ from harness.reports import page_wording
 from harness.reports.differences import Row, effect, statistics
 from harness.reports.distributions import MOST_LINES, Pairs, paired_figure, pairs_of, spread_figure, spreads_of
 from harness.reports.figures import Column, Point, rate_figure, speed_figure
+from harness.reports.game_links import NO_LINKS, GameLinks
 from harness.reports.key_figures import KeyFigure, key_figures
 from harness.reports.numbers import MISSING, p_number, percent
 from harness.reports.portrait import portrait
@@ -86,11 +87,11 @@ class ArmColumn(NamedTuple):
     arm: str
 
 
-def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None) -> Card:
+def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None, links: GameLinks = NO_LINKS) -> Card:
     """The card of a persona; `place` makes the ids of its figures unique, `worst` is the game to show."""
     change = found.change if found.asked("RQ2", persona) else None
     columns, figures = _columns(persona, change), key_figures(persona, found)
-    paired, paired_note = _paired(persona, place, found) if change is not None else (None, "")
+    paired, paired_note = _paired(persona, place, found, links) if change is not None else (None, "")
     return Card(
         persona=persona,
         anchor=f"persona-{place}",
@@ -105,19 +106,19 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
         facts=_facts(persona, change, found),
         tests=[_test(row) for row in found.comparisons if row["persona"] == persona],
         rate_figure=rate_figure(
-            [Column(label=each.label, series=each.series, points=_rates(found.of(each.arm))) for each in columns],
+            [_drawn(each, _rates(found.of(each.arm)), links) for each in columns],
             f"rate{place}",
             page_wording.rate_alternative(_values(columns, found, "failure_rate")),
         ),
         speed_figure=speed_figure(
-            [Column(label=each.label, series=each.series, points=_speeds(each.arm, found)) for each in columns],
+            [_drawn(each, _speeds(each.arm, found), links) for each in columns],
             f"speed{place}",
             page_wording.speed_alternative(_values(columns, found, "mean_speed_mps")),
         ),
         paired_figure=paired,
         paired_note=paired_note,
         spread_figure=spread_figure(
-            spreads_of(columns, found.games),
+            spreads_of(columns, found.games, links),
             f"spread{place}",
             page_wording.spread_alternative(_values(columns, found, "min_ttc_s")),
         ),
@@ -137,9 +138,9 @@ def _statistics(persona: str, found: Results) -> list[str]:
     ]
 
 
-def _paired(persona: str, place: int, found: Results) -> tuple[Markup, str]:
+def _paired(persona: str, place: int, found: Results, links: GameLinks) -> tuple[Markup, str]:
     """The figure of pairs and its note."""
-    pairs: Sequence[Pairs] = pairs_of(persona, found.games, found.change)
+    pairs: Sequence[Pairs] = pairs_of(persona, found.games, found.change, links)
     first = pairs[0]
     alternative = page_wording.paired_alternative(
         persona,
@@ -244,6 +245,11 @@ def _columns(persona: str, change: Change | None) -> list[ArmColumn]:
         arm = against_persona(change.ego(against=persona), persona).name
         columns.append(ArmColumn(f"{change.made} vs\n{name}", "retrained", arm))
     return columns
+
+
+def _drawn(column: ArmColumn, points: Sequence[Point], links: GameLinks) -> Column:
+    """A column of a figure; it leads to the worst game of its arm."""
+    return Column(label=column.label, series=column.series, points=points, link=links.worst(column.arm))
 
 
 def _rates(rows: Mapping[int, Row]) -> list[Point]:

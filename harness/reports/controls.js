@@ -3,9 +3,10 @@
 function control(root) {
   const part = name => root.querySelector(`[data-is="${name}"]`);
   const button = name => root.querySelector(`[data-do="${name}"]`);
-  const [arms, choice, beside, slider, clock, speed, status] = ["arm", "game", "with", "time", "time-text", "speed", "status"].map(part);
+  const [arms, beside, slider, clock, speed, status] = ["arm", "with", "time", "time-text", "speed", "status"].map(part);
   const [worst] = games.keys();
   const player = new Player(root.querySelector(".screens"), show);
+  const list = new GamesList(root, key => to(key));
 
   function show() {
     const { time, duration, playing } = player;
@@ -17,6 +18,8 @@ function control(root) {
     root.dataset.time = time;
     button("play").textContent = playing ? "Pause" : "Play";
     button("play").setAttribute("aria-pressed", playing);
+    button("road").hidden = !player.beside;
+    button("road").textContent = player.oneRoad ? "Two roads" : "One road";
     button("view").textContent = player.follows ? "Follow" : "Whole road";
     button("view").setAttribute("aria-pressed", player.follows);
   }
@@ -32,8 +35,10 @@ function control(root) {
 
   async function open(key, other, time) {
     if (!await player.open(key, other, time)) return false;
-    list(player.game.arm);
-    choice.value = key;
+    root.dataset.game = key;
+    if (list.arm !== null && list.arm !== player.game.arm) arms.value = player.game.arm;
+    list.ofArm(arms.value || null);
+    list.show(key);
     offer(player.game);
     beside.value = player.beside ? keyOf(player.beside) : "";
     root.dataset.ready ??= Math.round(performance.now()); // milliseconds since the page was requested
@@ -50,19 +55,14 @@ function control(root) {
     beside.replaceChildren(make("option", { value: "", text: "nothing" }), ...options);
   }
 
-  /** The games of an arm, worst first: the list that the buttons "previous" and "next" go through. */
-  function list(arm) {
-    if (arms.value === arm && choice.length) return;
-    arms.value = arm;
-    const ofArm = [...games].filter(([, game]) => game.arm === arm);
-    choice.replaceChildren(...ofArm.map(([key, game]) => make("option", { value: key, text: describe(game) })));
-  }
-
   function fillArms() {
     const counts = new Map();
     for (const game of games.values()) counts.set(game.arm, (counts.get(game.arm) ?? 0) + 1);
+    arms.append(make("option", { value: "", text: `every arm (${games.size})` }));
     arms.append(...[...counts].map(([arm, count]) => make("option", { value: arm, text: `${arm} (${count})` })));
-    arms.selectedIndex = -1;
+    const wanted = parsed(location.hash)?.key;
+    arms.value = games.get(games.has(wanted) ? wanted : worst).arm;
+    list.arm = arms.value;
   }
 
   async function copyLink() {
@@ -98,20 +98,26 @@ function control(root) {
     in: () => player.zoom(1.25),
     out: () => player.zoom(0.8),
     resetView: () => player.eachCamera(camera => camera.reset()),
-    later: () => to(choice.options[choice.selectedIndex + 1]?.value),
-    earlier: () => to(choice.options[choice.selectedIndex - 1]?.value),
+    later: () => to(list.beside(1)),
+    earlier: () => to(list.beside(-1)),
     beside: () => {
       const other = player.beside ? undefined : counterpartOf(player.game);
       if (!other && !player.beside) report("This page does not contain this episode of the other ego.");
-      else open(choice.value, other && keyOf(other), player.time).then(remember);
+      else open(root.dataset.game, other && keyOf(other), player.time).then(remember);
     },
     contact: nextTouch,
+    road: () => {
+      player.oneRoad = !player.oneRoad;
+      player.arrange();
+      player.seek(player.time);
+      remember();
+    },
     link: copyLink,
   };
   const keys = {
     " ": "play", ",": "back", ".": "on", Home: "start", End: "end", ArrowLeft: "secondBack", ArrowRight: "secondOn",
     ArrowUp: "faster", ArrowDown: "slower", "+": "in", "=": "in", "-": "out", 0: "resetView", f: "view", n: "later",
-    p: "earlier", b: "beside", c: "contact", l: "link",
+    p: "earlier", b: "beside", c: "contact", g: "road", l: "link",
   };
 
   for (const each of root.querySelectorAll("[data-do]")) each.addEventListener("click", () => actions[each.dataset.do]());
@@ -131,17 +137,16 @@ function control(root) {
   slider.addEventListener("change", remember);
   speed.addEventListener("change", () => { player.speed = Number(speed.value); });
   arms.addEventListener("change", () => {
-    choice.replaceChildren();
-    list(arms.value);
-    to(choice.value);
+    list.ofArm(arms.value || null);
+    to(list.order()[0]);
   });
-  choice.addEventListener("change", () => to(choice.value));
-  beside.addEventListener("change", () => open(choice.value, beside.value, player.time).then(remember));
+  beside.addEventListener("change", () => open(root.dataset.game, beside.value, player.time).then(remember));
 
   /** Open the game of the address; `moved`: a link to it was just followed. */
   async function follow(moved) {
     const wanted = parsed(location.hash);
     if (!wanted && moved) return;
+    if (wanted?.beside) player.oneRoad = wanted.oneRoad;
     const found = wanted && await open(wanted.key, wanted.beside, wanted.time);
     if (!found && !player.game) await open(worst);
     if (!wanted) return;
@@ -157,7 +162,7 @@ function control(root) {
   fillArms();
   root.hidden = false;
   window.addEventListener("hashchange", () => follow(true));
-  follow(false);
+  follow(false).then(() => setTimeout(() => list.fill()));
 }
 
 const playerElement = document.querySelector(".player");

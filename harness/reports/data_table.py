@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import math
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
+from markupsafe import Markup
 
 from harness.evaluation.tables import typed
 from harness.reports.numbers import MISSING, number, p_number, trimmed
 
+PACKED_FROM = 1_000
+"""A table with more rows is packed: columns of exact texts as JSON, deflated, in base64. `tables.js` reads them."""
+_CELL_BYTES = 60
 UNITS = (("_mps2", "m/s²"), ("_mps", "m/s"), ("_m", "m"), ("_s", "s"))
 RATES = (
     *("failure_rate", "non_ego_goal_rate", "ego_failure_rate", "naive_failure_rate", "solution_failure_rate"),
-    *("gap_share", "share"),
+    *("gap_share", "share", "near_miss_rate"),
 )
 POINTS = ("failure_difference", "fewer_failures")
 """Differences of rates."""
@@ -46,6 +53,8 @@ class Heading:
     unit: str
     text: bool
     """Whether its cells are words."""
+    kind: str = "text"
+    """How a cell of the column is shown: text, flag, count, plain, percent or number."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,25 +73,55 @@ class Table:
     caption: str
     headings: Sequence[Heading]
     rows: Sequence[Sequence[Cell]]
+    """None of them where they are packed."""
+    length: int
+    """Its number of rows."""
+    packed: Markup | None = None
+
+    @property
+    def bytes(self) -> int:
+        """About its size on the page."""
+        return len(self.packed or "") + len(self.rows) * len(self.headings) * _CELL_BYTES
 
 
 def table(name: str, caption: str, frame: pd.DataFrame) -> Table:
     """The frame, one of `harness.evaluation.tables.TABLES`, as cells; `name` is the CSV file's without its suffix."""
     frame = typed(frame)
+    headings = [heading(str(column), frame[column].dtype == object, _kind(frame[column])) for column in frame.columns]
+    if len(frame) > PACKED_FROM and not {"metric", *P_VALUES} & set(frame.columns):
+        packed = pack([[exact(value) for value in frame[column].tolist()] for column in frame.columns])
+        return Table(name=name, caption=caption, headings=headings, rows=(), length=len(frame), packed=packed)
     metrics = frame["metric"].tolist() if "metric" in frame.columns else [""] * len(frame)
     columns = [
         [_cell(column, value, metric) for value, metric in zip(frame[column].tolist(), metrics, strict=True)]
         for column in frame.columns
     ]
-    headings = [heading(str(column), frame[column].dtype == object) for column in frame.columns]
     rows = list(zip(*columns, strict=True))
-    return Table(name=name, caption=caption, headings=headings, rows=rows)
+    return Table(name=name, caption=caption, headings=headings, rows=rows, length=len(rows))
 
 
-def heading(column: str, text: bool) -> Heading:
+def pack(columns: Sequence[Sequence[str]]) -> Markup:
+    """Columns of texts as one text of a script element."""
+    text = json.dumps(columns, separators=(",", ":"))
+    return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii"))
+
+
+def _kind(column: pd.Series) -> str:
+    """How the cells of a column of a packed table are shown, as `_text` shows them."""
+    name = str(column.name)
+    if column.dtype == object:
+        return "text"
+    if column.dtype == "boolean" or column.dtype == bool:
+        return "flag"
+    if pd.api.types.is_integer_dtype(column.dtype):
+        return "plain" if name == "seed" else "count"
+    return "percent" if name.startswith(RATES + POINTS) else "number"
+
+
+def heading(column: str, text: bool, kind: str = "text") -> Heading:
     """The heading of a column, from its name and the unit in it."""
     if column in NAMES:
-        return Heading(column=column, label=NAMES[column], unit="", text=False)
+        return Heading(column=column, label=NAMES[column], unit="", text=False, kind=kind)
     stem, unit = column, "%" if column.startswith(RATES) else "points" if column.startswith(POINTS) else ""
     for ending, symbol in UNITS:
         if column.endswith(ending):
@@ -91,7 +130,7 @@ def heading(column: str, text: bool) -> Heading:
     label = stem.replace("_ttc", "_time_to_collision").replace("non_ego", "non-ego").replace("_", " ")
     for end in ("low", "high"):
         label = label.replace(f" {end}", f", 95 % {end}")
-    return Heading(column=column, label=label, unit=unit, text=text)
+    return Heading(column=column, label=label, unit=unit, text=text, kind=kind)
 
 
 def exact(value: object) -> str:

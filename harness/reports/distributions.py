@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports.figures import INK, SERIES, figure_of, svg
+from harness.reports.game_links import NO_LINKS, GameLinks
 from harness.reports.player_data import FloatArray
 from harness.reports.treatment import RETRAINED, Change
 
@@ -31,10 +32,12 @@ LONGEST_TIME_S = 20.0
 TIMES = ("ego_min_ttc_s",)
 FEWEST_IN_A_BOX = 8
 """Fewer games have no middle half: only the games themselves are drawn."""
-MOST_DOTS = 600
+MOST_DOTS = 300
 """The most games of an arm that are drawn one by one; of more, only the middle half and the median are drawn."""
 MOST_LINES = 300
 """The most pairs that are drawn; of more, this many are chosen, evenly over the episodes."""
+DOT_BYTES = 150
+"""About the size of a dot with its link on the page."""
 _FAILED_ALPHA, _WELL_ALPHA = 0.95, 0.45
 
 
@@ -47,6 +50,9 @@ class Pairs:
     after: FloatArray
     before_failed: NDArray[np.bool_]
     after_failed: NDArray[np.bool_]
+    before_links: Sequence[str]
+    after_links: Sequence[str]
+    """The address of each game on the page, or an empty text."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,16 +60,18 @@ class Spread:
     """One quantity of every game of each arm [N], and which of them failed."""
 
     label: str
-    arms: Sequence[tuple[str, str, FloatArray, NDArray[np.bool_]]]
-    """Label, series, values and failures of each arm."""
+    arms: Sequence[tuple[str, str, FloatArray, NDArray[np.bool_], Sequence[str]]]
+    """Label, series, values, failures and addresses of each arm's games."""
 
 
-def pairs_of(persona: str, games: pd.DataFrame, change: Change = RETRAINED) -> list[Pairs]:
+def pairs_of(persona: str, games: pd.DataFrame, change: Change = RETRAINED, links: GameLinks = NO_LINKS) -> list[Pairs]:
     """`PAIRED` of the episodes that the naive ego and the ego of round 2 both played against the persona."""
     arms = (against_persona(ego, persona).name for ego in (NaiveEgo(), change.ego(against=persona)))
     before, after = (games[games["arm"] == arm] for arm in arms)
     both = before.merge(after, on=["seed", "episode"], suffixes=("", "_after"))
     before_failed, after_failed = (_failed(both[column]) for column in ("ego_failed", "ego_failed_after"))
+    before_links = links.of(both)
+    after_links = links.of(both[["arm_after", "seed", "episode"]].rename(columns={"arm_after": "arm"}))
     return [
         Pairs(
             label=QUANTITIES[column],
@@ -71,20 +79,23 @@ def pairs_of(persona: str, games: pd.DataFrame, change: Change = RETRAINED) -> l
             after=_values(both[f"{column}_after"], column),
             before_failed=before_failed,
             after_failed=after_failed,
+            before_links=before_links,
+            after_links=after_links,
         )
         for column in PAIRED
     ]
 
 
-def spreads_of(arms: Sequence[tuple[str, str, str]], games: pd.DataFrame) -> list[Spread]:
+def spreads_of(arms: Sequence[tuple[str, str, str]], games: pd.DataFrame, links: GameLinks = NO_LINKS) -> list[Spread]:
     """`QUANTITIES` in the games of each arm, given as label, series and name."""
-    of_arm = [(label, series, games[games["arm"] == arm]) for label, series, arm in arms]
+    rows_of = {arm: games[games["arm"] == arm] for _, _, arm in arms}
+    of_arm = [(label, series, rows_of[arm], links.of(rows_of[arm])) for label, series, arm in arms]
     return [
         Spread(
             label=label,
             arms=[
-                (name, series, _values(rows[column], column), _failed(rows["ego_failed"]))
-                for name, series, rows in of_arm
+                (name, series, _values(rows[column], column), _failed(rows["ego_failed"]), addresses)
+                for name, series, rows, addresses in of_arm
             ],
         )
         for column, label in QUANTITIES.items()
@@ -110,10 +121,10 @@ def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str, made
             both = np.isfinite(pairs.before) & np.isfinite(pairs.after)
             ends = np.stack((pairs.before, pairs.after))
             axes.plot([0, 1], ends[:, both], color=INK, linewidth=0.7, alpha=0.22)
-            for place, (values, failed, series) in enumerate(
-                ((pairs.before, pairs.before_failed, "persona"), (pairs.after, pairs.after_failed, "retrained"))
-            ):
-                _games(axes, np.full(len(values), float(place)), values, failed, series)
+            before = (pairs.before, pairs.before_failed, "persona", pairs.before_links)
+            after = (pairs.after, pairs.after_failed, "retrained", pairs.after_links)
+            for place, (values, failed, series, links) in enumerate((before, after)):
+                _games(axes, np.full(len(values), float(place)), values, failed, series, links)
             if not both.any():
                 axes.annotate("no pair", (0.5, 0.5), xycoords="axes fraction", ha="center", fontsize=9)
             axes.set_xlim(-0.25, 1.25)
@@ -134,6 +145,8 @@ def _drawn(pairs: Pairs) -> Pairs:
         after=pairs.after[drawn],
         before_failed=pairs.before_failed[drawn],
         after_failed=pairs.after_failed[drawn],
+        before_links=[pairs.before_links[place] for place in drawn.tolist()],
+        after_links=[pairs.after_links[place] for place in drawn.tolist()],
     )
 
 
@@ -141,7 +154,7 @@ def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> 
     """For each quantity and arm: every game as a dot, the middle half as a box, the median as a line."""
     with figure_of(13.4, 4.0) as figure:
         for axes, spread in zip(figure.subplots(1, len(quantities), squeeze=False)[0], quantities, strict=True):
-            for place, (_, series, values, failed) in enumerate(spread.arms):
+            for place, (_, series, values, failed, links) in enumerate(spread.arms):
                 measured = np.isfinite(values)
                 if not measured.any():
                     axes.annotate(
@@ -154,26 +167,29 @@ def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> 
                     axes.bar(place, high - low, 0.66, bottom=low, color=SERIES[series], alpha=0.22, linewidth=0)
                 axes.plot([place - 0.33, place + 0.33], [median, median], color=SERIES[series], linewidth=2)
                 if measured.sum() <= MOST_DOTS:
-                    _games(axes, place + _beside(len(values)), values, failed, series)
+                    _games(axes, place + _beside(len(values)), values, failed, series, links)
             axes.use_sticky_edges = False
             axes.set_title(spread.label, fontsize=10, loc="left")
             axes.set_xlim(-0.6, len(spread.arms) - 0.4)
-            labels = [f"{label}\nn = {np.isfinite(values).sum()}" for label, _, values, _ in spread.arms]
+            labels = [f"{label}\nn = {np.isfinite(values).sum()}" for label, _, values, _, _ in spread.arms]
             axes.set_xticks(range(len(labels)), labels, fontsize=8)
             axes.tick_params(axis="x", length=0)
             axes.tick_params(axis="y", labelsize=9)
         return svg(figure, name, alternative)
 
 
-def _games(axes: Axes, x: FloatArray, values: FloatArray, failed: NDArray[np.bool_], series: str) -> None:
-    """Games as dots, failed ones as crosses."""
+def _games(
+    axes: Axes, x: FloatArray, values: FloatArray, failed: NDArray[np.bool_], series: str, links: Sequence[str]
+) -> None:
+    """Games as dots, failed ones as crosses; each leads to its game."""
     measured = np.isfinite(values)
     well = (measured & ~failed, "o", 2.4, _WELL_ALPHA)
     for chosen, marker, size, alpha in (well, (measured & failed, "x", 4.2, _FAILED_ALPHA)):
         if chosen.any():
-            axes.plot(
-                x[chosen], values[chosen], marker, color=SERIES[series], markersize=size, alpha=alpha,
-                markeredgewidth=1.1 if marker == "x" else 0, zorder=3,
+            axes.scatter(
+                x[chosen], values[chosen], size**2, color=SERIES[series], marker=marker, alpha=alpha,
+                linewidths=1.1 if marker == "x" else 0, zorder=3,
+                urls=[links[place] or None for place in np.flatnonzero(chosen).tolist()],
             )  # fmt: skip
 
 

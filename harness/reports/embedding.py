@@ -55,9 +55,7 @@ class Embedded:
         self._texts: list[str] = []
         size = 0
         for game in games if scene is not None else ():
-            text = _json(
-                _game(game, marks.get(key(game.arm, game.seed, game.episode), ()), crowds.get(game.persona, ()))
-            )
+            text = game_text(game, marks, crowds)
             size += len(text)
             if size > budget_bytes:
                 break
@@ -75,12 +73,21 @@ class Embedded:
 
     def document(self) -> Markup:
         """The games and the road as JSON that is safe inside a script element."""
-        scales = _json(list(SCALES.values()))
-        columns = f'"scales":{scales},"backgroundColumns":{BACKGROUND_COLUMNS},"scene":{_json(_scene(self._scene))}'
+        scales = json_text(list(SCALES.values()))
+        columns = f'"scales":{scales},"backgroundColumns":{BACKGROUND_COLUMNS},"scene":{json_text(_scene(self._scene))}'
         return Markup("{" + columns + ',"games":[' + ",\n".join(self._texts) + "]}")
 
 
-def _json(value: Any) -> str:
+def game_text(
+    game: RecordedGame,
+    marks: Mapping[str, Sequence[Mapping[str, Any]]],
+    crowds: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> str:
+    """One game as JSON, with its manoeuvres out of `marks` and the personas of its crowd, if it has one."""
+    return json_text(_game(game, marks.get(key(game.arm, game.seed, game.episode), ()), crowds.get(game.persona, ())))
+
+
+def json_text(value: Any) -> str:
     """JSON that cannot end a script element and contains no markup."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
     return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")

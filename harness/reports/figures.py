@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import math
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from harness.reports.numbers import short, steps_text
 from harness.reports.page_wording import NOT_PLAYED, stopped_at
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -48,6 +49,10 @@ _STYLE = {
     "axes.formatter.useoffset": False,
     "figure.constrained_layout.use": True,
 }
+GAME = "#game="
+"""The beginning of the address of a recorded game of the page."""
+MOST_STOPS = 12
+"""The links of a figure with more are left out when the page is walked through with the tab key: tables have them."""
 _LINES = ("-", "--", ":", "-.")
 
 
@@ -70,6 +75,8 @@ class Column:
     label: str
     series: str
     points: Sequence[Point]
+    link: str = ""
+    """The address that its bar and its points lead to; empty: none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +100,8 @@ def rate_figure(columns: Sequence[Column], name: str, alternative: str) -> Marku
             values = [point.value for point in column.points if math.isfinite(point.value)]
             if values:
                 mean = sum(values) / len(values)
-                axes.bar(place, mean, 0.62, color=SERIES[column.series], alpha=0.35, linewidth=0)
+                bar = axes.bar(place, mean, 0.62, color=SERIES[column.series], alpha=0.35, linewidth=0)
+                _link(bar, column.link)
         tops = [max(point.value, point.high) for column in columns for point in column.points]
         axes.set_ylim(0, max([0.05, *(top for top in tops if math.isfinite(top))]) * 1.14)
         axes.set_ylabel("failure rate (%)")
@@ -111,10 +119,11 @@ def speed_figure(columns: Sequence[Column], name: str, alternative: str) -> Mark
             for offset, point in _beside(column.points):
                 if point.middle_half:
                     low, high = point.middle_half
-                    axes.bar(
+                    bar = axes.bar(
                         place + offset, high - low, 0.62 / len(column.points), bottom=low,
                         color=SERIES[column.series], alpha=0.3, linewidth=0,
                     )  # fmt: skip
+                    _link(bar, column.link)
         axes.set_ylabel("average speed of the ego (m/s)")
         _points(axes, columns, lambda speed: f"{speed:.1f}")
         axes.margins(y=0.14)
@@ -204,12 +213,23 @@ def _points(axes: Axes, columns: Sequence[Column], text: Callable[[float], str])
                 reach = [[point.value - point.low], [point.high - point.value]]
                 axes.errorbar(x, point.value, yerr=reach, color=colour, linewidth=1.8, capsize=4, capthick=1.8)
                 top = point.high
-            axes.plot(x, point.value, "o", color=colour, markersize=6, clip_on=False, zorder=4)
+            _link(axes.plot(x, point.value, "o", color=colour, markersize=6, clip_on=False, zorder=4), column.link)
             if len(column.points) <= 2:
                 axes.annotate(text(point.value), (x, top), (0, 4), textcoords="offset points", ha="center", fontsize=9)
         if not any(math.isfinite(point.value) for point in column.points):
             axes.annotate(NOT_PLAYED, (place, 0), (0, 6), xycoords=("data", "axes fraction"),
                           textcoords="offset points", ha="center", fontsize=9)  # fmt: skip
+
+
+def _link(artists: Iterable[Artist], address: str) -> None:
+    for artist in artists:
+        artist.set_url(address or None)
+
+
+_SHORTER = re.compile(
+    r'(<a [^>]*>)\s*<g clip-path="[^"]*">\s*(<use [^>]*x="[\d.]+?\.\d)\d*(" y="[^>]*>)\s*</g>\s*</a>\s*'
+)
+"""The link of one dot of thousands, with its blanks and the clipping that changes nothing within the axes."""
 
 
 def svg(figure: Figure, name: str, alternative: str) -> Markup:
@@ -220,9 +240,14 @@ def svg(figure: Figure, name: str, alternative: str) -> Markup:
     size = re.search(r'viewBox="[^"]*"', drawn)
     assert size is not None  # matplotlib always writes one
     drawn = re.sub(r"<(metadata|style)\b.*?</\1>", "", drawn[drawn.index(">", size.end()) + 1 :], flags=re.DOTALL)
+    links = drawn.count(f'xlink:href="{GAME}')
+    skipped = 'tabindex="-1" ' if links > MOST_STOPS else ""
+    drawn = drawn.replace(f'xlink:href="{GAME}', f'{skipped}href="{GAME}')
+    drawn = _SHORTER.sub(r"\1\2\3</a>", drawn)
     drawn = drawn.replace('xlink:href="#', f'href="#{name}-').replace("url(#", f"url(#{name}-")
     drawn = drawn.replace(' id="', f' id="{name}-')
     drawn = re.sub(r"font(?:-size)?: ([\d.]+px)(?:;? [^;\"]*'DejaVu Sans'[^;\"]*)", r"font-size: \1", drawn)
     for stand_in, colour in _PAGE_COLOURS.items():
         drawn = drawn.replace(stand_in, colour)
-    return Markup('<svg {} role="img" aria-label="{}">').format(Markup(size[0]), alternative) + Markup(drawn)
+    role = "group" if links else "img"  # what is inside an image can't be a link
+    return Markup('<svg {} role="{}" aria-label="{}">').format(Markup(size[0]), role, alternative) + Markup(drawn)

@@ -27,7 +27,7 @@ from harness.reports.heatmaps import MatrixView, views
 from harness.reports.numbers import MISSING, interval, number, p_number, percent
 from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, as_sentence
 
-_CELL_BYTES, _REST_BYTES = 60, 50_000
+_REST_BYTES = 50_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +81,8 @@ class GameSection:
     @property
     def bytes(self) -> int:
         """About its size on the page."""
-        cells = sum(len(table.rows) * len(table.headings) for table in self.tables.values())
-        return cells * _CELL_BYTES + sum(len(each.figure) for view in self.views for each in view.maps) + _REST_BYTES
+        tables = sum(table.bytes for table in self.tables.values())
+        return tables + sum(len(each.figure) for view in self.views for each in view.maps) + _REST_BYTES
 
 
 def game_section(findings: GameFindings | None) -> GameSection | None:

@@ -15,14 +15,16 @@ from harness.reports import page_wording
 from harness.reports.acceptance_wording import headline, line
 from harness.reports.cards import Card, card
 from harness.reports.data_table import Table, table
-from harness.reports.distributions import MOST_DOTS
+from harness.reports.distributions import DOT_BYTES, MOST_DOTS
 from harness.reports.embedding import Embedded
+from harness.reports.first_answers import first_answers
 from harness.reports.game import GameSection, game_section
+from harness.reports.game_links import GameLinks
 from harness.reports.header import command_of, facts, made_by
 from harness.reports.learning import learning
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
 from harness.reports.next_steps import next_steps
-from harness.reports.page_template import environment_of, script
+from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, environment_of, libraries, script
 from harness.reports.player_data import RecordedGame, SceneDrawing, key
 from harness.reports.provenance import mixed_versions
 from harness.reports.replays import failures, keys, replay_list, worst_game
@@ -31,12 +33,12 @@ from harness.reports.run_tables import RunTables
 from harness.reports.search import searches
 from harness.reports.stage_table import stage_rows, unfinished
 
-MOST_ROWS = 3_000
+MOST_ROWS = 50_000
 """The page leaves out a longer table of games and refers to its CSV file."""
 GAMES_BYTES = 8_000_000
 PAGE_BYTES = 10_000_000
 """The largest page: recorded games get what the rest leaves of it, and at most GAMES_BYTES."""
-_ROW_BYTES, _REST_BYTES = 1_100, 1_200_000
+_REST_BYTES = 1_500_000
 REPLAYS_SHOWN = 12
 """The rest of the replays is folded away."""
 
@@ -50,7 +52,9 @@ def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: Sc
     tables = tables.with_types()
     found, section = results(tables), game_section(tables.game)
     listed = tables.episodes if len(tables.episodes) <= MOST_ROWS else tables.episodes[:0]
-    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), _room_for_games(len(listed), section), found.crowds)
+    shown = _shown_tables(tables, listed)
+    room = _room_for_games(_dots_bytes(tables), shown.values(), section)
+    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), room, found.crowds)
     environment = environment_of("reports")
     page = environment.get_template("report.html.jinja").render(
         **_header(tables, found),
@@ -60,19 +64,28 @@ def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: Sc
         **_player(tables, embedded),
         **_manoeuvres(tables),
         **_learning(tables),
-        **_tables(tables, listed),
+        **_tables(tables, shown, listed),
         **_replays(tables, embedded.keys),
         **_method(tables, found),
         game=section,
+        content_policy=CONTENT_POLICY,
+        elsewhere=ELSEWHERE.format("[]"),
+        libraries=libraries(environment),
         script=script(environment),
     )
     return page.strip() + "\n"
 
 
-def _room_for_games(rows: int, section: GameSection | None) -> int:
-    """Bytes that a page with this number of rows of games and this section leaves for recorded games."""
-    taken = _REST_BYTES + rows * _ROW_BYTES + (section.bytes if section else 0)
+def _room_for_games(dots_bytes: int, shown: Iterable[Table], section: GameSection | None) -> int:
+    """Bytes that a page with these figures, tables and this section leaves for recorded games."""
+    taken = _REST_BYTES + dots_bytes + sum(each.bytes for each in shown) + (section.bytes if section else 0)
     return max(min(GAMES_BYTES, PAGE_BYTES - taken), 0)
+
+
+def _dots_bytes(tables: RunTables) -> int:
+    """About the size of the games in the figures: of each persona four arms with four quantities, and the pairs."""
+    games = int(tables.episodes.groupby("arm").size().max()) if len(tables.episodes) else 0
+    return len(tables.personas) * (4 * 4 + 4) * DOT_BYTES * min(games, MOST_DOTS)
 
 
 def _header(tables: RunTables, found: Results) -> dict[str, Any]:
@@ -113,27 +126,29 @@ def _acceptance(tables: RunTables, found: Results) -> dict[str, Any]:
     checks = tables.acceptance
     lines = [line(check, len(found.seeds)) for check in worst_of_each(checks or ())]
     left = len(unfinished(tables.stages))
+    steps = next_steps(tables.manifest, tables.personas, found, checks, left)
     return {
         "acceptance": None if checks is None else (all(each.passed for each in lines), headline(checks), lines),
-        "next_steps": next_steps(tables.manifest, tables.personas, found, checks, left),
+        "answers": first_answers(tables.personas, found, steps),
+        "next_steps": steps,
     }
 
 
 def _cards(tables: RunTables, found: Results, embedded: Container[str]) -> dict[str, Any]:
     """The verdicts, and the figures and tests below them."""
     games_of_arm = tables.episodes.groupby("arm").size().max()
+    links = GameLinks(embedded=embedded, episodes=tables.episodes)
     return {
-        "cards": [
-            _card(persona, place, found, tables.episodes, embedded) for place, persona in enumerate(tables.personas, 1)
-        ],
+        "cards": [_card(persona, place, found, links) for place, persona in enumerate(tables.personas, 1)],
         "most_dots": MOST_DOTS if games_of_arm > MOST_DOTS else 0,
         "caution": page_wording.CAUTION,
         "tests": int(tables.comparisons["p_value"].notna().sum()),
     }
 
 
-def _card(persona: str, place: int, found: Results, episodes: pd.DataFrame, embedded: Container[str]) -> Card:
-    return card(persona, place, found, worst_game(against_persona(NaiveEgo(), persona).name, episodes, embedded))
+def _card(persona: str, place: int, found: Results, links: GameLinks) -> Card:
+    worst = worst_game(against_persona(NaiveEgo(), persona).name, links.episodes, links.embedded)
+    return card(persona, place, found, worst, links)
 
 
 def _player(tables: RunTables, embedded: Embedded) -> dict[str, Any]:
@@ -161,7 +176,7 @@ def _learning(tables: RunTables) -> dict[str, Any]:
     }
 
 
-def _tables(tables: RunTables, listed: pd.DataFrame) -> dict[str, Any]:
+def _shown_tables(tables: RunTables, listed: pd.DataFrame) -> dict[str, Table]:
     """The tables as cells; `listed` are the games that the page lists."""
     frames = {
         "comparisons": tables.comparisons,
@@ -171,11 +186,12 @@ def _tables(tables: RunTables, listed: pd.DataFrame) -> dict[str, Any]:
     }
     if len(tables.reconfiguration):
         frames["reconfiguration"] = tables.reconfiguration
-    cells: Mapping[str, Table] = {
-        name: table(name, page_wording.CAPTIONS[name], frame) for name, frame in frames.items()
-    }
+    return {name: table(name, page_wording.CAPTIONS[name], frame) for name, frame in frames.items()}
+
+
+def _tables(tables: RunTables, shown: Mapping[str, Table], listed: pd.DataFrame) -> dict[str, Any]:
     return {
-        "tables": cells,
+        "tables": shown,
         "keys": keys(listed),
         "games": len(tables.episodes),
         "most_rows": MOST_ROWS,

@@ -3,7 +3,7 @@
 class Player {
   /** `screens` is the element the games are shown in; `changed` is called whenever the time or the games change. */
   constructor(screens, changed) {
-    Object.assign(this, { element: screens, changed, screens: [], time: 0, speed: 1, playing: false, follows: true });
+    Object.assign(this, { element: screens, changed, screens: [], time: 0, speed: 1, playing: false, follows: true, oneRoad: false });
     this.opening = 0;
   }
 
@@ -31,7 +31,7 @@ class Player {
     for (const screen of this.screens) screen.close();
     this.screens = chosen.map(game => new GameScreen(game, at => { this.pause(); this.seek(at); }));
     this.element.replaceChildren(...this.screens.map(screen => screen.element));
-    this.element.classList.toggle("two", this.screens.length > 1);
+    this.arrange();
     const ranges = rangesOf(chosen);
     for (const screen of this.screens) {
       screen.others = chosen.filter(game => game !== screen.game);
@@ -41,6 +41,14 @@ class Player {
     }
     this.seek(time ?? momentOf(chosen[0]));
     return true;
+  }
+
+  /** Two games on two roads beside one another, or on one road with the second game as ghosts. */
+  arrange() {
+    const isPair = this.screens.length > 1;
+    this.element.classList.toggle("two", isPair && !this.oneRoad);
+    this.element.classList.toggle("one-road", isPair && this.oneRoad);
+    for (const screen of this.screens) screen.oneRoad = this.oneRoad;
   }
 
   seek(time) {
@@ -95,7 +103,7 @@ class Player {
   /** The address of this moment. */
   address() {
     const beside = this.beside ? `&with=${keyOf(this.beside)}` : "";
-    return `#game=${keyOf(this.game)}&t=${Number(this.time.toFixed(2))}${beside}`;
+    return `#game=${keyOf(this.game)}&t=${Number(this.time.toFixed(2))}${beside}${beside && this.oneRoad ? "&road=one" : ""}`;
   }
 }
 
@@ -108,5 +116,6 @@ function parsed(hash) {
     key: normal(parts.get("game")),
     beside: parts.has("with") ? normal(parts.get("with")) : undefined,
     time: Number.isFinite(time) ? time : undefined,
+    oneRoad: parts.get("road") === "one",
   };
 }

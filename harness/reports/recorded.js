@@ -20,11 +20,22 @@ function normal(key) {
 }
 
 const games = new Map(recorded.games.map(game => [keyOf(game), game]));
-const severalSeeds = new Set(recorded.games.map(game => game.seed)).size > 1;
+// Games that `harness serve` sends when they are first opened; the page as a file knows none.
+for (const [arm, persona, seed, episode, outcome, leastTime] of JSON.parse(document.getElementById("elsewhere").textContent)) {
+  const game = { arm, persona, seed, episode, outcome, leastTime, isElsewhere: true, players: [], background: [], touches: [], marks: [] };
+  if (!games.has(keyOf(game))) games.set(keyOf(game), game);
+}
+const severalSeeds = new Set([...games.values()].map(game => game.seed)).size > 1;
+
+async function fetched(game) {
+  const answer = await fetch(`games/${keyOf(game)}.json`);
+  if (!answer.ok) throw new Error(`the server has no game ${keyOf(game)}`);
+  Object.assign(game, await answer.json());
+}
 
 /** A promise of the game with the unpacked columns of its tracks. */
 function opened(game) {
-  game.promise ??= inflate(game.packed).then(numbers => {
+  game.promise ??= (game.isElsewhere ? fetched(game) : Promise.resolve()).then(() => inflate(game.packed)).then(numbers => {
     let at = 0;
     const columns = (track, names) => {
       for (const [place, name] of names.entries()) {
@@ -42,11 +53,16 @@ function opened(game) {
   return game.promise;
 }
 
-/** Base64 of deflated byte planes, as 32 bit numbers. */
-async function inflate(text) {
+/** The bytes of deflated bytes in base64. */
+async function inflated(text) {
   const packed = Uint8Array.from(atob(text), character => character.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const planes = new Uint8Array(await new Response(stream).arrayBuffer());
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Base64 of deflated byte planes, as 32 bit numbers. */
+async function inflate(text) {
+  const planes = await inflated(text);
   const count = planes.length / 4;
   const numbers = new Int32Array(count);
   for (let n = 0; n < count; n++) {

@@ -14,9 +14,10 @@ class GameScreen {
   constructor(game, seek) {
     this.game = game;
     this.others = []; // games beside this one: the same view, their players as outlines
+    this.oneRoad = false; // whether this screen stands for the others too
     this.camera = new Camera(46);
     this.view = make("canvas", { class: "view", role: "img" });
-    this.curves = make("canvas", { class: "curves", role: "img", "aria-label": this.described() });
+    this.curves = make("div", { class: "curves", role: "img", "aria-label": this.described() });
     this.values = make("p", { class: "values" });
     this.element = make("article", { class: "screen", "aria-label": titleOf(game) },
       this.heading(), this.view, this.values, this.curves, this.manoeuvres(seek));
@@ -82,7 +83,7 @@ class GameScreen {
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     camera.look([game, ...this.others], this.others.length ? time : shown, width, height);
     drawRoad(context, camera, ratio);
-    for (const other of this.others) drawGhost(context, camera, ratio, other, time);
+    for (const other of this.others) drawGhost(context, camera, ratio, other, time, this.oneRoad);
     drawGame(context, camera, ratio, game, shown, true);
     drawScaleBar(context, camera);
     if (time > game.duration + 1e-6) this.drawEnded(context, width);

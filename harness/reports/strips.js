@@ -1,4 +1,4 @@
-// The curves under a game: speed, acceleration, steering, gap and time to collision of both players, over its time.
+// The curves under a game: speed, acceleration, steering, gap and time to collision of its players. uPlot draws them.
 
 const STRIPS = [
   { name: "speed", unit: "m/s", column: "speed", from: 0 },
@@ -7,7 +7,7 @@ const STRIPS = [
   { name: "gap ahead", unit: "m", column: "gap", from: 0, most: 60 },
   { name: "time to collision", unit: "s", column: "time", from: 0, most: 10 },
 ];
-const ROW = 58, LANE = 15, AXIS = 18, LEFT = 34, RIGHT = 10;
+const ROW = 46, AXIS = 20, LEFT = 34, RIGHT = 10;
 
 /** The range of each strip over some games, so that games side by side have the same axes. */
 function rangesOf(shown) {
@@ -26,134 +26,106 @@ function rangesOf(shown) {
   });
 }
 
+/** Two or three round values of an axis. */
+function ticks(low, high) {
+  const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find(each => (high - low) / each <= 2.6) ?? 200;
+  const found = [];
+  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9; n++) found.push(Math.round(n * step * 10) / 10 || 0);
+  return found;
+}
+
 class Strips {
-  constructor(canvas, game, seek) {
-    this.game = game;
-    this.time = 0;
-    this.ranges = rangesOf([game]);
-    this.until = game.duration;
-    this.lanes = game.players.filter(track => game.marks.some(mark => mark.player === track.name));
-    this.top = this.lanes.length * LANE + 4;
-    canvas.style.height = `${this.top + STRIPS.length * ROW + AXIS}px`;
-    this.still = document.createElement("canvas");
-    this.sheet = new Sheet(canvas, () => { this.drawStill(); this.draw(this.time); });
-    this.onDrag(canvas, seek);
+  /** The curves of a game in an element of the page; `seek` is called with the time of a click or a drag. */
+  constructor(element, game, seek) {
+    Object.assign(this, { element, game, time: 0, until: game.duration, pointed: null, plots: [] });
+    this.observer = new ResizeObserver(() => this.fit());
+    this.observer.observe(element);
+    this.again = () => { for (const { plot } of this.plots) plot.redraw(); };
+    repaint.add(this.again);
+    this.onDrag(seek);
+  }
+
+  /** Draw with the axes of all games that are shown. */
+  align(ranges, until) {
+    Object.assign(this, { ranges, until });
+    for (const { plot } of this.plots) plot.destroy();
+    this.element.replaceChildren(...this.lanes());
+    this.plots = STRIPS.map((strip, row) => this.plotted(strip, row));
+    this.draw(this.time);
   }
 
   /** Dragging over the curves moves through time. */
-  onDrag(canvas, seek) {
+  onDrag(seek) {
     const at = event => {
-      const { left } = canvas.getBoundingClientRect();
-      const share = (event.clientX - left - LEFT) / (this.sheet.width - LEFT - RIGHT);
-      seek(Math.min(Math.max(share, 0), 1) * this.until);
+      const { left, width } = this.element.getBoundingClientRect();
+      const share = (event.clientX - left - LEFT) / (width - LEFT - RIGHT);
+      return Math.min(Math.max(share, 0), 1) * this.until;
     };
-    canvas.addEventListener("pointerdown", event => { canvas.setPointerCapture(event.pointerId); at(event); });
-    canvas.addEventListener("pointermove", event => event.buttons & 1 && canvas.hasPointerCapture(event.pointerId) && at(event));
+    this.element.addEventListener("pointerdown", event => { this.element.setPointerCapture(event.pointerId); seek(at(event)); });
+    this.element.addEventListener("pointermove", event => {
+      if (event.buttons & 1 && this.element.hasPointerCapture(event.pointerId)) seek(at(event));
+      this.point(event.pointerType === "mouse" ? at(event) : null);
+    });
+    this.element.addEventListener("pointerleave", () => this.point(null));
   }
 
-  /** Use the axes of all games that are shown. */
-  align(ranges, until) {
-    Object.assign(this, { ranges, until });
-    this.sheet.again();
-  }
-
-  x(time) {
-    return LEFT + time / (this.until || 1) * (this.sheet.width - LEFT - RIGHT);
-  }
-
-  y(row, value) {
-    const [low, high] = this.ranges[row], top = this.top + row * ROW + 15, bottom = this.top + (row + 1) * ROW - 4;
-    return bottom - (Math.min(Math.max(value, low), high) - low) / (high - low) * (bottom - top);
-  }
-
-  /** Draw everything except the cursor to a canvas of its own. */
-  drawStill() {
-    const { width, height, ratio } = this.sheet;
-    Object.assign(this.still, { width: Math.max(1, Math.round(width * ratio)), height: Math.max(1, Math.round(height * ratio)) });
-    const context = this.still.getContext("2d");
-    context.scale(ratio, ratio);
-    context.font = FONT;
-    this.drawMarks(context);
-    STRIPS.forEach((strip, row) => this.drawStrip(context, strip, row, width));
-    this.drawAxis(context, width);
-    for (const touch of this.game.touches) {
-      context.strokeStyle = palette.contact;
-      context.lineWidth = 1.5;
-      context.setLineDash([4, 3]);
-      context.beginPath();
-      context.moveTo(this.x(touch.time), this.top);
-      context.lineTo(this.x(touch.time), this.top + STRIPS.length * ROW);
-      context.stroke();
-      context.setLineDash([]);
-    }
+  /** Show the values of the time under the pointer; null: of the time of the game. */
+  point(time) {
+    this.pointed = time;
+    this.draw(this.time);
   }
 
   /** What the players did, a line for each of them. */
-  drawMarks(context) {
-    context.textAlign = "left";
-    context.textBaseline = "middle";
-    this.lanes.forEach((track, lane) => {
-      const y = lane * LANE + LANE / 2;
-      let free = -Infinity;
-      for (const mark of this.game.marks) {
-        if (mark.player !== track.name) continue;
-        const [from, to] = [this.x(mark.from), Math.max(this.x(mark.until), this.x(mark.from) + 3)];
-        context.fillStyle = colourOf(track);
-        context.globalAlpha = 0.35;
-        context.fillRect(from, y - 6, to - from, 12);
-        context.globalAlpha = 1;
-        context.fillRect(from, y - 6, 2, 12);
-        const wide = context.measureText(mark.name).width;
-        const at = from + 5 + wide > this.sheet.width ? from - wide - 3 : from + 5;
-        if (at > free) {
-          context.fillStyle = palette.ink;
-          context.fillText(mark.name, at, y);
-          free = at + wide;
-        }
+  lanes() {
+    const marked = this.game.players.filter(track => this.game.marks.some(mark => mark.player === track.name));
+    return marked.map(track => {
+      const lane = make("div", { class: `lane ${track.name === "ego" ? "of-ego" : "of-non-ego"}` });
+      for (const mark of this.game.marks.filter(each => each.player === track.name)) {
+        const [from, to] = [mark.from, mark.until].map(time => 100 * time / (this.until || 1));
+        const span = make("span", { text: mark.name, title: `${mark.from.toFixed(1)} s: ${mark.name} ${mark.text ?? ""}`.trim() });
+        if (from > 70) span.className = "before";
+        span.style.left = `${from}%`;
+        span.style.setProperty("--long", `${Math.max(to - from, 0.4)}%`);
+        const bar = make("i");
+        bar.style.left = `${from}%`;
+        bar.style.width = `${Math.max(to - from, 0.4)}%`;
+        lane.append(bar, span);
       }
+      return lane;
     });
   }
 
-  drawStrip(context, { name, unit, column, factor = 1 }, row, width) {
-    const [low, high] = this.ranges[row], [top, bottom] = [this.y(row, high), this.y(row, low)];
-    this.drawLapses(context, top, bottom);
-    context.strokeStyle = palette.grid;
-    context.lineWidth = 1;
-    context.fillStyle = palette.faint;
-    context.textAlign = "right";
-    context.textBaseline = "middle";
-    for (const value of ticks(low, high)) {
-      const y = Math.round(this.y(row, value)) + 0.5;
-      context.beginPath();
-      context.moveTo(LEFT, y);
-      context.lineTo(width - RIGHT, y);
-      context.stroke();
-      context.fillText(String(value).replace("-", "−"), LEFT - 5, y);
-    }
-    context.textAlign = "left";
-    context.textBaseline = "alphabetic";
-    context.fillText(`${name} (${unit})`, LEFT + 2, top - 3);
-    for (const track of [...this.game.players].reverse()) {
-      context.strokeStyle = colourOf(track);
-      context.lineWidth = 1.8;
-      context.lineJoin = "round";
-      context.beginPath();
-      let drawing = false;
-      track[column].forEach((value, step) => {
-        if (Number.isNaN(value)) {
-          drawing = false;
-          return;
-        }
-        const [x, y] = [this.x((track.first + step) * this.game.step), this.y(row, value * factor)];
-        if (drawing) context.lineTo(x, y);
-        else context.moveTo(x, y);
-        drawing = true;
-      });
-      context.stroke();
-    }
+  /** One strip: its heading with the values of the moment, and its plot. */
+  plotted({ name, unit, column, factor = 1 }, row) {
+    const { game } = this, [low, high] = this.ranges[row], last = row === STRIPS.length - 1;
+    const values = game.players.map(track => make("b", { class: track.name === "ego" ? "ego" : "non-ego" }));
+    const place = make("div");
+    this.element.append(make("p", { class: "strip" }, make("span", { text: `${name} (${unit})` }), ...values), place);
+    const times = Array.from({ length: game.steps + 1 }, (_, step) => step * game.step);
+    const series = game.players.map(track => times.map((_, step) => {
+      const value = track[column][step - track.first] * factor; // undefined * factor: NaN
+      return Number.isNaN(value) ? null : Math.min(Math.max(value, low), high);
+    }));
+    const axis = { stroke: () => palette.faint, font: FONT, ticks: { show: false } };
+    const plot = new uPlot({
+      width: this.width(), height: ROW + (last ? AXIS : 0), padding: [3, RIGHT, 3, 0],
+      legend: { show: false }, cursor: { show: false },
+      scales: { x: { time: false, range: () => [0, this.until || 1] }, y: { range: () => [low, high] } },
+      axes: [
+        { ...axis, show: last, size: AXIS, gap: 2, space: 45, grid: { show: false }, values: (_, times) => times.map(time => `${time} s`) },
+        { ...axis, size: LEFT, gap: 3, grid: { stroke: () => palette.grid, width: 1 }, splits: () => ticks(low, high),
+          values: (_, found) => found.map(value => String(value).replace("-", "−")) },
+      ],
+      series: [{}, ...game.players.map(track => ({ stroke: () => colourOf(track), width: 1.8, points: { show: false } }))],
+      hooks: { drawAxes: [plot => this.drawLapses(plot)], draw: [plot => this.drawTouches(plot)] },
+    }, [times, ...series], place);
+    const head = make("div", { class: "head" });
+    plot.over.append(head);
+    return { plot, head, values, column, factor };
   }
 
-  drawLapses(context, top, bottom) {
+  drawLapses(plot) {
+    const { context, y, bottom } = this.inside(plot);
     context.fillStyle = palette.lapse;
     context.globalAlpha = 0.16;
     for (const track of this.game.players) {
@@ -161,65 +133,62 @@ class Strips {
         if (!track.lapsed[step]) continue;
         const begun = step;
         while (track.lapsed[step + 1]) step++;
-        const [from, to] = [begun - 1, step].map(each => this.x(Math.max(track.first + each, 0) * this.game.step));
-        context.fillRect(from, top, to - from, bottom - top);
+        const [from, to] = [begun - 1, step].map(each => plot.valToPos(Math.max(track.first + each, 0) * this.game.step, "x", true));
+        context.fillRect(from, y, to - from, bottom - y);
       }
     }
-    context.globalAlpha = 1;
+    context.restore();
   }
 
-  drawAxis(context, width) {
-    const y = this.top + STRIPS.length * ROW + 4;
-    context.fillStyle = palette.faint;
-    context.textBaseline = "top";
-    const each = [0.5, 1, 2, 5, 10, 20, 50].find(step => this.until / step <= (width - LEFT) / 45) ?? 100;
-    for (let time = 0; time <= this.until + 1e-9; time += each) {
-      context.textAlign = time === 0 ? "left" : "center";
-      context.fillText(`${time} s`, this.x(time), y);
+  drawTouches(plot) {
+    const { context, y, bottom } = this.inside(plot);
+    context.strokeStyle = palette.contact;
+    context.lineWidth = 1.5 * (window.devicePixelRatio || 1);
+    context.setLineDash([5, 4]);
+    for (const touch of this.game.touches) {
+      const x = plot.valToPos(touch.time, "x", true);
+      context.beginPath();
+      context.moveTo(x, y);
+      context.lineTo(x, bottom);
+      context.stroke();
     }
+    context.restore();
   }
 
-  /** The curves, with the cursor at a time. */
+  /** The context of a plot, saved, and the upper and lower edge of its area in pixels of its canvas. */
+  inside(plot) {
+    plot.ctx.save();
+    return { context: plot.ctx, y: plot.bbox.top, bottom: plot.bbox.top + plot.bbox.height };
+  }
+
+  /** Move the cursor to a time, and show its values. */
   draw(time) {
     this.time = time;
-    const { context, canvas, width, ratio } = this.sheet;
-    context.setTransform(1, 0, 0, 1, 0, 0);
-    context.clearRect(0, 0, canvas.width, canvas.height);
-    context.drawImage(this.still, 0, 0);
-    context.setTransform(ratio, 0, 0, ratio, 0, 0);
-    const x = this.x(Math.min(time, this.until));
-    context.fillStyle = palette.ink;
-    context.fillRect(x - 0.75, 0, 1.5, this.top + STRIPS.length * ROW);
-    for (const [row, { column, factor = 1 }] of STRIPS.entries()) {
+    const shown = this.pointed ?? time, width = this.width() - LEFT - RIGHT;
+    for (const { head, values, column, factor } of this.plots) {
+      head.style.transform = `translateX(${Math.min(shown, this.until) / (this.until || 1) * width}px)`;
       this.game.players.forEach((track, place) => {
-        const value = valueAt(this.game, track, column, time) * factor;
-        if (Number.isNaN(value)) return;
-        context.fillStyle = colourOf(track);
-        context.beginPath();
-        context.arc(x, this.y(row, value), 3.2, 0, 7);
-        context.fill();
-        context.font = `600 ${FONT}`;
-        context.textAlign = "right";
-        context.textBaseline = "alphabetic";
-        const text = value.toFixed(Math.abs(value) < 99.95 ? 1 : 0).replace("-", "−");
-        const at = [width - RIGHT - place * 42, this.top + row * ROW + 12];
-        context.strokeStyle = palette.paper;
-        context.lineWidth = 4;
-        context.strokeText(text, ...at);
-        context.fillText(text, ...at);
+        const value = valueAt(this.game, track, column, shown) * factor;
+        const text = Number.isNaN(value) ? "" : value.toFixed(Math.abs(value) < 99.95 ? 1 : 0).replace("-", "−");
+        if (values[place].textContent !== text) values[place].textContent = text;
       });
     }
   }
 
-  close() {
-    this.sheet.close();
+  width() {
+    return Math.max(this.element.clientWidth, LEFT + RIGHT + 40);
   }
-}
 
-/** Two or three round values of an axis. */
-function ticks(low, high) {
-  const step = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100].find(each => (high - low) / each <= 2.6) ?? 200;
-  const found = [];
-  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9; n++) found.push(Math.round(n * step * 10) / 10 || 0);
-  return found;
+  fit() {
+    for (const { plot } of this.plots) {
+      if (plot.width !== this.width()) plot.setSize({ width: this.width(), height: plot.height });
+    }
+    this.draw(this.time);
+  }
+
+  close() {
+    this.observer.disconnect();
+    repaint.delete(this.again);
+    for (const { plot } of this.plots) plot.destroy();
+  }
 }

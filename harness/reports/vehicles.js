@@ -22,8 +22,8 @@ function drawGame(context, camera, ratio, game, time, labels) {
   if (labels) drawLabels(context, camera, game, time);
 }
 
-/** Draw the players of another game of the same start as outlines. */
-function drawGhost(context, camera, ratio, game, time) {
+/** Draw the players of another game of the same start as outlines; `filled` where no second road shows them. */
+function drawGhost(context, camera, ratio, game, time, filled) {
   camera.inMetres(context, ratio, () => {
     context.setLineDash([0.5, 0.35]);
     context.lineWidth = Math.max(0.16, 1.5 / camera.scale);
@@ -35,11 +35,29 @@ function drawGhost(context, camera, ratio, game, time) {
       context.rotate(pose.heading);
       context.strokeStyle = colourOf(track);
       box(context, ...track.size, 0.4);
+      context.fillStyle = colourOf(track);
+      context.globalAlpha = 0.3;
+      if (filled) context.fill();
+      context.globalAlpha = 1;
       context.stroke();
       context.restore();
     }
     context.setLineDash([]);
   });
+  if (filled) drawGhostNames(context, camera, game, time);
+}
+
+function drawGhostNames(context, camera, game, time) {
+  context.font = FONT;
+  context.textAlign = "center";
+  context.textBaseline = "middle";
+  context.fillStyle = palette.ink;
+  for (const track of game.players) {
+    const pose = poseAt(game, track, Math.min(time, game.duration));
+    if (!pose) continue;
+    const [x, y] = camera.place(pose.x, pose.y), up = game.players.some(each => poseAt(game, each, time)?.y < pose.y) ? -1 : 1;
+    context.fillText(`${nameOf(game, track)} (${game.arm.split("_vs_")[0]})`, x, y + up * (track.size[1] / 2 * camera.scale + 31));
+  }
 }
 
 function colourOf(track) {

@@ -25,6 +25,7 @@ from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.world import World
+from harness.shipped_documents import find_document
 from harness.traffic import network
 from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
@@ -46,7 +47,13 @@ from harness.traffic.zebra import stripes
 
 @dataclass(frozen=True, kw_only=True)
 class OpenScene:
-    """A scene that was read completely and has no problems."""
+    """A scene that was read completely and has no problems.
+
+    >>> import harness
+    >>> scene = harness.open_scene("merge")
+    >>> scene.world.roles, scene.world.step_s
+    (('ego', 'non_ego'), 0.1)
+    """
 
     folder: Path
     document: Scene
@@ -140,11 +147,16 @@ class OpenScene:
         )
 
 
-def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
+def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     """Read a scene's folder. Raises UsageError with every problem found in it.
 
-    `ego_type` is a vehicle type of the route file that replaces the type of the ego's vehicle.
+    A text may also be the name of a shipped scene. `ego_type` is a vehicle type of the route file that replaces the
+    type of the ego's vehicle.
+
+    >>> open_scene("merge").document.name
+    'merge'
     """
+    folder = find_document(folder, Path(), "networks") if isinstance(folder, str) else folder
     document_file = scene_file(folder)
     problems: list[Problem] = []
     collect(problems, lambda: check_within(document_file, folder))

@@ -27,6 +27,7 @@ from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
 from harness.traffic.scene import OpenScene
+from tests.support.random_observations import Recorded
 from tests.support.tiny import CAREFUL
 
 torch.set_num_threads(1)  # tiny networks: more threads only wait for each other
@@ -159,22 +160,6 @@ def test_saved__an_algorithm_that_is_not_supported_is_refused_by_what_the_file_h
     named = "DQN" if name == "QRDQN" else "PPO"
     with pytest.raises(UsageError, match=f"{name} saved this file, not {named} .policies of {name} are not supported"):
         Sb3Driver(document(named), file, sampled=False)
-
-
-class Recorded(gymnasium.Env[Any, Any]):
-    """An environment with the harness's spaces, or discrete actions, and random observations."""
-
-    def __init__(self, discrete: bool = False) -> None:
-        self.observation_space = gymnasium.spaces.Box(-1.0, 1.0, (SIZE,), np.float32)
-        continuous = gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float32)
-        self.action_space = gymnasium.spaces.Discrete(3) if discrete else continuous
-        self.random = np.random.default_rng(5)
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        return self.random.uniform(0.1, 0.4, SIZE).astype(np.float32), {}
-
-    def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        return self.reset()[0], float(np.sum(action)), False, False, {}
 
 
 def save(name: str, policy: str, env: Any, folder: Path, steps: int = 0, **more: Any) -> Path:

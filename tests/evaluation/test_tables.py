@@ -116,6 +116,17 @@ def test_summarise__agrees_with_pandas_and_scipy_on_the_same_games():
     assert row["non_ego_payoff"] == pytest.approx(played["non_ego_payoff"].mean())
 
 
+def test_summarise__near_misses_are_a_share_of_the_games_in_which_they_could_be_measured():
+    marks = (1, 0, None, 1, 0)
+    (row,) = summarise(episodes_of(*(game(episode=k, near_miss=mark) for k, mark in enumerate(marks)))).to_dict(
+        "records"
+    )
+    assert row["near_miss_rate"] == 0.5
+    # Clopper-Pearson for 2 of 4, symmetric about a half
+    assert row["near_miss_rate_low"] == pytest.approx(1 - row["near_miss_rate_high"])
+    assert row["near_miss_rate_high"] == pytest.approx(stats.beta.ppf(0.975, 3, 2))
+
+
 def test_summarise__no_failure_in_100_games_still_has_an_upper_bound():
     (row,) = summarise(episodes_of(*(game(episode=k) for k in range(100)))).to_dict("records")
     assert (row["failure_rate"], row["failure_rate_low"]) == (0, 0)

@@ -88,3 +88,13 @@ def until(page: Any, expression: str, argument: Any = None, seconds: float = 300
         if time.monotonic() > end:
             pytest.fail(f"not true within {seconds:g} s: {expression}")
         page.wait_for_timeout(20)
+
+
+def accessibility_violations(page: Any) -> list[str]:
+    """The rules of axe-core that a page violates, each with the first element."""
+    try:
+        from axe_playwright_python.sync_playwright import Axe
+    except ImportError:
+        missing("the package axe-playwright-python is not installed")
+    violations = Axe().run(page).response["violations"]
+    return [f"{each['id']}: {each['help']}: {each['nodes'][0]['html'][:200]}" for each in violations]

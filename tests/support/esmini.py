@@ -45,7 +45,7 @@ def require_esmini() -> Path:
 def play(scenario: Path, step_s: float, scratch: Path) -> tuple[pd.DataFrame, str]:
     """What esmini plays: the centre of each entity's body in each step; and what it logs."""
     esmini = require_esmini()
-    command = [esmini, "--osc", scenario.absolute(), "--headless", "--fixed_timestep", f"{step_s:g}"]
+    command = [str(esmini), "--osc", str(scenario.absolute()), "--headless", "--fixed_timestep", f"{step_s:g}"]
     command += ["--csv_logger", "played.csv", "--disable_stdout"]
     done = subprocess.run(command, cwd=scratch, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
     log = (scratch / "log.txt").read_text()

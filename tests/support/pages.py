@@ -229,7 +229,7 @@ class Page(HTMLParser):
         elif tag == "tr":
             self._table.append([])
         elif tag in ("td", "th"):
-            self._cell = {"exact": attributes.get("data-value", attributes.get("data-column")), "text": ""}
+            self._cell = {"exact": attributes.get("data-order", attributes.get("data-column")), "text": ""}
             self._table[-1].append(self._cell)
 
     def handle_endtag(self, tag: str) -> None:

@@ -14,6 +14,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -126,8 +127,14 @@ def _check_hope(arm: Arm, errors: Sequence[str]) -> None:
         raise StageFailed(f"{what} ({KEEP_GOING} plays the others too): {errors[0]}")
 
 
-def join_segments(segments: Sequence[Segment], episodes: Path, manoeuvres: Path, traces: Path) -> None:
-    """Join the segments of an arm into its files."""
+def join_segments(
+    segments: Sequence[Segment],
+    episodes: Path,
+    manoeuvres: Path,
+    traces: Path,
+    labels: Mapping[str, str | int] = MappingProxyType({}),
+) -> None:
+    """Join the segments of an arm into its files. `labels` name the arm in the metadata of its traces."""
     join_csv([segment.file(EPISODES) for segment in segments], episodes)
     join_csv([segment.file(MANOEUVRES) for segment in segments], manoeuvres)
-    join_traces([segment.file(_TRACES) for segment in segments], traces)
+    join_traces([segment.file(_TRACES) for segment in segments], traces, labels)

@@ -66,6 +66,7 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
             inputs["episodes"] = document.assessment.episodes
         case PreventabilityStage():
             inputs["references"] = reference_identity()
+            inputs["prevented"] = "goal without breaking a rule"
     if campaign.policies is not None and stage.reads:
         read = {name: policy_files(campaign.policies / name) for name in stage.reads}
         inputs["policies"] = {name: [campaign.hash_of(file) for file in each] for name, each in read.items()}

@@ -26,6 +26,7 @@ from harness.drivers.car import car_of
 from harness.drivers.reference_drivers import REFERENCES, lane_width_of, reference_driver
 from harness.environments.conflict_replay import Chance, ConflictReplay, Takeover, collision_of
 from harness.environments.rollout import Arm, assess
+from harness.evaluation.competence import broken_by
 from harness.evaluation.reference_columns import REFERENCE_COLUMNS
 from harness.evaluation.tables import read_csv, typed, write_csv
 from harness.evaluation.trace_file import TraceReader
@@ -152,9 +153,16 @@ def _play(
     outcomes = {}
     for game in assess(arm, episodes, on_start, work.attempt.abandoned):
         record = game.record
-        outcomes[int(record["episode"])] = {"outcome": str(record["ego_outcome"]), "error": str(record["error"])}
+        outcomes[int(record["episode"])] = {"outcome": outcome_of(record), "error": str(record["error"])}
         on_game()
     return outcomes
+
+
+def outcome_of(record: Mapping[str, Any]) -> str:
+    """How a game ends for a reference driver: a goal that it reaches by breaking a rule of the road prevents nothing,
+    and has the key of the rule (`harness.evaluation.competence.RULES`) for its outcome."""
+    outcome = str(record["ego_outcome"])
+    return broken_by(record) or outcome if outcome == "goal" else outcome
 
 
 def _stored(file: Path, first: bool) -> dict[int, dict[str, str]] | None:

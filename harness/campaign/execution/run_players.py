@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from harness.campaign.execution.player_factory import PlayerFactory
+from harness.campaign.execution.policies_of_run import policies_of_run
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import (
@@ -34,7 +35,6 @@ from harness.environments.rollout import Arm, parts_of
 from harness.errors import UsageError
 from harness.game.initial_state import draw_member
 from harness.game.state import EGO
-from harness.shipped_documents import is_name, shipped
 from harness.traffic.scene import OpenScene, open_scene
 
 
@@ -53,7 +53,8 @@ class RunPlayers:
     def __init__(
         self, folder: RunFolder, policies: Path | None = None, ego: str | None = None, allow_code: bool = False
     ) -> None:
-        """`policies` is the folder of policies that the campaign read, `ego` its external ego; None: it had none."""
+        """`policies` is the folder of policies that the campaign read; None: it is searched by their checksums.
+        `ego` is the campaign's external ego; None: it had none."""
         manifest = folder.manifest()
         driver = None if ego is None else find_driver(ego, Path("--ego"), "", allow_code)
         folder.check_whole(manifest)
@@ -70,7 +71,7 @@ class RunPlayers:
             personas={name: Persona.from_record(each) for name, each in records.items()},
             ego_driver=driver,
             other_egos={},
-            policies=policies or _shipped(document.policies),
+            policies=policies or policies_of_run(folder.path, document.policies, manifest.get("hashes", {})),
             keys={},
         )
 
@@ -118,7 +119,7 @@ class RunPlayers:
         policy = None
         if isinstance(planned, TrainedBefore) and self._context.policies is None:
             message = f"{planned.stage!r} was read from {self._context.document.policies!r}"
-            raise UsageError.of(self._folder.path, planned.stage, message, "name this folder with --policies")
+            raise UsageError.of(self._folder.path, planned.stage, message, "it is not found: name it with --policies")
         if isinstance(planned, Trained | TrainedBefore):
             policy = players.policy_folder(planned)
         driver = players.player(planned)
@@ -136,12 +137,6 @@ def seated_arm(scene: OpenScene, name: str, seed: int, ego: Seated, people: tupl
         personas=tuple(each.persona for each in seats),
         seed=seed,
     )
-
-
-def _shipped(written: str | None) -> Path | None:
-    """The shipped policies that a campaign names; None where it names a path: a manifest is not trusted with one."""
-    folder = shipped("policies") / written if written is not None and is_name(written) else None
-    return folder if folder is not None and folder.is_dir() else None
 
 
 def _chosen(stage: AssessmentStage) -> bool:

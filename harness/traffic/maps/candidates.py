@@ -27,7 +27,8 @@ from harness.traffic.route_table import line_over_junction
 from harness.traffic.stream import TURNAROUNDS, Feeders, Stream
 
 _OPPOSITE = -0.7  # cosine of the angle between two approaches that come towards each other
-_STRAIGHT = 0.87  # of the angle by which a way over a junction turns: of two that turn, none makes a scene
+_STRAIGHT = 0.87  # of the angle by which a way over a junction turns
+_FORK = 3  # arms of a junction at which all ways may turn; elsewhere, two ways that turn make no scene
 _BESIDE_M = 6.0  # of a junction, in which a crossing may be
 
 
@@ -109,6 +110,7 @@ def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Cand
     links = for_cars(node.getConnections())
     if len(links) < 2:
         return
+    arms = len({link.getFrom() for link in links})
     foes = {link: set(foes_of(link)) for link in links}
     streams = {link: Stream(link, feeders) for link in links}
     seen: set[tuple[object, ...]] = set()
@@ -116,7 +118,7 @@ def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Cand
         key = (one.getFrom(), one.getTo(), other.getFrom(), other.getTo(), one.getToLane() is other.getToLane())
         if key in seen or one not in foes[other] or other not in foes[one]:
             continue
-        kind = _kind(one, other, rings)
+        kind = _kind(one, other, rings, arms)
         overlap = overlap_of(streams[one], streams[other]) if kind is not None else None
         if kind is None or overlap is None:
             continue
@@ -126,8 +128,8 @@ def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Cand
         yield _candidate(node, kind, one, other, place)
 
 
-def _kind(one: Connection, other: Connection, rings: set[str]) -> Kind | None:
-    """The kind of a conflict of two connections; None for one that makes no scene."""
+def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> Kind | None:
+    """The kind of a conflict of two connections of a junction with so many arms; None for one that makes no scene."""
     if one.getFromLane() is other.getFromLane():
         return None
     if one.getFrom() is other.getFrom():
@@ -136,7 +138,7 @@ def _kind(one: Connection, other: Connection, rings: set[str]) -> Kind | None:
     if any(in_ring):
         return None if all(in_ring) else Kind.ROUNDABOUT
     turns = [float(_out(link) @ _into(link)) < _STRAIGHT for link in (one, other)]
-    if all(turns):
+    if all(turns) and arms > _FORK:
         return None
     if one.getToLane() is other.getToLane():
         return Kind.MERGE

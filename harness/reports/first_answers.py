@@ -1,0 +1,92 @@
+"""The first screen of the page: why the ego fails, whether that could have been prevented, and what to do now."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from harness.evaluation.strategies import EgoStrategy, NaiveEgo, against_persona
+from harness.reports.next_steps import NextStep
+from harness.reports.results import Results
+
+WHY = "Why does it fail?"
+PREVENTABLE = "Could it have been prevented?"
+NOW = "What now?"
+NO_FAILURE = "Against {persona} no ego fails."
+FAILS = "Against {persona} the {ego} ego fails in {failures} of {games} games."
+FAILS_NO_MORE = "The {ego} ego does not fail."
+MOSTLY = "{share} failures: {cause}."
+ALL, SOME, NONE = "Yes.", "Partly.", "No."
+PREVENTED = (
+    "Against {persona} a reference driver (a model of a careful human driver) in the seat of the naive ego avoids "
+    "{avoided} of its {failures} failures."
+)
+NOT_JUDGED = "Not known: reference drivers have judged no failure of this run."
+NOTHING_TO_PREVENT = "There is nothing to prevent: the naive ego does not fail."
+
+
+@dataclass(frozen=True, kw_only=True)
+class FirstAnswer:
+    """One question of the first screen and its answer, a sentence each line."""
+
+    question: str
+    lines: Sequence[str]
+    command: str = ""
+    """What to type, if the answer is something to do."""
+
+
+def first_answers(personas: Sequence[str], found: Results, steps: Sequence[NextStep]) -> list[FirstAnswer]:
+    """The questions after "did it pass?", in order; empty before a game against a persona was played."""
+    lines = [line for persona in personas for line in _why(persona, found)]
+    if not lines:
+        return []
+    answers = [
+        FirstAnswer(question=WHY, lines=lines),
+        FirstAnswer(question=PREVENTABLE, lines=_prevented(personas, found)),
+    ]
+    answers += [FirstAnswer(question=NOW, lines=[step.sentence], command=step.command) for step in steps[:1]]
+    return answers
+
+
+def _egos(persona: str, found: Results) -> Iterator[tuple[str, str, EgoStrategy]]:
+    """The egos that a persona's card shows: the question about each, its word, and the strategy."""
+    yield "RQ1", "naive", NaiveEgo()
+    if found.asked("RQ2", persona):
+        yield "RQ2", found.change.made, found.change.ego(against=persona)
+
+
+def _why(persona: str, found: Results) -> Iterator[str]:
+    """One line for each ego that fails against a persona: how often, and its most frequent cause."""
+    failing, egos = 0, 0
+    for question, word, ego in _egos(persona, found):
+        games = found.games[found.games["arm"] == against_persona(ego, persona).name]
+        if games.empty:
+            continue
+        failures, egos = int(games["ego_failed"].sum()), egos + 1
+        if failures:
+            failing += 1
+            cause = next(iter(found.causes(question, persona)), "")
+            share, _, words = cause.partition(": ")
+            mostly = f" {MOSTLY.format(share=share, cause=words)}" if words else ""
+            yield FAILS.format(persona=persona, ego=word, failures=failures, games=len(games)) + mostly
+        elif failing:
+            yield FAILS_NO_MORE.format(ego=word)
+    if egos and not failing:
+        yield NO_FAILURE.format(persona=persona)
+
+
+def _prevented(personas: Sequence[str], found: Results) -> list[str]:
+    lines, all_avoided, all_failures = [], 0, 0
+    for persona in personas:
+        judged = found.preventability.get(against_persona(NaiveEgo(), persona).name, ())
+        avoided = sum(each.from_start.by_any for each in judged)
+        failures = sum(each.from_start.judged for each in judged)
+        if failures:
+            lines.append(PREVENTED.format(persona=persona, avoided=avoided, failures=failures))
+        all_avoided, all_failures = all_avoided + avoided, all_failures + failures
+    if not lines:
+        arms = [against_persona(NaiveEgo(), persona).name for persona in personas]
+        failed = found.games[found.games["arm"].isin(arms)]["ego_failed"].sum()
+        return [NOT_JUDGED if failed else NOTHING_TO_PREVENT]
+    label = ALL if all_avoided == all_failures else SOME if all_avoided else NONE
+    return [f"{label} {lines[0]}", *lines[1:]]
