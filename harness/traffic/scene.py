@@ -8,7 +8,6 @@ from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
-import shapely
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 
@@ -40,7 +39,7 @@ from harness.traffic.start_overlaps import check_starts, start_warnings
 from harness.traffic.start_ranges import start_range
 from harness.traffic.trips import with_routes
 from harness.traffic.users_lanes import lanes_for
-from harness.traffic.walker_conflicts import Way, with_walkers_conflicts
+from harness.traffic.walker_conflicts import ways_of, with_walkers_conflicts
 from harness.traffic.warm_up import Snapshot, snapshots
 from harness.traffic.zebra import stripes
 
@@ -179,16 +178,12 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     area = network.drivable_area(net, own)
     ground = opened_ground(document, net, area, own)
     paved = area if ground is None else ground.surface
+    areas = [paved if player.pavements else area for player in document.players]
     open_one = partial(open_player, file=document_file, document=document, net=net, routes=routes)
     on_foot = partial(open_walker, file=document_file, document=document, net=net, routes=routes, ground=ground)
     opened = [
-        collect(
-            problems,
-            partial(on_foot, role)
-            if player.on_foot
-            else partial(open_one, role, area=paved if player.pavements else area),
-        )
-        for role, player in zip(document.roles, document.players, strict=True)
+        collect(problems, partial(on_foot, role) if player.on_foot else partial(open_one, role, area=ridden))
+        for role, player, ridden in zip(document.roles, document.players, areas, strict=True)
     ]
     vehicles = set(document.vehicles)
     collect(problems, lambda: check_departures(vehicles, net, routes, document.traffic_window_s, document.roles))
@@ -250,11 +245,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
 
 
 def _right_of_way(document: Scene, net: Net, players: Sequence[OpenPlayer]) -> RightOfWay:
-    ways = [
-        Way(player=k, line=shapely.LineString(player.way), marked=player.marked_crossing)
-        for k, player in enumerate(document.players)
-        if player.way is not None
-    ]
+    ways = ways_of(document)
     walkers = {way.player for way in ways}
     routes = [[] if k in walkers else [net.getEdge(name) for name in player.edges] for k, player in enumerate(players)]
     lanes_of = [lanes_for(player.kind) for player in document.players]

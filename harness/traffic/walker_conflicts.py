@@ -16,6 +16,7 @@ from sumolib.net import Net
 from sumolib.net.lane import Lane
 
 from harness.config.road_user import WALKER_WIDTH_M
+from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
 from harness.game.right_of_way import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.game.road import MARGIN_M, SPACING_M, Route
@@ -46,6 +47,15 @@ class _Crossing:
     own_end_m: float
     other_m: float
     other_end_m: float
+
+
+def ways_of(document: Scene) -> list[Way]:
+    """The ways of a scene's players on foot."""
+    return [
+        Way(player=k, line=shapely.LineString(player.way), marked=player.marked_crossing)
+        for k, player in enumerate(document.players)
+        if player.way is not None
+    ]
 
 
 def with_walkers_conflicts(

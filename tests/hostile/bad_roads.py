@@ -203,7 +203,7 @@ ROUTE_FILES = [
         ("a trip against the traffic", END, '<trip id="t" depart="0" from="exit" to="approach"/></routes>', ("trip t", "no route")),
         ("a trip from a zone", END, '<trip id="t" depart="0" fromTaz="1" toTaz="2"/></routes>', ("trip t", "zone", "od2trips")),
         ("a trip between junctions", END, '<trip id="t" depart="0" fromJunction="a" toJunction="b"/></routes>', ("trip.fromJunction", "edges")),
-        ("a person on a road for cars", END, '<person id="p" depart="0"><walk edges="exit"/></person></routes>', ("person p", "'exit'", "allows pedestrians")),
+        ("a person beyond the road", END, '<person id="p" depart="0" departPos="900"><walk edges="exit"/></person></routes>', ("person p", "departPos 900", "90 m")),
         ("a passenger", END, '<person id="p" depart="0"><walk edges="exit"/><ride to="exit"/></person></routes>', ("person.ride: is not supported", "remove it")),
         ("a person without a walk", END, '<person id="p" depart="0"/></routes>', ("person p", "no walk")),
         ("a person at no time", END, '<person id="p" depart="triggered"><walk edges="exit"/></person></routes>', ("person p.depart", "'triggered'")),

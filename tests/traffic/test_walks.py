@@ -115,6 +115,12 @@ def test_walk__that_sumo_does_not_carry_out_is_refused(tmp_path: Path, walk: str
     assert message(tmp_path, person(walk)).startswith(expected)
 
 
+def test_walk__on_a_road_for_vehicles_alone_is_refused(tmp_path: Path) -> None:
+    edges = CROSSING_EDGES.replace('id="cn"', 'id="cn" allow="passenger"')
+    said = message(tmp_path, person('<walk edges="sc cn"/>'), edges)
+    assert said.startswith("person p: walks on edge 'cn', none of whose lanes allows pedestrians")
+
+
 def test_player__is_no_person_of_the_route_file(tmp_path: Path) -> None:
     scene = build_scene(tmp_path, others='<person id="walker" depart="0"><walk edges="road"/></person>')
     document = (scene.folder / "scene.toml").read_text().replace('vehicle = "non_ego"', 'vehicle = "walker"')
