@@ -10,7 +10,7 @@ PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo campaign quick test test-fast coverage bench publish check lock clean
+.PHONY: help install demo campaign quick test test-esmini test-fast coverage bench publish check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
@@ -30,6 +30,9 @@ quick: install ## the same campaign with a budget of minutes: every stage, fewer
 
 test: install ## run every test, in about 27 minutes on two cores; `make test ARGS="-k payoff"` runs some
 	$(PYTEST) $(ARGS)
+
+test-esmini: install ## run the tests that play exports in esmini: make test-esmini ESMINI=/path/to/bin/esmini
+	HARNESS_REQUIRE_ESMINI=1 ESMINI="$(ESMINI)" $(BIN)/pytest -n 0 -m esmini tests/export $(ARGS)
 
 test-fast: install ## run the tests of every room that take a moment, in about a minute: after each edit
 	$(PYTEST) -m "not slow" $(ARGS)

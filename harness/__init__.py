@@ -24,8 +24,10 @@ if TYPE_CHECKING:
     from harness.drivers.sumo import SumoDriver
     from harness.environments.arena import Arena, Seat, Step
     from harness.environments.gymnasium_env import DrivingEnv, ParallelDrivingEnv
+    from harness.environments.gymnasium_vector import VectorDrivingEnv, make_vec
     from harness.environments.vector_env import ArenaVecEnv
     from harness.errors import HarnessError, SimulationError, UsageError
+    from harness.game.state import Outcome
     from harness.library import Results, load, run
     from harness.traffic.scene import OpenScene, open_scene
 
@@ -37,6 +39,7 @@ __all__ = [
     "HarnessError",
     "LearnedDriver",
     "OpenScene",
+    "Outcome",
     "ParallelDrivingEnv",
     "Persona",
     "Policy",
@@ -46,7 +49,9 @@ __all__ = [
     "Step",
     "SumoDriver",
     "UsageError",
+    "VectorDrivingEnv",
     "load",
+    "make_vec",
     "open_scene",
     "read_document",
     "read_policy",
@@ -62,8 +67,10 @@ _MODULES = {
     "drivers.sumo": ("SumoDriver",),
     "environments.arena": ("Arena", "Seat", "Step"),
     "environments.gymnasium_env": ("DrivingEnv", "ParallelDrivingEnv"),
+    "environments.gymnasium_vector": ("VectorDrivingEnv", "make_vec"),
     "environments.vector_env": ("ArenaVecEnv",),
     "errors": ("HarnessError", "SimulationError", "UsageError"),
+    "game.state": ("Outcome",),
     "library": ("Results", "load", "run"),
     "traffic.scene": ("OpenScene", "open_scene"),
 }
@@ -88,7 +95,12 @@ def _register() -> None:
 
     for name, player in (("harness/Ego-v0", "ego"), ("harness/NonEgo-v0", "non_ego")):
         if name not in registry:
-            register(name, entry_point="harness.environments.gymnasium_env:DrivingEnv", kwargs={"player": player})
+            register(
+                name,
+                entry_point="harness.environments.gymnasium_env:DrivingEnv",
+                vector_entry_point="harness.environments.gymnasium_vector:VectorDrivingEnv",
+                kwargs={"player": player},
+            )
 
 
 class _GymnasiumFinder:

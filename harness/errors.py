@@ -21,7 +21,15 @@ _LONGEST = 2_000  # characters of each part of a problem
 
 
 class HarnessError(Exception):
-    """Base of all errors that the harness raises."""
+    """Base of all errors that the harness raises.
+
+    >>> import harness
+    >>> try:
+    ...     harness.load("nowhere")
+    ... except harness.HarnessError as error:
+    ...     print(type(error).__name__)
+    UsageError
+    """
 
 
 @dataclass(frozen=True, order=True)
@@ -54,7 +62,15 @@ def _shortened(text: str) -> str:
 
 
 class UsageError(HarnessError):
-    """An error of the user, as a list of problems: all problems are reported at once."""
+    """An error of the user, as a list of problems: all problems are reported at once.
+
+    >>> import harness
+    >>> try:
+    ...     harness.DrivingEnv(player="nonego")
+    ... except harness.UsageError as error:
+    ...     print(error.problems[0].remedy)
+    did you mean 'non_ego'?
+    """
 
     def __init__(self, problems: Iterable[Problem]) -> None:
         self.problems = sorted(set(problems))
@@ -75,7 +91,12 @@ class StageFailed(HarnessError):
 
 
 class SimulationError(HarnessError):
-    """SUMO refused a command, died, or lost a vehicle."""
+    """SUMO refused a command, died, or lost a vehicle.
+
+    >>> import harness
+    >>> issubclass(harness.SimulationError, harness.HarnessError)
+    True
+    """
 
 
 class DriverError(HarnessError):

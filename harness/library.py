@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -29,7 +29,17 @@ _MOST_BYTES = 50_000_000
 
 @dataclass(frozen=True)
 class Results:
-    """The results in a run folder. Tables are read when they are asked for."""
+    """The results in a run folder. Tables are read when they are asked for.
+
+    >>> import harness
+    >>> results = harness.load("reports/merge")
+    >>> results.episodes.columns[:4].tolist()
+    ['arm', 'persona', 'seed', 'episode']
+    >>> float(results.summary.set_index("arm")["failure_rate"]["naive_alone"])
+    0.0
+    >>> results.verdicts[0]["persona"], results.verdicts[0]["question"]
+    ('speedy', 'RQ1')
+    """
 
     path: Path
     """The run folder."""
@@ -83,9 +93,32 @@ class Results:
         """Whether every stage was carried out and every game was played."""
         return not self.outcome["failed_stages"] and not self.outcome["error_games"]
 
+    @property
+    def policies(self) -> Mapping[str, Policy]:
+        """The policies that the run trained, by stage. Each is read when it is asked for."""
+        return _Policies(self.path / "policies")
+
     def policy(self, stage: str) -> Policy:
         """The policy of a training, such as "naive-seed1". Raises UsageError if the run has none."""
         return read_policy(self.path / "policies" / stage)
+
+
+class _Policies(Mapping[str, Policy]):
+    """The policies in a folder, by the names of their folders."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def __getitem__(self, stage: str) -> Policy:
+        if stage not in set(self):
+            raise KeyError(stage)
+        return read_policy(self._folder / stage)
+
+    def __iter__(self) -> Iterator[str]:
+        return (card.parent.name for card in sorted(self._folder.glob("*/policy.json")))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
 
 
 def run(
@@ -103,6 +136,13 @@ def run(
     working folder), `jobs` the number of stages carried out at once (default: one per core), and `progress` prints
     what the command prints. Raises UsageError for mistakes in documents. A stage that fails is in the results, not
     raised.
+
+    >>> import harness
+    >>> results = harness.run("two_games.toml", jobs=1)
+    >>> results.complete, len(results.episodes)
+    (True, 12)
+    >>> list(results.policies)
+    []
     """
     from rich.console import Console
 
@@ -118,7 +158,12 @@ def run(
 
 
 def load(run: str | Path) -> Results:
-    """The results in a run folder. Raises UsageError if there is no run in it."""
+    """The results in a run folder. Raises UsageError if there is no run in it.
+
+    >>> import harness
+    >>> harness.load("reports/merge").accepted
+    False
+    """
     folder = RunFolder(Path(run))
     folder.manifest()
     return Results(folder.path)

@@ -36,17 +36,19 @@ ROOMS: dict[str, set[str]] = {
     "evaluation": {"errors", "files", "game"},
     "environments": GROUND | {"traffic", "drivers", "evaluation"},
     "replay": {"errors", "game", "traffic", "evaluation"},
+    "export": {"errors", "game", "traffic", "evaluation", "replay"},
     "reports": GROUND | {"evaluation"},
     "training": GROUND | {"traffic", "drivers", "environments"},
     "campaign.plan": {"errors", "game", "config", "evaluation"},
     "campaign.storage": {"errors", "files", "version", "config", "traffic", "evaluation", "campaign.plan"},
     "campaign": GROUND | {"traffic", "drivers", "campaign.plan"},  # preflight
     "campaign.results": GROUND
-    | {"traffic", "drivers", "evaluation", "environments", "replay", "reports", "campaign.plan", "campaign.storage"},
+    | {"traffic", "drivers", "evaluation", "environments", "replay", "export", "reports"}
+    | {"campaign.plan", "campaign.storage"},
     "campaign.execution": GROUND
     | {"traffic", "drivers", "evaluation", "environments", "reports", "training"}
     | CAMPAIGN,
-    "cli": GROUND | {"traffic", "environments", "reports"} | CAMPAIGN,
+    "cli": GROUND | {"traffic", "drivers", "environments", "export", "reports"} | CAMPAIGN,
     "library": GROUND | {"drivers", "evaluation"} | CAMPAIGN,
     "__main__": {"cli"},
     "harness": GROUND | {"traffic", "drivers", "environments", "library"},

@@ -5,14 +5,18 @@ from __future__ import annotations
 import io
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from harness.cli import wording
+from harness.cli.output import AsJson, output, print_json
 from harness.cli.scenes import check_scene, folder_of_scene
 from harness.cli.terminal import print_plain
 from harness.shipped_documents import document_at
+
+if TYPE_CHECKING:
+    from rich.console import Console
 
 NOT_CONFORMANT = 1
 
@@ -44,6 +48,22 @@ def new_persona(
 
     file = create_persona(name, out)
     print(wording.persona_created(file))
+
+
+@persona_app.command("check")
+def check_persona(
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
+        ),
+    ],
+) -> None:
+    """Check a persona: its document, and that its sources are evidence and not the text of the template."""
+    from harness.cli import persona_check
+
+    file = document_at(file, "personas")
+    print(wording.persona_in_order(file, persona_check.check_persona(file)))
 
 
 @persona_app.command("show")
@@ -102,27 +122,37 @@ def check(
         ),
     ],
     allow_code: AllowCode = False,
+    as_json: AsJson = False,
 ) -> None:
     """Check a campaign and everything it names, and list its stages; or check one scene. Nothing is run or written."""
-    from rich.console import Console
+    with output(as_json) as console:
+        if (folder := folder_of_scene(file)) is not None:
+            lines = check_scene(folder)
+            print_plain(lines, console)
+            if as_json:
+                print_json({"scene": str(folder), "in_order": True, "remarks": lines[1:]})
+            return
+        _check_campaign(document_at(file, "campaigns"), allow_code, as_json, console)
 
-    if (folder := folder_of_scene(file)) is not None:
-        print_plain(check_scene(folder), Console())
-        return
 
+def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Console) -> None:
+    from harness.campaign.execution.repeat_check import varying_drivers
     from harness.campaign.plan.plan import plan
     from harness.campaign.preflight import open_campaign
     from harness.config.campaign import LEARNED
     from harness.errors import plain
 
-    file = document_at(file, "campaigns")
     opened = open_campaign(file, allow_code=allow_code)
+    varying = varying_drivers(opened)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
-    console = Console()
-    print_plain([wording.in_order(file), *opened.scene.warnings], console)
-    if opened.document.ego.driver != LEARNED:
-        print_plain([plain(wording.ego(opened))], console)
+    notes = opened.ego_driver.notes if opened.ego_driver is not None else ()
+    ego = [] if opened.document.ego.driver == LEARNED else [wording.ego(opened), *notes]
+    ego = [plain(each) for each in (*ego, *(f"{driver}: {told}" for driver, told in varying.items()))]
+    print_plain([wording.in_order(file), *opened.scene.warnings, *ego], console)
     print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
+    if as_json:
+        checked = {"campaign": opened.document.name, "file": str(file), "in_order": True}
+        print_json({**checked, "remarks": [*opened.scene.warnings, *ego], "stages": wording.stage_records(stages)})
 
 
 def schema(

@@ -6,26 +6,25 @@ import errno
 import signal
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
 
 from harness.cli import wording
 from harness.cli.comparison import compare
 from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
+from harness.cli.exports import export
+from harness.cli.output import AsJson, Quiet, Verbose, output
 from harness.cli.pinned_games import minimise, regression
+from harness.cli.policies import policy_app
 from harness.cli.replays import replay
+from harness.cli.results import exit_as, show_result
 from harness.cli.scenes import scene_app
 from harness.cli.serving import serve
 from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
 from harness.shipped_documents import document_at
-
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from harness.campaign.results.kept_results import RunResult
 
 MACHINE_ERRORS = (
     errno.ENOSPC,
@@ -68,7 +67,7 @@ CampaignFile = Annotated[
 RunPath = Annotated[
     Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
 ]
-Quick = Annotated[
+QuickRun = Annotated[
     bool,
     typer.Option(
         "--quick",
@@ -79,6 +78,13 @@ RunOut = Annotated[
     Path | None,
     typer.Option(
         metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]", show_default=False
+    ),
+]
+KeepGoing = Annotated[
+    bool,
+    typer.Option(
+        "--keep-going",
+        help="Play all games of an arm, even if its first ten can't be played for one reason.",
     ),
 ]
 Jobs = Annotated[
@@ -101,73 +107,77 @@ def options(
 @app.command()
 def campaign(
     file: CampaignFile,
-    quick: Quick = False,
+    quick: QuickRun = False,
     out: RunOut = None,
     jobs: Jobs = None,
     allow_code: AllowCode = False,
+    keep_going: KeepGoing = False,
     ray: Ray = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run a campaign: train, assess, retrain and compare.
 
     Run the command again to continue an interrupted campaign; finished stages are skipped. The run folder contains CSV
-    tables, report.html, trained policies, traces, and replays for SUMO-GUI.
+    tables, report.html, trained policies, traces, replays for SUMO-GUI, and harness.log.
     """
-    from rich.console import Console
+    with output(as_json, quiet, verbose) as console:
+        file = document_at(file, "campaigns")
+        with console.status(wording.reading(file)):  # shown before what takes time to import
+            from harness.campaign.execution.run_campaign import run_campaign
+            from harness.campaign.preflight import open_campaign
+            from harness.campaign.storage.run_folder import RunFolder
 
-    file = document_at(file, "campaigns")
-    console = Console()
-    with console.status(wording.reading(file)):  # shown before what takes time to import
-        from harness.campaign.execution.run_campaign import run_campaign
-        from harness.campaign.preflight import open_campaign
-        from harness.campaign.storage.run_folder import RunFolder
-
-        if ray is not None:  # the nodes of a cluster know no working folder
-            file, out = file.absolute(), out.absolute() if out is not None else None
-        opened = open_campaign(file, quick, allow_code)
-    folder = RunFolder(out or Path("reports") / opened.run_name)
-    if quick and not opened.quick:
-        console.print(wording.NOTHING_TO_SHORTEN)
-    _handle_termination_signals()
-    try:
-        with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
-            outcome = run_campaign(opened, folder, start_workers, console)
-    except KeyboardInterrupt as interrupt:
-        console.print(wording.INTERRUPTED)
-        raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
-    _show(outcome, folder.path, console)
-    _exit_as(outcome, console)
+            if ray is not None:  # the nodes of a cluster know no working folder
+                file, out = file.absolute(), out.absolute() if out is not None else None
+            opened = open_campaign(file, quick, allow_code)
+        folder = RunFolder(out or Path("reports") / opened.run_name)
+        if quick and not opened.quick:
+            console.print(wording.NOTHING_TO_SHORTEN)
+        _handle_termination_signals()
+        try:
+            with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
+                outcome = run_campaign(opened, folder, start_workers, console, keep_going)
+        except KeyboardInterrupt as interrupt:
+            console.print(wording.INTERRUPTED)
+            raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
+        show_result(outcome, folder.path, console, as_json)
+        exit_as(outcome, console)
 
 
 @app.command()
-def demo(out: RunOut = None, jobs: Jobs = None) -> None:
+def demo(
+    out: RunOut = None, jobs: Jobs = None, as_json: AsJson = False, quiet: Quiet = False, verbose: Verbose = False
+) -> None:
     """Play the paper's campaign with the shipped policies, in a few minutes: the campaign merge-demo.
 
     Bounds that are not kept are shown, but do not change the exit code.
     """
     try:
-        campaign(Path("merge-demo"), out=out, jobs=jobs)
+        campaign(Path("merge-demo"), out=out, jobs=jobs, as_json=as_json, quiet=quiet, verbose=verbose)
     except typer.Exit as ended:
         if ended.exit_code != NOT_ACCEPTED:
             raise
 
 
 @app.command()
-def report(run: RunPath) -> None:
+def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose: Verbose = False) -> None:
     """Write the tables, replays and report.html of a run again, from its folder alone."""
-    from rich.console import Console
+    with output(as_json, quiet, verbose) as console:
+        from harness.campaign.results.results import write_results
+        from harness.campaign.storage.run_folder import RunFolder
 
-    from harness.campaign.results.results import write_results
-    from harness.campaign.storage.run_folder import RunFolder
-
-    console, folder = Console(), RunFolder(run)
-    folder.manifest()
-    with folder.held():
-        outcome = write_results(folder, console)
-    _show(outcome, run, console)
-    _exit_as(outcome, console)
+        folder = RunFolder(run)
+        folder.manifest()
+        with folder.held():
+            outcome = write_results(folder, console)
+        show_result(outcome, run, console, as_json)
+        exit_as(outcome, console)
 
 
 app.command()(replay)
+app.command()(export)
 app.command()(serve)
 app.command()(compare)
 app.command()(new)
@@ -176,6 +186,7 @@ app.command("check-driver")(check_driver)
 app.command()(minimise)
 app.command()(regression)
 app.add_typer(persona_app, name="persona")
+app.add_typer(policy_app, name="policy")
 app.add_typer(scene_app, name="scene")
 app.command()(schema)
 app.command()(columns)
@@ -196,31 +207,6 @@ def _handle_termination_signals() -> None:
     for name in ("SIGTERM", "SIGHUP"):  # a signal that nohup ignores stays ignored
         if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:
             signal.signal(getattr(signal, name), terminate)
-
-
-def _show(outcome: RunResult, run: Path, console: Console) -> None:
-    styles = {"harm": "red", "mended": "green", "open": "yellow"}
-    for training in outcome.did_not_learn:
-        console.print(wording.did_not_learn(training), style="bold yellow", highlight=False, markup=False)
-    for verdict in outcome.verdicts:
-        label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
-        console.print(label, style=f"bold {styles[verdict.tone]}", highlight=False, markup=False)
-        for sentence in (verdict.sentence, *verdict.causes, verdict.speed):
-            if sentence:
-                console.print(f"  {sentence}", highlight=False, markup=False)
-    for bound in outcome.acceptance:
-        style = "green" if bound.passed else "bold red"
-        console.print(bound.text, style=style, highlight=False, markup=False, soft_wrap=True)
-    print_plain([wording.report_written(run)], console)
-
-
-def _exit_as(outcome: RunResult, console: Console) -> None:
-    if outcome.failed_stages:
-        console.print(wording.failed_stages(outcome.failed_stages), style="red", highlight=False)
-    if outcome.error_games:
-        console.print(wording.error_games(outcome.error_games), style="red")
-    if outcome.exit_code:
-        raise typer.Exit(outcome.exit_code)
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from harness.cli.net_tables import conflict_words
+from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.reports.net_page import Drawing, DrawnShape
@@ -47,6 +48,21 @@ def drawing_of(
     summary = (
         f"{len(lanes)} lanes, {len(junctions)} junctions, {signals} lanes with a signal, {len(conflicts)} conflicts."
     )
+    return Drawing(title=title, summary=summary, shapes=shapes, marks=marks)
+
+
+def map_drawing(
+    title: str,
+    lanes: Sequence[ListedLane],
+    junctions: Sequence[ListedJunction],
+    places: Sequence[tuple[int, FloatArray, str]],
+) -> Drawing:
+    """The drawing of a map's lanes and junctions, with numbers [2] (m) and texts at places."""
+    marks = [
+        DrawnShape(points=place[None], kind="conflict", text=text, label=str(number)) for number, place, text in places
+    ]
+    summary = f"{len(lanes)} lanes, {len(junctions)} junctions, {len(places)} conflicts."
+    shapes = [*_junction_shapes(junctions), *(_lane_shape(lane) for lane in lanes)]
     return Drawing(title=title, summary=summary, shapes=shapes, marks=marks)
 
 

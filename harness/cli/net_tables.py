@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rich.table import Table
+from rich.text import Text
 
+from harness.errors import plain
+from harness.traffic.maps.candidates import Kind
+from harness.traffic.maps.plans import GamePlan
 from harness.traffic.net_conflicts import ListedConflict, Priority
 from harness.traffic.net_listing import ListedLane
 
@@ -29,6 +33,27 @@ def conflict_table(conflicts: Sequence[ListedConflict]) -> Table:
         kind = "merging" if each.merging else "crossing"
         table.add_row(str(each.number), each.junction, kind, _way(each.first), _way(each.second), _priority(each))
     return table
+
+
+def plan_table(rows: Sequence[tuple[GamePlan, str]]) -> Table:
+    """A row for each game that can be made on a map, with its place."""
+    table = _table("conflict", "kind", "place", "ego", "person", "priority")
+    for plan, place in rows:
+        candidate = plan.candidate
+        person = "on foot" if candidate.second is None else " to ".join(candidate.second.edges)
+        ego = " to ".join(dict.fromkeys(candidate.first.edges))
+        cells = (str(plan.number), candidate.kind.value, place, ego, person, plan_priority(plan))
+        table.add_row(*(Text(plain(cell)) for cell in cells))
+    return table
+
+
+def plan_priority(plan: GamePlan) -> str:
+    """Which player has priority."""
+    candidate = plan.candidate
+    if candidate.kind is Kind.ZEBRA:
+        return "the person"
+    rule = {Priority.FIRST: "the ego"}.get(candidate.priority, _RULES[candidate.priority])
+    return f"signals, then {rule}" if candidate.with_signals else rule
 
 
 def conflict_words(conflict: ListedConflict) -> str:

@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from harness.cli import wording
+from harness.cli.output import AsJson, output, print_json
+from harness.errors import UsageError
 
 
 def replay(
@@ -44,22 +46,26 @@ def replay(
             show_default=False,
         ),
     ] = None,
+    as_json: AsJson = False,
 ) -> None:
     """Watch a recorded game in SUMO-GUI. Without ARM or EPISODE, list the recorded games."""
-    from rich.console import Console
+    with output(as_json) as console:
+        from harness.campaign.results.replay_game import GameList, film, found_game, game_records, game_table, watch
 
-    from harness.campaign.results.replay_game import GameList, film, found_game, game_table, watch
-    from harness.errors import UsageError
-
-    console = Console()
-    if film_file is not None and (list_games or arm is None or episode is None):
-        raise UsageError.of("--film", str(film_file), *wording.FILM_NEEDS_A_GAME)
-    if list_games or arm is None or episode is None:
-        chosen = GameList(arm=arm, outcome=outcome, seed=seed, rows=rows, page=page)
-        console.print(game_table(run, chosen))
-        return
-    with found_game(run, arm, episode, seed) as game:
-        if film_file is None:
-            watch(game, console)
-        else:
-            film(game, film_file, console)
+        listing = list_games or arm is None or episode is None
+        if film_file is not None and listing:
+            raise UsageError.of("--film", str(film_file), *wording.FILM_NEEDS_A_GAME)
+        if as_json and not listing:
+            raise UsageError.of("--json", "", *wording.JSON_IS_OF_A_LIST)
+        if arm is None or episode is None or list_games:
+            chosen = GameList(arm=arm, outcome=outcome, seed=seed, rows=rows, page=page)
+            if as_json:
+                print_json(game_records(run, chosen))
+            else:
+                console.print(game_table(run, chosen))
+            return
+        with found_game(run, arm, episode, seed) as game:
+            if film_file is None:
+                watch(game, console)
+            else:
+                film(game, film_file, console)

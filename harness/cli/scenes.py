@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from harness.cli import wording
+from harness.cli.new_scene import new_scene
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 _ROWS = 100
 _STARTS = 60  # drawn for each player
 
-scene_app = typer.Typer(no_args_is_help=True, help="Show the lanes of a SUMO net, or of a scene with its players.")
+scene_app = typer.Typer(no_args_is_help=True, help="Make scenes from maps, and show nets and scenes.")
+scene_app.command("new")(new_scene)
 
 
 @scene_app.command("show")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from rich.markup import escape
 if TYPE_CHECKING:
     from harness.campaign.plan.stages import Stage
     from harness.campaign.preflight import OpenCampaign
+    from harness.config.persona import Persona
     from harness.traffic.scene import OpenScene
 
 NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
@@ -20,6 +21,13 @@ KEPT = "finished work is kept"
 
 # --- errors: message and remedy ---
 FILM_NEEDS_A_GAME = ("shows one game", "name the game: harness replay RUN ARM EPISODE")
+JSON_IS_OF_A_LIST = ("lists games", "leave out the episode, or add --list")
+EXPORT_A_GAME = (
+    "is not an arm, an episode and a new folder",
+    "harness export RUN ARM EPISODE DIR, or harness export RUN --failures DIR",
+)
+EXPORT_FAILURES = ("is more than an arm and a new folder", "harness export RUN [ARM] --failures DIR")
+NO_EPISODE = ("is not the number of an episode", "harness replay RUN --list shows them")
 NOT_A_FOLDER = ("is not a folder", "name a folder")
 NOT_A_TOML_FILE = ("is not the name of a TOML file", "the name must end with .toml")
 FOLDER_NOT_EMPTY = ("is there already, and not empty", "name a new folder")
@@ -27,6 +35,11 @@ BAD_PROJECT_NAME = (
     "the folder's name is that of the campaign, too: letters, digits, _ and -, a letter first, at most 40",
     "name another folder",
 )
+BAD_SCENE_NAME = ("can't be the name of a scene", "use letters, digits and _, a letter first, at most 40")
+SCENE_EXISTS = ("is there already, and nothing is overwritten", "choose another NAME, or another folder with --out")
+MAKING_SCENES = "making and checking scenes"
+NO_CONFLICT_NEAR = ("there is no conflict near this edge", "give a larger --within")
+ONE_OR_ALL = ("--conflict and --all exclude each other", "give one of them")
 FILE_EXISTS = ("already exists", "no file is overwritten: name another file with --out")
 
 
@@ -48,6 +61,14 @@ def no_folder(folder: Path) -> tuple[str, str]:
 
 def no_document_kind(kinds: Sequence[str]) -> tuple[str, str]:
     return "is missing", f"name one of {', '.join(kinds)}, or write all of them with --out DIR"
+
+
+def no_such_conflict(count: int) -> tuple[str, str]:
+    return "there is no conflict of this number", f"choose one from 1 to {count}: --list lists them"
+
+
+def no_kind_of_conflict(kinds: Sequence[str]) -> tuple[str, str]:
+    return "is no kind of conflict of this map", f"its kinds are {', '.join(kinds)}"
 
 
 def bad_persona_name(name: str, suggestion: str) -> tuple[str, str]:
@@ -72,7 +93,14 @@ def machine_error(error: OSError) -> str:
 
 
 def persona_created(file: Path) -> str:
-    return f"{file}: a valid persona, a careful driver. To see what it means: harness persona show {file}"
+    show, check = f"harness persona show {file}", f"harness persona check {file}"
+    return f"{file}: a valid persona, a careful driver. To see what it means: {show}; what is left to write: {check}"
+
+
+def persona_in_order(file: Path, persona: Persona) -> str:
+    """A checked persona with the number of its sources."""
+    sources = f"{len(persona.sources)} source{'' if len(persona.sources) == 1 else 's'}"
+    return f"{file} is in order: {persona.name}, {sources}. To see what it means: harness persona show {file}"
 
 
 def project_created(folder: Path, files: Sequence[Path]) -> list[str]:
@@ -80,8 +108,34 @@ def project_created(folder: Path, files: Sequence[Path]) -> list[str]:
     return [*(f"wrote {file}" for file in files), f"Next: cd {folder} && harness campaign campaign.toml --quick"]
 
 
+def conflicts_found(counts: Iterable[tuple[str, int]], left_out: Mapping[str, int]) -> Iterator[str]:
+    """How many conflicts of each kind a map has, and why no scene can be made of others."""
+    kinds = [f"{count} {kind}" for kind, count in counts]
+    yield f"{', '.join(kinds)}."
+    for reason, count in sorted(left_out.items()):
+        yield f"left out: {count} ({reason})"
+
+
+def scene_made(number: int, place: str, folder: Path, campaign: Path) -> str:
+    return f"conflict {number}, {place}: wrote {folder} and {campaign}"
+
+
+def run_campaign_next(campaign: Path) -> str:
+    return f"Next: harness campaign {campaign} --quick"
+
+
+def policy_exported(file: Path, document: Path, difference: float) -> str:
+    return (
+        f"{file}: decides as the policy does, within {difference:.1g} over random observations. As a driver: {document}"
+    )
+
+
 def page_written(file: Path) -> str:
     return f"Page: {file}"
+
+
+def exported(count: int, folder: Path) -> str:
+    return f"Wrote {count} {'game' if count == 1 else 'games'} to {folder}: games.csv lists them"
 
 
 def report_written(run: Path) -> str:
@@ -96,8 +150,9 @@ def failed_stages(names: Sequence[str]) -> str:
     return f"Not finished: {', '.join(names)}"
 
 
-def error_games(count: int) -> str:
-    return f"{count} games could not be played; their pairs are left out"
+def error_games(count: int, reasons: Sequence[str]) -> list[str]:
+    """How many games could not be played, and a line for each reason."""
+    return [f"{count} games could not be played; their pairs are left out", *(f"  {each}" for each in reasons)]
 
 
 # --- harness check ---
@@ -160,3 +215,18 @@ def stage_lines(stages: Sequence[Stage]) -> Iterator[str]:
         reads = () if isinstance(stage, TrainingStage) else stage.reads
         after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
         yield f"  {stage.verb:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else "")
+
+
+def stage_records(stages: Sequence[Stage]) -> list[dict[str, object]]:
+    """A record for each stage, as `stage_lines` tells it."""
+    return [
+        {
+            "stage": stage.id,
+            "kind": stage.kind,
+            "persona": stage.persona,
+            "seed": stage.seed,
+            "after": list(stage.needs),
+            "reads": list(stage.reads),
+        }
+        for stage in stages
+    ]

@@ -22,6 +22,15 @@ CampaignName = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Z
 DocumentPath = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]*$")]
 
 
+def ego_called(driver: str) -> str:
+    """The ego before round 2 in sentences, after "the": "naive ego" if the campaign trains it, else by its driver."""
+    if driver == LEARNED:
+        return "naive ego"
+    if driver == SUMO:
+        return "ego driven by SUMO"
+    return f"ego {Path(driver).name.removesuffix('.toml')}"
+
+
 class Ego(Document):
     """The vehicle under study."""
 

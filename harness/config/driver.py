@@ -22,6 +22,7 @@ OUTPUTS = ("acceleration_mps2", "steering_rad")
 
 Argument = Annotated[str, Field(max_length=2000, pattern=r"^[^\x00]*$")]
 VariableName = Annotated[str, Field(min_length=1, max_length=200)]
+PedalsAndWheel = Annotated[list[Annotated[float, Field(ge=-1.0, le=1.0)]], Field(min_length=2, max_length=2)]
 DeadlineS = Annotated[float, Field(gt=0.0, le=600.0)]
 
 
@@ -34,9 +35,34 @@ class Sumo(Document):
     """The id of a `vType`. The ego is a car of this type, with its size and top speed."""
 
 
-class Process(Adjustable):
+class WithFiles(Document):
+    """A document of a driver whose decisions depend on files."""
+
+    keys_of_files: ClassVar[tuple[str, ...]] = ()
+    """The keys that name one file each."""
+    later_keys: ClassVar[tuple[str, ...]] = ("files",)
+    """Keys that are not hashed at their default: documents without them keep the stages of earlier versions."""
+
+    files: list[DocumentPath] = Field([], max_length=1000)
+    """Further files that its decisions depend on, relative to this document's folder. When one of them changes, the
+    games are played again."""
+
+    @property
+    def named_files(self) -> dict[str, str]:
+        """The files that keys of the document name, by the key."""
+        named = {key: getattr(self, key) for key in self.keys_of_files}
+        return {key: file for key, file in named.items() if file is not None}
+
+    def hashed(self) -> dict[str, Any]:
+        """What is hashed of the document. Bounds of a search have no effect on decisions."""
+        later = {key for key in self.later_keys if getattr(self, key) == type(self).model_fields[key].get_default()}
+        return self.model_dump(mode="json", exclude={"tunable", *later})
+
+
+class Process(Adjustable, WithFiles):
     """A program in any language that answers observations with controls. The protocol is in docs/egos.md."""
 
+    later_keys: ClassVar[tuple[str, ...]] = ("parameters",)
     parameter_table: ClassVar[str] = "parameters"
 
     kind: Literal["process"]
@@ -44,10 +70,8 @@ class Process(Adjustable):
     command: list[Argument] = Field(min_length=1, max_length=100)
     """The program and its arguments. It runs in `folder`; a name without `/` is searched on PATH."""
     folder: DocumentPath = "."
-    """The working folder of the program, relative to this document's folder. Paths of its files are relative to it."""
-    files: list[DocumentPath] = Field([], max_length=1000)
-    """Further files that its decisions depend on. When one of them changes, the games are played again. Arguments that
-    are files are always included."""
+    """The working folder of the program, relative to this document's folder. Arguments that are files are relative to
+    it, and always among the files that its decisions depend on."""
     units: Literal["si", "scaled"] = "si"
     """`si`: observations in metres, seconds and radians; outputs acceleration_mps2 and steering_rad. `scaled`:
     observations and actions of learned policies, in -1 to 1."""
@@ -59,9 +83,10 @@ class Process(Adjustable):
     """Parameters that the program receives in the first message, under `parameters`."""
 
 
-class Fmu(Adjustable):
+class Fmu(Adjustable, WithFiles):
     """A digital twin: an FMI 2.0 or 3.0 co-simulation FMU, stepped once per decision."""
 
+    keys_of_files: ClassVar[tuple[str, ...]] = ("file",)
     parameter_table: ClassVar[str] = "start"
 
     kind: Literal["fmu"]
@@ -69,12 +94,13 @@ class Fmu(Adjustable):
     file: DocumentPath
     """The FMU, relative to this document's folder."""
     inputs: dict[VariableName, str] = Field({}, max_length=200)
-    """The entry of the observation that each input of the FMU receives. An input that is not listed must have the name
-    of an entry."""
+    """The entry of the observation that each input of the FMU receives. An input that is not listed receives the entry
+    of its name; without such an entry it keeps its start value."""
     outputs: dict[str, VariableName] = Field({}, max_length=2)
     """The names of the FMU's outputs for `acceleration_mps2` and `steering_rad`, if they differ from these."""
-    start: dict[VariableName, float] = Field({}, max_length=1000)
-    """Start values of parameters, and of inputs that receive no entry."""
+    start: dict[VariableName, bool | int | float | str] = Field({}, max_length=1000)
+    """Start values of parameters, and of inputs that receive no entry: numbers, texts, true or false; of an enumeration
+    the name or the number of an item."""
     deadline_s: DeadlineS = 10.0
     """Longest time of a decision. It only detects programs that hang: a busy machine must not change a game."""
     start_deadline_s: DeadlineS = 60.0
@@ -97,18 +123,58 @@ class Fmu(Adjustable):
         return outputs
 
 
-class StableBaselines3(Document):
-    """A policy saved by Stable-Baselines3, trained on `harness/Ego-v0` or an environment with the same spaces."""
+class StableBaselines3(WithFiles):
+    """A policy saved by Stable-Baselines3 or sb3-contrib, trained on `harness/Ego-v0` or an environment with the same
+    spaces."""
 
+    keys_of_files: ClassVar[tuple[str, ...]] = ("file", "normalize")
+    later_keys: ClassVar[tuple[str, ...]] = ("files", "normalize", "actions")
     kind: Literal["stable_baselines3"]
     """The kind of driver, which determines the other keys."""
     file: DocumentPath
-    """The `.zip` file that Stable-Baselines3 saved, relative to this document's folder."""
-    algorithm: Literal["PPO", "A2C", "SAC", "TD3"]
-    """The algorithm that saved it."""
+    """The `.zip` file that the model's `save` wrote, relative to this document's folder."""
+    algorithm: Literal["PPO", "A2C", "SAC", "TD3", "DDPG", "DQN", "TQC", "RecurrentPPO"]
+    """The algorithm that saved it. A file that another one saved is refused."""
+    normalize: DocumentPath | None = None
+    """The file that `VecNormalize.save` wrote, relative to this document's folder; none: the policy sees observations
+    as they are. It is needed if the policy was trained under VecNormalize with normalised observations."""
+    actions: list[PedalsAndWheel] = Field([], max_length=10_000)
+    """Of a policy with discrete actions, such as DQN: pedals and wheel, -1 to 1, of each action, in their order."""
 
 
-class Python(Adjustable):
+class Network(WithFiles):
+    """A network in a file: a function of the observation."""
+
+    keys_of_files: ClassVar[tuple[str, ...]] = ("file",)
+
+    file: DocumentPath
+    """The file, relative to this document's folder."""
+    units: Literal["scaled", "si"] = "scaled"
+    """`scaled`: observations and actions in -1 to 1, as for learned policies. `si`: observations in metres, seconds and
+    radians; outputs acceleration_mps2 and steering_rad."""
+    actions: list[PedalsAndWheel] = Field([], max_length=10_000)
+    """If the network decides the index of an action, or a score for each: pedals and wheel of each action."""
+
+
+class Onnx(Network):
+    """A network in the ONNX format, run by ONNX Runtime."""
+
+    kind: Literal["onnx"]
+    """The kind of driver, which determines the other keys."""
+    input: VariableName | None = None
+    """The input that receives the observation; none: the only input that is not called `noise`."""
+    output: VariableName | None = None
+    """The output with the decision; none: the first."""
+
+
+class TorchScript(Network):
+    """A module that `torch.jit.save` wrote."""
+
+    kind: Literal["torchscript"]
+    """The kind of driver, which determines the other keys."""
+
+
+class Python(Adjustable, WithFiles):
     """An entry point of an installed Python package, in the group `harness.drivers`, with arguments."""
 
     parameter_table: ClassVar[str] = "parameters"
@@ -121,7 +187,7 @@ class Python(Adjustable):
     """Keyword arguments of the entry point."""
 
 
-DriverDocument: TypeAlias = Sumo | Rules | Process | Fmu | StableBaselines3 | Python
+DriverDocument: TypeAlias = Sumo | Rules | Process | Fmu | StableBaselines3 | Onnx | TorchScript | Python
 
 KINDS: dict[str, type[Document]] = {
     get_args(model.model_fields["kind"].annotation)[0]: model for model in get_args(DriverDocument)

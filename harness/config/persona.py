@@ -160,7 +160,13 @@ def _has_limit(value: float | Parametrised, limit: str) -> bool:
 
 
 class Persona(Document):
-    """A kind of driver: the payoff of equation 1 and human limits."""
+    """A kind of driver: the payoff of equation 1 and human limits.
+
+    >>> import harness
+    >>> speedy = harness.read_document("personas/speedy.toml", harness.Persona)
+    >>> speedy.payoff.alpha["human"] > 0.0
+    True
+    """
 
     name: Name
     """The name of the persona in stages, arms and tables."""

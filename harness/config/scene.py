@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
 
 from harness.config.obstacle import Obstacle
-from harness.config.road_user import WALKER_RUN_MPS, Actuators, Kind
+from harness.config.road_user import CYCLING, WALKER_RUN_MPS, Actuators, Kind
 from harness.config.toml_reading import TABLE, TABLES, Document, Interval, Mistakes
 from harness.game.state import MOST_PEOPLE, roles_of
 
@@ -45,6 +45,8 @@ class Player(Document):
     """The way of a pedestrian: points [x, y] in the net's coordinates, from its start to its goal. It may leave it."""
     marked_crossing: bool = False
     """Whether a pedestrian's way crosses the road on a marked crossing, where vehicles must yield."""
+    pavements: bool = False
+    """Whether a bicycle or an e-scooter may ride on pavements: lanes for pedestrians belong to its drivable area."""
     lane: str | None = None
     """The lane of the start, with `position_m` or `beside_ego_m`."""
     position_m: Interval | None = None
@@ -64,6 +66,8 @@ class Player(Document):
 
     @model_validator(mode="after")
     def _is_one_kind(self) -> Player:
+        if self.pavements and self.kind not in CYCLING:
+            raise ValueError('pavements is for kind = "bicycle" and "e_scooter": leave it out')
         if self.on_foot:
             if self.way is None:
                 raise ValueError("a pedestrian needs a way: points [x, y] from its start to its goal")

@@ -86,8 +86,14 @@ _NESTED_TOO_DEEP = ("tables are nested too deeply", "use a few levels of tables 
 D = TypeVar("D", bound=Document)
 
 
-def read_document(path: Path, model: type[D]) -> D:
-    """Read a TOML file into a model. Raises UsageError with file, key and remedy of each mistake in it."""
+def read_document(path: str | Path, model: type[D]) -> D:
+    """Read a TOML file into a model. Raises UsageError with file, key and remedy of each mistake in it.
+
+    >>> import harness
+    >>> harness.read_document("personas/speedy.toml", harness.Persona).name
+    'speedy'
+    """
+    path = Path(path)
     remedy = "a UTF-8 TOML file is needed"
     try:
         text = content_of(path, _MOST_BYTES).decode("utf-8")

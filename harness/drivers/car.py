@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from harness.errors import DriverError
 from harness.game import bicycle
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import Actuators
@@ -13,6 +15,20 @@ from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.world import World
 
 SPEED, _ROAD_STEERING = LAYOUT.index("speed_mps"), LAYOUT.index("road_steering_rad")
+
+
+LARGEST_MPS2, LARGEST_RAD, LARGEST_SCALED = 100.0, 2.0 * math.pi, 100.0
+"""Requests beyond these are not those of a driver: tyres transmit about 10 m/s², and wheels turn by less than 1 rad.
+Quantities are exchanged, or a unit is wrong. Scaled actions are -1 to 1, and a network without bounds may exceed
+them."""
+
+
+def check_plausible(requested: FloatArray, largest: float, quantity: str, unit: str) -> None:
+    """Raise DriverError if a request of a driver [N], of `quantity` in `unit`, is beyond ±`largest`."""
+    worst = float(np.max(np.abs(requested), initial=0.0))
+    if largest < worst < math.inf:
+        what = f"it decided {quantity} of {worst:.4g} {unit}"
+        raise DriverError(f"{what}, which is beyond ±{largest:.4g}: is the unit right?")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +54,10 @@ class Car:
 
     def actions(self, acceleration_mps2: FloatArray, steering_rad: FloatArray, observation: FloatArray) -> FloatArray:
         """Actions [N, 2] that request an acceleration [N] and a steering angle [N] at the speed in `observation`
-        [N, SIZE]. A request beyond the car's limits is clipped."""
+        [N, SIZE]. A request beyond the car's limits is clipped. Raises DriverError for one beyond `LARGEST_MPS2` or
+        `LARGEST_RAD`."""
+        check_plausible(acceleration_mps2, LARGEST_MPS2, "an acceleration", "m/s²")
+        check_plausible(steering_rad, LARGEST_RAD, "a road wheel angle", "rad")
         seen = self.physical(observation)
         speed, road_steering = seen[:, SPEED, None], seen[:, _ROAD_STEERING, None]
         requested = (acceleration_mps2[:, None], steering_rad[:, None])

@@ -8,6 +8,8 @@ import shutil
 from pathlib import Path
 
 from harness.config.campaign import resolve
+from harness.config.driver import Onnx, Process, Python, WithFiles
+from harness.config.toml_reading import nearest
 from harness.errors import UsageError
 
 
@@ -20,6 +22,26 @@ def find_program(name: str, folder: Path, document: Path) -> Path:
         message = f"there is no executable program {name!r} {where}"
         raise UsageError.of(document, "command", message, "build or install it, or correct its name or permissions")
     return Path(found)
+
+
+def files_of(place: Path, document: WithFiles) -> list[Path]:
+    """The files that a document at `place` names, each once: under a key of its own, under `files`, and as parameters
+    that are paths of files. Raises UsageError for a missing one."""
+    folder = place.parent
+    named = [*document.named_files.items(), *(("files", each) for each in document.files)]
+    for key, file in named:
+        if not is_file(folder, file):
+            remedy = nearest(Path(file).name, names_beside(resolve_in(folder, file)))
+            raise UsageError.of(place, key, f"{file!r}: there is no such file", remedy)
+    found = [resolve_in(folder, file) for _, file in named]
+    if isinstance(document, Onnx):  # exporters put large weights into a file beside it
+        found += [each for each in (path.with_name(f"{path.name}.data") for path in found) if each.is_file()]
+    if isinstance(document, Process | Python):
+        texts = [each for each in document.parameters.values() if isinstance(each, str) and each]
+        # A package reads them relative to the working folder, a program relative to its own.
+        places = [resolve_in(folder, document.folder) if isinstance(document, Process) else Path.cwd(), folder]
+        found += [resolve_in(each, text) for text in texts for each in places if is_file(each, text)]
+    return list(dict.fromkeys(found))
 
 
 def resolve_in(folder: Path, written: str) -> Path:

@@ -18,6 +18,7 @@ from typing import Any
 
 from harness.config.toml_reading import nearest
 from harness.drivers.car import Car
+from harness.drivers.driver_files import sha256_of
 from harness.drivers.protocol import Driver
 from harness.errors import DriverError, UsageError
 
@@ -44,8 +45,8 @@ def entry_point(name: str, file: object, key: str) -> importlib.metadata.EntryPo
 
 
 def version_of(point: importlib.metadata.EntryPoint) -> dict[str, str]:
-    """The identity of an installed driver: package, version, entry point, and a hash of its code. The hash is needed
-    because the code of a package under development changes without its version."""
+    """The identity of an installed driver: package, version, entry point, and a hash of its files. The hash is needed
+    because a package under development changes without its version."""
     package = point.dist
     return {
         "package": package.name if package is not None else "",
@@ -71,16 +72,22 @@ def installed_driver(point: importlib.metadata.EntryPoint, car: Car, parameters:
 
 
 def _code(module: str) -> str:
-    """SHA-256 over the Python files of a module's top-level package; empty if the package is not found."""
+    """SHA-256 over the files of a module's top-level package, weights included; empty if the package is not found."""
     try:
         spec = importlib.util.find_spec(module.partition(".")[0])
     except (ImportError, ValueError):
         return ""
     if spec is None:
         return ""
-    folders = [Path(each) for each in spec.submodule_search_locations or ()]
-    files = [file for folder in folders for file in folder.rglob("*.py")] or [Path(spec.origin or "")]
     digest = hashlib.sha256()
-    for file in sorted(each for each in files if each.is_file()):
-        digest.update(file.name.encode() + b"\0" + hashlib.sha256(file.read_bytes()).digest())
+    for folder in map(Path, spec.submodule_search_locations or ()):
+        for file in sorted(each for each in folder.rglob("*") if _counts(each.relative_to(folder)) and each.is_file()):
+            digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + sha256_of(file).encode())
+    if not spec.submodule_search_locations:
+        digest.update(sha256_of(Path(spec.origin or "")).encode())
     return digest.hexdigest()
+
+
+def _counts(file: Path) -> bool:
+    """Whether a file is part of a package: not what Python or tools leave beside it."""
+    return not any(part == "__pycache__" or part.startswith(".") for part in file.parts)

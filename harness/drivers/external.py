@@ -23,20 +23,34 @@ from typing import Any
 import numpy as np
 
 from harness.config.campaign import LEARNED, SUMO, resolve
-from harness.config.driver import DriverDocument, Fmu, Process, Python, StableBaselines3, Sumo, read_driver
-from harness.config.rule_driver import Rules
+from harness.config.driver import (
+    DriverDocument,
+    Fmu,
+    Process,
+    Python,
+    StableBaselines3,
+    Sumo,
+    TorchScript,
+    WithFiles,
+    read_driver,
+)
 from harness.config.toml_reading import nearest
 from harness.config.tunable import Adjustable, Tunable
 from harness.drivers.car import Car
-from harness.drivers.driver_files import find_program, is_file, names_beside, relative_to, resolve_in, sha256_of
-from harness.drivers.entry_points import entry_point, installed_driver, installed_names, version_of
-from harness.drivers.fmu import fmu_driver
-from harness.drivers.policy import LearnedDriver
+from harness.drivers.driver_files import (
+    files_of,
+    find_program,
+    is_file,
+    names_beside,
+    relative_to,
+    resolve_in,
+    sha256_of,
+)
+from harness.drivers.driver_kinds import driver_in_words, make_driver
+from harness.drivers.entry_points import entry_point, installed_names, version_of
+from harness.drivers.fmu import unconnected_inputs
 from harness.drivers.policy_file import check_no_archive, policy_files, read_policy
-from harness.drivers.process import ProcessDriver
 from harness.drivers.protocol import Driver
-from harness.drivers.rules import RulesDriver
-from harness.drivers.sumo import SumoDriver
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import SIZE
 from harness.shipped_documents import find_document, shipped_names
@@ -45,8 +59,10 @@ ALLOW_CODE = "--allow-code"
 _RUNS_CODE = {
     Process: "starts a program",
     Fmu: "runs an FMU, which is a program",
+    TorchScript: "runs a TorchScript module, which is a program",
     StableBaselines3: "reads a file of Stable-Baselines3, which may contain pickles: reading them can run any code",
 }
+_KIND_OF_SUFFIX = {".fmu": "fmu", ".onnx": "onnx", ".pt": "torchscript"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,13 +97,12 @@ class ExternalDriver:
         """Everything its decisions depend on. It is hashed into the keys of stages."""
         if self.document is None:
             return self.files[str(policy_files(self.place)[1])]
-        document = self.document.model_dump(
-            mode="json", exclude={"tunable"}
-        )  # bounds of a search, without effect on decisions
+        if isinstance(self.document, WithFiles):
+            document = self.document.hashed()
+        else:  # bounds of a search have no effect on decisions
+            document = self.document.model_dump(mode="json", exclude={"tunable"})
         if isinstance(self.document, Process):  # the files are hashed, so their place has no effect
             del document["folder"]
-            if not self.document.parameters:
-                del document["parameters"]
         return {"document": document, "files": list(self.files.values()), "package": dict(self.package)}
 
     @property
@@ -122,31 +137,27 @@ class ExternalDriver:
     def document_in(self, folder: Path) -> DriverDocument:
         """Its document, with paths relative to `folder` that lead to the same files."""
         assert self.document is not None, "a policy has no document"
-        match self.document:
-            case Process(folder=written):
-                return self.document.model_copy(update={"folder": relative_to(folder, resolve_in(self.place, written))})
-            case Fmu(file=file) | StableBaselines3(file=file):
-                return self.document.model_copy(update={"file": relative_to(folder, resolve_in(self.place, file))})
-        return self.document
+        if not isinstance(self.document, WithFiles):
+            return self.document
+        moved: dict[str, Any] = {
+            key: relative_to(folder, resolve_in(self.place, file)) for key, file in self.document.named_files.items()
+        }
+        moved["files"] = [relative_to(folder, resolve_in(self.place, each)) for each in self.document.files]
+        if isinstance(self.document, Process):
+            moved["folder"] = relative_to(folder, resolve_in(self.place, self.document.folder))
+        return self.document.model_copy(update=moved)
 
     @property
     def in_words(self) -> str:
         """A description of the driver for reports."""
-        match self.document:
-            case None:
-                return f"the policy {self.written}"
-            case Sumo(vehicle_type=name):
-                return f"SUMO's own models of vehicle type {name} ({self.written})"
-            case Rules(name=name):
-                return f"the rules {name} ({self.written})"
-            case Process(command=command):
-                return f"the program {' '.join(command)} ({self.written})"
-            case Fmu(file=file):
-                return f"the FMU {file} ({self.written})"
-            case StableBaselines3(file=file, algorithm=algorithm):
-                return f"the {algorithm} policy {file} of Stable-Baselines3 ({self.written})"
-            case Python(entry_point=name):
-                return f"{name} of the package {self.package['package']} {self.package['version']}"
+        return driver_in_words(self.document, self.written, self.package)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a check tells about the driver beside its name. Raises UsageError as `make` does."""
+        if isinstance(self.document, Fmu):
+            return tuple(filter(None, [unconnected_inputs(self.document, resolve_in(self.place, self.document.file))]))
+        return ()
 
     def make(self, car: Car, sampled: bool) -> Driver:
         """Make the driver for a car. `sampled`: a policy samples its actions; other drivers ignore it.
@@ -157,31 +168,7 @@ class ExternalDriver:
         changed = [file for file, known in self.files.items() if sha256_of(Path(file)) != known]
         if changed:
             raise DriverError(f"changed since the campaign was checked: {', '.join(changed)}")
-        match self.document:
-            case None:
-                return LearnedDriver(read_policy(self.place), sampled)
-            case Sumo():
-                return SumoDriver()
-            case Rules():
-                return RulesDriver(self.document, car)
-            case Process(folder=folder, units=units):
-                return ProcessDriver(
-                    self.command,
-                    resolve_in(self.place, folder),
-                    car,
-                    units=units,
-                    deadline_s=self.document.deadline_s,
-                    start_deadline_s=self.document.start_deadline_s,
-                    parameters=self.document.parameters,
-                )
-            case Fmu(file=file):
-                return fmu_driver(self.document, resolve_in(self.place, file), car)
-            case StableBaselines3(file=file):
-                from harness.drivers.sb3_policy import Sb3Driver  # torch is slow to import
-
-                return Sb3Driver(self.document, resolve_in(self.place, file), sampled)
-            case Python(entry_point=name, parameters=parameters):
-                return installed_driver(entry_point(name, self.written, "entry_point"), car, parameters)
+        return make_driver(self.document, self.place, self.command, car, sampled)
 
     def try_out(self, car: Car, sampled: bool, games: int = 1) -> None:
         """Make the driver, reset this number of games and decide once in each. Raises UsageError if that fails."""
@@ -208,7 +195,7 @@ def find_driver(written: str, file: Path, key: str, allow_code: bool) -> Externa
         read_policy(place)
         return _external(written, place, None, files=policy_files(place))
     if place.suffix.lower() != ".toml":
-        kind = "fmu" if place.suffix.lower() == ".fmu" else "stable_baselines3"
+        kind = _KIND_OF_SUFFIX.get(place.suffix.lower(), "stable_baselines3")
         remedy = f'; or name a TOML document with kind = "{kind}", file = "{place.name}"'
         check_no_archive(file, key, written, place, remedy=remedy)
     if not os.path.exists(place):
@@ -239,30 +226,22 @@ def _place(file: Path, written: str) -> Path:
 
 def _from_document(written: str, place: Path, document: DriverDocument) -> ExternalDriver:
     folder = place.parent
+    files = files_of(place, document) if isinstance(document, WithFiles) else []
     match document:
-        case Process(command=command, files=files):
+        case Process(command=command):
             runs_in = resolve_in(folder, document.folder)
             if not runs_in.is_dir():
                 remedy = nearest(runs_in.name, names_beside(runs_in))
                 raise UsageError.of(place, "folder", f"{document.folder!r}: there is no such folder", remedy)
             program = find_program(command[0], runs_in, place)
-            depends_on = [*(each for each in command[1:] if is_file(runs_in, each)), *files]
-            missing = [each for each in files if not is_file(runs_in, each)]
-            if missing:
-                remedy = nearest(Path(missing[0]).name, names_beside(resolve_in(runs_in, missing[0])))
-                raise UsageError.of(place, "files", f"{missing[0]!r}: there is no such file", remedy)
-            paths = [program, *(resolve_in(runs_in, each) for each in depends_on)]
-            return _external(written, folder, document, files=paths, command=(str(program), *command[1:]))
-        case Fmu(file=file) | StableBaselines3(file=file):
-            if not is_file(folder, file):
-                remedy = nearest(Path(file).name, names_beside(resolve_in(folder, file)))
-                raise UsageError.of(place, "file", f"{file!r}: there is no such file", remedy)
-            return _external(written, folder, document, files=[resolve_in(folder, file)])
+            arguments = [resolve_in(runs_in, each) for each in command[1:] if is_file(runs_in, each)]
+            files = [program, *arguments, *files]
+            return _external(written, folder, document, files=files, command=(str(program), *command[1:]))
         case Python(entry_point=name):
             package = version_of(entry_point(name, place, "entry_point"))
-            return _external(written, folder, document, package=package)
+            return _external(written, folder, document, files=files, package=package)
         case _:
-            return _external(written, folder, document)
+            return _external(written, folder, document, files=files)
 
 
 def _external(

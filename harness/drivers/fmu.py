@@ -10,22 +10,27 @@ An FMU is native code. If it crashes or hangs, one game fails and the campaign c
 
 from __future__ import annotations
 
+import difflib
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from harness.config.driver import OUTPUTS, Fmu
 from harness.config.toml_reading import nearest
 from harness.drivers.car import Car
+from harness.drivers.fmu_variables import ENTRY_TYPES, REALS, Value, value_for
 from harness.drivers.process import ProcessDriver
 from harness.errors import Problem, UsageError
 from harness.game.observation_layout import LAYOUT
 
 ENTRY_OF = {name.replace("@", "_"): name for name in LAYOUT} | {name: name for name in LAYOUT}
 """Possible names of an FMU's inputs, and the entry of each. Most tools do not allow `@` in a name: `_` replaces it."""
-_REALS = ("Real", "Float64")
+_OUTPUT_TYPES = ("Real", "Float64")
+_ALIKE = 0.8
+"""Likeness of two names from which one is taken for a misspelling of the other, as difflib measures it."""
+_MOST_PROBLEMS = 10
 _UNITS = {"mps": {"m": 1, "s": -1}, "mps2": {"m": 1, "s": -2}, "m": {"m": 1}, "rad": {"rad": 1}}
 _SI = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 _CHECKOUT = Path(__file__).resolve().parents[2]
@@ -34,10 +39,13 @@ _CHECKOUT = Path(__file__).resolve().parents[2]
 class Wiring(NamedTuple):
     """The connections of an FMU's variables, by value reference."""
 
-    inputs: list[tuple[int, int]]
-    """Value reference, and the index of the entry in the observation."""
+    inputs: list[tuple[int, int, str]]
+    """Value reference, the index of the entry in the observation, and the type."""
     outputs: list[int]
-    start: list[tuple[int, float]]
+    start: list[tuple[int, Value, str]]
+    """Value reference, value and type."""
+    unconnected: list[str]
+    """Inputs that keep the start value of the FMU."""
 
 
 def fmu_driver(document: Fmu, file: Path, car: Car) -> ProcessDriver:
@@ -86,12 +94,32 @@ def wiring(document: Fmu, file: Path) -> Wiring:
         )
     ]
     if problems:
-        raise UsageError(problems)
+        more = len(problems) - _MOST_PROBLEMS
+        shown = problems[:_MOST_PROBLEMS] if more > 1 else problems
+        others = [Problem(str(file), "", f"{more} more problems of this kind", "correct these first")] * (more > 1)
+        raise UsageError([*shown, *others])
+    connected = {*entries, *document.start}
     return Wiring(
-        [(variables[name].valueReference, LAYOUT.index(entry)) for name, entry in entries.items()],
+        [
+            (variables[name].valueReference, LAYOUT.index(entry), variables[name].type)
+            for name, entry in entries.items()
+        ],
         [variables[name].valueReference for name in outputs.values()],
-        [(variables[name].valueReference, value) for name, value in document.start.items()],
+        [
+            (variables[name].valueReference, value_for(variables[name], value), variables[name].type)
+            for name, value in document.start.items()
+        ],
+        [name for name, each in variables.items() if each.causality == "input" and name not in connected],
     )
+
+
+def unconnected_inputs(document: Fmu, file: Path) -> str:
+    """The inputs of an FMU that keep their start values, in words; empty if there is none. Raises as `wiring`."""
+    names = wiring(document, file).unconnected
+    if not names:
+        return ""
+    more = f" and {len(names) - _MOST_PROBLEMS} more" if len(names) > _MOST_PROBLEMS else ""
+    return f"inputs of the FMU that keep their start values: {', '.join(names[:_MOST_PROBLEMS])}{more}"
 
 
 def _inputs(document: Fmu, variables: Mapping[str, Any]) -> dict[str, str]:
@@ -115,8 +143,11 @@ def _missing(
                 found.append((name, f"the FMU has no {kind} of this name", known))
     for name in names_of["input"]:
         if name not in entries and name not in document.start:
-            remedy = f"connect it under [inputs], or give it a value under [start]; {nearest(name, ENTRY_OF)}"
-            found.append((name, "this input of the FMU has no entry of the observation and no value", remedy))
+            likely = difflib.get_close_matches(name, ENTRY_OF, n=1, cutoff=_ALIKE)
+            if variables[name].start is None or likely:
+                told = f"; did you mean {likely[0]!r}?" if likely else ""
+                remedy = f"connect it under [inputs], or give it a value under [start]{told}"
+                found.append((name, "this input of the FMU has no entry of the observation and no value", remedy))
     for name in document.start:
         if name not in variables or variables[name].causality not in ("parameter", "input"):
             settable = [key for key, each in variables.items() if each.causality in ("parameter", "input")]
@@ -140,14 +171,37 @@ def _unsuitable(
 ) -> list[tuple[str, str, str]]:
     """Key, message and remedy of each variable with another type or unit than its quantity."""
     found: list[tuple[str, str, str]] = []
+    for names, types, needed in (
+        (entries, ENTRY_TYPES, "a number, a Boolean or an enumeration is needed; give a text under [start]"),
+        (list(outputs.values()), _OUTPUT_TYPES, "a single Real (FMI 2.0) or Float64 is needed"),
+    ):
+        for name in names:
+            if name in variables and (variables[name].type not in types or variables[name].dimensions):
+                found.append((name, f"is {_type_of(variables[name])}", needed))
+    for name in document.start.keys() & variables.keys():
+        found += [(name, *mistake) for mistake in _mistakes_of_start(document, name, variables[name])]
     quantities = {**entries, **{name: output for output, name in outputs.items()}}
-    for name in {*quantities, *document.start} & variables.keys():
-        if variables[name].type not in _REALS or variables[name].dimensions:
-            found.append((name, f"is of type {variables[name].type}", "a single Real (FMI 2.0) or Float64 is needed"))
     for name, quantity in quantities.items():
         if name in variables and (message := _unit_problem(variables[name], quantity, description)):
             found.append((name, message, "convert it in the FMU: the harness uses SI units"))
     return found
+
+
+def _type_of(variable: Any) -> str:
+    return "an array" if variable.dimensions else f"of type {variable.type}"
+
+
+def _mistakes_of_start(document: Fmu, name: str, variable: Any) -> Iterator[tuple[str, str]]:
+    """Message and remedy of what is wrong with a value under [start]."""
+    if variable.dimensions:
+        yield "is an array", "only single values can be set"
+        return
+    try:
+        value_for(variable, document.start[name])
+    except ValueError as error:
+        yield f"the value {document.start[name]!r} under [start] is not possible", f"it {error}"
+    if name in (document.tunable or {}) and variable.type not in REALS:
+        yield f"is of type {variable.type}", "only Real variables can be tuned: leave it out under [tunable]"
 
 
 def _unit_problem(variable: Any, quantity: str, description: Any) -> str:

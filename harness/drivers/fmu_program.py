@@ -6,19 +6,25 @@ sets the inputs from the observation, does the step from t to t + step, and answ
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import fmpy
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 
+from harness.drivers.fmu_variables import entry_as, setter_of
 from harness.drivers.process import PROTOCOL
+
+_LOG_LINES, _LOG_CHARACTERS = 3, 160
 
 _ONE_GAME = "give the campaign training.games = 1 and reconfiguration.games_at_once = 1"
 
@@ -28,7 +34,12 @@ class _Instance:
 
     def __init__(self, spec: Mapping[str, Any], description: Any, folder: str, game: int) -> None:
         self._is_fmi2 = str(description.fmiVersion).startswith("2.")
-        self._wiring, self._step_s, self._steps = spec["wiring"], spec["step_s"], 0
+        inputs, self._outputs, start = spec["wiring"][:3]
+        self._step_s, self._steps, self._log = spec["step_s"], 0, deque[str](maxlen=_LOG_LINES)
+        self._inputs: dict[str, list[tuple[int, int, str]]] = {}  # by the function that sets them
+        for reference, entry, kind in inputs:
+            name = setter_of(str(description.fmiVersion), kind)
+            self._inputs.setdefault(name, []).append((reference, entry, kind))
         slave = FMU2Slave if self._is_fmi2 else FMU3Slave
         self._fmu = slave(
             guid=description.guid,
@@ -36,9 +47,19 @@ class _Instance:
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName=f"game{game}",
         )
-        self._fmu.instantiate()
-        start = self._wiring[2]
-        self._set([vr for vr, _ in start], [value for _, value in start])
+        try:
+            self._begin([(setter_of(str(description.fmiVersion), kind), vr, value) for vr, value, kind in start])
+        except Exception as error:  # FMPy and ctypes may raise any exception
+            raise self._with_log(error) from error
+
+    def _begin(self, start: Sequence[tuple[str, int, Any]]) -> None:
+        if self._is_fmi2:
+            self._callbacks = fmi2_callbacks(self._note)
+            self._fmu.instantiate(callbacks=self._callbacks, loggingOn=True)
+        else:
+            self._fmu.instantiate(loggingOn=True, logMessage=self._note)
+        for setter, reference, value in start:
+            getattr(self._fmu, setter)([reference], [value])
         if self._is_fmi2:
             self._fmu.setupExperiment(startTime=0.0)
             self._fmu.enterInitializationMode()
@@ -47,22 +68,56 @@ class _Instance:
         self._fmu.exitInitializationMode()
 
     def decide(self, observation: Sequence[float]) -> list[float]:
-        inputs, outputs, _ = self._wiring
-        self._set([vr for vr, _ in inputs], [observation[entry] for _, entry in inputs])
+        try:
+            return self._decide(observation)
+        except Exception as error:  # FMPy and ctypes may raise any exception
+            raise self._with_log(error) from error
+
+    def _decide(self, observation: Sequence[float]) -> list[float]:
+        for setter, inputs in self._inputs.items():
+            values = [entry_as(kind, observation[entry]) for _, entry, kind in inputs]
+            getattr(self._fmu, setter)([reference for reference, _, _ in inputs], values)
         now_s = self._steps * self._step_s
         result = self._fmu.doStep(currentCommunicationPoint=now_s, communicationStepSize=self._step_s)
         if not self._is_fmi2 and result[1]:
             raise RuntimeError("the FMU requests the end of the simulation")
         self._steps += 1
-        return [float(value) for value in (self._fmu.getReal if self._is_fmi2 else self._fmu.getFloat64)(outputs)]
+        outputs = (self._fmu.getReal if self._is_fmi2 else self._fmu.getFloat64)(self._outputs)
+        return [float(value) for value in outputs]
 
     def close(self) -> None:
         self._fmu.terminate()
         self._fmu.freeInstance()
 
-    def _set(self, references: list[int], values: list[float]) -> None:
-        if references:
-            (self._fmu.setReal if self._is_fmi2 else self._fmu.setFloat64)(references, values)
+    def _note(self, environment: Any, *message: Any) -> None:
+        """Keep a message of the FMU's log that is at least a warning. FMI 2.0 tells the instance's name first."""
+        status, _, text = message[-3:]
+        if status:
+            self._log.append(" ".join(text.decode("utf-8", "replace").split())[:_LOG_CHARACTERS] if text else "")
+
+    def _with_log(self, error: Exception) -> Exception:
+        log = f"; its log: {' / '.join(self._log)}" if self._log else ""
+        self._log.clear()
+        return FmuFailed(f"{error}{log}")
+
+
+class FmuFailed(Exception):
+    """A call of the FMU failed; the message ends with the FMU's own log."""
+
+
+def fmi2_callbacks(note: Callable[..., None]) -> Any:
+    """The callbacks of FMI 2.0 with a logger of ours."""
+    from fmpy import fmi2
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(note)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    with suppress(Exception):  # the formatting of variadic messages is a library for some platforms only
+        from fmpy.logging import addLoggerProxy
+
+        addLoggerProxy(ctypes.byref(callbacks))
+    return callbacks
 
 
 def main() -> None:
@@ -79,7 +134,8 @@ def main() -> None:
             try:
                 answer = _answer(json.loads(line), spec, description=description, folder=folder, instances=instances)
             except Exception as error:  # FMPy and ctypes may raise any exception
-                answer = {"error": f"{type(error).__name__}: {error}"}
+                told = str(error) if isinstance(error, FmuFailed) else f"{type(error).__name__}: {error}"
+                answer = {"error": told}
             answers.write(json.dumps(answer) + "\n")
             answers.flush()
     finally:

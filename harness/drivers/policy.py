@@ -9,7 +9,13 @@ from harness.game.arrays import FloatArray, IntArray
 
 
 class LearnedDriver:
-    """Drives by a policy: by its most likely action, or by a sample of its distribution."""
+    """Drives by a policy: by its most likely action, or by a sample of its distribution.
+
+    >>> import harness, numpy as np
+    >>> driver = harness.LearnedDriver(harness.read_policy("policies/merge/naive-seed1"), sampled=False)
+    >>> driver.decide(games=np.arange(3), observation=np.zeros((3, 98)), noise=np.zeros((3, 2))).shape
+    (3, 2)
+    """
 
     takes_over = True
 

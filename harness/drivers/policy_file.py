@@ -39,7 +39,13 @@ _POLICY_FOLDER = "name the folder of a policy, as under <run>/policies/"
 
 @dataclass(frozen=True)
 class Policy:
-    """Actor and critic as arrays: layers with tanh between them, and the log standard deviation of the actions [2]."""
+    """Actor and critic as arrays: layers with tanh between them, and the log standard deviation of the actions [2].
+
+    >>> import harness
+    >>> policy = harness.read_policy("policies/merge/naive-seed1")
+    >>> [weight.shape[1] for weight, bias in policy.layers("actor")][0]
+    98
+    """
 
     tensors: Mapping[str, FloatArray]
     card: Mapping[str, Any] = field(default_factory=dict)
@@ -73,8 +79,13 @@ def policy_files(folder: Path) -> tuple[Path, Path]:
     return folder / "policy.json", folder / "policy.safetensors"
 
 
-def read_policy(folder: Path) -> Policy:
-    """Read a policy's folder. Raises UsageError if it is missing, damaged, or was made for other observations."""
+def read_policy(folder: str | Path) -> Policy:
+    """Read a policy's folder. Raises UsageError if it is missing, damaged, or was made for other observations.
+
+    >>> read_policy("policies/merge/naive-seed1").card["player"]
+    'ego'
+    """
+    folder = Path(folder)
     card = read_card(folder)
     if card["format"] != FORMAT or card["observation"] != list(LAYOUT):
         raise UsageError.of(

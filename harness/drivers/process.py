@@ -29,13 +29,14 @@ from typing import IO, Any
 
 import numpy as np
 
-from harness.drivers.car import Car
+from harness.drivers.car import LARGEST_SCALED, Car, check_plausible
 from harness.errors import DriverError
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.observation_layout import LAYOUT
 
 PROTOCOL = 2
 _LONGEST_ANSWER_BYTES = 10_000_000
+_LONGEST_ERROR = 600
 _STDERR_TAIL_BYTES, _STDERR_TAIL_LINES = 4_000, 5
 # If the harness is killed, a program that never reads its input would keep running. On Linux the kernel kills the
 # program with the thread that started it. (1 is PR_SET_PDEATHSIG.)
@@ -96,8 +97,12 @@ class ProcessDriver:
         actions = _actions(self._request(message, self._deadline_s).get("actions"), len(games))
         if isinstance(actions, str):
             raise self._failure(f"answered with invalid actions: {actions}")
-        if self._si:
-            return self._car.actions(actions[:, 0], actions[:, 1], observation)
+        try:
+            if self._si:
+                return self._car.actions(actions[:, 0], actions[:, 1], observation)
+            check_plausible(actions, LARGEST_SCALED, "pedals or a wheel", "(-1 to 1 is possible)")
+        except DriverError as error:
+            raise self._failure(f"gave an implausible answer: {error}") from None
         return np.clip(actions, -1.0, 1.0)
 
     def close(self) -> None:
@@ -119,7 +124,7 @@ class ProcessDriver:
         if not isinstance(answer, dict):
             raise self._failure(f"answered {message['type']} with {_short(answer)}, not with an object")
         if "error" in answer:
-            raise self._failure(f"reports an error: {_short(answer['error'])}")
+            raise self._failure(f"reports an error: {_short(answer['error'], _LONGEST_ERROR)}")
         return answer
 
     def _failure(self, what: str) -> DriverError:
@@ -262,5 +267,5 @@ def _actions(answer: Any, games: int) -> FloatArray | str:
         return "a number is too large"
 
 
-def _short(value: Any) -> str:
-    return repr(value)[:200]
+def _short(value: Any, longest: int = 200) -> str:
+    return repr(value)[:longest]

@@ -13,6 +13,15 @@ class Driver(Protocol):
 
     A driver sees only `harness.game.observation`. It draws no random numbers of its own: randomness is passed to it as
     `noise`, which is drawn when the game is reset, so that a game can be replayed.
+
+    >>> import numpy as np
+    >>> class HalfThrottle:
+    ...     takes_over = True
+    ...     def reset(self, games): pass
+    ...     def decide(self, games, observation, noise): return np.tile([0.5, 0.0], (len(games), 1))
+    >>> driver: Driver = HalfThrottle()
+    >>> driver.decide(np.arange(2), np.zeros((2, 98)), np.zeros((2, 2))).tolist()
+    [[0.5, 0.0], [0.5, 0.0]]
     """
 
     takes_over: bool

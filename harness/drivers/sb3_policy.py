@@ -1,4 +1,4 @@
-"""A policy saved by Stable-Baselines3 as a driver. Such a file may contain pickles: reading it may run any code."""
+"""A policy saved by Stable-Baselines3 or sb3-contrib as a driver."""
 
 from __future__ import annotations
 
@@ -8,78 +8,97 @@ from typing import Any
 import numpy as np
 
 from harness.config.driver import StableBaselines3
-from harness.drivers.policy_file import ACTIONS
+from harness.drivers.sb3_file import DETERMINISTIC, SAC_LIKE, read_sb3_policy
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.observation_layout import SIZE
 
 
 class Sb3Driver:
-    """Drives by a policy of PPO, A2C, SAC or TD3: by its most likely action, or by a sample of its distribution."""
+    """Drives by a policy of Stable-Baselines3: by its most likely action, or by a sample of its distribution. The state
+    of a recurrent policy is kept per game."""
 
     takes_over = True
 
-    def __init__(self, document: StableBaselines3, file: Path, sampled: bool) -> None:
-        """Read the policy. Raises UsageError if it can't be read, if its spaces are not those of a driver, or if
-        `sampled` is true for a policy without a distribution to sample."""
-        self._policy = _read(document, file)
-        if sampled and (document.algorithm == "TD3" or getattr(self._policy, "use_sde", False)):
-            what = "TD3's policies are deterministic" if document.algorithm == "TD3" else "gSDE draws its own noise"
+    def __init__(self, document: StableBaselines3, file: Path, sampled: bool, normalize: Path | None = None) -> None:
+        """Read the policy. Raises UsageError as `read_sb3_policy` does, and if `sampled` is true for a policy without a
+        distribution to sample."""
+        self._policy, self._scaling, self._gives_index = read_sb3_policy(document, file, normalize)
+        deterministic = document.algorithm in DETERMINISTIC
+        if sampled and (deterministic or self._gives_index or getattr(self._policy, "use_sde", False)):
+            what = f"{document.algorithm}'s policies are deterministic" if deterministic else "gSDE draws its own noise"
+            what = "the noise samples no discrete actions" if self._gives_index and not deterministic else what
             remedy = 'give the ego a persona with decisions = "mode"'
             raise UsageError.of(file, "", f"the ego's persona samples its decisions, but {what}", remedy)
-        self._sampled, self._squashed = sampled, document.algorithm == "SAC"
+        self._sampled, self._squashed = sampled, document.algorithm in SAC_LIKE
+        self._actions = np.array(document.actions, dtype=np.float64)
+        self._memory = _Memory(self._policy) if document.algorithm == "RecurrentPPO" else None
 
     def reset(self, games: IntArray) -> None:
-        """Do nothing: each decision depends on the current observation only."""
+        """Reset games [N]: a recurrent policy forgets them; the decisions of others depend on the observation only."""
+        if self._memory is not None:
+            self._memory.forget(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """Actions [N, 2] from observations [N, SIZE]; `noise` [N, 2] is used if decisions are sampled."""
-        import torch
-
         inputs = np.asarray(observation, dtype=np.float32)
+        if self._scaling is not None:
+            inputs = np.asarray(self._scaling.normalize_obs(inputs), dtype=np.float32)
         if not self._sampled:
-            action, _ = self._policy.predict(inputs, deterministic=True)
+            action = self._most_likely(games, inputs)
+            if self._gives_index:
+                return self._actions[np.asarray(action, dtype=np.int64)]
             return np.clip(np.asarray(action, dtype=np.float64), -1.0, 1.0)
-        with torch.no_grad():
-            mean, deviation = self._distribution(torch.from_numpy(inputs))
+        mean, deviation = self._distribution(games, inputs)
         action = mean + deviation * noise
         return np.tanh(action) if self._squashed else np.clip(action, -1.0, 1.0)
 
-    def _distribution(self, inputs: Any) -> tuple[FloatArray, FloatArray]:
+    def _most_likely(self, games: IntArray, inputs: FloatArray) -> Any:
+        if self._memory is None:
+            return self._policy.predict(inputs, deterministic=True)[0]
+        state, starts = self._memory.recall(games)
+        action, state = self._policy.predict(inputs, state=state, episode_start=starts, deterministic=True)
+        self._memory.keep(games, state)
+        return action
+
+    def _distribution(self, games: IntArray, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Mean and deviation [N, 2] of the normal distribution of actions; for SAC before the squashing."""
-        if self._squashed:
-            mean, log_deviation, _ = self._policy.actor.get_action_dist_params(inputs)
-            return mean.double().numpy(), log_deviation.double().exp().numpy()
-        normal = self._policy.get_distribution(inputs).distribution
-        return normal.mean.double().numpy(), normal.stddev.double().numpy()
+        import torch
+
+        with torch.no_grad():
+            seen = torch.from_numpy(inputs)
+            if self._squashed:
+                mean, log_deviation, _ = self._policy.actor.get_action_dist_params(seen)
+                return mean.double().numpy(), log_deviation.double().exp().numpy()
+            if self._memory is None:
+                normal = self._policy.get_distribution(seen).distribution
+            else:
+                state, starts = self._memory.recall(games)
+                tensors = tuple(torch.from_numpy(each) for each in state)
+                found, new = self._policy.get_distribution(seen, tensors, torch.from_numpy(starts).float())
+                self._memory.keep(games, tuple(each.numpy() for each in new))
+                normal = found.distribution
+            return normal.mean.double().numpy(), normal.stddev.double().numpy()
 
 
-def _read(document: StableBaselines3, file: Path) -> Any:
-    import stable_baselines3
-    import torch
+class _Memory:
+    """The state of a recurrent policy in each game: hidden and cell, [layers, units]."""
 
-    torch.set_num_threads(1)
-    algorithm = getattr(stable_baselines3, document.algorithm)
-    # Replaced because only training needs them: a buffer of a million steps, and schedules that are pickled functions,
-    # which another version of Python may be unable to read.
-    replaced = {"buffer_size": 1, "learning_rate": 0.0, "lr_schedule": _zero, "clip_range": _zero}
-    try:
-        model = algorithm.load(file, device="cpu", custom_objects=replaced)
-    except Exception as error:  # zipfile, pickle, torch and unpickled classes may raise any exception
-        remedy = "is the algorithm right, and are the classes it was saved with installed?"
-        what = f"can't be read as a policy of {document.algorithm}: {type(error).__name__}: {error}"
-        raise UsageError.of(file, "", " ".join(what.split())[:500], remedy) from None
-    for name, size in (("observation", SIZE), ("action", ACTIONS)):
-        space = getattr(model, f"{name}_space", None)
-        bounds = getattr(space, "low", None), getattr(space, "high", None)
-        fits = getattr(space, "shape", None) == (size,) and all(
-            bound is not None and np.allclose(bound, end) for bound, end in zip(bounds, (-1.0, 1.0), strict=True)
-        )
-        if not fits:
-            message = f"its {name} space is {space}, not Box(-1.0, 1.0, ({size},), float32)"
-            raise UsageError.of(file, f"{name}_space", message, "train it on harness/Ego-v0")
-    return model.policy
+    def __init__(self, policy: Any) -> None:
+        layers, units = policy.lstm_hidden_state_shape[0], policy.lstm_hidden_state_shape[2]
+        self._blank = np.zeros((2, layers, units), dtype=np.float32)
+        self._of: dict[int, FloatArray] = {}
 
+    def forget(self, games: IntArray) -> None:
+        for game in games.tolist():
+            self._of.pop(game, None)
 
-def _zero(_: float) -> float:
-    return 0.0
+    def recall(self, games: IntArray) -> tuple[tuple[FloatArray, FloatArray], FloatArray]:
+        """Hidden and cell [layers, N, units], and which games [N] begin."""
+        both = np.stack([self._of.get(game, self._blank) for game in games.tolist()], axis=2)
+        starts = np.array([game not in self._of for game in games.tolist()])
+        return (both[0], both[1]), starts
+
+    def keep(self, games: IntArray, state: tuple[FloatArray, FloatArray]) -> None:
+        both = np.stack(state)
+        for place, game in enumerate(games.tolist()):
+            self._of[game] = both[:, :, place].copy()

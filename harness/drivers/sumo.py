@@ -6,7 +6,12 @@ from harness.game.arrays import FloatArray, IntArray
 
 
 class SumoDriver:
-    """A law-abiding driver, as SUMO models one."""
+    """A law-abiding driver, as SUMO models one.
+
+    >>> import harness
+    >>> harness.Seat(harness.SumoDriver()).driver.takes_over
+    False
+    """
 
     takes_over = False
 

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.environments.live import LiveSimulation
 from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat as Seat
 from harness.environments.seats import with_walkers
@@ -51,7 +52,7 @@ _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # comparing arrays wi
 
 @dataclass(kw_only=True)
 class Step:
-    """The result of a step. Arrays are [G, P]."""
+    """The result of a step, of `Arena.step`. Arrays are [G, P]."""
 
     payoff: FloatArray
     drove: BoolArray
@@ -60,8 +61,12 @@ class Step:
     """At the end of the step, before a player is removed."""
 
 
-class Arena:
-    """G games on one scene with the same seats."""
+class Arena(LiveSimulation):
+    """G games on one scene with the same seats.
+
+    >>> import harness
+    >>> Arena(harness.open_scene("merge"), games=2, seats=[Seat(harness.SumoDriver())] * 2).close()
+    """
 
     def __init__(
         self,

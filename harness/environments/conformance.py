@@ -63,6 +63,8 @@ class Findings:
     violations: list[str] = field(default_factory=list)
     """In words; empty: the driver conforms to the protocol."""
     passed: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    """About the driver, such as inputs that receive nothing."""
     outcomes: list[str] = field(default_factory=list)
     """Of the games."""
     seconds: list[float] = field(default_factory=list)
@@ -77,6 +79,7 @@ class Findings:
             self.title,
             *(f"  pass   {each}" for each in self.passed),
             *(f"  fail   {each}" for each in self.violations),
+            *(f"  note   {each}" for each in self.notes),
         ]
         if self.seconds:
             mean, longest = 1000 * sum(self.seconds) / len(self.seconds), 1000 * max(self.seconds)
@@ -153,6 +156,7 @@ def check_named(written: str, scene: Path, games: int, *, allow_code: bool) -> F
     else:
         driver, title = external.make(car_of(opened.world, EGO), sampled=False), external.in_words
     findings = check_conformance(driver, opened, games)
+    findings.notes += external.notes if external is not None else ()
     findings.title, findings.step_s = f"{title}, on {opened.document.name}", opened.world.step_s
     return findings
 
@@ -175,6 +179,18 @@ def check_conformance(driver: Driver, scene: OpenScene, games: int) -> Findings:
     except _Violation as error:
         findings.violations.append(str(error))
     return findings
+
+
+def difference_of(driver: Driver, scene: OpenScene) -> str:
+    """Play one game twice: what a driver decided otherwise the second time, in words; empty if nothing, and if the game
+    can't be played. Raises SimulationError if SUMO fails."""
+    findings = Findings()
+    try:
+        first = _play(driver, scene, 1, findings=findings, activity="playing")
+        _check_determinism(first, _play(driver, scene, 1, findings=findings, activity="playing again"), findings)
+    except _Violation:
+        return ""
+    return "".join(findings.violations)
 
 
 def _play(driver: Driver, scene: OpenScene, games: int, *, findings: Findings, activity: str) -> list[_PlayedGame]:

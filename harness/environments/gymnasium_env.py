@@ -7,34 +7,28 @@ in the process itself, each further one in a process of its own (`harness.traffi
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
-from harness.config.persona import Persona
-from harness.config.toml_reading import nearest, read_document
-from harness.drivers.policy import LearnedDriver
-from harness.drivers.policy_file import ACTIONS, read_policy
-from harness.drivers.sumo import SumoDriver
+from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Seat
-from harness.environments.single_game import Info, SingleGame
+from harness.environments.live import LiveSimulation
+from harness.environments.reset_options import named_game
+from harness.environments.seating import PERSONA, SCENE, Place, opened_scene, read_persona, seating_of
+from harness.environments.single_game import RENDER_MODES, Info, SingleGame
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.attention import HumanFactors
 from harness.game.observation_layout import SIZE
-from harness.shipped_documents import Kind, find_document
-from harness.traffic.scene import OpenScene, open_scene
+from harness.traffic.scene import OpenScene
 
-SCENE, PERSONA = "merge", "careful"
-
-Place: TypeAlias = str | Path
+_PICTURES_PER_S = 10  # the steps of the shipped scenes; an environment has those of its own scene
 
 
-class DrivingEnv(gymnasium.Env[Any, Any]):
+class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
     """One player's game on a scene with SUMO traffic. Also `gymnasium.make("harness/Ego-v0")`, `"harness/NonEgo-v0"`.
 
     Observation: Box(-1, 1, (98,), float32), in the player's frame; `harness.game.observation_layout` names its entries.
@@ -71,14 +65,29 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
     End: terminated when the player reaches its goal or touches a vehicle or a rail; truncated when the scene's time
     limit is up. (Training in campaigns treats the time limit as a termination, because there it is a failure.)
 
-    Info: `outcome` ("" while the game runs, then goal, collision, rail or timeout), `terms` (the reward by term of the
-    payoff), `station_m` and `goal_m` (distance along the route, and to the goal), `speed_mps`, `time_s`.
+    Info, all numbers: `outcome` (an `Outcome`: 0 while the game runs, then 1 goal, 2 collision, 3 rail, 4 timeout),
+    `is_success` (whether the goal is reached), `terms` (the reward by term of the payoff), `station_m` and `goal_m`
+    (distance along the route, and to the goal), `speed_mps`, `time_s`.
 
     Each game is drawn from the environment's random generator: the same seed gives the same games, including the random
-    numbers of SUMO.
+    numbers of SUMO. `reset(options={"episode": 3, "campaign_seed": 1})` starts a certain game instead: the one that
+    the arms of a campaign with that seed have as episode 3.
+
+    Render: `rgb_array` is uint8 [320, 640, 3], the 100 m around the player from above; `human` shows the same in a
+    window, in real time at most.
+
+    >>> environment = DrivingEnv(other="sumo")
+    >>> observation, info = environment.reset(seed=1)
+    >>> observation, reward, terminated, truncated, info = environment.step(environment.action_space.sample())
+    >>> observation.shape, terminated, info["time_s"]
+    ((98,), False, 0.1)
+    >>> import harness
+    >>> harness.Outcome(info["outcome"]).name
+    'RUNNING'
+    >>> environment.close()
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - declared so by Gymnasium
+    metadata: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": _PICTURES_PER_S}  # noqa: RUF012 - declared so by Gymnasium
 
     def __init__(
         self,
@@ -87,51 +96,39 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
         persona: Place = PERSONA,
         other: Place | None = None,
         other_persona: Place | None = None,
-        render_mode: None = None,
+        render_mode: str | None = None,
+        allow_code: bool = False,
     ) -> None:
         """Open the scene and load SUMO.
 
         `player` (a name of the scene: "ego" or "non_ego", with several people "non_ego_1" and so on) is the learner; it
         has the payoff and the human factors of `persona`. `other` is the driver of every other player: None (the player
-        is alone), "sumo", or the folder of a policy, which has the human factors of `other_persona`. Paths are relative
-        to the working directory; scenes and personas also have names, as in a campaign ("merge", "speedy"). Raises
-        UsageError for arguments that are wrong and files that can't be read, SimulationError if SUMO fails.
+        is alone), "sumo", or what `[ego] driver` of a campaign may be: the folder of a policy, a driver document, the
+        name of a shipped driver or of an installed package. It has the human factors of `other_persona`. Code in files
+        runs only with `allow_code`. Paths are relative to the working directory; scenes and personas also have names,
+        as in a campaign ("merge", "speedy"). Raises UsageError for arguments that are wrong and files that can't be
+        read, SimulationError if SUMO fails.
         """
-        opened = scene if isinstance(scene, OpenScene) else open_scene(_find(scene, "networks"))
-        roles = opened.world.roles
-        if player not in roles:
-            raise UsageError.of("DrivingEnv", "player", f"there is no player {player!r}", nearest(player, roles))
-        if other in (None, "sumo") and other_persona is not None:
-            raise UsageError.of("DrivingEnv", "other_persona", "only a policy has a persona", "leave it out")
-        self._player = roles.index(player)
-        own = _read_persona(persona)
-        opponent_persona = _read_persona(other_persona or PERSONA)
-        if other is None or other == "sumo":
-            opponent = Seat(SumoDriver())
-        else:
-            sampled = opponent_persona.decisions == "sampled"
-            opponent = Seat(LearnedDriver(read_policy(Path(other)), sampled))
-        opponent_factors = opponent_persona.human_factors if other_persona else HumanFactors()
-        players, there = len(roles), float(other is not None)
-        seats, human_factors, present = [opponent] * players, [opponent_factors] * players, [there] * players
-        seats[self._player], human_factors[self._player] = Seat(None, own.payoff), own.human_factors
-        present[self._player] = 1.0
-        self._game = SingleGame(opened, seats, human_factors, present)
+        seating = seating_of(scene, player, persona, other, other_persona, allow_code)
+        self._player = seating.learner
+        self._game = SingleGame(seating.scene, seating.seats, seating.human_factors, seating.present, render_mode)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / seating.scene.world.step_s)}
         self._running = False
         self.render_mode = render_mode
         self.observation_space = _observation_space()
         self.action_space = _action_space()
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[FloatArray, Info]:
-        """Reset to the next game that the generator draws. There are no options."""
+        """Reset to the next game that the generator draws, or to the episode that `options` name. Raises UsageError for
+        other options."""
         super().reset(seed=seed)
-        self._game.reset(self.np_random)
+        self._game.reset(self.np_random, named_game(options))
         self._running = True
         return self._game.observation(self._player), self._game.info(self._player)
 
     def step(self, action: FloatArray) -> tuple[FloatArray, float, bool, bool, Info]:
-        """Drive one step. Raises ResetNeeded if no game is running, ValueError if the action is not finite,
-        ImpossibleNumber if a number of the game is impossible."""
+        """Drive one step. Raises ResetNeeded if no game is running, ValueError if the action is not finite or has
+        another shape, ImpossibleNumber if a number of the game is impossible."""
         if not self._running:
             raise gymnasium.error.ResetNeeded("no game is running: call reset first")
         step = self._game.play({self._player: action})
@@ -145,13 +142,17 @@ class DrivingEnv(gymnasium.Env[Any, Any]):
             self._game.info(self._player, step),
         )
 
+    def render(self) -> Any:
+        """The picture of a game with the render mode rgb_array; None with the others."""
+        return self._game.picture(self._player)
+
     def close(self) -> None:
         """Close the SUMO simulation. The environment can't be used afterwards."""
         self._running = False
-        self._game.arena.close()
+        self._game.close()
 
 
-class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
+class ParallelDrivingEnv(LiveSimulation, ParallelEnv[str, FloatArray, FloatArray]):
     """The players' game with the agents "ego" and "non_ego"; with several people "non_ego_1", "non_ego_2" and so on.
 
     Observation, action, end and info of each agent: as in `DrivingEnv`, in dictionaries by agent.
@@ -160,29 +161,41 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
 
     End of an agent: it is removed from `agents`. At its goal it leaves the scene; after a crash it stays as an
     obstacle. The other agents continue until their own ends.
+
+    Reset options and render as in `DrivingEnv`; the picture shows what is around the ego.
+
+    >>> environment = ParallelDrivingEnv(non_ego_persona="speedy")
+    >>> observations, infos = environment.reset(seed=1)
+    >>> straight_on = {agent: [0.0, 0.0] for agent in environment.agents}
+    >>> observations, rewards, terminations, truncations, infos = environment.step(straight_on)
+    >>> sorted(rewards)
+    ['ego', 'non_ego']
+    >>> environment.close()
     """
 
-    metadata: dict[str, Any] = {"name": "driving_v0", "render_modes": []}  # noqa: RUF012 - declared so by PettingZoo
+    metadata: dict[str, Any] = {"name": "driving_v0", "render_modes": list(RENDER_MODES), "render_fps": _PICTURES_PER_S}  # noqa: RUF012 - declared so by PettingZoo
 
     def __init__(
         self,
         scene: Place | OpenScene = SCENE,
         ego_persona: Place = PERSONA,
         non_ego_persona: Place | Sequence[Place] = PERSONA,
-        render_mode: None = None,
+        render_mode: str | None = None,
     ) -> None:
         """Open the scene and load SUMO. `non_ego_persona` is one persona for all people of the scene, or one for each.
         Paths and errors are those of `DrivingEnv`."""
-        opened = scene if isinstance(scene, OpenScene) else open_scene(_find(scene, "networks"))
+        opened = opened_scene(scene)
         self._roles = opened.world.roles
         people = len(self._roles) - 1
-        written = [non_ego_persona] * people if isinstance(non_ego_persona, str | Path) else list(non_ego_persona)
+        written = [non_ego_persona] * people if isinstance(non_ego_persona, Place) else list(non_ego_persona)
         if len(written) != people:
             message, remedy = f"{len(written)} personas for {people} people", "give one for each, or one for all"
             raise UsageError.of("ParallelDrivingEnv", "non_ego_persona", message, remedy)
-        personas = [_read_persona(each) for each in (ego_persona, *written)]
+        personas = [read_persona(each) for each in (ego_persona, *written)]
         seats = [Seat(None, each.payoff) for each in personas]
-        self._game = SingleGame(opened, seats, [each.human_factors for each in personas], [1.0] * len(personas))
+        factors = [each.human_factors for each in personas]
+        self._game = SingleGame(opened, seats, factors, [1.0] * len(personas), render_mode)
+        self.metadata = {**self.metadata, "render_fps": round(1.0 / opened.world.step_s)}
         self._generator: np.random.Generator | None = None
         self.render_mode = render_mode
         self.possible_agents = list(self._roles)
@@ -201,10 +214,10 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, FloatArray], dict[str, Info]]:
-        """Reset to the next game that the generator draws. There are no options."""
+        """Reset as `DrivingEnv.reset` does. Other options are ignored: PettingZoo's checker passes some."""
         if seed is not None or self._generator is None:
             self._generator, _ = seeding.np_random(seed)
-        self._game.reset(self._generator)
+        self._game.reset(self._generator, named_game(options, others=True))
         self.agents = list(self._roles)
         return (
             {agent: self._game.observation(player) for player, agent in enumerate(self._roles)},
@@ -230,10 +243,14 @@ class ParallelDrivingEnv(ParallelEnv[str, FloatArray, FloatArray]):
             {agent: self._game.info(player, step) for agent, player in players.items()},
         )
 
+    def render(self) -> Any:
+        """As `DrivingEnv.render`, around the ego."""
+        return self._game.picture()
+
     def close(self) -> None:
         """Close the SUMO simulation. The environment can't be used afterwards."""
         self.agents = []
-        self._game.arena.close()
+        self._game.close()
 
 
 def _observation_space() -> gymnasium.spaces.Box:
@@ -242,11 +259,3 @@ def _observation_space() -> gymnasium.spaces.Box:
 
 def _action_space() -> gymnasium.spaces.Box:
     return gymnasium.spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)
-
-
-def _find(written: Place, kind: Kind) -> Path:
-    return find_document(written, Path(), kind) if isinstance(written, str) else written
-
-
-def _read_persona(written: Place) -> Persona:
-    return read_document(_find(written, "personas"), Persona)

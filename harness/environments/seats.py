@@ -13,7 +13,12 @@ from harness.game.world import World
 
 @dataclass(frozen=True)
 class Seat:
-    """A player's seat in the arena: its driver and its payoff (None: the payoff is not computed)."""
+    """A player's seat in the arena: its driver and its payoff (None: the payoff is not computed).
+
+    >>> import harness
+    >>> speedy = harness.read_document("personas/speedy.toml", harness.Persona)
+    >>> learner, other = harness.Seat(None, speedy.payoff), harness.Seat(harness.SumoDriver())
+    """
 
     driver: Driver | None
     """None: a learner; its actions are an argument of `Arena.step`."""

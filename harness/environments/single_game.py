@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
+import gymnasium
 import numpy as np
 
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena, Seat, Step
+from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation import observe
 from harness.game.seeding import generator_of
-from harness.game.state import Outcome
+from harness.game.state import EGO, Bodies, Outcome
 from harness.traffic.scene import OpenScene
 
+if TYPE_CHECKING:
+    from harness.environments.scene_picture import ScenePicture, Window
+
 Info: TypeAlias = dict[str, Any]
+
+
+RENDER_MODES = ("rgb_array", "human")
 
 
 class SingleGame:
@@ -29,27 +37,76 @@ class SingleGame:
         seats: Sequence[Seat],
         human_factors: Sequence[HumanFactors],
         present: Sequence[float],
+        render_mode: str | None = None,
     ) -> None:
-        """Load SUMO. `present` [P] are the shares of games in which players take part. Raises SimulationError."""
-        self._scene = scene
+        """Load SUMO. `present` [P] are the shares of games in which players take part.
+
+        Raises UsageError if there is no such render mode, SimulationError if SUMO can't load the scene.
+        """
+        if render_mode not in (None, *RENDER_MODES):
+            raise UsageError.of(
+                "environment", "render_mode", f"is {render_mode!r}", f"one of {', '.join(RENDER_MODES)}"
+            )
+        self._scene, self._render_mode = scene, render_mode
+        self._picture: ScenePicture | None = None
+        self._window: Window | None = None
+        self._bodies: Bodies | None = None
         self._start_distribution = self._scene.start_distribution(human_factors, present)
         self.arena = Arena(self._scene, 1, seats)
 
-    def reset(self, generator: np.random.Generator) -> None:
-        """Reset to the next game that the generator draws."""
-        parts = ("environment", int(generator.integers(2**63 - 1)))
+    def reset(self, generator: np.random.Generator, parts: tuple[str | int, ...] | None = None) -> None:
+        """Reset to the game with the seeds of `parts`, or to the next one that the generator draws."""
+        parts = parts or ("environment", int(generator.integers(2**63 - 1)))
         start = draw_initial_state(self._start_distribution, *parts)
         self.arena.reload(start.seed)
         self.arena.reset({0: start}, {0: self._scene.departures(generator_of(*parts, "others"))})
+        self._bodies = self.arena.nearby.of(self.arena.state, self.arena.reading)
+        self._show()
 
     def play(self, actions: Mapping[int, FloatArray]) -> Step:
-        """Play a step with these actions [2] of players. Raises ValueError if one is not finite."""
+        """Play a step with these actions [2] of players. Raises ValueError for another shape and numbers that are not
+        finite."""
         array = np.zeros((1, len(self.arena.seats), ACTIONS))
         for player, action in actions.items():
-            array[0, player] = action
-        if not np.isfinite(array).all():
-            raise ValueError(f"an action is not finite: {dict(actions)}")
-        return self.arena.step(array)
+            array[0, player] = checked_actions(action, (ACTIONS,))
+        step = self.arena.step(array)
+        self._bodies = step.quantities.bodies
+        self._show()
+        return step
+
+    def picture(self, player: int = EGO) -> Any:
+        """What `render` returns: uint8 [height, width, 3] around a player, None in a window or without a render mode.
+        Raises ResetNeeded before the first reset."""
+        if self._render_mode is None:
+            gymnasium.logger.warn("render does nothing: make the environment with render_mode='rgb_array'")
+            return None
+        if self._bodies is None:
+            raise gymnasium.error.ResetNeeded("there is no game to draw: call reset first")
+        return self._drawn(player) if self._render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Close the SUMO simulation and the window."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+        self.arena.close()
+
+    def _drawn(self, player: int) -> Any:
+        from harness.environments.scene_picture import ScenePicture
+
+        self._picture = self._picture or ScenePicture(self._scene)
+        assert self._bodies is not None
+        return self._picture.draw(self._bodies, 0, player)
+
+    def _show(self) -> None:
+        """Show the game in its window, in real time at most."""
+        if self._render_mode != "human":
+            return
+        from harness.environments.scene_picture import Window
+
+        self._window = self._window or Window(f"harness: {self._scene.document.name}")
+        learners = [player for player, seats in enumerate(self.arena.seats) if seats[0].driver is None]
+        self._window.show(self._drawn(learners[0]), self.arena.world.step_s)
 
     def ended(self, player: int) -> tuple[bool, bool]:
         """Whether the player's game was terminated, and whether it was truncated."""
@@ -67,12 +124,27 @@ class SingleGame:
         state = self.arena.state if step is None else step.quantities.state
         station_m = float(state.station_m[0, player])
         payoff = self.arena.seats[player][0].payoff
-        terms = {} if step is None or payoff is None else payoff.evaluate(step.quantities, player)
+        outcome, terms = int(state.outcome[0, player]), dict[str, float]()
+        if payoff is not None:
+            terms = dict.fromkeys((*(each.name for each in payoff.terms), *payoff.fuzzy), 0.0)
+        if payoff is not None and step is not None:
+            terms = {name: float(share[0]) + 0.0 for name, share in payoff.evaluate(step.quantities, player).items()}
         return {
-            "outcome": Outcome(int(state.outcome[0, player])).word,
-            "terms": {name: float(share[0]) + 0.0 for name, share in terms.items()},
+            "outcome": outcome,
+            "is_success": outcome == Outcome.GOAL,
+            "terms": terms,
             "station_m": station_m,
             "goal_m": float(self.arena.world.road.routes.goal_m[player]) - station_m,
             "speed_mps": float(state.speed_mps[0, player]),
             "time_s": float(state.step[0]) * self.arena.world.step_s,
         }
+
+
+def checked_actions(actions: Any, shape: tuple[int, ...]) -> FloatArray:
+    """Actions as an array. Raises ValueError if they have another shape or are not finite."""
+    array = np.asarray(actions, dtype=float)
+    if array.shape != shape:
+        raise ValueError(f"actions have the shape {array.shape}, not {shape}: pedals and wheel, each from -1 to 1")
+    if not np.isfinite(array).all():
+        raise ValueError(f"an action is not finite: {actions}")
+    return array

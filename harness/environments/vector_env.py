@@ -14,6 +14,7 @@ from stable_baselines3.common.vec_env import VecEnv
 from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset
+from harness.environments.live import LiveSimulation
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution
 from harness.game.observation_layout import SIZE
@@ -34,7 +35,7 @@ class Finished:
     """Whether no other player took part."""
 
 
-class GamesVecEnv(VecEnv):
+class GamesVecEnv(LiveSimulation, VecEnv):
     """Games of one learner, as Stable-Baselines3's `VecEnv`."""
 
     render_mode = None
@@ -81,6 +82,14 @@ class ArenaVecEnv(GamesVecEnv):
     up. The game is reset in the same step, and its last observation is `terminal_observation` in `infos`.
 
     Each game is drawn from `parts`, the number of its tile, and the count of that tile's games.
+
+    >>> import harness
+    >>> environments = harness.make_vec(2, other="sumo", interface="sb3")
+    >>> observations = environments.reset()
+    >>> observations, rewards, done, infos = environments.step([[0.0, 0.0], [0.5, 0.0]])
+    >>> done.tolist()
+    [False, False]
+    >>> environments.close()
     """
 
     def __init__(
@@ -108,7 +117,9 @@ class ArenaVecEnv(GamesVecEnv):
         return self.arena.observation[:, self._learner].copy()
 
     def step_async(self, actions: FloatArray) -> None:
-        """Store the learner's actions [G, 2] for `step_wait`."""
+        """Store the learner's actions [G, 2] for `step_wait`. Raises ValueError for another shape."""
+        if np.shape(actions) != (self.num_envs, ACTIONS):
+            raise ValueError(f"actions have the shape {np.shape(actions)}, not {(self.num_envs, ACTIONS)}")
         self._actions[:, self._learner] = actions
 
     def step_wait(self) -> tuple[FloatArray, FloatArray, Any, list[dict[str, Any]]]:

@@ -6,11 +6,12 @@ not depend on whether the segments were played in one run.
 
 from __future__ import annotations
 
+import json
 from collections import OrderedDict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
+from types import MappingProxyType, TracebackType
 from typing import Any
 
 import numpy as np
@@ -71,9 +72,15 @@ class TraceWriter:
             _write([games.unify_dictionaries().combine_chunks()], self._path)
 
 
-def join_traces(parts: Sequence[Path], path: Path) -> None:
-    """Concatenate the traces of segments in one file."""
-    _write((group for part in parts for group in _row_groups(part)), path)
+def join_traces(parts: Sequence[Path], path: Path, labels: Mapping[str, str | int] = MappingProxyType({})) -> None:
+    """Concatenate the traces of segments in one file.
+
+    `labels` (the arm and its seed) are the file's metadata: `pandas.read_parquet(path).attrs` has them.
+    """
+    metadata: dict[bytes | str, bytes | str] = {name: str(label) for name, label in labels.items()}
+    if labels:
+        metadata["PANDAS_ATTRS"] = json.dumps(dict(labels))
+    _write((group for part in parts for group in _row_groups(part)), path, SCHEMA.with_metadata(metadata or None))
 
 
 def read_trace(path: Path, episode: int) -> pd.DataFrame:
@@ -174,13 +181,13 @@ def _footer(path: Path) -> _Footer:
     return _Footer(metadata=metadata, lowest=lowest, highest=highest)
 
 
-def _write(groups: Iterable[pa.Table], path: Path) -> None:
+def _write(groups: Iterable[pa.Table], path: Path, schema: pa.Schema = SCHEMA) -> None:
     scratch = scratch_beside(path)
     try:
-        with pq.ParquetWriter(scratch, SCHEMA, compression="zstd") as writer:
+        with pq.ParquetWriter(scratch, schema, compression="zstd") as writer:
             for group in groups:
                 if group.num_rows:
-                    writer.write_table(group)
+                    writer.write_table(group.replace_schema_metadata(schema.metadata))
         replace_durably(scratch, path)
     finally:
         scratch.unlink(missing_ok=True)

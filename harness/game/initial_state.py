@@ -155,17 +155,16 @@ class Conditions:
 
 @dataclass(frozen=True, kw_only=True)
 class StartDistribution:
-    """The distribution of initial states: start ranges [P], lengths [P] and probabilities of taking part [P].
+    """The distribution of initial states: start ranges, lengths, top speeds and probabilities of taking part, each [P].
 
     Players that do not take part in every game take part in the same games, as far as their probabilities are equal.
-
     A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
-
     In `along_route_share` of the games, the players start anywhere along their `routes` instead, up to their goals.
     """
 
     places: Sequence[StartRange]
     length_m: FloatArray
+    max_speed_mps: FloatArray
     human_factors: Sequence[Sequence[HumanFactors]]
     shares: Sequence[Sequence[float]]
     present_share: Sequence[float]
@@ -211,6 +210,7 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
         along = draw_along_route(
             start_distribution.routes,
             start_distribution.length_m,
+            start_distribution.max_speed_mps,
             np.array(present),
             start_distribution.along_route_share,
             generator_of(*parts, "along route"),

@@ -242,13 +242,13 @@ class Quantities:
 
     @cached_property
     def rail_clearance_m(self) -> FloatArray:
-        """Distance to the nearest edge of the drivable area, for walkers of their surface: 0 on the edge, at most
-        `REACH_M`."""
+        """Distance to the nearest edge of the drivable area, for walkers and cyclists on pavements of their surface: 0
+        on the edge, at most `REACH_M`."""
         road = self.world.road
         distance_m = road.rails.distance_m(self._cars, REACH_M)
         if road.walkers_rails is None:
             return distance_m
-        return np.where(self.world.walks, road.walkers_rails.distance_m(self._cars, REACH_M), distance_m)
+        return np.where(self.world.leaves_carriageway, road.walkers_rails.distance_m(self._cars, REACH_M), distance_m)
 
     @cached_property
     def clearance_m(self) -> FloatArray:

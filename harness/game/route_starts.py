@@ -22,6 +22,7 @@ _OFFSET_SD_M, _TURNED_SD_RAD = 0.2, 0.03  # from the centre of the lane, and fro
 def draw_along_route(
     routes: Routes,
     length_m: FloatArray,
+    max_speed_mps: FloatArray,
     present: BoolArray,
     share: float,
     generator: np.random.Generator,
@@ -31,12 +32,13 @@ def draw_along_route(
 
     None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P], apart from
     one another and from the `obstacles` [O]. A lane and a station are drawn uniformly, the speed uniformly from 0 to
-    the speed limit.
+    the speed limit, or to the player's `max_speed_mps` [P] if that is less.
     """
     if generator.random() >= share:
         return None
     for _ in range(_ATTEMPTS):
-        starts = np.array([_draw(routes, player, length_m[player], generator) for player in range(len(length_m))]).T
+        drawn = [_draw(routes, each, length_m[each], max_speed_mps[each], generator) for each in range(len(length_m))]
+        starts = np.array(drawn).T
         if _apart(starts[0], starts[1], length_m, present) and _clear(starts, length_m, present, obstacles):
             x_m, y_m, heading_rad, speed_mps, station_m = starts
             return x_m, y_m, heading_rad, speed_mps, station_m
@@ -44,7 +46,7 @@ def draw_along_route(
 
 
 def _draw(
-    routes: Routes, player: int, length_m: float, generator: np.random.Generator
+    routes: Routes, player: int, length_m: float, max_speed_mps: float, generator: np.random.Generator
 ) -> tuple[float, float, float, float, float]:
     last_m = max(routes.goal_m[player] - _BEFORE_GOAL_M, 0.5 * length_m)
     station_m = generator.uniform(0.5 * length_m, last_m)
@@ -57,7 +59,8 @@ def _draw(
     x_m = routes.x_m[row] - offset_m * np.sin(heading_rad)
     y_m = routes.y_m[row] + offset_m * np.cos(heading_rad)
     turned_rad = generator.normal(0.0, _TURNED_SD_RAD)
-    return x_m, y_m, heading_rad + turned_rad, generator.uniform(0.0, routes.speed_limit_mps[row]), station_m
+    speed_mps = generator.uniform(0.0, min(routes.speed_limit_mps[row], max_speed_mps))
+    return x_m, y_m, heading_rad + turned_rad, speed_mps, station_m
 
 
 def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: BoolArray) -> bool:

@@ -24,7 +24,7 @@ from harness.replay.contact import Contact, contacts
 from harness.replay.floating_car_data import shown_at, write_recording, write_xml
 from harness.replay.gui_settings import WINDOW_PX, Viewport, choose_view, view_settings
 from harness.replay.lanes import Lanes
-from harness.replay.obstacles import shapes_of
+from harness.replay.obstacles import painted, shapes_of
 from harness.replay.signals import programmes
 from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
 from harness.traffic.xml_file import xml_bytes
@@ -42,11 +42,13 @@ def write_replay(
     step_length_s: float,
     rails: Sequence[FloatArray] = (),
     obstacles: Obstacles = NO_OBSTACLES,
+    stripes: Sequence[FloatArray] = (),
 ) -> None:
     """Write one game's replay to `folder`, which is replaced. The folder appears only when it is complete.
 
     `trace` is the game's rows (columns as in `traces/`), `route_files` define its vehicle types, `rails` are
-    polylines [n, 2] in net coordinates, `obstacles` are those of the scene. The same arguments give the same bytes.
+    polylines [n, 2] in net coordinates, `obstacles` are those of the scene, `stripes` are the corners [n, 2] of each
+    stripe of its marked crossings. The same arguments give the same bytes.
     Raises ValueError for a trace with no row or with more than one game.
     """
     if trace["episode"].nunique() != 1:
@@ -64,6 +66,7 @@ def write_replay(
     try:
         (partial / "scene.net.xml").write_bytes(xml_bytes(net_file))
         scenery = _scenery(types=types, rails=rails, touches=touches, view=view, title=title)
+        scenery.extend(painted(stripes))
         scenery.extend(shapes_of(trace, types, obstacles))
         scenery.extend(programmes(trace, step_length_s))
         write_xml(scenery, partial / "scene.add.xml")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -34,7 +34,13 @@ def shapes_of(
         yield _polygon(f"building_{number}", corners, _BUILDING_COLOUR, filled=len(outline) > 2)
 
 
-def _polygon(name: str, corners: FloatArray, colour: str, *, filled: bool) -> ElementTree.Element:
+def painted(stripes: Sequence[FloatArray]) -> Iterator[ElementTree.Element]:
+    """The polygons of the stripes of marked crossings, below the vehicles."""
+    for number, corners in enumerate(stripes):
+        yield _polygon(f"stripe_{number}", corners, "white", filled=True, layer=1)
+
+
+def _polygon(name: str, corners: FloatArray, colour: str, *, filled: bool, layer: int = 4) -> ElementTree.Element:
     shape = " ".join(f"{x:.3f},{y:.3f}" for x, y in corners)
-    look = {"color": colour, "layer": "4", "fill": "1" if filled else "0", "lineWidth": f"{0.5 * _WALL_M:g}"}
+    look = {"color": colour, "layer": str(layer), "fill": "1" if filled else "0", "lineWidth": f"{0.5 * _WALL_M:g}"}
     return ElementTree.Element("poly", {"id": name, "shape": shape} | look)

@@ -25,15 +25,27 @@ def programmes(trace: pd.DataFrame, step_length_s: float) -> list[ElementTree.El
     The column `signals` has the state of each light in each step, as `id=state` separated by spaces. A change in a
     step is shown in SUMO's step of the same sample, which is a step later than in the game.
     """
+    changes = changes_of_signals(trace, step_length_s)
+    return [_programme(light, states, step_length_s) for light, states in changes.items()]
+
+
+def changes_of_signals(trace: pd.DataFrame, step_length_s: float) -> dict[str, list[tuple[int, str]]]:
+    """The steps in which each light's recorded state changed, with the new states; the first is its first state.
+
+    In the order of the lights' ids; empty for a trace without lights.
+    """
     if "signals" not in trace:
-        return []
+        return {}
     steps = trace.assign(step=np.rint(trace["time_s"].to_numpy(float) / step_length_s).astype(int))
     steps = steps.drop_duplicates("step").sort_values("step")
-    changes: dict[str, list[tuple[int, str]]] = {}
+    states: dict[str, list[tuple[int, str]]] = {}
     for step, text in zip(steps["step"].tolist(), steps["signals"].tolist(), strict=True):
         for light, state in _states(str(text)):
-            changes.setdefault(light, []).append((step, state))
-    return [_programme(light, states, step_length_s) for light, states in sorted(changes.items())]
+            states.setdefault(light, []).append((step, state))
+    return {
+        light: [next(phase) for _, phase in groupby(of_light, key=lambda each: each[1])]
+        for light, of_light in sorted(states.items())
+    }
 
 
 def _states(text: str) -> Iterator[tuple[str, str]]:
@@ -44,9 +56,8 @@ def _states(text: str) -> Iterator[tuple[str, str]]:
             yield light, state
 
 
-def _programme(light: str, states: list[tuple[int, str]], step_length_s: float) -> ElementTree.Element:
+def _programme(light: str, starts: list[tuple[int, str]], step_length_s: float) -> ElementTree.Element:
     root = ElementTree.Element("tlLogic", id=light, type="static", programID=PROGRAMME, offset="0")
-    starts = [next(phase) for _, phase in groupby(states, key=lambda each: each[1])]
     begin = 0.0  # of SUMO's clock: the first phase also covers the step before the game
     for place, (_, state) in enumerate(starts):
         end = (starts[place + 1][0] + 1) * step_length_s if place + 1 < len(starts) else begin + _AFTER_THE_GAME_S

@@ -99,7 +99,10 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
             shown_verdict(question.format(doing=found.change.doing), found.verdicts(name, persona), figures)
             for name, question in QUESTIONS.items()
         ],
-        rates=[_rate(label, series, found.of(arm)) for label, series, arm in page_wording.arm_labels(persona, change)],
+        rates=[
+            _rate(label, series, found.of(arm))
+            for label, series, arm in page_wording.arm_labels(persona, change, found.naive)
+        ],
         facts=_facts(persona, change, found),
         tests=[_test(row) for row in found.comparisons if row["persona"] == persona],
         rate_figure=rate_figure(
@@ -174,7 +177,7 @@ def _facts(persona: str, change: Change | None, found: Results) -> list[tuple[st
     facts: list[tuple[str, Sequence[str]]] = []
     causes = {seed: page_wording.causes(row) for seed, row in against.items() if failures(row)}
     if causes:
-        facts.append((page_wording.how_it_fails(persona), page_wording.by_seed(causes)))
+        facts.append((page_wording.how_it_fails(persona, found.naive), page_wording.by_seed(causes)))
     prevented = {each.seed: each.sentences for each in found.preventability.get(arm, ()) if each.failures}
     if prevented:
         lines = {seed: " ".join(sentences) for seed, sentences in prevented.items()}
@@ -191,7 +194,7 @@ def _facts(persona: str, change: Change | None, found: Results) -> list[tuple[st
         alone = page_wording.counts(found.of(arm), f"the {change.made} ego")
         facts.append((page_wording.changed_ego_alone(change.made), alone))
     if any(failures(row) for row in found.of(NAIVE_ALONE.name).values()):
-        facts.append((page_wording.CAUTION, [page_wording.FAILS_ALONE]))
+        facts.append((page_wording.CAUTION, [page_wording.FAILS_ALONE.format(naive=found.naive)]))
     return [(title, lines or [page_wording.NOT_PLAYED]) for title, lines in facts]
 
 
@@ -208,7 +211,7 @@ def _alone(persona: str, found: Results) -> list[str]:
 def _ordinary_driver(persona: str, found: Results) -> list[str]:
     ordinary = found.of(NAIVE_VS_SUMO.name)
     against = found.of(against_persona(NaiveEgo(), persona).name)
-    lines = page_wording.counts(ordinary, "the naive ego")
+    lines = page_wording.counts(ordinary, f"the {found.naive}")
     seeds = [
         seed
         for seed, row in ordinary.items()

@@ -102,7 +102,13 @@ def _scene(scene: SceneDrawing | None) -> dict[str, Any] | None:
         "edgeLines": [_points(line) for line in scene.edge_lines],
         "rails": [_points(line) for line in scene.rails],
         "goal": [_points(line) for line in scene.goal],
-        **({"buildings": [_points(outline) for outline in scene.buildings]} if scene.buildings else {}),
+        **{
+            name: [_points(outline) for outline in outlines]
+            for name, outlines in (("buildings", scene.buildings), ("stripes", scene.stripes))
+            if outlines
+        },
+        "hidingObstacles": list(scene.hiding_obstacles),
+        "tallWidth": scene.tall_width_m,
     }
 
 

@@ -52,7 +52,7 @@ def _preventable(persona: str, found: Results) -> Iterator[KeyFigure]:
     for each in found.preventability.get(against_persona(NaiveEgo(), persona).name, ()):
         if each.failures:
             seed = f"Seed {each.seed}: " if len(found.seeds) > 1 else ""
-            count = f"{each.from_start.by_any} of {each.from_start.judged} failures of the naive ego"
+            count = f"{each.from_start.by_any} of {each.from_start.judged} failures of the {found.naive}"
             rate = f"{percent(each.rate)} of its games, {SURE}: {interval(each.rate_low, each.rate_high)}"
             lines.append(f"{seed}{count} by a reference driver in its seat ({rate})")
     if lines:

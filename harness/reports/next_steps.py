@@ -16,7 +16,7 @@ from harness.reports.wording import failures
 
 FINISH = "Some stages are not done. The same command continues; finished stages are skipped."
 WATCH_REMAINING = "See how the {made} ego still fails against {persona}: its worst game."
-WATCH_NAIVE = "See how {persona} makes the naive ego fail: its worst game."
+WATCH_NAIVE = "See how {persona} makes the {naive} fail: its worst game."
 RETRAIN_AGAINST_SEVERAL = "Retrain one ego against several personas: add this to the campaign, and run it again."
 MINIMISE = "Find the mildest start at which this game still fails, and keep it as a test."
 SET_BOUNDS = "State what this ego must achieve: add bounds to the campaign, and the command passes or fails."
@@ -67,7 +67,7 @@ def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:
             game = most_severe(found.games[found.games["arm"] == arm])
             command = f"harness replay . {shlex.quote(arm)} {game['episode']}"
             command += f" --seed {game['seed']}" if len(found.seeds) > 1 else ""
-            yield NextStep(sentence=sentence.format(made=made, persona=persona), command=command)
+            yield NextStep(sentence=sentence.format(made=made, persona=persona, naive=found.naive), command=command)
             yield NextStep(sentence=MINIMISE, command=command.replace("harness replay", "harness minimise", 1))
             return
 

@@ -10,6 +10,7 @@ import pandas as pd
 from harness.evaluation.acceptance import worst_of_each
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, against_persona
+from harness.evaluation.unplayed_games import reasons_of
 from harness.reports import page_wording
 from harness.reports.acceptance_wording import headline, line
 from harness.reports.cards import Card, card
@@ -114,6 +115,9 @@ def _troubles(tables: RunTables) -> dict[str, Any]:
         "mixed": mixed_versions(tables.stages),
         "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
         "errors": len(errored),
+        "varying": list(tables.manifest.get("varying_drivers", {}).items()),
+        "error_reasons": reasons_of(errored["error"]),
+        "ego_games": int(tables.episodes["ego_failed"].notna().sum()),
     }
 
 

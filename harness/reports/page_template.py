@@ -12,7 +12,7 @@ ELSEWHERE = '<script type="application/json" id="elsewhere">{}</script>'
 SCRIPTS = tuple(
     f"{name}.js"
     for name in (
-        *("recorded", "road", "vehicles", "strips", "screen", "player"),
+        *("recorded", "road", "sight", "vehicles", "strips", "screen", "player"),
         *("tables", "games_list", "controls", "clips", "figures", "folds"),
     )
 )

@@ -45,7 +45,7 @@ PREVENTABLE = "Could it have been prevented?"
 BY_DRIVER = "Results by the persona that drove"
 PERSONA_ALONE = "The persona alone on the road"
 CAUTION = "Caution"
-FAILS_ALONE = "The naive ego also fails alone: the persona does not cause all of its failures."
+FAILS_ALONE = "The {naive} also fails alone: the persona does not cause all of its failures."
 
 MIXED_VERSIONS = "This run mixes versions: its results may differ from those of a single version."
 UNKNOWN_VERSION = "of no known version"
@@ -73,11 +73,11 @@ def made_with(versions: str, stages: Sequence[str]) -> str:
 # --- a persona's card ---
 
 
-def arm_labels(persona: str, change: Change | None) -> list[tuple[str, str, str]]:
+def arm_labels(persona: str, change: Change | None, naive: str) -> list[tuple[str, str, str]]:
     """Label, series and arm of each failure rate of a card; `change` is None without a round 2."""
     labels = [
-        ("naive ego, alone", "alone", NAIVE_ALONE.name),
-        (f"naive ego, against {persona}", "persona", against_persona(NaiveEgo(), persona).name),
+        (f"{naive}, alone", "alone", NAIVE_ALONE.name),
+        (f"{naive}, against {persona}", "persona", against_persona(NaiveEgo(), persona).name),
     ]
     if change is None:
         return labels
@@ -104,9 +104,9 @@ def _sure(row: Row, rate: str) -> str:
     return f"{SURE}: {interval(row[f'{rate}_low'], row[f'{rate}_high'])}"
 
 
-def how_it_fails(persona: str) -> str:
-    """The title of the causes of the naive ego's failures."""
-    return f"How the naive ego fails against {persona}"
+def how_it_fails(persona: str, naive: str) -> str:
+    """The title of the causes of the failures of the ego before round 2."""
+    return f"How the {naive} fails against {persona}"
 
 
 def causes(row: Row) -> str:
@@ -247,27 +247,28 @@ def arm_in_words(arm: Arm, found: Results) -> str:
             name = strategy_name(non_ego)
             return f"{f'one {name} driver at a time' if several else f'the non-ego {name}'} without the ego"
         case Arm(ego=NaiveEgo(), non_ego=None):
-            return f"the naive ego on the road without the non-ego{several}"
+            return f"the {found.naive} on the road without the non-ego{several}"
         case Arm(ego=ego, non_ego=None) if ego is not None:
-            return f"{_ego_in_words(ego)}, without the non-ego{several}"
+            return f"{_ego_in_words(ego, found.naive)}, without the non-ego{several}"
         case Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()):
             if several:
-                return "the naive ego with ordinary law-abiding SUMO drivers in the non-egos' places"
-            return "the naive ego with an ordinary law-abiding SUMO driver in the non-ego's place"
+                return f"the {found.naive} with ordinary law-abiding SUMO drivers in the non-egos' places"
+            return f"the {found.naive} with an ordinary law-abiding SUMO driver in the non-ego's place"
         case Arm(ego=RetrainedEgo(against=against) | ReconfiguredEgo(against=against) as ego, non_ego=non_ego) if (
             non_ego is not None and against == strategy_name(non_ego)
         ):
-            return f"{_ego_in_words(ego)}, against the same {found.who(against).removeprefix('the ') or against}"
+            same = found.who(against).removeprefix("the ") or against
+            return f"{_ego_in_words(ego, found.naive)}, against the same {same}"
         case Arm(ego=ego, non_ego=non_ego) if ego is not None and non_ego is not None:
             name = strategy_name(non_ego)
-            return f"{_ego_in_words(ego)} against {found.who(name) or f'the non-ego {name}'}"
+            return f"{_ego_in_words(ego, found.naive)} against {found.who(name) or f'the non-ego {name}'}"
     raise ValueError("an arm has at least one player")
 
 
-def _ego_in_words(ego: EgoStrategy) -> str:
+def _ego_in_words(ego: EgoStrategy, naive: str) -> str:
     match ego:
         case NaiveEgo():
-            return "the naive ego"
+            return f"the {naive}"
         case ReconfiguredEgo(against=against):
             return f"the ego tuned against {against}"
         case RetrainedEgo(against=against, round=2):

@@ -83,6 +83,12 @@ class SceneDrawing:
     """Solid lines between lanes and hard shoulders."""
     buildings: Sequence[FloatArray] = ()
     """Outlines of buildings."""
+    stripes: Sequence[FloatArray] = ()
+    """Corners of the stripes of marked crossings."""
+    hiding_obstacles: Sequence[str] = ()
+    """Names of the obstacles that are higher than eyes."""
+    tall_width_m: float | None = None
+    """Width from which a vehicle hides what is behind it; None: no vehicle of the scene is that wide."""
 
 
 def key(arm: str, seed: int, episode: int) -> str:

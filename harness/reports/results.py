@@ -8,6 +8,7 @@ from typing import Any
 
 import pandas as pd
 
+from harness.config.campaign import LEARNED, ego_called
 from harness.evaluation.causes.sentences import cause_lines
 from harness.evaluation.people import people_in
 from harness.evaluation.preventability import Preventability, preventability_of
@@ -36,6 +37,8 @@ class Results:
     """Ids of the stages of the campaign, whether they are done or not."""
     is_reconfigured: bool
     """Whether round 2 searches the parameters of an external ego."""
+    naive: str
+    """The ego before round 2 in sentences, after "the"."""
     people: int
     """Non-egos of the scene."""
     crowds: Mapping[str, Sequence[str]]
@@ -59,7 +62,7 @@ class Results:
     @property
     def change(self) -> Change:
         """What round 2 makes of the ego, if it is played."""
-        return RECONFIGURED if self.is_reconfigured else RETRAINED
+        return (RECONFIGURED if self.is_reconfigured else RETRAINED)._replace(naive=self.naive)
 
     def asked(self, question: str, persona: str) -> list[int]:
         """The training seeds of which a question is asked: its treatment is planned, or it is compared."""
@@ -107,6 +110,7 @@ def results(tables: RunTables) -> Results:
         speeds={key: games.dropna() for key, games in good.groupby(["arm", "seed"])["ego_mean_speed_mps"]},
         games=good,
         seeds=sorted({*manifest.get("seeds", ()), *summary["seed"].tolist(), *comparisons["seed"].tolist()}),
+        naive=ego_called(manifest.get("campaign", {}).get("ego", {}).get("driver", LEARNED)),
         significance=manifest.get("campaign", {}).get("assessment", {}).get("significance"),
         planned=tables.stages,
         is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),

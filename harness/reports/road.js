@@ -66,6 +66,10 @@ const ROAD = (() => {
     edges: path(scene.edgeLines),
     rails: path(scene.rails),
     goal: scene.goal,
+    stripes: path(scene.stripes ?? []),
+    walls: scene.buildings ?? [],
+    hidingObstacles: new Set(scene.hidingObstacles ?? []),
+    tallWidth: scene.tallWidth ?? Infinity,
     buildings: path((scene.buildings ?? []).map(outline => [...outline, outline[0]])),
     left: most(xs, Math.min, Infinity), right: most(xs, Math.max, -Infinity),
     bottom: most(ys, Math.min, Infinity), top: most(ys, Math.max, -Infinity),
@@ -142,6 +146,8 @@ function drawRoad(context, camera, ratio) {
   camera.inMetres(context, ratio, () => {
     context.fillStyle = palette.asphalt;
     context.fill(ROAD.surface, "evenodd");
+    context.fillStyle = palette.mark;
+    context.fill(ROAD.stripes);
     drawBuildings(context, thin(2));
     context.strokeStyle = palette.mark;
     context.lineWidth = Math.max(0.13, thin(1));

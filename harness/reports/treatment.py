@@ -22,6 +22,8 @@ class Change(NamedTuple):
     """What round 2 does, in sentences."""
     ego: type[RetrainedEgo] | type[ReconfiguredEgo]
     """The ego of round 2 as a strategy."""
+    naive: str = "naive ego"
+    """The ego before round 2 in sentences, after "the": an ego that the campaign did not train has its own name."""
 
 
 RETRAINED = Change("retrained", "retraining", RetrainedEgo)

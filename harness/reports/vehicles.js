@@ -1,10 +1,11 @@
-// The moving parts of the road: cars as oriented boxes with heading, trails, lapses and contacts.
+// The moving parts of the road: road users as oriented boxes with heading, trails, lapses and contacts.
 
 const TRAIL_S = 4, GHOSTS_S = 1, BURST_S = 0.35;
 
 /** Draw a game at a time, from bottom to top: trails, background traffic, players, contacts. */
 function drawGame(context, camera, ratio, game, time, labels) {
   camera.inMetres(context, ratio, () => {
+    for (const track of game.players) drawHidden(context, game, track, time);
     for (const track of game.players) drawTrail(context, camera, game, track, time);
     for (const track of game.background) {
       const pose = poseAt(game, track, time);

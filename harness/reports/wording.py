@@ -116,7 +116,7 @@ def verdicts(
 def _of_seeds(question: str, who: str, answers: Sequence[Answer], change: Change) -> Conclusion:
     yes, seeds = sum(answer.yes for answer in answers), len(answers)
     finding = {
-        "RQ1": f"{who} makes the naive ego fail significantly more often than it does alone",
+        "RQ1": f"{who} makes the {change.naive} fail significantly more often than it does alone",
         "RQ2": f"{change.doing} makes the ego fail significantly less often against {who}",
     }[question]
     label = f"yes in {yes} of {seeds} seeds" if yes else f"not shown in any of {seeds} seeds"
@@ -201,13 +201,13 @@ def _failure_sentence(
 ) -> str:
     was, now, pairs = failures_of(before), failures_of(after), row["pairs"]
     if question == "RQ1":
-        claim = f"{who[:1].upper()}{who[1:]} makes the naive ego fail in {now} games instead of {was}"
-        counts = f"The naive ego fails in {now} games against {who} and in {was} alone"
+        claim = f"{who[:1].upper()}{who[1:]} makes the {change.naive} fail in {now} games instead of {was}"
+        counts = f"The {change.naive} fails in {now} games against {who} and in {was} alone"
         direction = "more often"
     else:
         claim = f"{change.doing.capitalize()} reduces the ego's failures against {who} "
         claim += f"from {was} games to {now}"
-        counts = f"Against {who} the {change.made} ego fails in {now} games, the naive ego in {was}"
+        counts = f"Against {who} the {change.made} ego fails in {now} games, the {change.naive} in {was}"
         direction = "less often"
     return {
         Verdict.SIGNIFICANT: f"{claim}.",

@@ -1,5 +1,7 @@
 """Background traffic: departures, motion and arrivals of the vehicles that SUMO drives beside the players.
 
+Persons on foot depart with them; `background_people` reads them.
+
 Reading a vehicle's motion from libsumo costs up to half of SUMO's own work on it. A vehicle that is far from every
 player is therefore read again only when it may have come near, at the top speeds of vehicle and players.
 """
@@ -19,10 +21,11 @@ from harness.errors import SimulationError
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.neighbours import Search, rows_by_game
 from harness.traffic.angles import heading_rad_of
+from harness.traffic.background_people import BackgroundPeople
 from harness.traffic.insertion import Insertion, put_beside
 from harness.traffic.levels import on_players_level
 from harness.traffic.route_file import Departure
-from harness.traffic.simulation import Reading
+from harness.traffic.simulation import Reading, side_by_side
 from harness.traffic.vehicle_reads import DIRECT, read_near, string_record
 
 _LONGEST_WAIT = 50  # steps
@@ -96,6 +99,7 @@ class BackgroundTraffic:
         self._places: dict[str, tuple[int, int]] = {}  # row and place of each vehicle in SUMO, by its name there
         self._beside: dict[str, Departure] = {}  # vehicles that are to depart beside the middle of their lane
         self._table = _Table(len(prefixes))
+        self._people = BackgroundPeople(prefixes=prefixes, offsets_m=offsets_m, recorded=recorded, roads_m=roads_m)
         self._empty_reading = self._reading(np.zeros(0, dtype=np.int64), np.zeros((4, 0)))
 
     def reset(self, game: int, departures: Sequence[Departure]) -> Reading | None:
@@ -109,6 +113,8 @@ class BackgroundTraffic:
                     self._beside.pop(sumo_name, None)
                     libsumo.vehicle.remove(sumo_name)
             self._table.clear(game)
+        if self._people.inserted:
+            self._people.clear(game)
         self._first_step[game] = self._step
         self._waiting.pop(game, None)
         if not departures:
@@ -132,11 +138,19 @@ class BackgroundTraffic:
                     due[self._places[name]] = self._step
                     if name in self._beside:
                         put_beside(name, self._beside.pop(name))
+        if self._people.inserted:
+            self._people.advance()
         for game in list(self._waiting):
             self._depart(game)
 
     def read(self, players_x_m: FloatArray, players_y_m: FloatArray, players_present: BoolArray) -> Reading:
-        """The vehicles near the players [G, P] that are present, or all vehicles if games are recorded."""
+        """The vehicles and persons near the players [G, P] that are present, or all if games are recorded."""
+        vehicles = self._read_vehicles(players_x_m, players_y_m, players_present)
+        if not self._people.inserted:
+            return vehicles
+        return side_by_side(vehicles, self._people.read(players_x_m, players_y_m, players_present))
+
+    def _read_vehicles(self, players_x_m: FloatArray, players_y_m: FloatArray, players_present: BoolArray) -> Reading:
         if not self._places:
             return self._empty_reading
         table = self._table
@@ -164,7 +178,7 @@ class BackgroundTraffic:
 
     def _on_level(self, game: int, departures: Sequence[Departure]) -> list[Departure]:
         """The vehicles of the warm-up among the departures that are on the level of the players' roads."""
-        vehicles = [each for each in departures if each.motion is not None]
+        vehicles = [each for each in departures if each.motion is not None and not each.on_foot]
         if self._roads_m is None or not vehicles:
             return vehicles
         names = np.array([self._prefixes[game] + each.name for each in vehicles], dtype=object)
@@ -172,8 +186,8 @@ class BackgroundTraffic:
         return [each for each, kept in zip(vehicles, near.tolist(), strict=True) if kept]
 
     def _sumo_has_all(self, players_present: BoolArray) -> bool:
-        """Whether SUMO has as many vehicles as were inserted and have neither arrived nor been removed."""
-        others = np.count_nonzero(players_present) + self.standing
+        """Whether SUMO has as many vehicles and persons as were inserted and have neither arrived nor been removed."""
+        others = np.count_nonzero(players_present) + self.standing + len(self._people.inserted)
         return _libsumo.simulation_getMinExpectedNumber() == len(self._places) + others
 
     def _depart(self, game: int) -> None:
@@ -181,6 +195,9 @@ class BackgroundTraffic:
         waiting = self._waiting[game]
         while waiting and waiting[-1].depart_s <= now:
             departure = waiting.pop()
+            if departure.on_foot:
+                self._people.add(game, departure)
+                continue
             sumo_name, vehicle = self._prefixes[game] + departure.name, libsumo.vehicle
             sumo_text = sumo_name.encode()
             self._insertion.depart(self._prefixes[game], sumo_name, departure)

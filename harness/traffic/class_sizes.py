@@ -1,4 +1,4 @@
-"""Sizes of SUMO's vehicle classes."""
+"""Sizes and desired speeds of SUMO's vehicle classes."""
 
 from __future__ import annotations
 
@@ -20,3 +20,5 @@ SIZES_M = {
 """Length and width of a vType without them, by its class: the defaults of SUMO 1.28."""
 CAR_SIZE_M = (5.0, 1.8)
 """Those of all other classes."""
+DESIRED_SPEEDS_MPS = {"bicycle": 20.0 / 3.6, "pedestrian": 5.0 / 3.6}
+"""The desiredMaxSpeed of a vType without one, by its class. Other classes have none."""

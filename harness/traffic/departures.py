@@ -16,6 +16,7 @@ from harness.game.state import ROLES
 from harness.traffic import network
 from harness.traffic.route_file import Departure, RouteFile
 from harness.traffic.stops import stop_problems
+from harness.traffic.walks import unsafe_net, walk_problems
 from harness.traffic.xml_file import number_of
 
 LANES = ("random", "free", "allowed", "best", "first")
@@ -31,7 +32,7 @@ _ALL_THE_TIME_S = (0.0, inf)
 
 def edges_of(departure: Departure, net: Net, routes: RouteFile) -> list[Edge]:
     """The edges of a vehicle's route. Raises UsageError for edges that the net does not have."""
-    key = f"vehicle {departure.name}"
+    key = f"{'person' if departure.on_foot else 'vehicle'} {departure.name}"
     problems: list[Problem] = []
     edges = {
         name: collect(problems, partial(network.find_edge, net, routes.path, key, name))
@@ -66,12 +67,18 @@ def check_departures(
     `players` are the ids of the players' vehicles in the route file, `roles` their names in the game.
     """
     problems: list[Problem] = []
-    for departure in background_departures(routes, players, window_s):
-        where = (str(routes.path), f"vehicle {departure.name}")
+    background = background_departures(routes, players, window_s)
+    unsafe = unsafe_net(net) if any(each.on_foot for each in background) else None
+    if unsafe:
+        raise UsageError([Problem(str(routes.path), "person", *unsafe)])
+    for departure in background:
+        where = (str(routes.path), f"{'person' if departure.on_foot else 'vehicle'} {departure.name}")
         if departure.name in roles and players <= routes.vehicles.keys():
             problems.append(Problem(*where, "has the name of a player, but is not the player's vehicle", "rename it"))
         edges = collect(problems, partial(edges_of, departure, net, routes))
-        if edges:
+        if edges and departure.on_foot:
+            problems += [Problem(*where, *each) for each in walk_problems(departure, edges)]
+        elif edges:
             problems += [Problem(*where, *each) for each in _gaps(edges)]
             problems += _end_problems(*where, departure, first=edges[0], last=edges[-1], routes=routes)
             kind = routes.types[departure.vehicle_type].vehicle_class

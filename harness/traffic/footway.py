@@ -1,4 +1,4 @@
-"""A player on foot: its way, the surface on which it walks, and its body in SUMO.
+"""A player on foot: its way, the surface on which it walks, and its body in SUMO. Cyclists on pavements share it.
 
 In SUMO a walker is a small vehicle with the shape of a pedestrian: persons that are placed end SUMO 1.28 in nets with
 crossings, and SUMO's cars do not see them beside crossings.
@@ -25,10 +25,11 @@ from harness.game.arrays import FloatArray
 from harness.game.raster import CELL_M, Raster
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic import surface
-from harness.traffic.network import car_lanes, lane_line
+from harness.traffic.network import car_lanes, lane_line, rail_lines
 from harness.traffic.player import OpenPlayer
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_table import extended, road_edges, sampled
+from harness.traffic.stream import USERS
 
 WALKER_TYPE = "harness_pedestrian"
 WALKER_ATTRIBUTES = {
@@ -47,41 +48,48 @@ _ROOM_M = 0.5 * (WALKER_LENGTH_M**2 + WALKER_WIDTH_M**2) ** 0.5  # a walker's ce
 
 @dataclass(frozen=True, kw_only=True)
 class Ground:
-    """Where players on foot walk."""
+    """Where players on foot walk, and cyclists on pavements ride."""
 
     surface: BaseGeometry
     """Carriageway, pavements, walking areas and crossings."""
     carriageway: BaseGeometry
     """The part of it that cars can drive on."""
-    near_m: FloatArray
-    """[4] bounds of the surroundings of the ways: least x and y, greatest x and y."""
+    near_m: FloatArray | None
+    """[4] bounds of the surroundings of the ways: least x and y, greatest x and y; None without players on foot."""
+    rail_lines: tuple[FloatArray, ...]
+    """The edges of the surface as polylines [n, 2]. With cyclists they are open where roads leave the scene."""
 
     @cached_property
-    def raster(self) -> Raster:
+    def raster(self) -> Raster | None:
         """The carriageway's cells around the ways."""
+        if self.near_m is None:
+            return None
         low, high = self.near_m[:2] - CELL_M, self.near_m[2:] + CELL_M
         counts = np.ceil((high - low) / CELL_M).astype(int)
         x_m, y_m = (low[k] + CELL_M * (np.arange(counts[k]) + 0.5) for k in range(2))
         cells = shapely.contains_xy(self.carriageway, *np.meshgrid(x_m, y_m, indexing="ij"))
         return Raster(origin_m=low, cells=cells)
 
-    @property
-    def rail_lines(self) -> list[FloatArray]:
-        """The edges of the surface as polylines [n, 2]."""
-        outlines = shapely.get_parts(shapely.get_rings(shapely.get_parts(self.surface)))
-        return [shapely.get_coordinates(each) for each in outlines]
 
-
-def ground(net: Net, carriageway: BaseGeometry, ways: Sequence[FloatArray]) -> Ground:
-    """The ground around ways [n, 2]; `carriageway` is the net's drivable area."""
-    around = shapely.union_all([shapely.LineString(way) for way in ways]).buffer(MARGIN_M)
+def ground(net: Net, carriageway: BaseGeometry, ways: Sequence[FloatArray], ridden: Sequence[Edge] = ()) -> Ground:
+    """The ground around ways [n, 2] and around the routes of cyclists over edges; `carriageway` is the net's drivable
+    area."""
+    lines = [shapely.LineString(way) for way in ways]
+    routes = [shapely.LineString(lane_line(lane)) for edge in ridden for lane in edge.getLanes()]
+    around = shapely.union_all([*lines, *routes]).buffer(MARGIN_M)
     parts = [each for each in _pavements(net) if each.intersects(around)]
-    near = shapely.union_all([shapely.LineString(way) for way in ways]).buffer(_STRAYS_M)
+    area = surface.without_slits(surface.joined([carriageway, *parts]))
     return Ground(
-        surface=surface.without_slits(surface.joined([carriageway, *parts])),
+        surface=area,
         carriageway=carriageway,
-        near_m=np.array(near.bounds),
+        near_m=np.array(shapely.union_all(lines).buffer(_STRAYS_M).bounds) if lines else None,
+        rail_lines=tuple(rail_lines(net, area, ridden) if ridden else _outlines(area)),
     )
+
+
+def _outlines(area: BaseGeometry) -> list[FloatArray]:
+    outlines = shapely.get_parts(shapely.get_rings(shapely.get_parts(area)))
+    return [shapely.get_coordinates(each) for each in outlines]
 
 
 def _pavements(net: Net) -> list[BaseGeometry]:
@@ -136,7 +144,9 @@ def _nearest_road(net: Net, way: FloatArray) -> Edge:
     return min(roads, key=lambda edge: shapely.distance(line, shapely.LineString(lane_line(car_lanes(edge)[0]))))
 
 
-def open_walker(role: str, *, file: Path, document: Scene, routes: RouteFile, ground: Ground | None) -> OpenPlayer:
+def open_walker(
+    role: str, *, file: Path, document: Scene, net: Net, routes: RouteFile, ground: Ground | None
+) -> OpenPlayer:
     """The player of a name of a scene document, which was read from `file`, on foot.
 
     Raises UsageError with every problem found.
@@ -157,12 +167,29 @@ def open_walker(role: str, *, file: Path, document: Scene, routes: RouteFile, gr
     if shapely.intersects(ground.carriageway, shapely.Point(way[-1])):
         message = f"ends on the carriageway, at [{way[-1][0]:.1f}, {way[-1][1]:.1f}]"
         raise problem(message, "end it on a pavement")
+    junction = _junction_crossed(net, line)
+    if junction is not None:
+        message = f"crosses the road inside junction {junction!r}, where conflicts and signals of walkers are not known"
+        raise problem(message, "let it cross the lanes before or behind the junction")
     vehicle = routes.vehicles[document.vehicles[document.roles.index(role)]]
     return OpenPlayer(
         route=way_table(way, ground.surface),
         edges=vehicle.edges,
         vehicle_type=routes.types[vehicle.vehicle_type],
     )
+
+
+def _junction_crossed(net: Net, way: shapely.LineString) -> str | None:
+    """The first junction inside which a way crosses a lane of traffic; None if there is none."""
+    for edge in net.getEdges(withInternal=True):
+        if edge.getFunction() != "internal":
+            continue
+        for lane in edge.getLanes():
+            line = lane_line(lane)
+            is_road = any(lane.allows(user) for user in USERS) and np.ptp(line, axis=0).any()
+            if is_road and way.intersects(shapely.LineString(line)):
+                return str(edge.getFromNode().getID())
+    return None
 
 
 def way_table(way: FloatArray, area: BaseGeometry) -> Route:
@@ -190,8 +217,10 @@ def way_table(way: FloatArray, area: BaseGeometry) -> Route:
     )
 
 
-def opened_ground(document: Scene, net: Net, carriageway: BaseGeometry) -> Ground | None:
-    """The ground of a scene's players on foot; None without any."""
+def opened_ground(document: Scene, net: Net, carriageway: BaseGeometry, own: Sequence[Edge]) -> Ground | None:
+    """The ground of a scene's players on foot, and of its cyclists on pavements; None without any. `own` are the edges
+    of the players' routes."""
     ways = [np.array(player.way, dtype=float) for player in document.players if player.way is not None]
     usable = [way for way in ways if np.ptp(way, axis=0).any()]
-    return ground(net, carriageway, usable) if usable else None
+    ridden = own if any(player.pavements for player in document.players) else ()
+    return ground(net, carriageway, usable, ridden) if usable or ridden else None

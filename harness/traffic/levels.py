@@ -2,16 +2,20 @@
 
 The road of a game is flat: the drivable area has the level of the players' routes (`network.drivable_area`), and so
 have contact and observation. A vehicle on a bridge over a player's road, or under it, takes no part in the game.
+Players' routes that lie over one another are refused.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 
+from harness.errors import UsageError
 from harness.game.arrays import BoolArray, FloatArray
 from harness.traffic.network import passes_other_levels
 from harness.traffic.surface import CLEARANCE_M
@@ -30,6 +34,32 @@ def heights_of_players_roads(net: Net, own: Collection[Edge]) -> FloatArray | No
     inside = [edge for edge in net.getEdges() if edge.isSpecial() and edge.getFromNode() in nodes]
     lanes = [lane for edge in [*own, *inside] for lane in edge.getLanes()]
     return np.concatenate([_points(np.array(lane.getShape3D(), dtype=float)) for lane in lanes])
+
+
+def roads_over_one_another(own: Sequence[Edge]) -> tuple[Edge, Edge, float] | None:
+    """Two edges of the players' routes that lie over one another, and the difference of their heights (m).
+
+    None without any. A game is flat: its players would touch where one drives over the other.
+    """
+    if not own or np.ptp([height for edge in own for *_, height in edge.getLanes()[0].getShape3D()]) <= CLEARANCE_M:
+        return None
+    points = [np.concatenate([_points(np.array(lane.getShape3D(), dtype=float)) for lane in e.getLanes()]) for e in own]
+    for one, other in combinations(range(len(own)), 2):
+        away = points[one][:, None] - points[other][None, :]
+        heights_m = np.where(np.hypot(away[..., 0], away[..., 1]) <= _SPACING_M, np.abs(away[..., 2]), 0.0)
+        if heights_m.max() > CLEARANCE_M:
+            return own[one], own[other], float(heights_m.max())
+    return None
+
+
+def check_one_level(file: Path, own: Sequence[Edge]) -> None:
+    """Raise UsageError if roads of the players' routes lie over one another."""
+    found = roads_over_one_another(own)
+    if found is not None:
+        one, other, height_m = found
+        message = f"edges {one.getID()!r} and {other.getID()!r} of the players' routes lie over one another, "
+        message += f"{height_m:.1f} m apart: a game is flat, and its players would touch there"
+        raise UsageError.of(file, "routes", message, "choose routes on one level")
 
 
 def _points(line: FloatArray) -> FloatArray:

@@ -269,12 +269,13 @@ class LibsumoSimulation:
 
     def _insertion(self, player: int) -> tuple[str, str | None, float]:
         """A player's vehicle type, its start lane (None: its start is along its route), and the largest speed at which
-        SUMO inserts it: the speed limit for its type."""
+        SUMO inserts it: the speed limit for its type, or the speed that its type desires."""
         routes, types = self._scene.world.road.routes, libsumo.vehicletype
         vehicle_type = self._scene.vehicle(player).vehicle_type
+        desired = self._scene.routes.types[vehicle_type].desired_speed_mps
         lane = self._scene.document.players[player].lane
         legal = float(routes.speed_limit_mps[routes.first_row[player]])
-        obeyed = legal * min(1.0, types.getSpeedFactor(vehicle_type))
+        obeyed = min(legal, desired) * min(1.0, types.getSpeedFactor(vehicle_type))
         return vehicle_type, lane and lane.rsplit("_", 1)[1], float(min(obeyed, types.getMaxSpeed(vehicle_type)))
 
     def _read_players(self) -> FloatArray | None:

@@ -21,7 +21,7 @@ import sumo
 from harness.config.scene import scene_file
 from harness.errors import Problem, SimulationError, UsageError
 from harness.traffic.departures import background_departures
-from harness.traffic.route_writing import vehicle_element
+from harness.traffic.route_writing import traveller_element
 from harness.traffic.scene import OpenScene
 
 PATIENCE_S, PATIENCE_S_PER_BYTE = 15.0, 2e-6  # time limit of a program: a constant, and a part per byte of the net
@@ -79,7 +79,7 @@ def _write_vehicles(scene: OpenScene, file: Path) -> int:
     kinds = {replace(each, name="", depart_s=0.0, stops=()): each for each in departures}
     root = ElementTree.Element("routes")
     for k, each in enumerate(kinds.values()):
-        root.append(vehicle_element(each, name=each.name, depart_s=_INTERVAL_S * k))
+        root.append(traveller_element(each, name=each.name, depart_s=_INTERVAL_S * k))
     if not kinds:
         ElementTree.SubElement(root, "vType", id="harness_unused")  # the schema forbids an empty document
     ElementTree.ElementTree(root).write(file, encoding="utf-8", xml_declaration=True)

@@ -132,6 +132,9 @@ def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Depart
         message = f"{routes.path.name} has no vehicle {player.vehicle!r}"
         raise UsageError.of(file, f"{role}.vehicle", message, nearest(player.vehicle, names))
     vehicle = routes.vehicles[player.vehicle]
+    if vehicle.on_foot:
+        message = f"{player.vehicle!r} is a person"
+        raise UsageError.of(file, f"{role}.vehicle", message, 'give kind = "pedestrian" and its way, or a vehicle')
     if vehicle.vehicle_type not in routes.types:
         message = "a player's type can't be a distribution"
         raise UsageError.of(routes.path, f"vehicle {vehicle.name}.type", message, "name one vType")

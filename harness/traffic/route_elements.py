@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
-from harness.traffic.class_sizes import CAR_SIZE_M, SIZES_M
+from harness.traffic.class_sizes import CAR_SIZE_M, DESIRED_SPEEDS_MPS, SIZES_M
 from harness.traffic.flows import LEAST_PERIOD_S
 from harness.traffic.route_file import DEFAULT_TYPE, Mix, RouteChoice, VehicleType
 from harness.traffic.stops import Stop, StopPlace, stop_in
@@ -22,7 +22,9 @@ RANGES = {
     "length": (0.0, 100.0),
     "width": (0.0, 10.0),
     "maxSpeed": (0.0, 200.0),
+    "desiredMaxSpeed": (0.0, 200.0),
     "vehsPerHour": (0.0, 3600.0 / LEAST_PERIOD_S),
+    "personsPerHour": (0.0, 3600.0 / LEAST_PERIOD_S),
     "perHour": (0.0, 3600.0 / LEAST_PERIOD_S),
     "period": (LEAST_PERIOD_S * 0.999, 1e7),
     "probability": (-0.001, 1.0),
@@ -148,14 +150,17 @@ def _shared(choices: tuple[RouteChoice, ...], share: float | None) -> list[Route
 
 
 def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
+    vehicle_class = element.get("vClass", VehicleType.vehicle_class)
     length_m, width_m = SIZES_M.get(element.get("vClass", ""), CAR_SIZE_M)
+    desired_mps = DESIRED_SPEEDS_MPS.get(vehicle_class, VehicleType.desired_speed_mps)
     return VehicleType(
         name=required(path, element, "id"),
         length_m=ranged(path, element, "length", length_m),
         width_m=ranged(path, element, "width", width_m),
         max_speed_mps=ranged(path, element, "maxSpeed", VehicleType.max_speed_mps),
+        desired_speed_mps=ranged(path, element, "desiredMaxSpeed", desired_mps),
         lane_changes=element.get("laneChangeModel", ""),
-        vehicle_class=element.get("vClass", VehicleType.vehicle_class),
+        vehicle_class=vehicle_class,
     )
 
 

@@ -7,6 +7,7 @@ game's generator: types and routes of distributions, and the times of random flo
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,6 +22,8 @@ from harness.traffic.stops import Stop
 DEFAULT_TYPE = "DEFAULT_VEHTYPE"
 SHARE = " of the room"
 """The ending of a drawn place across the lane: a share, from -1 (right) to 1 (left), of the room beside the vehicle."""
+EDGE_SHARE = " of the edge"
+"""The ending of a drawn place of a person along an edge: a share of its length."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,6 +34,8 @@ class VehicleType:
     length_m: float = 5.0
     width_m: float = 1.8
     max_speed_mps: float = 55.55
+    desired_speed_mps: float = math.inf
+    """The vType's desiredMaxSpeed. SUMO inserts no vehicle that is faster than this times its speed factor."""
     lane_changes: str = ""
     """The vType's laneChangeModel; empty: SUMO's default."""
     vehicle_class: str = "passenger"
@@ -81,6 +86,8 @@ class Departure:
     """The routes of a distribution. A departure of a game has one route and no choices."""
     motion: Motion | None = None
     """Of a vehicle that drives already when the game begins. `lane` is then the whole id of its lane."""
+    on_foot: bool = False
+    """Whether it is a person, whose edges are those of its walk. The speed may be empty: as its type desires."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,6 +188,8 @@ class RouteFile:
             departure = _on(departure, choice)
         if departure.lateral == "random":
             departure = replace(departure, lateral=f"{generator.uniform(-1.0, 1.0):.3f}{SHARE}")
+        if departure.on_foot:
+            departure = _placed(departure, generator)
         return self._routed(departure)
 
     def _routed(self, departure: Departure) -> Departure:
@@ -191,6 +200,15 @@ class RouteFile:
 
 def _on(departure: Departure, choice: RouteChoice) -> Departure:
     return replace(departure, edges=choice.edges, stops=choice.stops + departure.stops, choices=())
+
+
+def _placed(person: Departure, generator: np.random.Generator) -> Departure:
+    """A person with drawn places at random along the first and the last edge of its walk."""
+    first, last = (
+        f"{generator.random():.6f}{EDGE_SHARE}" if place == "random" else place
+        for place in (person.position, person.arrival[1])
+    )
+    return replace(person, position=first, arrival=("", last, ""))
 
 
 def _index(shares: Sequence[float], generator: np.random.Generator) -> int:

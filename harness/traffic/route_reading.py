@@ -16,6 +16,7 @@ from harness.errors import Problem, UsageError, collect
 from harness.traffic.flows import LEAST_PERIOD_S, MOST_AT_ONCE, Rate
 from harness.traffic.route_elements import NamedRoutes, Types, choices_in, ranged, read_routes, read_types, route_in
 from harness.traffic.route_file import DEFAULT_TYPE, Departure, Flow, RouteChoice, RouteFile
+from harness.traffic.route_people import DEFAULT_PERSONS_TYPE, PEOPLE, PERSONS_TYPE, person_in
 from harness.traffic.route_schema import FLOW_RATES, VEHICLES, check_content
 from harness.traffic.stops import stop_in
 from harness.traffic.xml_attributes import number_in, required, seconds_in
@@ -34,17 +35,22 @@ def read_route_file(path: Path, *additional: Path) -> RouteFile:
     only_types.extend(element for element in root if element.tag in ("vType", "vTypeDistribution"))
     problems: list[Problem] = []
     types = read_types(path, only_types, problems)
+    elements = _travellers(root)
+    if any(each.tag in PEOPLE for each in elements):
+        types = replace(types, types={DEFAULT_PERSONS_TYPE: PERSONS_TYPE, **types.types})
     named = read_routes(path, root, problems)
     vehicles: dict[str, Departure] = {}
     flows: dict[str, Flow] = {}
-    for element in _vehicles(root):
-        departure = collect(problems, partial(_departure, path, element, named, types))
+    for element in elements:
+        person = element.tag in PEOPLE
+        read = partial(person_in, path, element, types) if person else partial(_departure, path, element, named, types)
+        departure = collect(problems, read)
         if departure is None:
             continue
         if departure.name in vehicles or departure.name in flows:
             where = f"{element.tag} {departure.name}"
             problems.append(Problem(str(path), where, "stands twice", "rename one of the two"))
-        elif element.tag == "flow":
+        elif element.tag in ("flow", "personFlow"):
             flow = collect(problems, partial(_flow, path, element, departure))
             if flow is not None:
                 flows[departure.name] = flow
@@ -68,11 +74,11 @@ def _content(path: Path) -> ElementTree.Element:
     return root
 
 
-def _vehicles(root: ElementTree.Element) -> list[ElementTree.Element]:
-    """The vehicles, trips and flows of a file. A flow within an interval has the times of the interval."""
+def _travellers(root: ElementTree.Element) -> list[ElementTree.Element]:
+    """The vehicles, trips, flows and persons of a file. A flow within an interval has the times of the interval."""
     found = []
     for element in root:
-        if element.tag in VEHICLES:
+        if element.tag in (*VEHICLES, *PEOPLE):
             found.append(element)
         elif element.tag == "interval":
             for flow in element:
@@ -165,8 +171,8 @@ def _lateral(path: Path, where: str, element: ElementTree.Element) -> str:
 
 
 def _flow(path: Path, element: ElementTree.Element, departure: Departure) -> Flow:
-    where = f"flow {departure.name}"
-    rates = [name for name in FLOW_RATES if element.get(name) is not None]
+    where = f"{element.tag} {departure.name}"
+    rates = [name for name in (*FLOW_RATES, "personsPerHour") if element.get(name) is not None]
     if not rates or (rates == ["number"] and element.get("end") is None):
         raise UsageError.of(path, where, "has no rate", "give one of period, vehsPerHour, probability")
     if len(set(rates) - {"number"}) > 1:
@@ -198,7 +204,7 @@ def _number(path: Path, where: str, element: ElementTree.Element) -> int:
 def _rate(path: Path, where: str, element: ElementTree.Element) -> Rate:
     if element.get("probability") is not None:
         return Rate(probability_per_s=ranged(path, element, "probability", 0.0))
-    for name in ("vehsPerHour", "perHour"):
+    for name in ("vehsPerHour", "personsPerHour", "perHour"):
         if element.get(name) is not None:
             return Rate(period_s=3600.0 / ranged(path, element, name, 1.0))
     random = _RANDOM_PERIOD.fullmatch(element.get("period", "").strip())

@@ -14,6 +14,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from harness.errors import Problem, UsageError
+from harness.traffic.route_people import PEOPLE, kinds_of_people, without_other_stages
 from harness.traffic.schema import Kind, kinds, problems_in
 from harness.traffic.stops import STOP_ATTRIBUTES
 
@@ -41,16 +42,11 @@ _NO_EFFECT = {
 }
 
 Reason = tuple[str, str]
-_NO_PEOPLE: Reason = (
-    "people on foot and passengers are not supported: libsumo 1.28 may crash with them",
-    'remove these elements; a player may be on foot, with kind = "pedestrian"',
-)
 _NO_CONTAINERS: Reason = ("containers are not supported", "remove these elements")
 _NOT_EDGES: Reason = ("routes are found between edges only", "give edges as from, to and via")
 _NO_STATION: Reason = ("a stop at such a place is not supported", "give the stop's lane, startPos and endPos instead")
 _NO_CAUSE: Reason = ("nothing arrives that the stop could wait for", "give a duration instead")
 _REFUSED: Mapping[str, Reason] = {
-    **dict.fromkeys(("person", "personFlow"), _NO_PEOPLE),
     **dict.fromkeys(("container", "containerFlow"), _NO_CONTAINERS),
     "include": ("is not understood here: other files are not read", "copy their content into this file"),
 }
@@ -74,7 +70,7 @@ def check_content(path: Path, root: ElementTree.Element) -> None:
         message = "is not a SUMO route file: its root is not routes"
         raise UsageError.of(path, str(root.tag), message, "name a .rou.xml")
     _remove_records(root)
-    problems = [*_refused(path, root), *_invalid_names(path, root)]
+    problems = [*without_other_stages(path, root), *_refused(path, root), *_invalid_names(path, root)]
     for parent in [root, *root.iter("interval")]:
         for element in [each for each in parent if each.tag in _REFUSED]:
             parent.remove(element)
@@ -141,7 +137,7 @@ def _supported_kinds() -> Mapping[str, Kind]:
     route = dict.fromkeys(("repeat", "cycleTime", *_NO_EFFECT["route"]), False)
     rates = dict.fromkeys(("begin", "end", *FLOW_RATES), False)
     unused = ("arrival", "routeLength")
-    top = (*VEHICLES, "vType", "vTypeDistribution", "route", "routeDistribution", "interval", "busStop")
+    top = (*VEHICLES, *PEOPLE, "vType", "vTypeDistribution", "route", "routeDistribution", "interval", "busStop")
     return {
         **types,
         "root": Kind(children={name: name for name in top}),
@@ -173,4 +169,5 @@ def _supported_kinds() -> Mapping[str, Kind]:
         ),
         "access": Kind(dict.fromkeys(("lane", "pos", "length", "friendlyPos"), False)),
         "param": types["paramType"],
+        **kinds_of_people(),
     }

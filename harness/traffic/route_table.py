@@ -67,6 +67,15 @@ def junctions_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_
     ]
 
 
+def route_line(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -> tuple[FloatArray, list[float]]:
+    """[n, 2] the line of a route's table, and the stations of the starts of its edges and of the junctions between.
+
+    Raises ValueError if consecutive edges are not connected.
+    """
+    points, starts = _join([piece.line for piece in _pieces(net, edges, lanes_of)])
+    return points, starts.tolist()
+
+
 def line_over_junction(net: Net, link: Connection) -> FloatArray:
     """[n, 2] line of a link over its junction."""
     return _over_junction(net, link)[0]

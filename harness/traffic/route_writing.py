@@ -4,10 +4,27 @@ from __future__ import annotations
 
 from xml.etree import ElementTree
 
-from harness.traffic.route_file import SHARE, Departure
+from harness.traffic.route_file import EDGE_SHARE, SHARE, Departure
 
 
-def vehicle_element(departure: Departure, name: str, depart_s: float) -> ElementTree.Element:
+def traveller_element(departure: Departure, name: str, depart_s: float) -> ElementTree.Element:
+    """A `<vehicle>` with one route, or a `<person>` with one walk, under a name and at a time."""
+    return (_person_element if departure.on_foot else _vehicle_element)(departure, name, depart_s)
+
+
+def _person_element(departure: Departure, name: str, depart_s: float) -> ElementTree.Element:
+    factor = {} if departure.speed_factor is None else {"speedFactor": f"{departure.speed_factor:.6f}"}
+    attributes = {"id": name, "type": departure.vehicle_type, "depart": f"{depart_s:.3f}", **factor}
+    departs, arrives = (
+        "random" if each.endswith(EDGE_SHARE) else each for each in (departure.position, departure.arrival[1])
+    )
+    element = ElementTree.Element("person", {**attributes, "departPos": departs})
+    speed = {"speed": departure.speed} if departure.speed else {}
+    ElementTree.SubElement(element, "walk", {"edges": " ".join(departure.edges), "arrivalPos": arrives, **speed})
+    return element
+
+
+def _vehicle_element(departure: Departure, name: str, depart_s: float) -> ElementTree.Element:
     """A `<vehicle>` with one route, under a name and at a time."""
     arrival_lane, arrival_position, arrival_speed = departure.arrival
     attributes = {

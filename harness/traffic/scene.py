@@ -25,11 +25,12 @@ from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.world import World
+from harness.shipped_documents import find_document
 from harness.traffic import network
 from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
 from harness.traffic.footway import open_walker, opened_ground, with_walkers
-from harness.traffic.levels import heights_of_players_roads
+from harness.traffic.levels import check_one_level, heights_of_players_roads
 from harness.traffic.obstacles import check_clear_starts, hiding_in, open_obstacles, with_types
 from harness.traffic.player import OpenPlayer, open_player
 from harness.traffic.right_of_way import right_of_way
@@ -41,11 +42,18 @@ from harness.traffic.trips import with_routes
 from harness.traffic.users_lanes import lanes_for
 from harness.traffic.walker_conflicts import Way, with_walkers_conflicts
 from harness.traffic.warm_up import Snapshot, snapshots
+from harness.traffic.zebra import stripes
 
 
 @dataclass(frozen=True, kw_only=True)
 class OpenScene:
-    """A scene that was read completely and has no problems."""
+    """A scene that was read completely and has no problems.
+
+    >>> import harness
+    >>> scene = harness.open_scene("merge")
+    >>> scene.world.roles, scene.world.step_s
+    (('ego', 'non_ego'), 0.1)
+    """
 
     folder: Path
     document: Scene
@@ -57,6 +65,7 @@ class OpenScene:
     junctions: frozenset[str] | None = None  # those that games need; None: all of the net
     obstacles: Obstacles = NO_OBSTACLES
     lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
+    stripes: tuple[FloatArray, ...] = ()  # [5, 2] each, of the marked crossings
     roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
 
     @property
@@ -125,6 +134,7 @@ class OpenScene:
         return StartDistribution(
             places=self.places,
             length_m=self.world.length_m,
+            max_speed_mps=self.world.actuators.max_speed_mps,
             human_factors=factors_of,
             shares=shares or [[1.0] * len(each) for each in factors_of],
             present_share=present_share,
@@ -137,11 +147,16 @@ class OpenScene:
         )
 
 
-def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
+def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     """Read a scene's folder. Raises UsageError with every problem found in it.
 
-    `ego_type` is a vehicle type of the route file that replaces the type of the ego's vehicle.
+    A text may also be the name of a shipped scene. `ego_type` is a vehicle type of the route file that replaces the
+    type of the ego's vehicle.
+
+    >>> open_scene("merge").document.name
+    'merge'
     """
+    folder = find_document(folder, Path(), "networks") if isinstance(folder, str) else folder
     document_file = scene_file(folder)
     problems: list[Problem] = []
     collect(problems, lambda: check_within(document_file, folder))
@@ -160,12 +175,19 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     if routes is None:
         raise UsageError(problems)
     own = _edges_of_players(document, net, routes)
+    collect(problems, lambda: check_one_level(document_file, own))
     area = network.drivable_area(net, own)
-    ground = opened_ground(document, net, area)
-    open_one = partial(open_player, file=document_file, document=document, net=net, area=area, routes=routes)
-    on_foot = partial(open_walker, file=document_file, document=document, routes=routes, ground=ground)
+    ground = opened_ground(document, net, area, own)
+    paved = area if ground is None else ground.surface
+    open_one = partial(open_player, file=document_file, document=document, net=net, routes=routes)
+    on_foot = partial(open_walker, file=document_file, document=document, net=net, routes=routes, ground=ground)
     opened = [
-        collect(problems, partial(on_foot if player.on_foot else open_one, role))
+        collect(
+            problems,
+            partial(on_foot, role)
+            if player.on_foot
+            else partial(open_one, role, area=paved if player.pavements else area),
+        )
         for role, player in zip(document.roles, document.players, strict=True)
     ]
     vehicles = set(document.vehicles)
@@ -186,7 +208,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
     background = _background_edges(vehicles, net, routes)
     lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
-    walking = tuple(player.on_foot for player in document.players)
+    walking, riding = zip(*((player.on_foot, player.pavements) for player in document.players), strict=True)
     world = World(
         road=Road(
             network.rails(lines, REACH_M + 10.0),
@@ -201,6 +223,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         time_limit_s=document.time_limit_s,
         right_of_way=_right_of_way(document, net, players),
         on_foot=walking if any(walking) else (),
+        on_pavements=riding if any(riding) else (),
         hiding=hiding_in(obstacles, routes, document),
     )
     if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:
@@ -217,6 +240,7 @@ def open_scene(folder: Path, ego_type: str | None = None) -> OpenScene:
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
         junctions=network.junctions_near(net, [*own, *background]),
+        stripes=tuple(stripes([np.array(each.way) for each in document.players if each.marked_crossing], area)),
         roads_m=heights_of_players_roads(net, own),
     )
     factors, present = [HumanFactors()] * len(places), [1.0] * len(places)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,11 @@ class Reading:
     """[G] the whole states of the traffic lights on the players' routes, as `id=state` separated by spaces, if games
     are recorded."""
 
+    @property
+    def bodies(self) -> list[NDArray[Any]]:
+        """The columns [G, M] of the background vehicles, in the order of the fields."""
+        return [getattr(self, name) for name in _OF_VEHICLES]
+
 
 class AtReset(NamedTuple):
     """A game after a reset: states of signal links [L], seconds since they changed [L], the text of its lights, and the
@@ -66,6 +71,11 @@ def with_game(reading: Reading | None, games: int, game: int, background: Readin
         columns[name][game] = nothing
         columns[name][game, :most] = row[0]
     return Reading(**columns) if reading is None else replace(reading, **columns)
+
+
+def side_by_side(first: Reading, second: Reading) -> Reading:
+    """A reading [G, M + N] with the bodies of two readings [G, M] and [G, N]."""
+    return Reading(*(np.concatenate(pair, axis=1) for pair in zip(first.bodies, second.bodies, strict=True)))
 
 
 class Simulation(Protocol):

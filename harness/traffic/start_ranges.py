@@ -29,9 +29,14 @@ class Meeting:
 
 def meeting(ego: Route, other: Route) -> Meeting | None:
     """The first place where the routes, up to their goals, meet; None if they do not."""
+    ego_points, other_points = (_points(route)[: round(route.goal_m / SPACING_M) + 1] for route in (ego, other))
+    return meeting_of_lines(ego_points, other_points)
+
+
+def meeting_of_lines(ego_points: FloatArray, other_points: FloatArray) -> Meeting | None:
+    """The first place where two lines, of points [n, 2] every `SPACING_M`, meet; None if they do not."""
     from scipy.spatial import KDTree  # loads SciPy's sparse matrices: only for commands that open a scene
 
-    ego_points, other_points = (_points(route)[: round(route.goal_m / SPACING_M) + 1] for route in (ego, other))
     distances, rows = KDTree(other_points).query(ego_points)
     near = np.flatnonzero(distances < _MEETS_M)
     if not len(near):

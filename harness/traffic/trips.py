@@ -26,11 +26,13 @@ from harness.traffic import network
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.stops import placed
 from harness.traffic.sumo_program import run_program
+from harness.traffic.walks import with_places_in_metres
 from harness.traffic.xml_file import parse_xml
 
 PATIENCE_S, PATIENCE_S_PER_BYTE = 60.0, 4e-6  # time limit: a constant, and a part per byte of the net
 MOST_PROBLEMS = 20
 _Query = tuple[str, str, tuple[str, ...]]  # vehicle class, top speed, edges from first to last
+_ON_FOOT = "person"  # in place of the class
 
 
 def with_routes(routes: RouteFile, net_file: Path, net: Net, needed: Iterable[Departure]) -> RouteFile:
@@ -65,6 +67,8 @@ def _settled(departure: Departure, routes: RouteFile, net: Net) -> Departure:
     if departure.trip:
         edges = routes.found.get((departure.vehicle_type, departure.trip), ())
         departure = replace(departure, edges=edges)
+    if departure.on_foot and departure.edges:
+        return with_places_in_metres(departure, net)
     stops = tuple(placed(stop, net, kind) for stop in departure.stops)
     choices = tuple(
         replace(each, stops=tuple(placed(stop, net, kind) for stop in each.stops)) for each in departure.choices
@@ -87,7 +91,8 @@ def _find(
             if edge not in known and collect(problems, lambda: _check_edge(net, routes.path, key, edge)):  # noqa: B023
                 known.add(edge)
         kind = routes.types[trip.vehicle_type]
-        queries[kind.name, trip.trip] = (kind.vehicle_class, f"{kind.max_speed_mps:g}", trip.trip)
+        walk, drive = (_ON_FOOT, "0"), (kind.vehicle_class, f"{kind.max_speed_mps:g}")
+        queries[kind.name, trip.trip] = (*(walk if trip.on_foot else drive), trip.trip)
     if problems:
         raise UsageError(sorted(set(problems))[:MOST_PROBLEMS])
     answers = _answers(net_file, routes.path, sorted(set(queries.values())))
@@ -127,8 +132,14 @@ def _run_duarouter(net_file: Path, route_path: Path, queries: Sequence[_Query]) 
     root = ElementTree.Element("routes")
     kinds = {each[:2]: f"t{k}" for k, each in enumerate(dict.fromkeys(query[:2] for query in queries))}
     for (vehicle_class, speed), name in kinds.items():
+        if vehicle_class == _ON_FOOT:
+            continue
         ElementTree.SubElement(root, "vType", id=name, vClass=vehicle_class, maxSpeed=speed)
     for k, (vehicle_class, speed, places) in enumerate(queries):
+        if vehicle_class == _ON_FOOT:
+            person = ElementTree.SubElement(root, "person", id=str(k), depart="0")
+            ElementTree.SubElement(person, "walk", {"from": places[0], "to": places[1]})
+            continue
         via = {"via": " ".join(places[1:-1])} if len(places) > 2 else {}
         attributes = {"id": str(k), "type": kinds[vehicle_class, speed], "depart": "0", "from": places[0]}
         ElementTree.SubElement(root, "trip", attributes | via | {"to": places[-1]})
@@ -144,8 +155,8 @@ def _run_duarouter(net_file: Path, route_path: Path, queries: Sequence[_Query]) 
                 route_path, "trip", f"SUMO's duarouter failed: {said}", "write the routes into the file"
             )
         edges: list[list[str]] = [[] for _ in queries]
-        for vehicle in parse_xml(found).iter("vehicle"):
-            route = vehicle.find("route")
+        for traveller in parse_xml(found):
+            route = traveller.find("walk" if traveller.tag == "person" else "route")
             if route is not None:
-                edges[int(vehicle.get("id", "0"))] = route.get("edges", "").split()
+                edges[int(traveller.get("id", "0"))] = route.get("edges", "").split()
     return edges

@@ -3,7 +3,8 @@
 SUMO runs the background traffic alone for the time of the warm-up, several times with different seeds, in separate
 processes. The vehicles at the end of each run are a snapshot. A game draws one of them and puts its vehicles on the
 road at once, each with its lane, place, speed, speed factor, remaining route and remaining stops. Vehicles that wait to
-depart, and parked ones, are left out. The snapshots are the same in training and in assessment, and are cached.
+depart, and parked ones, are left out. A person enters the traffic in the first step of the game, on its edge, with the
+rest of its walk. The snapshots are the same in training and in assessment, and are cached.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from harness.game.initial_state import InitialState
 from harness.game.seeding import between, generator_of, seed_of
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.route_file import Departure, Motion, RouteFile
-from harness.traffic.route_writing import vehicle_element
+from harness.traffic.route_writing import traveller_element
 from harness.traffic.stops import Stop
 from harness.traffic.sumo_program import run_program
 from harness.traffic.xml_file import parse_xml
@@ -130,7 +131,7 @@ def _run(
         folder = Path(name)
         (folder / "types.rou.xml").write_text(routes.types_xml, encoding="utf-8")
         root = ElementTree.Element("routes")
-        root.extend(vehicle_element(each, each.name, each.depart_s) for each in departures)
+        root.extend(traveller_element(each, each.name, each.depart_s) for each in departures)
         ElementTree.ElementTree(root).write(folder / "vehicles.rou.xml", encoding="utf-8", xml_declaration=True)
         files = ("--net-file", str(net_file), "--route-files", "types.rou.xml,vehicles.rou.xml")
         _run_sumo([*files, *options, "--seed", str(seed_of("warm-up", k) % 2**31)], folder)
@@ -154,13 +155,13 @@ def _vehicles(
     steps = parse_xml(folder / "motion.xml").findall("timestep")
     end_s = float(options[options.index("--save-state.times") + 1])
     first_s = float(options[options.index("--device.fcd.begin") + 1])
-    moving = {
-        vehicle.get("id", ""): vehicle
-        for step in steps
-        if abs(float(step.get("time", "nan")) - first_s) < 1e-6
-        for vehicle in step.findall("vehicle")
-    }
-    return [
+    seen = [each for step in steps if abs(float(step.get("time", "nan")) - first_s) < 1e-6 for each in step]
+    moving = {each.get("id", ""): each for each in seen if each.tag == "vehicle"}
+    walking = [(each, departures[each.get("id", "")]) for each in seen if each.tag == "person"]
+    people = [
+        _person(each, person, routes) for each, person in walking if person.edges.count(each.get("edge", "")) == 1
+    ]
+    return people + [
         _vehicle(state, moving[state.get("id", "")], departures[state.get("id", "")], routes, end_s)
         for state in parse_xml(folder / "state.xml").findall("vehicle")
         if state.get("id") in moving and not _is_parked(state)
@@ -184,15 +185,6 @@ def _vehicle(
     stops = tuple(stop.later(-end_s) for stop in departure.stops[len(departure.stops) - len(waiting) :])
     if stops and waiting[0].get("started") is not None:
         stops = (replace(stops[0], duration_s=float(waiting[0].get("duration", "0"))), *stops[1:])
-    kind, speed = routes.types[departure.vehicle_type], float(moving.attrib["speed"])
-    motion = Motion(
-        x_m=float(moving.attrib["x"]),
-        y_m=float(moving.attrib["y"]),
-        heading_rad=float(heading_rad_of(float(moving.attrib["angle"]))),
-        speed_mps=speed,
-        length_m=kind.length_m,
-        width_m=kind.width_m,
-    )
     return replace(
         departure,
         name=departure.name + _ENDING,
@@ -204,7 +196,31 @@ def _vehicle(
         speed_factor=float(state.attrib["speedFactor"]),
         lateral="",
         stops=stops,
-        motion=motion,
+        motion=_motion(moving, departure, routes),
+    )
+
+
+def _person(moving: ElementTree.Element, departure: Departure, routes: RouteFile) -> Departure:
+    """The departure of a person at the beginning of a game, from its motion on an edge that it walks along once."""
+    return replace(
+        departure,
+        name=departure.name + _ENDING,
+        edges=departure.edges[departure.edges.index(moving.attrib["edge"]) :],
+        depart_s=0.0,
+        position=moving.attrib["pos"],
+        motion=_motion(moving, departure, routes),
+    )
+
+
+def _motion(moving: ElementTree.Element, departure: Departure, routes: RouteFile) -> Motion:
+    kind = routes.types[departure.vehicle_type]
+    return Motion(
+        x_m=float(moving.attrib["x"]),
+        y_m=float(moving.attrib["y"]),
+        heading_rad=float(heading_rad_of(float(moving.attrib["angle"]))),
+        speed_mps=float(moving.attrib["speed"]),
+        length_m=kind.length_m,
+        width_m=kind.width_m,
     )
 
 

@@ -70,6 +70,21 @@ def test_installed__identity_has_version_parameters_and_code(site: Path, tmp_pat
     assert all(identities.count(each) == 1 for each in identities)
 
 
+def test_installed__identity_has_the_weights_in_the_package(site: Path, tmp_path: Path) -> None:
+    (site / "steady.py").rename(site / "moved.py")
+    (site / "steady").mkdir()
+    (site / "moved.py").rename(site / "steady" / "__init__.py")
+    (site / "steady" / "weights.bin").write_bytes(b"one")
+    identities = [find("steady", tmp_path).identity]
+    (site / "steady" / "__pycache__").mkdir()
+    (site / "steady" / "__pycache__" / "left.pyc").write_bytes(b"by Python")
+    identities.append(find("steady", tmp_path).identity)
+    (site / "steady" / "weights.bin").write_bytes(b"two")
+    identities.append(find("steady", tmp_path).identity)
+    assert identities[0] == identities[1]
+    assert identities[1] != identities[2]
+
+
 def test_installed__an_unknown_name_gets_the_nearest_as_remedy(site: Path, tmp_path: Path) -> None:
     for written, remedy in (("staedy", "'steady'"), ("lerned", f"'{LEARNED}'")):
         with pytest.raises(UsageError) as caught:

@@ -23,7 +23,7 @@ from harness.drivers.external import ALLOW_CODE
 from harness.drivers.policy_file import write_policy
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT
-from tests.support.external_drivers import document, find, problems
+from tests.support.external_drivers import document, find, install, problems
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, TRAINING, harness, write_campaign
@@ -59,7 +59,7 @@ def ego(driver: object) -> dict[str, Any]:
         ('kind = "fmu"\nfile = "twin.fmu"', "file: 'twin.fmu': there is no such file"),
         ('kind = "fmu"\nfile = "mine.toml"\n[inputs]\nv = "speed_mp"', "did you mean 'speed_mps'?"),
         ('kind = "fmu"\nfile = "mine.toml"\n[outputs]\nsteering = "a"', "did you mean 'steering_rad'?"),
-        ('kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "DQN"', "algorithm: 'DQN' is not possible"),
+        ('kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "ARS"', "algorithm: 'ARS' is not possible"),
         ('kind = "python"\nentry_point = "nobody"', "entry_point: no installed package provides a driver 'nobody'"),
     ],
 )  # fmt: skip
@@ -113,6 +113,63 @@ def test_find__identity_of_a_program_has_all_its_files(tmp_path: Path) -> None:
     found.append(find("perl/perl.toml", tmp_path))
     identities = [each.identity for each in found]
     assert all(identities.count(each) == 1 for each in identities)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'kind = "process"\ncommand = ["perl"]\nfolder = "elsewhere"',
+        'kind = "fmu"\nfile = "mine.toml"',
+        'kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "PPO"',
+        'kind = "python"\nentry_point = "steady"',
+    ],
+)
+def test_find__files_of_every_kind_are_relative_to_the_document_and_hashed(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path / "site")
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    (tmp_path / "egos" / "elsewhere").mkdir(parents=True)
+    (tmp_path / "egos" / "weights.bin").write_bytes(b"one")
+    document(tmp_path / "egos", text + '\nfiles = ["weights.bin"]')
+    before = find("egos/mine.toml", tmp_path)
+    assert str(tmp_path / "egos" / "weights.bin") in before.files
+    (tmp_path / "egos" / "weights.bin").write_bytes(b"two")
+    assert find("egos/mine.toml", tmp_path).identity != before.identity
+    moved = before.document_in(tmp_path / "run" / "policies")
+    assert getattr(moved, "files") == ["../../egos/weights.bin"]  # noqa: B009 - a kind of document with files
+    document(tmp_path / "egos", text + '\nfiles = ["wieghts.bin"]')
+    assert "files: 'wieghts.bin': there is no such file (did you mean 'weights.bin'?)" in refusal(
+        "egos/mine.toml", tmp_path
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "keys"),
+    [
+        ('kind = "fmu"\nfile = "mine.toml"', "deadline_s file inputs kind outputs start start_deadline_s"),
+        ('kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "PPO"', "algorithm file kind"),
+        ('kind = "python"\nentry_point = "steady"', "entry_point kind parameters"),
+    ],
+)
+def test_find__a_document_without_later_keys_keeps_its_identity(
+    text: str, keys: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path / "site")
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    assert sorted(find(document(tmp_path, text), tmp_path).identity["document"]) == keys.split()
+
+
+def test_find__a_parameter_that_is_the_path_of_a_file_is_hashed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    install(tmp_path / "site")
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    (tmp_path / "weights.bin").write_bytes(b"one")
+    name = document(tmp_path, 'kind = "python"\nentry_point = "steady"\n[parameters]\nweights = "weights.bin"')
+    before = find(name, tmp_path).identity
+    (tmp_path / "weights.bin").write_bytes(b"two")
+    assert find(name, tmp_path).identity != before
 
 
 def test_find__a_link_is_not_resolved(tmp_path: Path) -> None:
@@ -272,13 +329,14 @@ def test_campaign__games_in_which_a_program_crashes_are_errors(tmp_path: Path) -
     assert set(episodes["arm"]) == {"naive_alone", "naive_vs_sumo"}
     assert set(episodes["ego_outcome"]) == {"error"}
     assert episodes["error"].str.contains("DriverError: .*too fast").all()
+    assert "too fast" in done.stdout.partition("games could not be played")[2].splitlines()[1]
 
 
 # --- the page about egos ---
 
 
 def test_page__has_a_valid_document_of_each_kind() -> None:
-    page = (REPOSITORY / "docs" / "egos.md").read_text()
+    page = "".join((REPOSITORY / "docs" / name).read_text() for name in ("egos.md", "egos-by-networks.md"))
     blocks = [block for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "kind =" in block]
     kinds = {KINDS[table["kind"]].model_validate(table).kind for table in map(tomllib.loads, blocks)}  # type: ignore[attr-defined]
     assert kinds == set(KINDS) - {"rules"}

@@ -9,12 +9,13 @@ from typing import Any
 import fmpy
 import numpy as np
 import pytest
+from pythonfmu import FmuBuilder
 
 from harness.config.driver import Fmu
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
-from harness.drivers.fmu import fmu_driver, wiring
+from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.environments.rollout import Arm, assess
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
@@ -97,7 +98,7 @@ def test_fmu__has_si_units_and_a_state_per_game_which_reset_discards(
         if step == 4:
             driver.reset(GAMES[1:2])
             before[1] = 0.0
-        view = random.uniform(-1.0, 1.0, (3, SIZE)).astype(np.float32)
+        view = random.uniform(-0.9, 0.9, (3, SIZE)).astype(np.float32)
         view[:, LAYOUT.index("other0_seen")] = [0.0, 1.0, 1.0]
         before, steering = expected(car.physical(view), before, 1.8)
         actions = driver.decide(GAMES, view, np.zeros((3, 2)))
@@ -117,11 +118,41 @@ def test_fmu__may_have_other_names_of_inputs_and_outputs(twins: dict[int, Path],
     [
         ('name="steering_rad"', 'name="delta"', {}, "steering_rad: the FMU has no output of this name"),
         ('name="steering_rad"', 'name="steer_rad"', {}, "did you mean 'steer_rad'?"),
-        ('name="path_left_m"', 'name="y_lane"', {}, "y_lane: this input of the FMU has no entry of the observation"),
         ('name="path_left_m"', 'name="path_lft_m"', {}, "did you mean 'path_left_m'?"),
         ("", "", {"inputs": {"y": "path_left_m"}}, "y: the FMU has no input of this name"),
         ("", "", {"start": {"time_gap": 2.0}}, "time_gap: the FMU has no parameter or input of this name"),
         ("", "", {"start": {"speed_mps": 2.0}, "inputs": {"speed_mps": "goal_m"}}, "leave out one of them"),
+        (
+            "",
+            "",
+            {"start": {"time_gap_s": "long"}},
+            "time_gap_s: the value 'long' under [start] is not possible (it takes",
+        ),
+        ("", "", {"start": {"time_gap_s": True}}, "it takes a number, because it is of type Real"),
+        (
+            '"fixed"><Real unit="s" start="1.5"/>',
+            '"fixed"><String start="a"/>',
+            {"start": {"time_gap_s": 1.0}},
+            "takes a text",
+        ),
+        (
+            '"fixed"><Real unit="s" start="1.5"/>',
+            '"fixed"><Integer start="1"/>',
+            {"start": {"time_gap_s": 1.5}},
+            "an integer",
+        ),
+        (
+            '"fixed"><Real unit="s" start="1.5"/>',
+            '"fixed"><Integer start="1"/>',
+            {"start": {"time_gap_s": 2}, "tunable": {"time_gap_s": [1.0, 3.0]}},
+            "only Real variables can be tuned",
+        ),
+        (
+            '"continuous"><Real unit="m" start="0.0"/>',
+            '"discrete"><String start="a"/>',
+            {},
+            "give a text under [start]",
+        ),
         ('"continuous"><Real unit="rad"/>', '"discrete"><Integer/>', {}, "steering_rad: is of type Integer"),
         (
             'm="1" s="-1"',
@@ -140,13 +171,22 @@ def test_fmu__a_variable_that_is_missing_or_does_not_fit_is_an_error(
 
 
 def test_fmu__all_missing_variables_are_reported_at_once(tmp_path: Path) -> None:
-    file = changed(tmp_path, ('name="steering_rad"', 'name="delta"'), ('name="path_left_m"', 'name="y_lane"'))
+    file = changed(tmp_path, ('name="steering_rad"', 'name="delta"'), ('name="path_left_m"', 'name="path_lft_m"'))
     found = problems(document(start={"gap": 1.0}), file)
-    assert [name for name in ("steering_rad:", "y_lane:", "gap:") if name in found] == [
-        "steering_rad:",
-        "y_lane:",
-        "gap:",
-    ]
+    assert all(name in found for name in ("steering_rad:", "path_lft_m:", "gap:"))
+
+
+def test_fmu__many_problems_fit_a_screen(tmp_path: Path) -> None:
+    found = problems(document(start={f"gap{k}": 1.0 for k in range(50)}), changed(tmp_path))
+    assert len(found.splitlines()) == 11
+    assert "40 more problems" in found
+    assert max(map(len, found.splitlines())) < 400
+
+
+def test_fmu__an_input_without_an_entry_keeps_its_start_value(tmp_path: Path) -> None:
+    file = changed(tmp_path, ('name="path_left_m"', 'name="y_lane"'))
+    assert unconnected_inputs(document(), file) == "inputs of the FMU that keep their start values: y_lane"
+    assert unconnected_inputs(document(start={"y_lane": 0.0}), file) == ""
 
 
 def test_fmu__for_model_exchange_is_refused(tmp_path: Path) -> None:
@@ -218,3 +258,81 @@ def test_fmu__an_error_status_is_reported(tmp_path: Path, car: Car) -> None:
     driver.reset(GAMES)
     with pytest.raises(DriverError, match=r"failing\.fmu reports an error: .*fmi2DoStep"):
         driver.decide(GAMES, np.zeros((3, SIZE), dtype=np.float32), np.zeros((3, 2)))
+
+
+ENUMERATED = """<TypeDefinitions><SimpleType name="Mode"><Enumeration>
+<Item name="eco" value="1"/><Item name="sport" value="3"/></Enumeration></SimpleType>
+</TypeDefinitions><ModelVariables>"""
+
+
+@pytest.mark.parametrize(("written", "value"), [("sport", 3), (1, 1)])
+def test_fmu__an_enumeration_takes_the_name_or_number_of_an_item(
+    written: str | int, value: int, tmp_path: Path
+) -> None:
+    real = '"fixed"><Real unit="s" start="1.5"/>'
+    changes = ("<ModelVariables>", ENUMERATED), (real, '"fixed"><Enumeration declaredType="Mode" start="1"/>')
+    file = changed(tmp_path, *changes)
+    assert wiring(document(start={"time_gap_s": written}), file).start[0][1:] == (value, "Enumeration")
+    assert "takes one of 'eco' (1), 'sport' (3)" in problems(document(start={"time_gap_s": 2}), file)
+
+
+MIXED = """
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real, String
+from pythonfmu.enums import Fmi2Status
+
+
+class Mixed(Fmi2Slave):
+    "An FMU with inputs and parameters of every type that pythonfmu has."
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.speed_mps, self.other0_seen, self.lanes, self.load_kg = 0.0, False, 0, 150.0
+        self.gain, self.brisk, self.gear, self.weather = 1.0, False, 1, "dry"
+        self.acceleration_mps2, self.steering_rad = 0.0, 0.0
+        inputs = Fmi2Causality.input
+        parameters = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
+        self.register_variable(Real("speed_mps", causality=inputs))
+        self.register_variable(Boolean("other0_seen", causality=inputs, variability=Fmi2Variability.discrete))
+        self.register_variable(Integer("lanes", causality=inputs, variability=Fmi2Variability.discrete))
+        self.register_variable(Real("load_kg", causality=inputs))
+        self.register_variable(Real("gain", **parameters))
+        self.register_variable(Boolean("brisk", **parameters))
+        self.register_variable(Integer("gear", **parameters))
+        self.register_variable(String("weather", **parameters))
+        self.register_variable(Real("acceleration_mps2", causality=Fmi2Causality.output))
+        self.register_variable(Real("steering_rad", causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        if self.weather == "fog":
+            self.log("the camera sees nothing", Fmi2Status.error)
+            return False
+        self.acceleration_mps2 = self.gain + self.gear + 0.1 * self.lanes + 0.01 * self.load_kg
+        self.acceleration_mps2 += 0.5 * self.brisk - 4.0 * self.other0_seen + (0.25 if self.weather == "wet" else 0.0)
+        return True
+"""
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An FMU made by pythonfmu."""
+    folder = tmp_path_factory.mktemp("mixed")
+    (folder / "mixed.py").write_text(MIXED)
+    return Path(FmuBuilder.build_FMU(folder / "mixed.py", dest=folder))
+
+
+def test_pythonfmu__variables_of_every_type_are_set(mixed: Path, car: Car) -> None:
+    start = {"gain": 0.5, "brisk": True, "gear": 2, "weather": "wet"}
+    driver = fmu_driver(document(inputs={"lanes": "goal_m"}, start=start), mixed, car)
+    view = np.zeros((1, SIZE), dtype=np.float32)
+    view[0, LAYOUT.index("goal_m")], view[0, LAYOUT.index("other0_seen")] = 0.0253, 1.0  # 5.06 m and a road user
+    driver.reset(GAMES[:1])
+    wanted = 0.5 + 2 + 0.1 * 5 + 0.01 * 150.0 + 0.5 - 4.0 + 0.25
+    expected_actions = car.actions(np.array([wanted]), np.zeros(1), view)
+    np.testing.assert_allclose(driver.decide(GAMES[:1], view, np.zeros((1, 2))), expected_actions, atol=1e-9)
+
+
+def test_pythonfmu__its_own_log_is_in_the_error(mixed: Path, car: Car) -> None:
+    driver = fmu_driver(document(start={"weather": "fog"}), mixed, car)
+    driver.reset(GAMES[:1])
+    with pytest.raises(DriverError, match=r"fmi2DoStep.*its log: .*the camera sees nothing"):
+        driver.decide(GAMES[:1], np.zeros((1, SIZE), dtype=np.float32), np.zeros((1, 2)))

@@ -69,6 +69,9 @@ def test_process__scaled_units_are_those_of_policies(tmp_path: Path, car: Car) -
     mine = driver(tmp_path, car, change, units="scaled")
     mine.reset(GAMES)
     np.testing.assert_array_equal(mine.decide(GAMES, SEEN, NOISE), SEEN[:, :2])
+    assert "pedals or a wheel of 1e+09 (-1 to 1 is possible)" in refusal(
+        driver(tmp_path, car, "if number == 2: answer['actions'][1] = [1e9, 0]", units="scaled")
+    )
 
 
 @pytest.mark.parametrize(
@@ -89,6 +92,14 @@ def test_process__scaled_units_are_those_of_policies(tmp_path: Path, car: Car) -
         ("if number == 2: answer['actions'][1] = ['0', 0]", "each must be a pair of numbers"),
         ("if number == 2: answer['actions'][1] = [float('nan'), 0]", "is not finite"),
         ("if number == 2: answer['actions'][1] = [10**400, 0]", "too large"),
+        (
+            "if number == 2: answer['actions'][1] = [1e9, 0]",
+            "decided an acceleration of 1e+09 m/s², which is beyond ±100",
+        ),
+        (
+            "if number == 2: answer['actions'][1] = [0, -9.0]",
+            "a road wheel angle of 9 rad, which is beyond ±6.283",
+        ),
         ("if number == 2: answer = {'error': 'no such lane'}", "reports an error: 'no such lane'"),
         ("if number == 0: answer = {'protocol': 1}", "does not support protocol 2"),
         ("if number == 1: print('{}', flush=True)", "answered"),

@@ -1,4 +1,5 @@
-"""Policies saved by Stable-Baselines3 drive as they do there; they are read only with the user's permission."""
+"""Policies saved by Stable-Baselines3 and sb3-contrib drive as they do there; they are read only with the user's
+permission."""
 
 from __future__ import annotations
 
@@ -11,8 +12,10 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+import sb3_contrib
 import stable_baselines3
 import torch
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import harness
 from harness.config.driver import StableBaselines3
@@ -24,17 +27,24 @@ from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
 from harness.traffic.scene import OpenScene
+from tests.support.random_observations import Recorded
 from tests.support.tiny import CAREFUL
 
 torch.set_num_threads(1)  # tiny networks: more threads only wait for each other
 
-ALGORITHMS = ("PPO", "A2C", "SAC", "TD3")
+ALGORITHMS = ("PPO", "A2C", "SAC", "TD3", "DDPG", "TQC")
+WITH_BUFFER = {"learning_starts": 100, "batch_size": 16, "buffer_size": 500}
 SHORT: dict[str, dict[str, Any]] = {
     "PPO": {"n_steps": 64, "batch_size": 32, "n_epochs": 1},
     "A2C": {"n_steps": 16},
-    "SAC": {"learning_starts": 50, "batch_size": 16, "buffer_size": 500},
-    "TD3": {"learning_starts": 50, "batch_size": 16, "buffer_size": 500},
+    **dict.fromkeys(("SAC", "TD3", "DDPG", "TQC"), WITH_BUFFER),
 }
+
+
+def algorithm(name: str) -> Any:
+    return getattr(stable_baselines3, name, None) or getattr(sb3_contrib, name)
+
+
 GAMES = np.arange(20)
 SEEN = np.random.default_rng(3).uniform(-1.0, 1.0, (20, SIZE)).astype(np.float32)
 NOISE = np.random.default_rng(4).standard_normal((20, 2))
@@ -48,8 +58,9 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     game = gymnasium.make("harness/Ego-v0", other="sumo")
     try:
         for name in ALGORITHMS:
-            algorithm = getattr(stable_baselines3, name)
-            model = algorithm("MlpPolicy", game, seed=1, device="cpu", policy_kwargs={"net_arch": [16]}, **SHORT[name])
+            model = algorithm(name)(
+                "MlpPolicy", game, seed=1, device="cpu", policy_kwargs={"net_arch": [16]}, **SHORT[name]
+            )
             model.learn(128)
             model.save(folder / f"{name}.zip")
     finally:
@@ -64,7 +75,7 @@ def document(algorithm: str, **keys: Any) -> StableBaselines3:
 
 @pytest.mark.parametrize("name", ALGORITHMS)
 def test_saved__drives_as_stable_baselines3_does(name: str, saved: dict[str, Path]) -> None:
-    model = getattr(stable_baselines3, name).load(saved[name], device="cpu")
+    model = algorithm(name).load(saved[name], device="cpu")
     expected, _ = model.predict(SEEN, deterministic=True)
     driver = Sb3Driver(document(name), saved[name], sampled=False)
     actions = driver.decide(GAMES, SEEN, NOISE)
@@ -73,13 +84,13 @@ def test_saved__drives_as_stable_baselines3_does(name: str, saved: dict[str, Pat
     assert np.ptp(actions) > 0.0
 
 
-@pytest.mark.parametrize("name", ["PPO", "A2C", "SAC"])
+@pytest.mark.parametrize("name", ["PPO", "A2C", "SAC", "TQC"])
 def test_saved__samples_by_the_noise_and_its_own_deviation(name: str, saved: dict[str, Path]) -> None:
-    policy = getattr(stable_baselines3, name).load(saved[name], device="cpu").policy
+    policy = algorithm(name).load(saved[name], device="cpu").policy
     driver = Sb3Driver(document(name), saved[name], sampled=True)
     with torch.no_grad():
         seen = torch.from_numpy(SEEN)
-        if name == "SAC":
+        if name in ("SAC", "TQC"):
             mean, log_deviation, _ = policy.actor.get_action_dist_params(seen)
             expected = np.tanh(mean.numpy() + log_deviation.exp().numpy() * NOISE)
         else:
@@ -92,9 +103,10 @@ def test_saved__samples_by_the_noise_and_its_own_deviation(name: str, saved: dic
     )
 
 
-def test_saved__a_deterministic_policy_can_not_be_sampled(saved: dict[str, Path]) -> None:
-    with pytest.raises(UsageError, match="TD3's policies are deterministic"):
-        Sb3Driver(document("TD3"), saved["TD3"], sampled=True)
+@pytest.mark.parametrize("name", ["TD3", "DDPG"])
+def test_saved__a_deterministic_policy_can_not_be_sampled(name: str, saved: dict[str, Path]) -> None:
+    with pytest.raises(UsageError, match=f"{name}'s policies are deterministic"):
+        Sb3Driver(document(name), saved[name], sampled=True)
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
@@ -136,10 +148,130 @@ def test_saved__a_policy_with_other_spaces_is_refused(
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "named"), [("SAC", "PPO"), ("PPO", "TD3"), ("TD3", "SAC")])
-def test_saved__a_wrong_algorithm_is_an_error(name: str, named: str, saved: dict[str, Path]) -> None:
-    with pytest.raises(UsageError, match=f"can't be read as a policy of {named}.*is the algorithm right"):
+@pytest.mark.parametrize(("name", "named"), [("SAC", "PPO"), ("PPO", "TD3"), ("TQC", "SAC")])
+def test_saved__the_file_says_which_algorithm_saved_it(name: str, named: str, saved: dict[str, Path]) -> None:
+    with pytest.raises(UsageError, match=f'{name} saved this file, not {named} \\(algorithm = "{name}"\\)'):
         Sb3Driver(document(named), saved[name], sampled=False)
+
+
+@pytest.mark.parametrize("name", ["QRDQN", "MaskablePPO", "TRPO"])
+def test_saved__an_algorithm_that_is_not_supported_is_refused_by_what_the_file_holds(name: str, tmp_path: Path) -> None:
+    file = save(name, "MlpPolicy", Recorded(discrete=name != "TRPO"), tmp_path)
+    named = "DQN" if name == "QRDQN" else "PPO"
+    with pytest.raises(UsageError, match=f"{name} saved this file, not {named} .policies of {name} are not supported"):
+        Sb3Driver(document(named), file, sampled=False)
+
+
+def save(name: str, policy: str, env: Any, folder: Path, steps: int = 0, **more: Any) -> Path:
+    """A file of an algorithm, trained for some steps."""
+    small = {"policy_kwargs": {"net_arch": [8], **more.pop("policy_kwargs", {})}}
+    if name in ("DQN", "QRDQN", *SHORT) and name not in ("PPO", "A2C"):
+        small |= {"buffer_size": 200, "learning_starts": 10_000}
+    model = algorithm(name)(policy, env, device="cpu", seed=1, **small, **more)
+    if steps:
+        model.learn(steps)
+    model.save(folder / f"{name}.zip")
+    return folder / f"{name}.zip"
+
+
+@pytest.fixture(scope="module")
+def recurrent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recurrent policy."""
+    folder, keys = tmp_path_factory.mktemp("recurrent"), {"policy_kwargs": {"lstm_hidden_size": 8}}
+    return save("RecurrentPPO", "MlpLstmPolicy", Recorded(), folder, **keys)
+
+
+def test_recurrent__drives_with_a_state_per_game_which_reset_discards(recurrent: Path) -> None:
+    model = sb3_contrib.RecurrentPPO.load(recurrent, device="cpu")
+    driver = Sb3Driver(document("RecurrentPPO"), recurrent, sampled=False)
+    driver.reset(np.arange(3))
+    states: dict[int, Any] = dict.fromkeys(range(3))
+    for step in range(6):
+        if step == 3:
+            driver.reset(np.array([1]))
+            states[1] = None
+        games = np.array([0, 2, 1] if step % 2 else [0, 1, 2])  # their order may change, and one may be missing
+        games = games[: 2 + step % 2]
+        decided = driver.decide(games, SEEN[games + step], NOISE[games])
+        for game, action in zip(games.tolist(), decided, strict=True):
+            begins = np.array([states[game] is None])
+            expected, states[game] = model.predict(
+                SEEN[[game + step]], state=states[game], episode_start=begins, deterministic=True
+            )
+            np.testing.assert_allclose(action, expected[0], atol=1e-6)
+
+
+def test_recurrent__samples_with_its_state(recurrent: Path) -> None:
+    sampled = Sb3Driver(document("RecurrentPPO"), recurrent, sampled=True)
+    mode = Sb3Driver(document("RecurrentPPO"), recurrent, sampled=False)
+    for driver in (sampled, mode):
+        driver.reset(GAMES)
+    for _ in range(3):
+        mean, drawn = mode.decide(GAMES, SEEN, NOISE), sampled.decide(GAMES, SEEN, NOISE)
+        deviation = sampled._policy.log_std.detach().exp().numpy()
+        np.testing.assert_allclose(drawn, np.clip(mean + deviation * NOISE, -1.0, 1.0), atol=1e-5)
+
+
+def test_recurrent__is_refused_under_the_name_of_another_algorithm(recurrent: Path) -> None:
+    with pytest.raises(UsageError, match="RecurrentPPO saved this file, not PPO"):
+        Sb3Driver(document("PPO"), recurrent, sampled=False)
+
+
+def test_discrete__each_index_stands_for_pedals_and_wheel(tmp_path: Path) -> None:
+    file = save("DQN", "MlpPolicy", Recorded(discrete=True), tmp_path)
+    chosen, _ = stable_baselines3.DQN.load(file, device="cpu").predict(SEEN, deterministic=True)
+    table = [[-1.0, 0.0], [0.0, 0.25], [0.5, 0.0]]
+    driver = Sb3Driver(document("DQN", actions=table), file, sampled=False)
+    np.testing.assert_array_equal(driver.decide(GAMES, SEEN, NOISE), np.array(table)[chosen])
+    with pytest.raises(UsageError, match="discrete, 0 to 2, and the document has 2 `actions`"):
+        Sb3Driver(document("DQN", actions=table[:2]), file, sampled=False)
+
+
+@pytest.fixture(scope="module")
+def normalised(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Path], Path]:
+    """Policies trained under VecNormalize, and what its `save` wrote."""
+    folder = tmp_path_factory.mktemp("normalised")
+    env = VecNormalize(DummyVecEnv([Recorded]))
+    files = {
+        "PPO": save("PPO", "MlpPolicy", env, folder, steps=16, n_steps=16, batch_size=16),
+        "SAC": save("SAC", "MlpPolicy", env, folder, steps=16),
+    }
+    env.save(str(folder / "vn.pkl"))
+    return files, folder / "vn.pkl"
+
+
+@pytest.mark.parametrize("name", ["PPO", "SAC"])
+def test_normalised__sees_what_it_learned_from(name: str, normalised: tuple[dict[str, Path], Path]) -> None:
+    files, scaling = normalised
+    model = algorithm(name).load(files[name], device="cpu")
+    seen = VecNormalize.load(str(scaling), DummyVecEnv([Recorded])).normalize_obs(SEEN)
+    expected, _ = model.predict(seen, deterministic=True)
+    driver = Sb3Driver(document(name, normalize="vn.pkl"), files[name], sampled=False, normalize=scaling)
+    np.testing.assert_allclose(driver.decide(GAMES, SEEN, NOISE), expected, atol=1e-6)
+    assert np.abs(expected - model.predict(SEEN, deterministic=True)[0]).max() > 0.01
+
+
+@pytest.mark.parametrize("name", ["PPO", "SAC"])
+def test_normalised__is_refused_without_the_scaling(name: str, normalised: tuple[dict[str, Path], Path]) -> None:
+    with pytest.raises(UsageError, match="learned from observations that VecNormalize scaled"):
+        Sb3Driver(document(name), normalised[0][name], sampled=False)
+
+
+def test_normalised__the_scaling_is_a_file_of_the_driver(
+    normalised: tuple[dict[str, Path], Path], tmp_path: Path
+) -> None:
+    files, scaling = normalised
+    for file in (files["PPO"], scaling):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    text = 'kind = "stable_baselines3"\nfile = "PPO.zip"\nalgorithm = "PPO"\nnormalize = "vn.pkl"\n'
+    (tmp_path / "mine.toml").write_text(text)
+    found = find_driver("mine.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=True)
+    assert {Path(each).name for each in found.files} == {"PPO.zip", "vn.pkl"}
+    with pytest.raises(UsageError, match="--allow-code"):
+        find_driver("mine.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=False)
+    (tmp_path / "vn.pkl").write_bytes(pickle.dumps({"mean": 0.0}))
+    with pytest.raises(UsageError, match="can't be read as a VecNormalize: TypeError: it holds a dict"):
+        Sb3Driver(document("PPO"), files["PPO"], sampled=False, normalize=tmp_path / "vn.pkl")
 
 
 def test_saved__a_file_that_is_no_zip_is_refused(tmp_path: Path) -> None:

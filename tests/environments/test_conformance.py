@@ -10,13 +10,15 @@ import numpy as np
 import pytest
 
 from harness.config.campaign import LEARNED, SUMO
+from harness.drivers.car import Car, car_of
 from harness.drivers.sumo import SumoDriver
 from harness.environments import conformance
 from harness.environments.arena import Arena
-from harness.environments.conformance import check_conformance
+from harness.environments.conformance import check_conformance, difference_of
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation_layout import LAYOUT
+from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness
@@ -72,6 +74,17 @@ class Raising(Good):
         if observation[0, LAYOUT.index("speed_mps")] >= 0.0:
             raise KeyError("no such lane")
         return super().decide(games, observation, noise)
+
+
+class WrongUnits(Good):
+    """Asks for 1e9 m/s²."""
+
+    def __init__(self, car: Car) -> None:
+        super().__init__()
+        self.car = car
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return self.car.actions(np.full(len(games), 1e9), np.zeros(len(games)), observation)
 
 
 class Stale(Good):
@@ -135,6 +148,17 @@ def test_check__a_conforming_driver_passes(merge: OpenScene) -> None:
 def test_check__a_violation_is_named(driver: type[Good], message: str, merge: OpenScene) -> None:
     (violation,) = check_conformance(driver(), merge, 2).violations
     assert message in violation
+
+
+def test_check__an_implausible_request_is_named_with_its_unit(merge: OpenScene) -> None:
+    (violation,) = check_conformance(WrongUnits(car_of(merge.world, EGO)), merge, 2).violations
+    assert "it decided an acceleration of 1e+09 m/s², which is beyond ±100: is the unit right?" in violation
+
+
+def test_repeats__a_driver_that_varies_is_told_and_others_are_not(merge: OpenScene) -> None:
+    assert difference_of(Good(), merge) == ""
+    assert "it is not deterministic: in decision 0 of game 0" in difference_of(Random(), merge)
+    assert difference_of(Raising(), merge) == "", "games that can't be played are told by the arms"
 
 
 def write(folder: Path, change: str = "") -> Path:

@@ -20,7 +20,17 @@ from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
 import harness
-from harness import Arena, ArenaVecEnv, DrivingEnv, ParallelDrivingEnv, Seat, UsageError, open_scene, read_document
+from harness import (
+    Arena,
+    ArenaVecEnv,
+    DrivingEnv,
+    Outcome,
+    ParallelDrivingEnv,
+    Seat,
+    UsageError,
+    open_scene,
+    read_document,
+)
 from harness.config.persona import Persona
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.sumo import SumoDriver
@@ -99,7 +109,7 @@ def test_gymnasium__passes_its_checker(opened: Open, name: str, other: str | Non
     environment = opened(gymnasium.make, name, other=other)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        check_env(environment.unwrapped)
+        check_env(environment.unwrapped, skip_render_check=True)  # it would open a window; see test_rendering.py
 
 
 @pytest.mark.parametrize(
@@ -161,7 +171,7 @@ def test_seed__gives_the_same_games_in_this_process_and_another(opened: Open, bu
 def test_step__reward_is_the_personas_payoff_by_terms(opened: Open) -> None:
     environment = opened(DrivingEnv)
     _, info = environment.reset(seed=1)
-    assert info["outcome"] == ""
+    assert info["outcome"] == Outcome.RUNNING
     steps = played(environment)
     assert environment.action_space.shape == (2,)
     for observation, reward, _, _, info in steps:
@@ -170,7 +180,7 @@ def test_step__reward_is_the_personas_payoff_by_terms(opened: Open) -> None:
     careful = read_document(REPOSITORY / "personas/careful.toml", Persona)
     assert set(steps[0][4]["terms"]) == {each.name for each in careful.payoff.terms}
     *_, terminated, truncated, info = steps[-1]
-    assert (terminated, truncated, info["outcome"], info["terms"]["goal"]) == (True, False, "goal", 5.0)
+    assert (terminated, truncated, info["outcome"], info["terms"]["goal"]) == (True, False, Outcome.GOAL, 5.0)
     assert info["goal_m"] <= 0.0
     assert info["time_s"] == pytest.approx(0.1 * len(steps))
 
@@ -179,7 +189,7 @@ def test_step__contact_terminates_with_the_observation_of_that_moment(opened: Op
     environment = opened(DrivingEnv)
     environment.reset(seed=1)
     observation, _, terminated, truncated, info = played(environment, SWERVE)[-1]
-    assert (terminated, truncated, info["outcome"]) == (True, False, "rail")
+    assert (terminated, truncated, info["outcome"]) == (True, False, Outcome.RAIL)
     assert info["speed_mps"] > 5.0
     assert observation[LAYOUT.index("speed_mps")] == pytest.approx(info["speed_mps"] / 30.0)
 
@@ -189,7 +199,7 @@ def test_step__the_time_limit_truncates(opened: Open, busy: OpenScene) -> None:
     environment.reset(seed=1)
     steps = played(environment, np.array([-1.0, 0.0]))
     *_, terminated, truncated, info = steps[-1]
-    assert (len(steps), terminated, truncated, info["outcome"]) == (30, False, True, "timeout")
+    assert (len(steps), terminated, truncated, info["outcome"]) == (30, False, True, Outcome.TIMEOUT)
 
 
 def test_step__needs_a_running_game_and_finite_actions(opened: Open) -> None:
@@ -230,9 +240,20 @@ def test_other__a_policy_has_its_personas_attention(opened: Open, policy: Path) 
     assert min(speeds) == 0.0
 
 
+@pytest.mark.parametrize("other", ["rss", "egos/adas.toml", "egos/examples/process/perl.toml"])
+def test_other__may_be_what_a_campaign_takes_as_its_ego(opened: Open, other: str) -> None:
+    environment = opened(DrivingEnv, other=other, allow_code=True)
+    environment.reset(seed=1)
+    before = environment._game.arena.state.station_m[0, 1]
+    for _ in range(10):
+        environment.step(STRAIGHT_ON)
+    assert environment._game.arena.state.station_m[0, 1] > before + 1.0
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
+        ({"other": "egos/examples/process/perl.toml"}, "--allow-code"),
         ({"player": "nonego"}, "did you mean 'non_ego'"),
         ({"scene": "networks/merg"}, "networks/merg"),
         ({"persona": "personas/carefull.toml"}, "carefull.toml"),
@@ -280,11 +301,11 @@ def test_parallel__an_agent_is_removed_at_its_end_and_the_other_continues(opened
         _, _, terminations, _, infos = environment.step(actions)
     assert environment.agents == ["ego"]
     assert terminations == {"ego": False, "non_ego": True}
-    assert infos["non_ego"]["outcome"] == "rail"
+    assert infos["non_ego"]["outcome"] == Outcome.RAIL
     while environment.agents:
         observations, rewards, terminations, truncations, infos = environment.step({"ego": STRAIGHT_ON})
         assert {*observations, *rewards, *terminations, *truncations, *infos} == {"ego"}
-    assert infos["ego"]["outcome"] == "goal"
+    assert infos["ego"]["outcome"] == Outcome.GOAL
     assert environment.step({}) == ({}, {}, {}, {}, {})
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from harness.evaluation import trace_file
@@ -73,6 +74,15 @@ def test_reader__gives_what_is_read_game_by_game(
     reader = TraceReader()
     for episode in (3, 0, 1, 7, 2, 3):
         pd.testing.assert_frame_equal(reader.read(arm, episode), read_trace(arm, episode))
+
+
+def test_trace__of_an_arm_says_whose_it_is(tmp_path: Path) -> None:
+    write(tmp_path / "0", game(0), game(1))
+    join_traces([tmp_path / "0"], tmp_path / "arm.parquet", {"arm": "naive_alone", "seed": 1})
+    assert pd.read_parquet(tmp_path / "arm.parquet").attrs == {"arm": "naive_alone", "seed": 1}
+    metadata = pq.read_schema(tmp_path / "arm.parquet").metadata
+    assert (metadata[b"arm"], metadata[b"seed"]) == (b"naive_alone", b"1")
+    assert len(read_trace(tmp_path / "arm.parquet", 1)) == len(game(1)["step"])
 
 
 def test_reader__reads_a_segment_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

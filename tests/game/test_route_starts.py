@@ -17,6 +17,7 @@ from harness.traffic.scene import OpenScene
 from tests.support.roads import arc, straight
 
 LENGTH_M = np.array([4.6, 4.6])
+MAX_SPEED_MPS = np.array([40.0, 8.0])  # a car and a bicycle
 BOTH = np.array([True, True])
 BEND = Routes.of([arc(25.0, length=60.0), straight(0.0, length=80.0, y0=40.0)])
 ONE_ROAD = Routes.of([straight(0.0), straight(0.0)])
@@ -27,7 +28,7 @@ def draws(
 ) -> list[tuple[FloatArray, ...] | None]:
     """The draws of `count` games."""
     generators = (np.random.default_rng(seed) for seed in range(count))
-    return [draw_along_route(routes, LENGTH_M, np.array(present), share, each) for each in generators]
+    return [draw_along_route(routes, LENGTH_M, MAX_SPEED_MPS, np.array(present), share, each) for each in generators]
 
 
 def placed(routes: Routes, count: int, present: Sequence[bool] = (True, True)) -> FloatArray:
@@ -50,8 +51,10 @@ def test_starts__are_on_the_route_between_its_begin_and_10_m_before_the_goal() -
     turned = heading - BEND.heading_rad[BEND.rows(station)]
     assert np.abs(turned).max() < 0.15  # five of 0.03 rad
     assert speed.min() >= 0.0
-    assert speed.max() <= 13.0  # the limit
-    assert np.ptp(speed) > 12.0
+    assert speed[:, 0].max() <= 13.0  # the limit
+    assert speed[:, 1].max() <= 8.0  # the bicycle's own
+    assert np.ptp(speed[:, 0]) > 12.0
+    assert np.ptp(speed[:, 1]) > 7.0
 
 
 def test_starts__are_on_all_lanes() -> None:

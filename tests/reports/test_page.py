@@ -227,7 +227,7 @@ def test_words__as_many_failures_against_an_ordinary_driver_are_stated(page):
 
 def test_words__failures_alone_are_stated(page):
     assert "Caution" not in page.text
-    assert FAILS_ALONE in text_of(campaign(personas=["speedy"], failing={"alone": 0.1}))
+    assert FAILS_ALONE.format(naive="naive ego") in text_of(campaign(personas=["speedy"], failing={"alone": 0.1}))
 
 
 @pytest.mark.parametrize("question", ["RQ1", "RQ2"])
@@ -375,13 +375,40 @@ def test_banner__stages_that_are_not_done_are_named_with_their_message(page):
     assert "not done" not in page.text
 
 
+def test_banner__a_driver_that_varies_is_named(page):
+    arguments = campaign()
+    arguments["manifest"]["varying_drivers"] = {"dice.toml": "in decision 3 it decided otherwise"}
+    assert "dice.toml: in decision 3 it decided otherwise" in text_of(arguments)
+    assert "played again" not in page.text.split("What to do next")[0]
+
+
 def test_banner__games_that_could_not_be_played_are_counted_by_arm(page):
     arguments = campaign()
     rows = arguments["episodes"]
     text = text_of(with_errors(arguments, (rows["arm"] == "naive_vs_speedy") & (rows["episode"] < 3)))
     assert f"3 of {len(rows)} games could not be played." in text
     assert "naive_vs_speedy, seed 1: 3" in text
+    assert "3 games: the simulator died" in text
     assert "could not be played." not in page.text.split("Figures")[0]
+
+
+@pytest.mark.parametrize(
+    ("driver", "name"), [("../egos/adas.toml", "ego adas"), ("steady", "ego steady"), ("sumo", "ego driven by SUMO")]
+)
+def test_verdicts__call_an_ego_of_others_by_its_own_name(driver, name):
+    arguments = campaign(personas=["speedy"])
+    arguments["manifest"]["campaign"]["ego"]["driver"] = driver
+    text = text_of(arguments).partition("What to do next")[0]
+    assert f"the {name}" in text
+    assert "naive ego" not in text
+
+
+def test_banner__an_ego_that_played_no_game_has_not_never_failed():
+    arguments = campaign()
+    arguments["manoeuvres"] = arguments["manoeuvres"].iloc[:0]
+    text = text_of(with_errors(arguments, arguments["episodes"]["episode"] >= 0))
+    assert "The ego played no game." in text
+    assert "never failed" not in text
 
 
 # --- replays ---

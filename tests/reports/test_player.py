@@ -11,6 +11,7 @@ from harness.reports.player_data import key
 from tests.support.chromium import launched, opener, until
 from tests.support.pages import campaign, recordings, rendered
 from tests.support.recorded import STEP_S, recorded
+from tests.support.repository import REPOSITORY
 
 GAME, OTHER = "naive_vs_speedy,1,6", "retrained_vs_speedy,1,6"  # a collision, and the same episode after retraining
 
@@ -452,3 +453,21 @@ def test_page__games_that_do_not_fit_stay_in_the_run_folder(arguments, monkeypat
     assert 0 < shown < len(arguments["episodes"])
     assert f"{shown} recorded games" in html
     assert f"{len(arguments['episodes']) - shown} more games do not fit into the page" in html
+
+
+def test_hidden__is_the_area_between_the_lines_of_sight_past_a_box(browser):
+    page = browser.new_page()
+    page.add_script_tag(path=REPOSITORY / "harness" / "reports" / "sight.js")
+    box = [[10.0, 1.0], [10.0, -1.0], [12.0, -1.0], [12.0, 1.0]]
+    shadow = page.evaluate(
+        """box => {
+          const points = [], add = (x, y) => points.push([x, y]);
+          addShadow({ moveTo: add, lineTo: add, closePath() {} }, { x: 0, y: 0 }, box);
+          return points;
+        }""",
+        box,
+    )
+    page.close()
+    far_m = 120.0 / 101.0**0.5  # the game's sight, along a line of sqrt(10^2 + 1^2) m
+    expected = [[10.0, -1.0], [10.0 * far_m, -far_m], [10.0 * far_m, far_m], [10.0, 1.0]]
+    assert shadow == [pytest.approx(corner) for corner in expected]

@@ -61,6 +61,7 @@ def build_scene(
     cars: str = CARS,
     goal_m: float = 250.0,
     time_limit_s: float = 20.0,
+    net_options: Sequence[str] = (),
 ) -> OpenScene:
     """Write a scene's folder with a net built by netconvert, and open it.
 
@@ -71,9 +72,8 @@ def build_scene(
     (folder / "n.edg.xml").write_text(f"<edges>{edges}</edges>")
     program = shutil.which("netconvert", path=os.path.join(sumo.SUMO_HOME, "bin"))
     assert program is not None
-    subprocess.run(
-        [program, "-n", "n.nod.xml", "-e", "n.edg.xml", "-o", "n.net.xml"], cwd=folder, check=True, capture_output=True
-    )
+    files = ("-n", "n.nod.xml", "-e", "n.edg.xml", "-o", "n.net.xml")
+    subprocess.run([program, *files, *net_options], cwd=folder, check=True, capture_output=True)
     players = {name: place for name, place in places.items() if name != "goal"}
     vehicles = "".join(
         f"""<vehicle id="{name}" type="{"ego" if name == "ego" else "person"}_car" depart="0">

@@ -10,7 +10,9 @@ import pytest
 
 from harness.config.road_user import WALKING_MPS
 from harness.errors import UsageError
+from harness.game.geometry import Box
 from harness.game.right_of_way import Control
+from harness.game.state import State
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 
@@ -78,6 +80,66 @@ def test_conflicts__at_a_marked_crossing_the_vehicle_yields() -> None:
     assert tables.stop_lines.player.tolist() == [0]
     assert tables.stop_lines.control.tolist() == [Control.GIVE_WAY]
     assert tables.stop_lines.station_m[0] == pytest.approx(tables.conflicts.begin_m[0] - 1.0)
+
+
+RIDER = """<vType id="bike" vClass="bicycle"/>
+<vehicle id="rider" type="bike" depart="0"><route edges="eastbound"/></vehicle></routes>"""
+RIDES = """kind = "bicycle"
+vehicle = "rider"
+goal = { edge = "eastbound", position_m = 230.0 }
+pavements = true
+"""
+
+
+def rider(folder: Path, *edits: tuple[str, str, str]) -> Path:
+    """The scene of the street between pavements, with a cyclist on it in place of the walker."""
+    on_foot = f"""kind = "pedestrian"\n{WAY}     # along the pavement, then across the road\n"""
+    return changed(
+        folder, "crossing", ("crossing.rou.xml", "</routes>", RIDER), ("scene.toml", on_foot, RIDES),
+        ("scene.toml", "arrival_after_ego_s = [-2.0, 2.0]", "route_m = [90.0, 100.0]"),
+        ("scene.toml", "speed_mps = [1.0, 1.4]", "speed_mps = [4.0, 5.0]"), *edits,
+    )  # fmt: skip
+
+
+def test_pavements__belong_to_the_area_of_a_cyclist_whose_scene_says_so(tmp_path: Path) -> None:
+    world = open_scene(rider(tmp_path)).world
+    routes = world.road.routes
+    ego, cyclist = routes.rows(np.array([[100.0, 100.0]]))[0]
+    assert routes.y_m[[ego, cyclist]] == pytest.approx([-1.75, -1.75])  # both ways are the middle of the lane
+    # the road is 3.5 m wide on either side of y = 0, each pavement 5 m
+    assert (routes.left_edge_m[ego], routes.right_edge_m[ego]) == pytest.approx((5.25, -1.75), abs=0.05)
+    assert (routes.left_edge_m[cyclist], routes.right_edge_m[cyclist]) == pytest.approx((10.25, -6.75), abs=0.05)
+    # boxes of 1 m x 0.5 m: the first is on the pavement, the second 0.1 m over its outer edge at y = -8.5
+    state = State.empty(2, 2)
+    state.x_m[:], state.y_m[:] = 150.0, [[0.0, -6.0], [0.0, -8.35]]
+    box = Box(state.x_m, state.y_m, state.heading_rad, np.array([4.6, 1.0]), np.array([1.8, 0.5]))
+    assert world.leaves_carriageway.tolist() == [False, True]
+    assert world.road.walkers_rails is not None
+    assert world.road.walkers_rails.distance_m(box, 20.0)[:, 1] == pytest.approx([8.5 - 6.25, 0.0])
+
+
+def test_pavements__are_walls_for_a_cyclist_whose_scene_does_not_say_so(tmp_path: Path) -> None:
+    routes = open_scene(rider(tmp_path, ("scene.toml", "pavements = true\n", ""))).world.road.routes
+    cyclist = routes.rows(np.array([[100.0, 100.0]]))[0, 1]
+    assert (routes.left_edge_m[cyclist], routes.right_edge_m[cyclist]) == pytest.approx((5.25, -1.75), abs=0.05)
+
+
+def test_pavements__are_for_cyclists_only(tmp_path: Path) -> None:
+    assert "pavements is for kind" in problem(rider(tmp_path, ("scene.toml", 'kind = "bicycle"', 'kind = "car"')))
+
+
+def test_way__that_crosses_the_road_inside_a_junction_is_refused(tmp_path: Path) -> None:
+    walks = """kind = "pedestrian"
+way = [[100.0, 95.6], [145.0, 95.6]]                   # along the path beside the road, over the side road
+"""
+    goal = """speed_mps = [4.0, 5.5]
+goal = { edge = "east_out", position_m = 40.0 }"""
+    folder = changed(
+        tmp_path, "cyclist", ("scene.toml", 'kind = "bicycle"\nvehicle = "non_ego"\n', walks),
+        ("scene.toml", goal, "speed_mps = [1.0, 1.4]"),
+        ("cyclist.net.xml", 'allow="bicycle"', 'allow="bicycle pedestrian"'),
+    )  # fmt: skip
+    assert "crosses the road inside junction 'centre'" in problem(folder)
 
 
 def test_bicycle__rides_on_its_own_lane_and_the_turning_car_yields() -> None:

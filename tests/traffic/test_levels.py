@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from harness.environments.arena import Arena, Seat
+from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT
 from harness.game.state import Outcome
 from harness.traffic.levels import on_players_level
@@ -81,6 +82,14 @@ def test_level__vehicles_on_the_players_own_road_are_met_whatever_its_slope(tmp_
 def test_flat__needs_no_heights(tmp_path: Path) -> None:
     assert scene(tmp_path / "scene", "east", height_m=2.0).roads_m is None
     assert seen_and_met(scene(tmp_path / "flat", "east", height_m=2.0), "east", "north")[2]  # as at a level crossing
+
+
+def test_bridge__a_player_whose_route_leads_over_the_other_is_refused(tmp_path: Path) -> None:
+    places = {"ego": ("east", "east_0"), "non_ego": ("north", "north_0"), "goal": "east"}
+    with pytest.raises(
+        UsageError, match=r"'east' and 'north' of the players' routes lie over one another, 7\.0 m apart"
+    ):
+        build_scene(tmp_path / "bridge", nodes(HEIGHT_M), EDGES, places)
 
 
 def test_level__is_that_of_the_nearest_part_of_the_players_roads() -> None:

@@ -16,10 +16,11 @@ import numpy as np
 import pytest
 
 from harness.errors import SimulationError
-from harness.game.initial_state import InitialState
+from harness.game.attention import HumanFactors
+from harness.game.initial_state import InitialState, draw_initial_state
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.route_file import Departure
-from harness.traffic.scene import OpenScene
+from harness.traffic.scene import OpenScene, open_scene
 from harness.traffic.simulation import Reading
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed
@@ -55,6 +56,18 @@ def opened(scene: OpenScene) -> Iterator[Open]:
     for each in simulations:
         each.close()
     assert not libsumo.isLoaded()
+
+
+def test_bicycle__starts_anywhere_along_its_route(opened: Open) -> None:
+    """SUMO refuses a vehicle whose speed exceeds what its type desires: 5.6 m/s here, at a maxSpeed of 8 m/s."""
+    scene = open_scene(REPOSITORY / "networks" / "cyclist")
+    starts = scene.start_distribution([HumanFactors()] * 2, [1.0, 1.0], along_route_share=1.0)
+    drawn = [draw_initial_state(starts, "training", seed) for seed in range(20)]
+    assert max(float(each.speed_mps[1]) for each in drawn) > 5.6
+    assert all(each.speed_mps[1] <= 8.0 for each in drawn)
+    simulation = opened(on=scene)
+    for each in drawn:
+        simulation.reset(0, each, [])
 
 
 def other(name: str, depart_s: float = 0.0, lane: str = "0", position: str = "100", speed: str = "5") -> Departure:

@@ -279,12 +279,8 @@ def test_file__what_only_draws_or_records_is_left_out(write: Write) -> None:
 
 
 def test_file__each_kind_of_refused_element_is_one_problem(write: Write) -> None:
-    people = '<person id="p" depart="0"><walk edges="a"/></person><person id="q" depart="0"><walk edges="a"/></person>'
-    expected = (
-        "person: people on foot and passengers are not supported: libsumo 1.28 may crash with them (2 times) "
-        '(remove these elements; a player may be on foot, with kind = "pedestrian")'
-    )
-    assert problem(write(people)) == expected
+    boxes = '<container id="p" depart="0"/><container id="q" depart="0"/>'
+    assert problem(write(boxes)) == "container: containers are not supported (2 times) (remove these elements)"
 
 
 # --- the window and the density of a game -------------------------------------------------------------------------

@@ -66,6 +66,28 @@ def test_game__later_vehicles_follow_the_rhythm_of_the_flow(scene: OpenScene) ->
     assert [(each.name, each.depart_s) for each in later] == [(f"right.{10 + k}", 4.0 * k) for k in range(5)]
 
 
+def test_game__begins_with_persons_on_their_way(tmp_path: Path) -> None:
+    people = """<personFlow id="walkers" begin="0" end="100" period="10">
+        <walk edges="road" arrivalPos="250"/></personFlow>"""
+    scene = warmed(tmp_path / "scene", people, "warm_up_s = 40.0")
+    found = sorted(on_road(scene.departures(generator_of("a"))), key=lambda each: each.name)
+    assert [each.name for each in found] == [f"walkers.{k}.warm" for k in range(4)]
+    # they began 40, 30, 20 and 10 s ago, at 5 km/h, with SUMO's differences of 10 % between persons and its dawdling
+    walked_m = np.array([float(each.position) for each in found])
+    assert walked_m / np.array([40.0, 30.0, 20.0, 10.0]) == pytest.approx(1.25, abs=0.4)
+    arena = Arena(scene, 1, [Seat(None), Seat(None)], recorded=True)
+    try:
+        away = placed(scene, (150.0, -4.8, 0.0, 0.0), (150.0, -1.6, 0.0, 0.0))
+        arena.reset({0: away}, {0: scene.departures(generator_of("a"))})
+        for _ in range(2):
+            arena.step(np.zeros((1, 2, 2)))
+        assert arena.reading is not None
+        places_m = dict(zip(arena.reading.names[0], arena.reading.x_m[0], strict=True))
+    finally:
+        arena.close()
+    assert [places_m[each.name] for each in found] == pytest.approx(walked_m.tolist(), abs=1.0)
+
+
 def test_game__with_the_same_seed_has_the_same_traffic(scene: OpenScene) -> None:
     first = scene.departures(generator_of("a"))
     again = open_scene(scene.folder)

@@ -14,6 +14,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pandas as pd
@@ -23,12 +24,17 @@ from harness.campaign.storage.checksums import mismatches, read_checksums, write
 from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES, name_manoeuvres
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.environments.rollout import Arm, Game, assess
+from harness.errors import StageFailed
 from harness.evaluation.people import columns_for
 from harness.evaluation.tables import PLAYED_COLUMNS, join_csv, typed, write_csv
 from harness.evaluation.trace_file import TraceWriter, join_traces
+from harness.evaluation.unplayed_games import reason_of
 from harness.files import make_folder
 
 SEGMENT_EPISODES = 50
+HOPELESS_GAMES = 10
+"""An arm ends if this many games, its first, can't be played for one reason: the others would not be played either."""
+KEEP_GOING = "--keep-going"
 _TRACES = "traces.parquet"
 
 
@@ -51,7 +57,7 @@ class Segment:
         errors = record.get("errors")
         return errors if isinstance(errors, int) else None
 
-    def play(self, games: Iterator[Game], labels: Mapping[str, Any], arm: Arm, on_game: Callable[[], None]) -> int:
+    def play(self, games: Iterator[Game], labels: Mapping[str, Any], arm: Arm, on_game: Callable[[Game], None]) -> int:
         """Play it; `games` yields its games next. Returns how many of them could not be played."""
         records = []
         with TraceWriter(self.file(_TRACES)) as traces:
@@ -60,7 +66,7 @@ class Segment:
                 records.append({**game.record, **labels})
                 if game.trace is not None:
                     traces.add(game.trace)
-                on_game()
+                on_game(game)
         table = typed(pd.DataFrame(records).reindex(columns=list(columns_for(len(arm.drivers) - 1, PLAYED_COLUMNS))))
         write_csv(table, self.file(EPISODES))
         write_csv(name_manoeuvres(table, self.file(_TRACES), arm.scene), self.file(MANOEUVRES))
@@ -83,22 +89,28 @@ def play_segments(
     attempt: Attempt,
     on_start: OnStart,
     on_progress: OnProgress,
+    keep_going: bool = False,
 ) -> int:
     """Play the games of an arm that are missing. Returns how many of all its games could not be played.
 
     `labels` are the cells that all records share. `on_start` gets each episode number before that game is played,
-    `on_progress` the number of games played and their total. Raises as `assess` does.
+    `on_progress` the number of games played and their total. Raises as `assess` does, and StageFailed if the first ten
+    games can't be played for one reason, unless `keep_going`.
     """
     make_folder(segments[0].folder)
     errors = {segment: segment.errors() for segment in segments}
     missing = [each for each, found in errors.items() if found is None or (found and attempt.first)]
     total = segments[-1].episodes.stop
     done = total - sum(len(segment.episodes) for segment in missing)
+    first = None if keep_going or done else list[str]()
 
-    def on_game() -> None:
+    def on_game(game: Game) -> None:
         nonlocal done
         done += 1
         on_progress(done, total)
+        if first is not None and done <= HOPELESS_GAMES:
+            first.append(str(game.record["error"]))
+            _check_hope(arm, first)
 
     episodes = chain.from_iterable(segment.episodes for segment in missing)
     with closing(assess(arm, episodes, on_start, attempt.abandoned)) as games:  # type: ignore[type-var]
@@ -108,8 +120,21 @@ def play_segments(
     return sum(found or 0 for found in errors.values())
 
 
-def join_segments(segments: Sequence[Segment], episodes: Path, manoeuvres: Path, traces: Path) -> None:
-    """Join the segments of an arm into its files."""
+def _check_hope(arm: Arm, errors: Sequence[str]) -> None:
+    """Raise StageFailed if these are the errors of an arm's first games, and all of one reason."""
+    if len(errors) == HOPELESS_GAMES and all(errors) and len({reason_of(each) for each in errors}) == 1:
+        what = f"{arm.name}: none of its first {HOPELESS_GAMES} games could be played, all for one reason"
+        raise StageFailed(f"{what} ({KEEP_GOING} plays the others too): {errors[0]}")
+
+
+def join_segments(
+    segments: Sequence[Segment],
+    episodes: Path,
+    manoeuvres: Path,
+    traces: Path,
+    labels: Mapping[str, str | int] = MappingProxyType({}),
+) -> None:
+    """Join the segments of an arm into its files. `labels` name the arm in the metadata of its traces."""
     join_csv([segment.file(EPISODES) for segment in segments], episodes)
     join_csv([segment.file(MANOEUVRES) for segment in segments], manoeuvres)
-    join_traces([segment.file(_TRACES) for segment in segments], traces)
+    join_traces([segment.file(_TRACES) for segment in segments], traces, labels)

@@ -85,8 +85,8 @@ class StageProgress:
             self.bars.remove_task(self._rows.pop(event.stage))
         if event.kind in ("done", "failed", "skipped"):
             self.bars.advance(self._whole)
-        line = self._line(event)
-        if line:
+        shown = event.kind != "started" or not self._console.is_terminal  # there its bar shows that it started
+        if shown and (line := event_line(event)):
             self.bars.console.print(line, highlight=False, soft_wrap=True, markup=False)
 
     def tell(self, stage: str, what: str, message: str) -> None:
@@ -107,16 +107,18 @@ class StageProgress:
             task = next(each for each in self.bars.tasks if each.id == row)
             self._console.print(_running_line(event, unit, task), highlight=False, markup=False)
 
-    def _line(self, event: Event) -> str:
-        match event.kind:
-            case "progress":
-                return ""
-            case "started":
-                return "" if self._console.is_terminal else f"started  {event.stage}"
-            case "done":
-                return _done_line(event)
-            case _:
-                return f"{event.kind:8s} {event.stage}: {event.message}"
+
+def event_line(event: Event) -> str:
+    """An event in words; progress has none."""
+    match event.kind:
+        case "progress":
+            return ""
+        case "started":
+            return f"started  {event.stage}"
+        case "done":
+            return _done_line(event)
+        case _:
+            return f"{event.kind:8s} {event.stage}: {event.message}"
 
 
 def _running_line(event: Event, unit: str, task: Task) -> str:

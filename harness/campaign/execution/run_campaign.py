@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
 
 from harness.campaign.execution.cache_keys import stage_keys
-from harness.campaign.execution.progress import StageProgress
+from harness.campaign.execution.progress import StageProgress, event_line
+from harness.campaign.execution.repeat_check import CHECKING as REPEATING
+from harness.campaign.execution.repeat_check import varying_drivers
 from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stages import StartWorkers, run_stages
 from harness.campaign.execution.stage_events import Event
@@ -19,7 +22,9 @@ from harness.campaign.results.kept_results import RunResult, kept_result
 from harness.campaign.storage.learned import Entries, did_not_learn, judged, recorded_goals
 from harness.campaign.storage.manifest import FINISHED
 from harness.campaign.storage.run_folder import FORMAT, RunFolder
+from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.versions import versions, versions_of_numbers
+from harness.errors import plain
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.reports.provenance import mixed_versions, warn
 
@@ -27,24 +32,33 @@ CHECKING = "checking what is finished"
 NOTHING_TO_DO = "Nothing to do: every stage is finished, and the results are those of this version."
 
 
-def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console) -> RunResult:
-    """Carry out what is left of a campaign, and write its tables, replays and report.
+def run_campaign(
+    campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console, keep_going: bool = False
+) -> RunResult:
+    """Carry out what is left of a campaign, and write its tables, replays and report. `keep_going` is that of
+    `arm_segments.play_segments`.
 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
     """
     folder.claim(campaign.document.name, campaign.quick)
     with folder.held():
+        with console.status(REPEATING):
+            varying = varying_drivers(campaign, folder)
+        for driver, difference in varying.items():
+            console.print(plain(f"{driver}: {difference}"), style="bold yellow", highlight=False, markup=False)
         stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
         with console.status(CHECKING):
-            manifest = _ManifestKeeper(campaign, folder, stages, keys)
+            manifest = _ManifestKeeper(campaign, folder, stages, keys, varying)
             scene = campaign.scene.document
             folder.keep_scene(campaign.scene.folder, scene.files)
             finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
+            _log_plan(campaign, stages, finished)
             kept = kept_result(folder, manifest.content) if len(finished) == len(stages) else None
         if kept is not None:
             warn(mixed_versions(manifest.content["stages"]), console)
             console.print(NOTHING_TO_DO, highlight=False)
+            LOGGER.info(NOTHING_TO_DO)
             return kept
         if len(finished) < len(stages):
             manifest.warn_of_versions(console)
@@ -54,22 +68,44 @@ def run_campaign(campaign: OpenCampaign, folder: RunFolder, start_workers: Start
                     incapable = did_not_learn(manifest.content["stages"])
                     manifest.note(event)
                     progress.show(event)
+                    log_event(event)
                     for training, shortfall in did_not_learn(manifest.content["stages"]).items():
                         if training not in incapable:
                             progress.tell(training, DID_NOT_LEARN, shortfall)
+                            LOGGER.warning("%s: %s: %s", DID_NOT_LEARN, training, shortfall)
 
-                workers = start_workers(run_context_of(campaign, folder, keys), len(stages) - len(finished))
+                context = run_context_of(campaign, folder, keys, keep_going)
+                workers = start_workers(context, len(stages) - len(finished))
                 run_stages(stages, finished, workers, emit)
         from harness.campaign.results.results import write_results  # imports pandas and statistics
 
         return write_results(folder, console)
 
 
+def _log_plan(campaign: OpenCampaign, stages: Sequence[Stage], finished: Sequence[str]) -> None:
+    quick = ", quick" if campaign.quick else ""
+    LOGGER.info("campaign %s%s: %d stages, %d finished", campaign.document.name, quick, len(stages), len(finished))
+    for stage in stages:
+        LOGGER.debug("%s %s", "finished" if stage.id in finished else "to do   ", stage.id)
+
+
+def log_event(event: Event) -> None:
+    """Write an event of a stage into the run's log. Progress is not logged."""
+    levels = {"failed": logging.ERROR, "crashed": logging.WARNING, "skipped": logging.WARNING}
+    if event.kind != "progress":
+        LOGGER.log(levels.get(event.kind, logging.INFO), "%s", event_line(event))
+
+
 class _ManifestKeeper:
     """Keeps the manifest in step with what happens."""
 
     def __init__(
-        self, campaign: OpenCampaign, folder: RunFolder, stages: Sequence[Stage], keys: Mapping[str, str]
+        self,
+        campaign: OpenCampaign,
+        folder: RunFolder,
+        stages: Sequence[Stage],
+        keys: Mapping[str, str],
+        varying: Mapping[str, str],
     ) -> None:
         self._folder, self._campaign, self._plan = folder, campaign.document, stages
         self._stages: Entries = {stage.id: _entry(stage, folder.finished(stage.id, keys[stage.id])) for stage in stages}
@@ -87,6 +123,8 @@ class _ManifestKeeper:
             "hashes": dict(campaign.hashes),
             "versions": versions(),
         }
+        if varying:
+            self._manifest["varying_drivers"] = dict(varying)
         self._write()
 
     @property

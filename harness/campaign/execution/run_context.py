@@ -29,6 +29,8 @@ class RunContext:
     policies: Path | None
     keys: Mapping[str, str]
     """The cache key of every stage."""
+    keep_going: bool = False
+    """Whether an arm is played to its end even if its first games can't be played."""
 
     def persona(self, name: str) -> Persona:
         """A persona of the campaign; the ego's own for the empty name."""
@@ -58,7 +60,9 @@ class RunContext:
         return self.policies / stage
 
 
-def run_context_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str]) -> RunContext:
+def run_context_of(
+    campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str, str], keep_going: bool = False
+) -> RunContext:
     """The context of a run of a campaign. Its scene is the run folder's copy, which does not change."""
     return RunContext(
         folder=folder.path,
@@ -70,4 +74,5 @@ def run_context_of(campaign: OpenCampaign, folder: RunFolder, keys: Mapping[str,
         other_egos=campaign.other_egos,
         policies=campaign.policies,
         keys=keys,
+        keep_going=keep_going,
     )

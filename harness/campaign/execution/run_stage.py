@@ -224,11 +224,12 @@ def _assess(stage: AssessmentStage, run: StageRun) -> Made:
     else:
         arm, choice = _arm_of_two(stage, run)
     segments = segments_of(folder.segments(stage.id), context.document.assessment.episodes)
-    labels = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
-    errors = play_segments(arm, segments, labels, run.attempt, run.on_start, run.on_progress)
+    labels: dict[str, str | int] = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
+    callbacks = run.on_start, run.on_progress
+    errors = play_segments(arm, segments, labels, run.attempt, *callbacks, keep_going=context.keep_going)
     work = folder.work(stage.id)
     files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
-    join_segments(segments, *files)
+    join_segments(segments, files[0], files[1], files[2], labels)
     files += make_tables(folder, stage.id, run.scene)
     episodes = segments[-1].episodes.stop
     facts = {"episodes": episodes, "errors": errors, "versions": [versions_of_numbers()], **choice}

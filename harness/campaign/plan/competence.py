@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from harness.campaign.plan.stages import TrainingStage
-from harness.config.campaign import Campaign
+from harness.config.campaign import Campaign, ego_called
 from harness.evaluation.research_questions import AloneBound
 from harness.evaluation.strategies import (
     Arm,
@@ -66,17 +66,19 @@ def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
                 yield AloneBound(player="non_ego", words=_non_ego_in_words(non_ego), arm=arm, goal_share=share)
         case _:
             arm, share = Arm(ego=strategy).name, asked.ego_goal_share
-            yield AloneBound(player="ego", words=_ego_in_words(strategy), arm=arm, goal_share=share)
+            yield AloneBound(
+                player="ego", words=_ego_in_words(strategy, campaign.ego.driver), arm=arm, goal_share=share
+            )
 
 
 def _non_ego_in_words(strategy: NonEgoStrategy) -> str:
     return f"the {strategy_name(strategy)} driver"
 
 
-def _ego_in_words(strategy: EgoStrategy) -> str:
+def _ego_in_words(strategy: EgoStrategy, driver: str) -> str:
     match strategy:
         case NaiveEgo():
-            return "the naive ego"
+            return f"the {ego_called(driver)}"
         case RetrainedEgo(round=2):
             return "the retrained ego"
         case ReconfiguredEgo():

@@ -59,6 +59,8 @@ class RunResult(Document):
     """One for each persona and question."""
     failed_stages: tuple[Line, ...]
     error_games: int = Field(ge=0)
+    error_reasons: tuple[Line, ...] = ()
+    """Why games could not be played, the most frequent reason first."""
     did_not_learn: tuple[Line, ...] = ()
     """The trainings that made no player that can drive the scene, each with its share of goals and the bound."""
     acceptance: tuple[ShownCheck, ...] = ()

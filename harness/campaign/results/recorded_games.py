@@ -15,6 +15,7 @@ from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.trace_quantities import series_of
 from harness.evaluation.worst_first import worst_first
+from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
 from harness.replay.contact import contacts
 from harness.replay.vehicles import types_of_vehicles
@@ -131,4 +132,7 @@ def scene_drawing(scene: OpenScene) -> SceneDrawing:
         rails=scene.rail_lines,
         goal=drawing.goal_lines(scene, net),
         buildings=scene.obstacles.outlines,
+        stripes=scene.stripes,
+        hiding_obstacles=[each.name for each in scene.obstacles.each if each.hides],
+        tall_width_m=TALL_WIDTH_M if scene.world.hiding.vehicles else None,
     )

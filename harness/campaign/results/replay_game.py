@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import pandas as pd
 from rich.box import SIMPLE
@@ -26,8 +27,9 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
 from harness.evaluation.worst_first import FAILURES, severities, worst_first
 from harness.replay import follow_in_sumo_gui, replay_name, write_film, write_replay
-from harness.traffic.scene import open_scene
+from harness.traffic.scene import OpenScene, open_scene
 
+_OTHERS = "--page, --rows, --outcome and ARM choose others"
 FAILURE = "failure"
 """Stands for every outcome that is a failure."""
 
@@ -45,43 +47,78 @@ class GameList:
     page: int = 1
 
 
-def game_table(run: Path, chosen: GameList) -> Table:
-    """The games of a run, worst first, with the pair of manoeuvres that led to the end."""
+@dataclass(frozen=True, kw_only=True)
+class ListedGames:
+    """Games of a run, worst first: a page of them."""
+
+    games: pd.DataFrame
+    """Of episodes.csv: arm, seed, episode, an outcome per player, ego_min_ttc_s; and severity, and manoeuvres in words:
+    the pair that led to the end."""
+    players: tuple[str, ...]
+    number: int
+    """Of the games on all pages."""
+    pages: int
+    named: bool
+    """Whether the run has named its manoeuvres."""
+
+
+def listed_games(run: Path, chosen: GameList) -> ListedGames:
+    """The chosen games of a run. Raises UsageError where no game is of an arm, a seed or an outcome."""
     folder = RunFolder(run)
-    episodes = _episodes(folder)
+    episodes = episodes_of(folder)
     manoeuvres = folder.path / "manoeuvres.csv"
     pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
-    missing = "" if manoeuvres.is_file() else f"; to name the manoeuvres: harness report {run}"
     episodes = _chosen(run, episodes, chosen)
-    shown, left = _page(worst_first(episodes.assign(severity=severities(episodes))), chosen)
-    more = f"{left}; " if left else ""
+    ordered = worst_first(episodes.assign(severity=severities(episodes)))
+    games, pages = _page(ordered, chosen)
+    players = ("ego", *people_in(episodes.columns))
+    columns = ["arm", "seed", "episode", *(f"{name}_outcome" for name in players), "ego_min_ttc_s", "severity"]
+    found = [pairs.get((game.arm, game.seed, game.episode)) for game in games.itertuples()]
+    return ListedGames(
+        games=games[columns].assign(manoeuvres=[pair.words if pair else "" for pair in found]),
+        players=players,
+        number=len(ordered),
+        pages=pages,
+        named=manoeuvres.is_file(),
+    )
+
+
+def game_table(run: Path, chosen: GameList) -> Table:
+    """The chosen games of a run, for the terminal."""
+    listed = listed_games(run, chosen)
+    left = f"page {chosen.page} of {listed.pages}, {listed.number:,} games; {_OTHERS}; " if listed.pages > 1 else ""
+    missing = "" if listed.named else f"; to name the manoeuvres: harness report {run}"
     table = Table(
         title=Text(f"Games of {run}, worst first"),
         title_justify="left",
-        caption=Text(f"{more}to watch one: harness replay RUN ARM EPISODE{missing}"),
+        caption=Text(f"{left}to watch one: harness replay RUN ARM EPISODE{missing}"),
         box=SIMPLE,
         padding=0,
     )
-    players = ("ego", *people_in(episodes.columns))
-    for name in ("arm", "seed", "episode", *players, "manoeuvres", "TTC (s)", "severity"):
+    for name in ("arm", "seed", "episode", *listed.players, "manoeuvres", "TTC (s)", "severity"):
         heading = name.replace("non_ego", "non-ego").replace("_", " ")
-        table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *players))
-    for game in shown.itertuples():
+        table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *listed.players))
+    for game in listed.games.itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
         severity = "" if math.isinf(game.severity) else f"{game.severity:.1f}"
-        pair = pairs.get((game.arm, game.seed, game.episode))
-        outcomes = [getattr(game, f"{name}_outcome") for name in players]
-        words = (str(game.seed), str(game.episode), *outcomes, pair.words if pair else "")
-        table.add_row(
-            *(Text(plain(cell)) for cell in (game.arm, *words, ttc, severity))
-        )  # text without markup, whatever the table contains
+        outcomes = [getattr(game, f"{name}_outcome") for name in listed.players]
+        words = (game.arm, str(game.seed), str(game.episode), *outcomes, game.manoeuvres, ttc, severity)
+        table.add_row(*(Text(plain(cell)) for cell in words))  # text without markup, whatever the table contains
     return table
+
+
+def game_records(run: Path, chosen: GameList) -> dict[str, Any]:
+    """The chosen games of a run, for JSON: a number that is not known is None."""
+    listed = listed_games(run, chosen)
+    known = listed.games.astype(object).where(listed.games.notna() & ~listed.games.isin([math.inf, -math.inf]), None)
+    shown = {"page": chosen.page, "pages": listed.pages, "number": listed.number}
+    return {"run": str(run), **shown, "games": known.to_dict("records")}
 
 
 def _chosen(run: Path, episodes: pd.DataFrame, chosen: GameList) -> pd.DataFrame:
     """The games that fulfil the conditions. Raises UsageError where one is of no game."""
     if chosen.arm is not None:
-        episodes = _of_arm(run, episodes, chosen.arm)
+        episodes = games_of_arm(run, episodes, chosen.arm)
     if chosen.seed is not None:
         seeds = sorted(set(episodes["seed"]))
         if chosen.seed not in seeds:
@@ -96,17 +133,11 @@ def _chosen(run: Path, episodes: pd.DataFrame, chosen: GameList) -> pd.DataFrame
     return episodes
 
 
-def _page(games: pd.DataFrame, chosen: GameList) -> tuple[pd.DataFrame, str]:
-    """The games of the page, and a remark on the others; empty if there are none."""
-    if chosen.rows is None or (len(games) <= chosen.rows and chosen.page == 1):
-        return games, ""
-    first = (chosen.page - 1) * chosen.rows
-    shown = games.iloc[first : first + chosen.rows]
-    pages = -(-len(games) // chosen.rows)
-    return (
-        shown,
-        f"page {chosen.page} of {pages}, {len(games):,} games; --page, --rows, --outcome and ARM choose others",
-    )
+def _page(games: pd.DataFrame, chosen: GameList) -> tuple[pd.DataFrame, int]:
+    """The games of the page, and the number of pages."""
+    rows = chosen.rows or max(len(games), 1)
+    first = (chosen.page - 1) * rows
+    return games.iloc[first : first + rows], max(-(-len(games) // rows), 1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,16 +150,26 @@ class FoundGame:
     step_length_s: float
 
 
-@contextmanager
-def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
-    """A game with a temporary replay folder, made from its trace. The folders under `replays/` are not opened here: a
-    changed configuration there could make SUMO read and write any file.
+@dataclass(frozen=True, kw_only=True)
+class PlayedGame:
+    """A recorded game: its trace, and the scene that it was played on."""
+
+    name: str
+    title: str
+    record: pd.DataFrame
+    """Its row of `episodes.csv`."""
+    trace: pd.DataFrame
+    scene: OpenScene
+
+
+def played_game(run: Path, arm: str, episode: int, seed: int | None) -> PlayedGame:
+    """The game of an arm and episode; `seed` None is the first training seed.
 
     Raises UsageError if there is no such game, or it could not be played.
     """
     folder = RunFolder(run)
     chosen_seed = folder.manifest()["seeds"][0] if seed is None else seed
-    games = _of_arm(run, _episodes(folder), arm)
+    games = games_of_arm(run, episodes_of(folder), arm)
     found = games[(games["episode"] == episode) & (games["seed"] == chosen_seed)]
     if found.empty:
         raise UsageError.of(
@@ -139,33 +180,56 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
         )
     if found.iloc[0]["error"]:
         raise UsageError.of(run, f"{arm} {episode}", f"could not be played: {found.iloc[0]['error']}", "choose another")
-    if not folder.traces(stage_id(arm, chosen_seed)).is_file():
+    traces = traces_of(folder, arm, chosen_seed, episode)
+    scene = open_scene(folder.scene)
+    trace = read_trace(traces, episode)
+    if trace.empty:
+        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
+    return PlayedGame(
+        name=replay_name(arm, chosen_seed, episode),
+        title=f"{arm}, seed {chosen_seed}, episode {episode}",
+        record=found,
+        trace=trace,
+        scene=scene,
+    )
+
+
+def traces_of(folder: RunFolder, arm: str, seed: int, episode: int) -> Path:
+    """The traces file of an arm and seed. Raises UsageError, which names the episode, if the folder lacks it."""
+    traces = folder.traces(stage_id(arm, seed))
+    if not traces.is_file():
         raise UsageError.of(
-            run,
+            folder.path,
             f"{arm} {episode}",
             "was recorded, but this folder does not contain the traces",
-            f"watch it in {run / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
+            f"watch it in {folder.path / 'report.html'}, or run campaign {folder.manifest()['name']!r} again",
         )
-    scene = open_scene(folder.scene)
-    trace = read_trace(folder.traces(stage_id(arm, chosen_seed)), episode)
-    title = f"{arm}, seed {chosen_seed}, episode {episode}"
-    name = replay_name(arm, chosen_seed, episode)
-    if trace.empty:
-        traces = folder.traces(stage_id(arm, chosen_seed))
-        raise UsageError.of(traces, "", f"has no trace of episode {episode}", "run the campaign again")
+    return traces
+
+
+@contextmanager
+def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[FoundGame]:
+    """A game with a temporary replay folder, made from its trace. The folders under `replays/` are not opened here: a
+    changed configuration there could make SUMO read and write any file.
+
+    Raises UsageError if there is no such game, or it could not be played.
+    """
+    game = played_game(run, arm, episode, seed)
+    scene = game.scene
     with TemporaryDirectory(prefix="harness-replay-") as scratch:
-        replay = Path(scratch) / name
+        replay = Path(scratch) / game.name
         write_replay(
-            trace,
+            game.trace,
             scene.net_file,
             scene.route_files,
             replay,
-            title=title,
+            title=game.title,
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
             obstacles=scene.obstacles,
+            stripes=scene.stripes,
         )
-        yield FoundGame(replay=replay, trace=trace, title=title, step_length_s=scene.world.step_s)
+        yield FoundGame(replay=replay, trace=game.trace, title=game.title, step_length_s=scene.world.step_s)
 
 
 def watch(game: FoundGame, console: Console) -> None:
@@ -193,12 +257,14 @@ def film(game: FoundGame, file: Path, console: Console) -> None:
     console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
 
 
-def _episodes(folder: RunFolder) -> pd.DataFrame:
+def episodes_of(folder: RunFolder) -> pd.DataFrame:
+    """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run."""
     folder.manifest()
     return read_csv(folder.path / "episodes.csv")
 
 
-def _of_arm(run: Path, episodes: pd.DataFrame, arm: str) -> pd.DataFrame:
+def games_of_arm(run: Path, episodes: pd.DataFrame, arm: str) -> pd.DataFrame:
+    """The rows of an arm. Raises UsageError if there is none."""
     arms = sorted(set(episodes["arm"]))
     if arm not in arms:
         raise UsageError.of(run, arm, "has no such arm", nearest(arm, arms or ["(no arm is done yet)"]))

@@ -26,9 +26,10 @@ from harness.campaign.storage.learned import did_not_learn, judged
 from harness.campaign.storage.manifest import FINISHED, is_tuned
 from harness.campaign.storage.manoeuvre_table import manoeuvres_of
 from harness.campaign.storage.run_folder import MANIFEST, RunFolder
+from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.trace_tables import cause_table, severity_table, with_severity
 from harness.config.campaign import Campaign
-from harness.errors import UsageError
+from harness.errors import UsageError, plain
 from harness.evaluation.acceptance import Evidence, unanswered
 from harness.evaluation.causes.columns import CAUSE_COLUMNS
 from harness.evaluation.comparison import compare, games_by_arm
@@ -48,6 +49,7 @@ from harness.evaluation.tables import (
     write_csv,
 )
 from harness.evaluation.trace_file import TraceReader, check_traces
+from harness.evaluation.unplayed_games import reasons_of
 from harness.evaluation.worst_first import worst_first
 from harness.files import write_atomically
 from harness.replay import choose_games, replay_name, write_replay
@@ -143,6 +145,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         ),
         failed_stages=failed,
         error_games=int((episodes["error"] != "").sum()),
+        error_reasons=tuple(map(plain, reasons_of(episodes["error"]))),
         did_not_learn=tuple(f"{name}: {shortfall}" for name, shortfall in did_not_learn(entries).items()),
         acceptance=tuple(
             ShownCheck(passed=each.passed, text=each.text) for each in shown_lines(checks, len(campaign.seeds))
@@ -150,6 +153,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     )
     write_ci_files(folder, manifest, checks, result)
     keep_result(folder, written, result)
+    LOGGER.info("wrote the results of %d games; exit code %d", len(episodes), result.exit_code)
     return result
 
 
@@ -255,6 +259,7 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
             step_length_s=scene.world.step_s,
             rails=scene.rail_lines,
             obstacles=scene.obstacles,
+            stripes=scene.stripes,
         )
     _drop_stale(folder.replays, set(names))
     return names

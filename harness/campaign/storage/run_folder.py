@@ -5,6 +5,7 @@
                              of a reconfiguration: driver.toml
     traces/<stage>.parquet   one file per arm
     scene/                   a copy of the scene's files
+    harness.log              what the commands did, and when
     .stages/<stage>/         what a stage needs to go on, or to be skipped: checkpoint, trials, segments, tables,
                              done.json
     .stages/results.json     what the tables, replays and report were made from, and their checksums
@@ -33,6 +34,7 @@ from harness.campaign.plan.stages import stage_id
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
 from harness.campaign.storage.manifest import StageEntry, check_manifest, problems_for_report
+from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
 from harness.files import content_of, drop_scratch, leads_out, make_folder, write_atomically
 
@@ -57,8 +59,8 @@ def _check(content: bytes) -> dict[str, Any]:
 
 
 def _has_only_locks(folder: Path) -> bool:
-    """Whether a folder holds nothing but folders and locks, as a command leaves it that was killed at once."""
-    names = [name for _, _, files in os.walk(folder) for name in files]
+    """Whether a folder holds nothing but folders, locks and a log, as a command leaves it that was killed at once."""
+    names = [name for _, _, files in os.walk(folder) for name in files if name != LOG]
     return all(name.startswith(("lock", f".{MANIFEST}.")) or name.endswith(".lock") for name in names)
 
 
@@ -260,7 +262,7 @@ class RunFolder:
             yield
             return
         try:
-            with only_one(self.lock):
+            with only_one(self.lock), run_log(self.path):
                 wait_for_workers(self.workers, _PATIENCE_S)
                 drop_scratch(self.path)
                 shutil.rmtree(self.scratch, ignore_errors=True)

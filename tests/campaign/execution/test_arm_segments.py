@@ -15,6 +15,7 @@ from harness.campaign.execution.arm_segments import Segment, join_segments, play
 from harness.campaign.execution.crash_retries import FIRST, Attempt
 from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm
+from harness.errors import StageFailed
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_traces
 from harness.game.arrays import FloatArray, IntArray
@@ -122,6 +123,37 @@ def test_arm__only_segments_with_errors_are_played_again_by_the_next_run(
     assert play(forgetful, tmp_path, AGAIN) == (1, [])  # within a run, errors stay
     assert play(forgetful, tmp_path) == (0, [3, 4, 5])
     assert files(tmp_path) == files(whole)
+
+
+class NeverDecides(Steady):
+    """Raises in every game, or in every game but one."""
+
+    def __init__(self, but: int = -1) -> None:
+        super().__init__()
+        self.but, self.games = but, 0
+
+    def reset(self, games: IntArray) -> None:
+        self.games += 1
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        if self.games - 1 == self.but:
+            return super().decide(games, observation, noise)
+        raise RuntimeError(f"out of ideas after {self.games * 1.5} s")
+
+
+def play_ten(driver: Steady, scene: OpenScene, folder: Path, **more: bool) -> int:
+    segments = segments_of(folder / "segments", 12)
+    return play_segments(
+        arm(scene, driver, SumoDriver()), segments, LABELS, FIRST, lambda game: None, lambda done, total: None, **more
+    )
+
+
+def test_arm__ends_if_its_first_ten_games_fail_for_one_reason(merge: OpenScene, tmp_path: Path) -> None:
+    with pytest.raises(StageFailed, match=r"none of its first 10 games .*--keep-going.*RuntimeError: out of ideas"):
+        play_ten(driver := NeverDecides(), merge, tmp_path)
+    assert driver.games == 10
+    assert play_ten(NeverDecides(), merge, tmp_path, keep_going=True) == 12
+    assert play_ten(NeverDecides(but=9), merge, tmp_path / "one") == 11
 
 
 @pytest.mark.parametrize("name", ["json", "episodes.csv", "manoeuvres.csv", "traces.parquet"])

@@ -1,0 +1,58 @@
+"""The check that external drivers decide the same when a game is played again.
+
+Games are compared in pairs, and finished games are not played again: a driver that varies makes both worthless. Its
+campaign runs, with a warning on the terminal and in the report. The answer is kept in the run folder:
+
+<run>/.stages/repeats.json     by a hash of driver and scene: the difference, in words; empty if there is none
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+from harness.campaign.preflight import OpenCampaign
+from harness.campaign.storage.run_folder import RunFolder
+from harness.drivers.external import ExternalDriver
+from harness.environments.repeated_game import difference_when_repeated
+from harness.files import make_folder, write_atomically
+
+CHECKING = "playing a game twice"
+_CODE = ("process", "fmu", "stable_baselines3", "python", "onnx", "torchscript")
+"""Kinds of drivers whose code is not the harness's own."""
+
+
+def varying_drivers(campaign: OpenCampaign, folder: RunFolder | None = None) -> dict[str, str]:
+    """The external drivers of a campaign that decide otherwise when a game is played again, each with the difference in
+    words. With a run folder, what it knows already is not played."""
+    file = folder.path / ".stages" / "repeats.json" if folder is not None else None
+    known = _known(file) if file is not None else {}
+    drivers = [each for each in (campaign.ego_driver, *campaign.other_egos.values()) if each is not None]
+    found = {}
+    for driver in drivers:
+        if driver.kind in _CODE:
+            key = _key(campaign, driver)
+            if key not in known:
+                sampled = driver is campaign.ego_driver and campaign.ego_persona.decisions == "sampled"
+                known[key] = difference_when_repeated(driver, campaign.scene.folder, sampled)
+                if file is not None:
+                    make_folder(file.parent)
+                    write_atomically(file, json.dumps(known, indent=1).encode())
+            found[driver.written] = known[key]
+    return {name: difference for name, difference in found.items() if difference}
+
+
+def _known(file: Path) -> dict[str, str]:
+    try:
+        known = json.loads(file.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    if not isinstance(known, dict):
+        return {}
+    return {str(key): text for key, text in known.items() if isinstance(text, str)}
+
+
+def _key(campaign: OpenCampaign, driver: ExternalDriver) -> str:
+    scene = {name: campaign.hash_of(campaign.scene.folder / name) for name in campaign.scene.document.files}
+    return hashlib.sha256(json.dumps([driver.identity, scene], sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,165 @@
+"""`harness scene new`: from a map to scenes and campaigns that run as they are."""
+
+from __future__ import annotations
+
+import io
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from harness.cli import wording
+from harness.cli.terminal import print_plain
+from harness.errors import FAILED, UsageError, plain
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from harness.traffic.maps.open_map import OpenMap
+    from harness.traffic.maps.plans import GamePlan
+
+_ROWS = 40
+_SKETCH_ROWS = 24
+
+
+def new_scene(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="The name of the scene and of its campaign.", show_default=False)
+    ],
+    source: Annotated[
+        Path,
+        typer.Option(
+            "--from",
+            metavar="FILE",
+            help="A map: .net.xml of SUMO, .osm of OpenStreetMap or .xodr of OpenDRIVE; each may be compressed (.gz).",
+            show_default=False,
+        ),
+    ],
+    conflict: Annotated[
+        int | None,
+        typer.Option(
+            metavar="K", help="Make the scene of this conflict.  [default: the first one]", show_default=False
+        ),
+    ] = None,
+    every: Annotated[
+        bool, typer.Option("--all", help="Make a scene of each conflict that is listed: NAME_1, NAME_2 and so on.")
+    ] = False,
+    only_list: Annotated[bool, typer.Option("--list", help="List the conflicts, and make no scene.")] = False,
+    kind: Annotated[
+        str | None, typer.Option(metavar="KIND", help="Only conflicts of this kind.", show_default=False)
+    ] = None,
+    near: Annotated[
+        str | None,
+        typer.Option(metavar="EDGE", help="Only conflicts at junctions near this edge.", show_default=False),
+    ] = None,
+    within: Annotated[float, typer.Option(min=0.0, metavar="M", help="Distance in metres that is near.")] = 100.0,
+    rows: Annotated[int, typer.Option(min=1, metavar="N", help="Most conflicts to list.")] = _ROWS,
+    left_hand: Annotated[
+        bool, typer.Option("--left-hand", help="Traffic in the OpenStreetMap file keeps to the left.")
+    ] = False,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Also write a page that draws the map with the conflicts.", show_default=False
+        ),
+    ] = None,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder that gets networks/NAME and campaigns/NAME.toml.")
+    ] = Path(),
+) -> None:
+    """Make scenes from a map: the places where the ways of two road users cross or merge, found in its right of way.
+
+    Lists these conflicts with their numbers, and writes a scene of one of them, or of each: the net, the players'
+    routes, starts from which they meet, goals, and a campaign.
+    """
+    from rich.console import Console
+
+    from harness.cli.scene_writing import check_new
+    from harness.traffic.maps.open_map import open_map
+
+    if conflict is not None and every:
+        raise UsageError.of("harness scene new", "--all", *wording.ONE_OR_ALL)
+    if not only_list:
+        check_new(name, [] if every else [name], out)
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")  # the terminal may not have every character
+    console = Console()
+    with tempfile.TemporaryDirectory(prefix="harness-map-") as folder:
+        with console.status(wording.reading(source)):
+            opened = open_map(source, Path(folder), left_hand=left_hand)
+        plans = _wanted(opened, kind, near, within)
+        chosen = {name: _numbered(opened, conflict) if conflict is not None else plans[0]}
+        if every:
+            chosen = {f"{name}_{plan.number}": plan for plan in plans}
+            check_new(name, [] if only_list else list(chosen), out)
+        _show(opened, plans[:rows], console)
+        if len(plans) > rows:
+            print_plain([wording.rows_left_out(len(plans) - rows, "conflicts")], console)
+        if html is not None:
+            _write_page(opened, plans, html)
+            print_plain([wording.page_written(html)], console)
+        if not only_list:
+            _write(opened, chosen, out, console)
+
+
+def _wanted(opened: OpenMap, kind: str | None, near: str | None, within_m: float) -> list[GamePlan]:
+    plans = opened.near(near, within_m)
+    if near is not None and not plans:
+        raise UsageError.of("--near", near, *wording.NO_CONFLICT_NEAR)
+    if kind is None:
+        return plans
+    kinds = list(dict.fromkeys(plan.candidate.kind.value for plan in plans))
+    if kind not in kinds:
+        raise UsageError.of("--kind", kind, *wording.no_kind_of_conflict(kinds))
+    return [plan for plan in plans if plan.candidate.kind.value == kind]
+
+
+def _numbered(opened: OpenMap, number: int) -> GamePlan:
+    if not 1 <= number <= len(opened.plans):
+        raise UsageError.of("--conflict", str(number), *wording.no_such_conflict(len(opened.plans)))
+    return opened.plans[number - 1]
+
+
+def _show(opened: OpenMap, plans: Sequence[GamePlan], console: Console) -> None:
+    """The sketch, the table and the numbers of a map's conflicts."""
+    from harness.cli.map_sketch import sketch
+    from harness.cli.net_tables import plan_table
+
+    marks = [(plan.number, plan.candidate.place) for plan in plans]
+    braille = (console.encoding or "").lower().startswith("utf")
+    columns = max(min(console.width - 2, 120), 20)
+    print_plain(sketch(opened.roads(), marks, columns=columns, rows=_SKETCH_ROWS, braille=braille), console)
+    console.print(plan_table([(plan, opened.place_of(plan)) for plan in plans]), highlight=False)
+    counts = Counter(plan.candidate.kind.value for plan in opened.plans)
+    print_plain(wording.conflicts_found(counts.items(), opened.left_out), console)
+
+
+def _write_page(opened: OpenMap, plans: Sequence[GamePlan], file: Path) -> None:
+    from harness.cli.net_drawing import map_drawing
+    from harness.cli.net_tables import plan_priority
+    from harness.reports.net_page import write_net_page
+
+    places = []
+    for plan in plans:
+        kind, priority = plan.candidate.kind.value, plan_priority(plan)
+        text = f"conflict {plan.number}: {kind}, {opened.place_of(plan)}; priority: {priority}"
+        places.append((plan.number, plan.candidate.place, text))
+    write_net_page(map_drawing(opened.source.name, *opened.listed(), places), file)
+
+
+def _write(opened: OpenMap, chosen: dict[str, GamePlan], out: Path, console: Console) -> None:
+    from harness.cli.scene_writing import files_of, write_scenes
+
+    with console.status(wording.MAKING_SCENES):
+        written, problems = write_scenes(opened, chosen, out)
+    for each in written:
+        plan = chosen[each]
+        print_plain([wording.scene_made(plan.number, plain(opened.place_of(plan)), *files_of(each, out))], console)
+    print_plain([str(problem) for problem in problems], console)
+    print_plain([wording.run_campaign_next(files_of(written[0], out)[1])], console)
+    if problems:
+        raise typer.Exit(FAILED)

@@ -1,0 +1,81 @@
+"""What a command prints, and where: for people, for programs (`--json`), less (`--quiet`) or more (`--verbose`)."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from harness.errors import USAGE_ERROR, UsageError
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+AsJson = Annotated[
+    bool,
+    typer.Option("--json", help="Print the result as one JSON object; what else there is to say goes to stderr."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only what failed.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Also print the lines of the run's log, harness.log, with more detail.")
+]
+
+
+@contextmanager
+def output(as_json: bool, quiet: bool = False, verbose: bool = False) -> Iterator[Console]:
+    """The console for what people read: with JSON on standard output, it is standard error.
+
+    During the block a usage error is printed as JSON as well, if that is asked for, and `verbose` shows the run's log.
+    """
+    from rich.console import Console
+
+    console = Console(stderr=as_json, quiet=quiet)
+    with _problems_as_json(as_json), _log_shown(verbose, console):
+        if quiet and verbose:
+            raise UsageError.of("--quiet", "--verbose", "are opposites", "leave one of them out")
+        yield console
+
+
+def print_json(content: Any) -> None:
+    """Print JSON to standard output. A number that JSON can't write is a null already."""
+    print(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
+
+
+@contextmanager
+def _problems_as_json(as_json: bool) -> Iterator[None]:
+    """Where JSON is asked for, print the problems of a usage error as JSON as well."""
+    try:
+        yield
+    except UsageError as error:
+        if as_json:
+            names = ("file", "key", "message", "remedy")
+            problems = [{name: getattr(problem, name) for name in names} for problem in error.problems]
+            print_json({"exit_code": USAGE_ERROR, "problems": problems})
+        raise
+
+
+@contextmanager
+def _log_shown(verbose: bool, console: Console) -> Iterator[None]:
+    """Print what is logged of a run, with details, above the bars of a console."""
+    if not verbose:
+        yield
+        return
+    from harness.campaign.storage.run_log import LOGGER, RunLogFormatter
+
+    class Shown(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            console.print(self.format(record), style="dim", highlight=False, markup=False, soft_wrap=True)
+
+    handler, level = Shown(), LOGGER.level
+    handler.setFormatter(RunLogFormatter())
+    LOGGER.addHandler(handler)
+    LOGGER.setLevel(logging.DEBUG)
+    try:
+        yield
+    finally:
+        LOGGER.removeHandler(handler)
+        LOGGER.setLevel(level)

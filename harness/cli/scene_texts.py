@@ -1,0 +1,78 @@
+"""The files of a scene on a map: scene.toml, the route file and a campaign."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from harness.errors import plain
+from harness.traffic.maps.candidates import Kind
+from harness.traffic.maps.plans import GamePlan
+
+_ON_ROADS = ("speedy", "distracted")
+_PERSONAS = {
+    Kind.MERGE: _ON_ROADS,
+    Kind.LANE_END: _ON_ROADS,
+    Kind.FOLLOWING: _ON_ROADS,
+    Kind.ZEBRA: ("jaywalker", "phone_walker"),
+}
+_MEANINGS = {
+    Kind.TURN_ACROSS: "the non-ego comes towards the ego and turns across its way",
+    Kind.CROSSING: "the non-ego crosses the ego's way",
+    Kind.ROUNDABOUT: "the non-ego enters a roundabout in front of the ego",
+    Kind.MERGE: "the non-ego joins the ego's road",
+    Kind.LANE_END: "the non-ego's lane ends beside the ego's",
+    Kind.ZEBRA: "the non-ego, on foot, crosses the ego's road on a marked crossing",
+    Kind.FOLLOWING: "the non-ego is ahead of the ego",
+}
+
+
+def scene_files(name: str, plan: GamePlan, source: Path, place: str) -> dict[str, str]:
+    """The texts of scene.toml and of the route file, by the files' names."""
+    values = {
+        "name": name,
+        "plan": plan,
+        "source": plain(source.name),
+        "place": plain(place),
+        "meaning": _MEANINGS[plan.candidate.kind],
+    }
+    return {
+        "scene.toml": _rendered("new_scene.toml.jinja", values),
+        f"{name}.rou.xml": _rendered("new_scene.rou.xml.jinja", values, in_xml=True),
+    }
+
+
+def campaign_text(name: str, plan: GamePlan) -> str:
+    """A campaign on a scene with the shipped personas that suit its kind."""
+    values = {"name": name, "personas": personas_for(plan), "meaning": _MEANINGS[plan.candidate.kind]}
+    return _rendered("new_scene_campaign.toml.jinja", values)
+
+
+def personas_for(plan: GamePlan) -> Sequence[str]:
+    """The shipped personas that suit a game."""
+    signals = plan.candidate.kind is Kind.CROSSING and plan.candidate.with_signals
+    return ("red_light_runner",) if signals else _PERSONAS.get(plan.candidate.kind, ("impatient",))
+
+
+def _rendered(template: str, values: Mapping[str, object], *, in_xml: bool = False) -> str:
+    environment = Environment(
+        loader=PackageLoader("harness", "cli"),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        autoescape=in_xml,
+        trim_blocks=True,
+    )
+    environment.filters["toml"] = _toml
+    return environment.get_template(template).render(values)
+
+
+def _toml(value: object) -> str:
+    """A value in TOML: a string, a number, or a list of them."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(float(str(value)))

@@ -1,0 +1,78 @@
+"""What each kind of driver document is made into, and what it is called."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from harness.config.driver import DriverDocument, Fmu, Onnx, Process, Python, StableBaselines3, Sumo, TorchScript
+from harness.config.rule_driver import Rules
+from harness.drivers.car import Car
+from harness.drivers.driver_files import resolve_in
+from harness.drivers.entry_points import entry_point, installed_driver
+from harness.drivers.fmu import fmu_driver
+from harness.drivers.network_driver import NetworkDriver
+from harness.drivers.policy import LearnedDriver
+from harness.drivers.policy_file import read_policy
+from harness.drivers.process import ProcessDriver
+from harness.drivers.protocol import Driver
+from harness.drivers.rules import RulesDriver
+from harness.drivers.sumo import SumoDriver
+
+
+def driver_in_words(document: DriverDocument | None, written: str, package: Mapping[str, str]) -> str:
+    """A description of a driver for reports; `document` is None for a policy's folder."""
+    match document:
+        case None:
+            return f"the policy {written}"
+        case Sumo(vehicle_type=name):
+            return f"SUMO's own models of vehicle type {name} ({written})"
+        case Rules(name=name):
+            return f"the rules {name} ({written})"
+        case Process(command=command):
+            return f"the program {' '.join(command)} ({written})"
+        case Fmu(file=file):
+            return f"the FMU {file} ({written})"
+        case StableBaselines3(file=file, algorithm=algorithm):
+            return f"the {algorithm} policy {file} of Stable-Baselines3 ({written})"
+        case Onnx(file=file):
+            return f"the ONNX network {file} ({written})"
+        case TorchScript(file=file):
+            return f"the TorchScript module {file} ({written})"
+        case Python(entry_point=name):
+            return f"{name} of the package {package['package']} {package['version']}"
+
+
+def make_driver(
+    document: DriverDocument | None, place: Path, command: Sequence[str], car: Car, sampled: bool
+) -> Driver:
+    """Make a driver for a car. `place` is the folder that paths are relative to, or a policy's folder; `command` is a
+    program's. Raises as `ExternalDriver.make` does."""
+    match document:
+        case None:
+            return LearnedDriver(read_policy(place), sampled)
+        case Sumo():
+            return SumoDriver()
+        case Rules():
+            return RulesDriver(document, car)
+        case Process(folder=folder, units=units):
+            return ProcessDriver(
+                command,
+                resolve_in(place, folder),
+                car,
+                units=units,
+                deadline_s=document.deadline_s,
+                start_deadline_s=document.start_deadline_s,
+                parameters=document.parameters,
+            )
+        case Fmu(file=file):
+            return fmu_driver(document, resolve_in(place, file), car)
+        case StableBaselines3(file=file, normalize=normalize):
+            from harness.drivers.sb3_policy import Sb3Driver  # torch is slow to import
+
+            scaling = resolve_in(place, normalize) if normalize is not None else None
+            return Sb3Driver(document, resolve_in(place, file), sampled, scaling)
+        case Onnx(file=file) | TorchScript(file=file):
+            return NetworkDriver(document, resolve_in(place, file), car)
+        case Python(entry_point=name, parameters=parameters):
+            return installed_driver(entry_point(name, place, "entry_point"), car, parameters)

@@ -1,0 +1,122 @@
+"""Pictures of a running game, for `render`: the road, the vehicles and the goal around one player, seen from above."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from PIL import Image, ImageDraw
+
+from harness.errors import UsageError
+from harness.game.arrays import FloatArray
+from harness.game.state import Bodies
+from harness.traffic.drawing import goal_lines, lane_marks, surfaces
+from harness.traffic.network import read_net
+from harness.traffic.scene import OpenScene
+
+SIZE_PX = (640, 320)
+WIDTH_M = 100.0  # of the road that is shown: a car of 4.6 m is 29 pixels long
+_FINER = 2  # drawn larger and scaled down: edges are smooth
+_GROUND, _ROAD, _MARK, _GOAL, _OUTLINE = "#e8ece4", "#9a9da3", "#ffffff", "#2ca02c", "#303030"
+_BACKGROUND, _OBSTACLE = "#dcdcdc", "#6e6e78"
+_PLAYERS = ("#1f77ff", "#ff7f0e", "#d62728", "#9467bd", "#8c564b")  # as in films: the ego is blue
+
+
+class ScenePicture:
+    """Draws games of a scene."""
+
+    def __init__(self, scene: OpenScene) -> None:
+        self._scene = scene
+
+    def draw(self, bodies: Bodies, game: int, player: int) -> Any:
+        """The surroundings of a player, uint8 [height, width, 3], in network directions: north is up."""
+        centre = np.array([bodies.x_m[game, player], bodies.y_m[game, player]])
+        size = (_FINER * SIZE_PX[0], _FINER * SIZE_PX[1])
+        image = Image.new("RGB", size, _GROUND)
+        draw, scale = ImageDraw.Draw(image), size[0] / WIDTH_M
+
+        def pixels(points_m: FloatArray) -> list[tuple[float, float]]:
+            place = (points_m[:, :2] - centre) * (scale, -scale) + 0.5 * np.array(size)
+            return [(x, y) for x, y in place.tolist()]
+
+        for rings in self._surfaces:
+            for ring, colour in zip(rings, (_ROAD, *[_GROUND] * (len(rings) - 1)), strict=True):
+                draw.polygon(pixels(ring), fill=colour)
+        for lines, colour, width_m in (
+            (self._marks, _MARK, 0.15),
+            (self._rails, _OUTLINE, 0.25),
+            (self._goals, _GOAL, 1),
+        ):
+            for line in lines:
+                draw.line(pixels(line), fill=colour, width=round(width_m * scale))
+        for body in reversed(range(bodies.x_m.shape[1])):  # the players last: above everything
+            if bodies.present[game, body]:
+                draw.polygon(pixels(_corners(bodies, game, body)), fill=self._colour(bodies, body), outline=_OUTLINE)
+        return np.asarray(image.resize(SIZE_PX, Image.Resampling.BOX))
+
+    def _colour(self, bodies: Bodies, body: int) -> str:
+        players, obstacles = len(self._scene.world.roles), len(self._scene.obstacles.each)
+        if body < players:
+            return _PLAYERS[body]
+        return _OBSTACLE if body >= bodies.x_m.shape[1] - obstacles else _BACKGROUND
+
+    @cached_property
+    def _shapes(self) -> tuple[list[list[FloatArray]], list[FloatArray], list[FloatArray]]:
+        net = read_net(self._scene.net_file)
+        return surfaces(net), lane_marks(net), goal_lines(self._scene, net)
+
+    @property
+    def _surfaces(self) -> list[list[FloatArray]]:
+        return self._shapes[0]
+
+    @property
+    def _marks(self) -> list[FloatArray]:
+        return self._shapes[1]
+
+    @property
+    def _goals(self) -> list[FloatArray]:
+        return self._shapes[2]
+
+    @property
+    def _rails(self) -> tuple[FloatArray, ...]:
+        return self._scene.rail_lines
+
+
+def _corners(bodies: Bodies, game: int, body: int) -> FloatArray:
+    """[4, 2] the corners of a body."""
+    x_m, y_m, heading_rad, length_m, width_m = (
+        float(getattr(bodies, name)[game, body]) for name in ("x_m", "y_m", "heading_rad", "length_m", "width_m")
+    )
+    along = 0.5 * length_m * np.array([np.cos(heading_rad), np.sin(heading_rad)])
+    across = 0.5 * width_m * np.array([-np.sin(heading_rad), np.cos(heading_rad)])
+    return np.array([x_m, y_m]) + np.array([along + across, along - across, -along - across, -along + across])
+
+
+class Window:
+    """A window that shows pictures, by matplotlib's interactive backends."""
+
+    def __init__(self, title: str) -> None:
+        """Raises UsageError if there is no screen, or no backend that can open a window."""
+        import matplotlib.pyplot as plt
+
+        self._plt: Any = plt
+        self._figure, axes = plt.subplots(figsize=(SIZE_PX[0] / 100, SIZE_PX[1] / 100), dpi=100, num=title)
+        if self._figure.canvas.required_interactive_framework is None:
+            self.close()
+            message = f"matplotlib can't open a window: its backend is {plt.get_backend()}"
+            remedy = "use a screen with Tk or Qt (apt-get install python3-tk, pip install PySide6), or rgb_array"
+            raise UsageError.of("render_mode", "human", message, remedy)
+        self._figure.subplots_adjust(0, 0, 1, 1)
+        axes.set_axis_off()
+        self._shown = axes.imshow(np.zeros((SIZE_PX[1], SIZE_PX[0], 3), dtype=np.uint8))
+
+    def show(self, picture: Any, pause_s: float) -> None:
+        """Show a picture for at least `pause_s`."""
+        self._shown.set_data(picture)
+        self._figure.canvas.draw_idle()
+        self._plt.pause(max(pause_s, 1e-3))
+
+    def close(self) -> None:
+        """Close the window."""
+        self._plt.close(self._figure)

@@ -1,0 +1,191 @@
+"""A recorded game as what exports write: bodies with their courses, and the signals' states.
+
+A road user that was absent for a while is one body for each of its presences.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import pandas as pd
+import shapely
+
+from harness.export.kinds import BUILDING, PERSON, Kind, kind_of_shape
+from harness.game.arrays import FloatArray
+from harness.replay.signals import changes_of_signals
+from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
+from harness.traffic.scene import OpenScene
+
+WHEELBASE_SHARE = 0.6
+"""Wheelbase of a vehicle of the background traffic, as a share of its length; players have one in their scene."""
+_NOT_IN_NAMES = re.compile(r"[^\w.:#-]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Body:
+    """A road user or a thing during one presence in the game. Poses [n] are those of the body's centre."""
+
+    name: str
+    """Unique in the game; without characters that have a meaning in OpenSCENARIO."""
+    original: str
+    """The name in the trace."""
+    kind: Kind
+    length_m: float
+    width_m: float
+    wheelbase_m: float
+    """0 for bodies without wheels."""
+    is_player: bool
+    first_step: int
+    time_s: FloatArray
+    x_m: FloatArray
+    y_m: FloatArray
+    heading_rad: FloatArray
+    """Without jumps of a whole turn."""
+    speed_mps: FloatArray
+    acceleration_mps2: FloatArray
+    leaves: bool
+    """Whether it is gone before the game ends."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether its pose changes."""
+        return any(bool(np.ptp(values) > 0.0) for values in (self.x_m, self.y_m, self.heading_rad))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SignalChange:
+    """From a time on, a traffic light has a state: a character of SUMO's for each of its links."""
+
+    light: str
+    time_s: float
+    state: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportedGame:
+    """A recorded game: the players first, then other road users by the time of their appearance, then buildings."""
+
+    name: str
+    """The name of its files."""
+    title: str
+    arm: str
+    seed: int
+    episode: int
+    outcome: str
+    step_s: float
+    end_s: float
+    bodies: tuple[Body, ...]
+    signals: tuple[SignalChange, ...]
+    """By time; the first of each light is at 0 s."""
+
+
+def exported_game(
+    trace: pd.DataFrame, scene: OpenScene, *, name: str, arm: str, seed: int, episode: int, outcome: str
+) -> ExportedGame:
+    """One game from its trace (columns as in `traces/`) and the scene that it was played on.
+
+    Raises ValueError for a trace without rows.
+    """
+    if trace.empty:
+        raise ValueError(f"the trace of {name} has no rows")
+    world = scene.world
+    types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
+    wheelbases_m = dict(zip(world.roles, world.actuators.wheelbase_m.tolist(), strict=True))
+    changes = changes_of_signals(trace, world.step_s)
+    states = [
+        SignalChange(light=light, time_s=step * world.step_s, state=state)
+        for light, phases in changes.items()
+        for step, state in phases
+    ]
+    end_s = float(trace["time_s"].max())
+    bodies = [*_bodies(trace, types, wheelbases_m, world.roles), *_buildings(scene.obstacles.outlines, end_s)]
+    return ExportedGame(
+        name=name,
+        title=f"{arm}, seed {seed}, episode {episode}: {outcome}",
+        arm=arm,
+        seed=seed,
+        episode=episode,
+        outcome=outcome,
+        step_s=world.step_s,
+        end_s=end_s,
+        bodies=tuple(_with_unique_names(bodies)),
+        signals=tuple(sorted(states, key=lambda each: (each.time_s, each.light))),
+    )
+
+
+def _bodies(
+    trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], wheelbases_m: Mapping[str, float], roles: Sequence[str]
+) -> Iterator[Body]:
+    last_step = int(trace["step"].max())
+    order = {role: place for place, role in enumerate(roles)}
+    by_name = {str(name): rows.sort_values("step") for name, rows in trace.groupby("player", sort=True)}
+    for name, rows in sorted(by_name.items(), key=lambda each: (order.get(each[0], len(order)), each[1]["step"].min())):
+        drawn, kind = types[name], kind_of_shape(types[name].shape)
+        wheelbase_m = wheelbases_m.get(name, WHEELBASE_SHARE * drawn.length_m)
+        for piece in _pieces(rows):
+            yield Body(
+                name=name,
+                original=name,
+                kind=kind,
+                length_m=drawn.length_m,
+                width_m=drawn.width_m,
+                wheelbase_m=wheelbase_m if kind.group != PERSON and drawn.shape else 0.0,
+                is_player=name in order,
+                first_step=int(piece["step"].iloc[0]),
+                heading_rad=np.unwrap(piece["heading_rad"].to_numpy(float)),
+                leaves=int(piece["step"].iloc[-1]) < last_step,
+                **{
+                    column: piece[column].to_numpy(float)
+                    for column in ("time_s", "x_m", "y_m", "speed_mps", "acceleration_mps2")
+                },
+            )
+
+
+def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
+    """A road user's rows, split where it was absent."""
+    cuts = np.flatnonzero(np.diff(rows["step"].to_numpy()) > 1) + 1
+    for first, end in pairwise([0, *cuts.tolist(), len(rows)]):
+        yield rows.iloc[first:end]
+
+
+def _buildings(outlines: Sequence[FloatArray], end_s: float) -> Iterator[Body]:
+    """The smallest rectangle around each building's outline [n, 2]."""
+    for number, outline in enumerate(outlines):
+        corners = shapely.get_coordinates(shapely.oriented_envelope(shapely.MultiPoint(outline)))
+        if len(corners) < 4:  # a wall without thickness
+            corners = np.concatenate((outline[[0, -1]], outline[[-1, 0]]))
+        along, across = corners[1] - corners[0], corners[2] - corners[1]
+        x_m, y_m = corners[:4].mean(0) if len(corners) > 4 else corners[:2].mean(0)
+        yield Body(
+            name=f"building_{number}",
+            original=f"building_{number}",
+            kind=BUILDING,
+            length_m=float(np.hypot(*along)),
+            width_m=max(float(np.hypot(*across)), 0.1),
+            wheelbase_m=0.0,
+            is_player=False,
+            first_step=0,
+            time_s=np.array([0.0, end_s]),
+            x_m=np.full(2, x_m),
+            y_m=np.full(2, y_m),
+            heading_rad=np.full(2, np.arctan2(along[1], along[0])),
+            speed_mps=np.zeros(2),
+            acceleration_mps2=np.zeros(2),
+            leaves=False,
+        )
+
+
+def _with_unique_names(bodies: Sequence[Body]) -> Iterator[Body]:
+    """Bodies with names that are no parameter of OpenSCENARIO (`$name`) and occur once."""
+    taken: set[str] = set()
+    for body in bodies:
+        plain = _NOT_IN_NAMES.sub("_", body.name)
+        name, number = plain, 2
+        while name in taken:
+            name, number = f"{plain}#{number}", number + 1
+        taken.add(name)
+        yield replace(body, name=name)

@@ -1,0 +1,178 @@
+"""`harness scene new`: from a map to scenes and campaigns that are in order, or one line and nothing written."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from harness.campaign.preflight import open_campaign
+from harness.cli.main import app
+from harness.errors import UsageError
+from harness.game.initial_state import draw_initial_state
+from harness.traffic.scene import OpenScene, open_scene
+from tests.support.repository import REPOSITORY
+
+MAPS = REPOSITORY / "tests" / "data" / "maps"
+TOWN, JUNCTION = MAPS / "town.osm", MAPS / "t_junction.xodr"
+Run = Callable[..., list[str]]
+
+
+@pytest.fixture
+def new(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Run:
+    """Runs `harness scene new` in an empty folder `out` on a wide terminal, and gives its lines."""
+    monkeypatch.setenv("COLUMNS", "200")
+    (tmp_path / "out").mkdir()
+
+    def run(*arguments: Any) -> list[str]:
+        given = ["scene", "new", *map(str, arguments), "--out", str(tmp_path / "out")]
+        result = CliRunner().invoke(app, given)
+        if result.exception is not None:
+            raise result.exception
+        return result.output.splitlines()
+
+    return run
+
+
+def files_in(folder: Path) -> list[str]:
+    return sorted(str(each.relative_to(folder)) for each in folder.rglob("*") if each.is_file())
+
+
+def numbers_of(lines: list[str], kind: str) -> list[int]:
+    """The numbers of the conflicts of a kind in the table."""
+    return [int(found[1]) for line in lines if (found := re.match(rf"(\d+) +{kind} ", line))]
+
+
+def arrivals_apart_s(scene: OpenScene, games: int) -> list[float]:
+    """Seconds from the ego's arrival to the person's at the place where they meet, if both keep their speeds."""
+    routes = scene.world.road.routes
+    apart = []
+    for k in range(games):
+        state = draw_initial_state(scene.usual_starts, "meet", k)
+        lines = [
+            np.stack((routes.x_m, routes.y_m), axis=1)[routes.first_row[p] : routes.last_row[p] + 1] for p in (0, 1)
+        ]
+        starts = [int(np.argmin(np.hypot(*(lines[p] - np.array([state.x_m[p], state.y_m[p]])).T))) for p in (0, 1)]
+        ahead = [lines[p][starts[p] : starts[p] + 400] for p in (0, 1)]
+        gaps = np.hypot(*(ahead[0][:, None] - ahead[1][None]).transpose(2, 0, 1))
+        first = int(np.flatnonzero(gaps.min(axis=1) < 1.6)[0])
+        times = [0.5 * first / state.speed_mps[0], 0.5 * int(gaps[first].argmin()) / state.speed_mps[1]]
+        apart.append(times[1] - times[0])
+    return apart
+
+
+def test_new__from_openstreetmap_to_a_campaign_that_is_in_order(tmp_path: Path, new: Run) -> None:
+    lines = new("town", "--from", TOWN)
+    out = tmp_path / "out"
+    names = ["scene.toml", "town.net.xml", "town.rou.xml"]
+    assert files_in(out) == ["campaigns/town.toml", *(f"networks/town/{name}" for name in names)]
+    assert lines[-1] == f"Next: harness campaign {out / 'campaigns' / 'town.toml'} --quick"
+    campaign = open_campaign(out / "campaigns" / "town.toml")
+    assert campaign.scene.folder == out / "networks" / "town"
+    assert [persona.name for persona in campaign.personas] == ["impatient"]
+
+
+def test_new__from_opendrive_the_players_meet(tmp_path: Path, new: Run) -> None:
+    lines = new("t", "--from", JUNCTION)
+    assert numbers_of(lines, "turn across") == [1]
+    scene = open_scene(tmp_path / "out" / "networks" / "t")
+    apart = arrivals_apart_s(scene, games=40)
+    assert max(map(abs, apart)) < 1.5 + 0.5  # the place is a zone of some metres
+    assert min(apart) < -0.5 < 0.5 < max(apart)
+
+
+@pytest.mark.parametrize("kind", ["roundabout entry", "zebra crossing", "lane end"])
+def test_new__makes_a_scene_of_a_kind(kind: str, tmp_path: Path, new: Run) -> None:
+    new("town", "--from", TOWN, "--kind", kind)
+    scene = open_scene(tmp_path / "out" / "networks" / "town")
+    assert scene.document.players[1].on_foot == (kind == "zebra crossing")
+
+
+def test_new__of_a_number_makes_that_one(tmp_path: Path, new: Run) -> None:
+    new("t", "--from", JUNCTION, "--conflict", 3)
+    assert "conflict 3" in (tmp_path / "out" / "networks" / "t" / "scene.toml").read_text(encoding="utf-8")
+
+
+def test_new__of_all_makes_a_scene_of_each_that_is_listed(tmp_path: Path, new: Run) -> None:
+    lines = new("t", "--from", JUNCTION, "--all", "--kind", "merge")
+    numbers = numbers_of(lines, "merge")
+    assert len(numbers) == 3
+    folders = sorted(each.name for each in (tmp_path / "out" / "networks").iterdir())
+    assert folders == [f"t_{number}" for number in numbers]
+
+
+def test_new__a_list_writes_nothing_but_the_page(tmp_path: Path, new: Run) -> None:
+    page = tmp_path / "map.html"
+    lines = new("t", "--from", JUNCTION, "--list", "--html", page)
+    assert files_in(tmp_path / "out") == []
+    text = page.read_text(encoding="utf-8")
+    assert re.findall(r'<text class="number"[^>]*>(\d+)</text>', text) == ["1", "2", "3", "4", "5", "6"]
+    assert "conflict 1: turn across" in text
+    assert any("⠀" in line or "." in line for line in lines)
+
+
+def test_new__near_an_edge_keeps_the_numbers(new: Run) -> None:
+    everywhere = numbers_of(new("t", "--from", TOWN, "--list", "--rows", 100), "roundabout entry")
+    near = numbers_of(new("t", "--from", TOWN, "--list", "--near", "104#0", "--within", 1), "roundabout entry")
+    assert near
+    assert set(near) <= set(everywhere)
+
+
+BAD = {
+    "a number that does not exist": (["t", "--conflict", 99], r"--conflict: 99: there is no conflict.*1 to 6"),
+    "the number 0": (["t", "--conflict", 0], r"there is no conflict of this number"),
+    "a kind that does not exist": (["t", "--kind", "zebra"], r"is no kind of conflict of this map.*turn across"),
+    "an edge that does not exist": (["t", "--near", "-11"], r"no edge '-11'.*did you mean '-1'"),
+    "a name with markup": (["<b>[red]t"], r"can't be the name of a scene"),
+    "a name that leads elsewhere": (["../t"], r"can't be the name of a scene"),
+    "one and all": (["t", "--conflict", 1, "--all"], r"exclude each other"),
+}
+
+
+@pytest.mark.parametrize("arguments", BAD.values(), ids=BAD)
+def test_new__what_is_wrong_is_one_line_and_writes_nothing(
+    arguments: tuple[list[Any], str], tmp_path: Path, new: Run
+) -> None:
+    given, message = arguments
+    with pytest.raises(UsageError, match=message.replace("--conflict: 99", "--conflict: 99")) as error:
+        new(*given, "--from", JUNCTION)
+    assert len(str(error.value).splitlines()) == 1
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_new__nothing_that_is_there_is_touched(tmp_path: Path, new: Run) -> None:
+    campaign = tmp_path / "out" / "campaigns" / "t.toml"
+    campaign.parent.mkdir()
+    campaign.write_text("mine")
+    with pytest.raises(UsageError, match="is there already, and nothing is overwritten"):
+        new("t", "--from", JUNCTION)
+    assert files_in(tmp_path / "out") == ["campaigns/t.toml"]
+    assert campaign.read_text() == "mine"
+
+
+def test_new__names_on_a_map_can_be_anything(tmp_path: Path, new: Run) -> None:
+    text = TOWN.read_text(encoding="utf-8").replace("Bahnhofstraße", '&lt;script&gt;[red]"""\\')
+    (tmp_path / "odd [b].osm").write_text(text, encoding="utf-8")
+    page = tmp_path / "map.html"
+    lines = new("t", "--from", tmp_path / "odd [b].osm", "--html", page)
+    assert any('<script>[red]"""\\' in line for line in lines)
+    assert "<script>[red]" not in page.read_text(encoding="utf-8")
+    assert open_scene(tmp_path / "out" / "networks" / "t").document.name == "t"
+
+
+def test_new__a_folder_without_room_keeps_nothing(tmp_path: Path, new: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(source: Path, target: Path) -> Path:
+        target.mkdir()
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(shutil, "copytree", full)
+    with pytest.raises(UsageError, match="can't be written: No space left"):
+        new("t", "--from", JUNCTION)
+    assert files_in(tmp_path / "out") == []
+    assert list((tmp_path / "out" / "networks").iterdir()) == []

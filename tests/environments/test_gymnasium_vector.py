@@ -1,0 +1,146 @@
+"""G games in one simulation: Gymnasium's vector environment and Stable-Baselines3's, by `make_vec`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import gymnasium
+import libsumo
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+
+import harness
+from harness import Outcome, UsageError, VectorDrivingEnv, make_vec
+from harness.game.observation_layout import LAYOUT, SIZE
+from harness.traffic.scene import OpenScene
+from tests.support.scenes import build_scene
+
+GAMES = 4
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
+    """A straight road with a time limit of 3 s."""
+    return build_scene(tmp_path_factory.mktemp("scenes") / "short", time_limit_s=3.0)
+
+
+@pytest.fixture
+def opened() -> Iterator[Callable[..., Any]]:
+    """Makes environments, and closes them."""
+    environments = []
+
+    def opened(make: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+        environments.append(make(*arguments, **named))
+        return environments[-1]
+
+    yield opened
+    for each in environments:
+        each.close()
+    assert not libsumo.isLoaded()
+
+
+def actions(pedals: float = 0.0, wheel: float = 0.0) -> Any:
+    return np.tile([pedals, wheel], (GAMES, 1))
+
+
+def test_gymnasium__makes_it_by_name(opened: Callable[..., Any]) -> None:
+    environment = opened(gymnasium.make_vec, "harness/NonEgo-v0", num_envs=GAMES, persona="speedy")
+    assert isinstance(environment.unwrapped, VectorDrivingEnv)
+    observations, info = environment.reset(seed=1)
+    assert environment.observation_space.contains(observations)
+    assert observations.shape == (GAMES, SIZE)
+    assert info["outcome"].tolist() == [Outcome.RUNNING] * GAMES
+    assert environment.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+
+
+def test_seed__gives_the_same_games(opened: Callable[..., Any], short: OpenScene) -> None:
+    environment = opened(VectorDrivingEnv, GAMES, scene=short, other="sumo")
+
+    def games(seed: int) -> list[Any]:
+        first = environment.reset(seed=seed)[0]
+        return [first, *(environment.step(actions(0.3))[0] for _ in range(40))]
+
+    first, again, other = games(5), games(5), games(6)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first[0], other[0])
+
+
+def test_step__the_time_limit_truncates_and_the_next_game_starts_in_the_same_step(
+    opened: Callable[..., Any], short: OpenScene
+) -> None:
+    environment = opened(VectorDrivingEnv, GAMES, scene=short)
+    environment.reset(seed=1)
+    for _ in range(29):
+        _, _, terminated, truncated, info = environment.step(actions())
+        assert not (terminated | truncated).any()
+        assert "final_obs" not in info
+    observations, _, terminated, truncated, info = environment.step(actions())
+    assert truncated.all()
+    assert not terminated.any()
+    assert info["final_info"]["outcome"].tolist() == [Outcome.TIMEOUT] * GAMES
+    assert info["time_s"].tolist() == [0.0] * GAMES
+    speed = LAYOUT.index("speed_mps")  # of the game that ended: the car is not stopped yet
+    last = np.stack(info["final_obs"])[:, speed] * 30.0
+    np.testing.assert_allclose(last, info["final_info"]["speed_mps"], rtol=1e-5)
+    assert (last > 1.0).all()
+    assert not np.array_equal(observations, np.stack(info["final_obs"]))
+
+
+def test_step__a_wreck_terminates(opened: Callable[..., Any]) -> None:
+    environment = opened(VectorDrivingEnv, GAMES)
+    environment.reset(seed=1)
+    info: dict[str, Any] = {}
+    while "final_info" not in info:
+        _, _, terminated, truncated, info = environment.step(actions(1.0, 1.0))
+    assert not truncated.any()
+    ended = info["_final_info"]
+    np.testing.assert_array_equal(terminated, ended)
+    assert set(info["final_info"]["outcome"][ended].tolist()) == {Outcome.RAIL}
+    assert not info["final_info"]["is_success"].any()
+
+
+def test_wrappers__of_gymnasium_count_the_episodes(opened: Callable[..., Any], short: OpenScene) -> None:
+    environment = opened(RecordEpisodeStatistics, VectorDrivingEnv(GAMES, scene=short))
+    environment.reset(seed=1)
+    for _ in range(30):
+        *_, info = environment.step(actions())
+    assert info["episode"]["l"].tolist() == [30] * GAMES
+
+
+@pytest.mark.parametrize(
+    "wrong", [np.zeros(2), np.zeros((GAMES, 3)), np.full((GAMES, 2), np.nan)], ids=["one game", "three", "nan"]
+)
+def test_step__wrong_actions_are_refused(opened: Callable[..., Any], short: OpenScene, wrong: Any) -> None:
+    environment = opened(VectorDrivingEnv, GAMES, scene=short)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        environment.step(actions())
+    environment.reset(seed=1)
+    with pytest.raises(ValueError, match=r"shape|finite"):
+        environment.step(wrong)
+
+
+def test_arguments__wrong_ones_are_usage_errors(short: OpenScene) -> None:
+    for wrong in ({"n": 0}, {"n": 2, "interface": "gym"}, {"n": 2, "render_mode": "rgb_array"}):
+        with pytest.raises(UsageError):
+            make_vec(**wrong)
+    assert not libsumo.isLoaded()
+
+
+def test_sb3__learns_on_it_and_the_seed_gives_the_same_games(opened: Callable[..., Any]) -> None:
+    from stable_baselines3 import PPO
+
+    environments = [opened(make_vec, GAMES, interface="sb3", seed=seed, other="sumo") for seed in (1, 1, 2)]
+    first, again, other = (each.reset() for each in environments)
+    np.testing.assert_array_equal(first, again)
+    assert not np.array_equal(first, other)
+    with pytest.raises(ValueError, match="shape"):
+        environments[0].step(np.zeros((GAMES, 3)))
+    model = PPO("MlpPolicy", environments[0], n_steps=16, batch_size=32, n_epochs=1, device="cpu").learn(64)
+    assert model.num_timesteps == 64
+
+
+def test_public__names() -> None:
+    assert harness.make_vec is make_vec

@@ -1,0 +1,162 @@
+"""The wheel, installed in an environment of its own: everything that a user meets works without the checkout."""
+
+from __future__ import annotations
+
+import ast
+import importlib.metadata
+import itertools
+import json
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+
+from harness.shipped_documents import shipped_names
+from tests.support.repository import REPOSITORY
+from tests.support.sources import SOURCES, tree_of
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+DISTRIBUTION = "safedriverl-harness"
+GAMES = """
+name = "two_games"
+scene = "merge"
+personas = ["speedy"]
+policies = "merge"
+[ego]
+persona = "careful"
+[assessment]
+episodes = 2
+reference_drivers = false
+"""
+USER_TEST = """
+import harness
+
+def test_my_ego_drives_alone():
+    results = harness.run("games.toml", jobs=1)
+    assert results.complete
+    assert results.summary.set_index("arm")["failure_rate"]["naive_alone"] <= 0.5
+"""
+
+
+@pytest.fixture(scope="session")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a new virtual environment with the wheel in it, beside the libraries that the tests run with."""
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    build = [*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", folder, REPOSITORY]
+    subprocess.run(build, check=True, timeout=300)
+    (wheel,) = folder.glob("*.whl")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder / "venv"], check=True, timeout=300)
+    (packages,) = (folder / "venv" / "lib").glob("python*/site-packages")
+    # Only the folder of the libraries: an editable installation in it is a .pth file, which counts in no other folder.
+    (packages / "libraries.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    install = [
+        *pip,
+        "--python",
+        folder / "venv" / "bin" / "python",
+        "install",
+        "--no-deps",
+        "--ignore-installed",
+        wheel,
+    ]
+    subprocess.run(install, check=True, timeout=300)
+    return folder / "venv"
+
+
+def run(
+    environment: Path, folder: Path, program: str, *arguments: str, expected: int = 0
+) -> subprocess.CompletedProcess[str]:
+    """Run a program of the environment in a folder, with no path to the checkout."""
+    variables = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    variables["NUMBA_CACHE_DIR"] = str(environment / "compiled")  # of no use to anything else
+    command = [environment / "bin" / program, *arguments]
+    done = subprocess.run(command, cwd=folder, env=variables, capture_output=True, text=True, timeout=600)
+    assert done.returncode == expected, done.stdout + done.stderr
+    return done
+
+
+def python(environment: Path, folder: Path, code: str) -> str:
+    return run(environment, folder, "python", "-c", code).stdout.strip()
+
+
+def test_wheel__has_every_shipped_document_and_is_typed(environment: Path, tmp_path: Path) -> None:
+    package = Path(python(environment, tmp_path, "import harness; print(harness.__file__)")).parent
+    assert package.is_relative_to(environment)
+    assert (package / "py.typed").is_file()
+    for kind in ("networks", "personas", "egos", "policies", "campaigns"):
+        there = sorted(each.stem for each in (package / "shipped" / kind).iterdir() if each.name != "README.md")
+        assert [name for name in there if name != "examples"] == [n for n in shipped_names(kind) if n != "examples"]
+
+
+def test_wheel__the_command_says_its_version(environment: Path, tmp_path: Path) -> None:
+    version = python(environment, tmp_path, f"import importlib.metadata as m; print(m.version({DISTRIBUTION!r}))")
+    assert run(environment, tmp_path, "harness", "--version").stdout == f"harness {version}\n"
+
+
+def test_wheel__a_new_project_is_in_order_and_shipped_campaigns_have_names(environment: Path, tmp_path: Path) -> None:
+    run(environment, tmp_path, "harness", "new", "lab")
+    lab = tmp_path / "lab"
+    assert sorted(each.name for each in lab.iterdir()) == ["README.md", "campaign.toml", "networks", "personas"]
+    assert "5 trainings" in run(environment, lab, "harness", "check", "campaign.toml").stdout
+    run(environment, lab, "harness", "check", "merge-demo")
+    run(environment, lab, "harness", "persona", "show", "my_driver")
+
+
+def test_wheel__plays_a_campaign_with_the_shipped_policies(environment: Path, tmp_path: Path) -> None:
+    (tmp_path / "games.toml").write_text(GAMES, encoding="utf-8")
+    told = json.loads(run(environment, tmp_path, "harness", "campaign", "games.toml", "--json", "--jobs", "1").stdout)
+    assert (told["exit_code"], told["failed_stages"], told["error_games"]) == (0, [], 0)
+    assert (tmp_path / "reports" / "two_games" / "report.html").is_file()
+    # the test that a user writes, on the same run folder
+    (tmp_path / "test_mine.py").write_text(USER_TEST, encoding="utf-8")
+    run(environment, tmp_path, "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_mine.py")
+
+
+# --- metadata ---------------------------------------------------------------------------------------------------------
+
+
+def declared() -> tuple[list[str], dict[str, list[str]]]:
+    """The requirements of the package: of every user, and by extra."""
+    project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["name"] == DISTRIBUTION
+    return project["dependencies"], project["optional-dependencies"]
+
+
+def names_of(requirements: Iterable[str]) -> set[str]:
+    return {re.split(r"[^A-Za-z0-9._-]", each, maxsplit=1)[0].lower().replace("_", "-") for each in requirements}
+
+
+def imported(path: Path) -> set[str]:
+    """The packages that a file imports from outside the standard library."""
+    names = []
+    for node in ast.walk(tree_of(path)):
+        names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        names += [str(node.module)] if isinstance(node, ast.ImportFrom) and not node.level else []
+    return {name.split(".")[0] for name in names} - set(sys.stdlib_module_names) - {"harness", "tomllib"}
+
+
+def test_metadata__names_every_library_that_the_package_imports() -> None:
+    provided = importlib.metadata.packages_distributions()
+    always, extras = declared()
+    users = names_of(itertools.chain(always, *(extras[name] for name in extras if name not in ("dev", "docs"))))
+    needed = {name for path in SOURCES for name in imported(path)}
+    assert {name for name in needed if not names_of(provided.get(name, [name])) & users} == set()
+
+
+def test_metadata__hints_name_the_distribution_and_its_extras() -> None:
+    """A hint about a library that is not installed says `pip install 'safedriverl-harness[EXTRA]'`."""
+    extras = declared()[1]
+    texts = [*SOURCES, REPOSITORY / "README.md", *(REPOSITORY / "docs").rglob("*.md")]
+    hints = {match for text in texts for match in re.findall(r"([\w-]*harness)\[(\w+)\]", text.read_text("utf-8"))}
+    assert {name for name, _ in hints} == {DISTRIBUTION}
+    assert {extra for _, extra in hints} <= set(extras)
+    assert {"fmi", "ray"} <= {extra for _, extra in hints}
