@@ -112,9 +112,9 @@ def cutting_in(gap_m: float, speed_mps: float = 12.0, **changes: Any) -> list[pd
 
 def test_cut_in__has_its_time_gap_and_time_to_collision(merge: OpenScene) -> None:
     (found,) = only(named(merge, *cutting_in(10.0, 8.0)), "non_ego", "cut_in")
-    assert found.time_s == 2.4  # from here on their centres are less than 1.8 m apart across the road
-    assert found.gap_m == pytest.approx(10.0, abs=0.3)
-    assert found.ttc_s == pytest.approx(10.0 / 4.0)
+    assert found.time_s == 2.0  # its centre is 0.8 m from the mark, and half of its width is 0.9 m
+    assert found.gap_m == pytest.approx(10.0 + 0.4 * 4.0, abs=0.3)  # 0.4 s before their bodies begin to overlap
+    assert found.ttc_s == pytest.approx(found.gap_m / 4.0)
     assert found.until_s == 3.2  # within half a metre of the ego's path
     assert found.text == f"cuts in {found.gap_m:.1f} m ahead, TTC {found.ttc_s:.1f} s"
 

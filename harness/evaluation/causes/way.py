@@ -6,13 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from harness.evaluation.manoeuvres.thresholds import HALF_LANE_M
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.quantities import Quantities
 from harness.game.state import EGO
-
-HALF_LANE_M = 1.6
-"""From the centre of a lane to its mark, where no other lane is nearer, as inside a junction: SUMO's default lane has
-3.2 m."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.encounters import Encounter, encounters_of
-from harness.evaluation.manoeuvres.thresholds import SAME_WITHIN_S
+from harness.evaluation.manoeuvres.thresholds import HALF_LANE_M, SAME_WITHIN_S
 from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities
@@ -21,6 +21,7 @@ from harness.game.world import World
 _HERE = int(np.flatnonzero(PATH_M == 0.0)[0])
 _NEARBY_M = 10.0  # of road, behind and ahead
 _LARGEST_STEP_M = 1.0  # sideways in a step; more means that another lane is now the nearest
+_SAME_LANE_M = 0.1  # centres of lanes that are nearer are of one lane
 _ROUNDING_S = 1e-9
 
 Stretch = tuple[int, int]  # its first and last step
@@ -147,6 +148,19 @@ class Course:
         on_path = self.between.on_path
         half_width = on_path.half_width_m[:, of, player] + 0.5 * self.quantities.world.width_m[of]
         return np.abs(on_path.left_m[:, of, player]) < half_width
+
+    def over_mark(self, player: int, of: int) -> BoolArray:
+        """[T] whether a part of the body of `player` is within the lane in which `of` drives."""
+        q, on_path = self.quantities, self.between.on_path
+        routes = q.world.road.routes
+        lanes = routes.lane_offset_m[routes.rows(q.state.station_m)][:, of]
+        away = np.abs(lanes - q.lateral_offset_m[:, of, None])
+        nearest = np.where(np.isnan(away), np.inf, away).argmin(-1)
+        centre = np.take_along_axis(lanes, nearest[:, None], -1)
+        apart = np.abs(lanes - centre)
+        apart = np.where(apart > _SAME_LANE_M, apart, np.inf).min(-1)  # NaN, no lane, is not greater
+        half = np.minimum(0.5 * apart, HALF_LANE_M)
+        return np.abs(self.left_m(player, of) - centre[:, 0]) - on_path.half_width_m[:, of, player] < half
 
     def left_m(self, player: int, of: int) -> FloatArray:
         """[T] how far `player` is to the left of the route of `of`."""

@@ -25,7 +25,8 @@ from harness.game.arrays import BoolArray
 def cut_ins(course: Course, player: int, other: int) -> Iterator[Span]:
     """The player enters the other's path from the side, ahead of it and near, and not in a lapse (that is a drift).
 
-    Gap and time to collision are the other's, at that moment.
+    It begins when the player's body crosses the mark of the other's lane. Gap and time to collision are the other's, at
+    that moment; the time is along the road, as UN R157 has it for cut-ins: the bodies do not overlap yet.
     """
     in_way = course.in_way(player, other)
     both = course.drove[:, player] & course.drove[:, other]
@@ -39,16 +40,20 @@ def cut_ins(course: Course, player: int, other: int) -> Iterator[Span]:
     enters = both & ahead & in_way & ~course.quantities.state.lapsed[:, player]
     enters[1:] &= ~in_way[:-1] & both[:-1]
     enters[0] = False
+    speed = course.quantities.speed_mps
+    closing = speed[:, other] - speed[:, player] * np.cos(turned_rad)
     same_until = -1
     for step in np.flatnonzero(enters & near & alike).tolist():
         if step > same_until and _moved_more(course, player, other, step):
             last = _while(in_way & both & ahead, step)
+            begin = _since(course.over_mark(player, other) & both, step)
+            time_s = float(gap[begin] / closing[begin]) if closing[begin] > 0.0 else np.inf
             yield Span(
-                first=step,
+                first=begin,
                 last=_first(np.abs(course.between.on_path.left_m[:, other, player]) < 0.5, step, last),
-                gap_m=float(gap[step]),
-                ttc_s=float(ttc[step]),
-                text=f"cuts in {gap[step]:.1f} m ahead{_seconds(', TTC', ttc[step])}",
+                gap_m=float(gap[begin]),
+                ttc_s=time_s,
+                text=f"cuts in {gap[begin]:.1f} m ahead{_seconds(', TTC', time_s)}",
             )
             same_until = step + course.steps(least.SAME_WITHIN_S)
 
@@ -184,6 +189,12 @@ def _while(mask: BoolArray, step: int) -> int:
     """The last step of the stretch of `mask` [T] that `step` is in."""
     ends = np.flatnonzero(~mask[step:])
     return step + int(ends[0]) - 1 if len(ends) else len(mask) - 1
+
+
+def _since(mask: BoolArray, step: int) -> int:
+    """The first step of the stretch of `mask` [T] that `step` is in; `step` where it is in none."""
+    outside = np.flatnonzero(~mask[: step + 1])
+    return min(int(outside[-1]) + 1, step) if len(outside) else 0
 
 
 def _first(mask: BoolArray, first: int, last: int) -> int:

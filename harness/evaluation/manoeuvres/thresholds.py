@@ -109,3 +109,6 @@ to the unexpected (Green 2000, "How long does it take to stop?": 1.25 to 1.5 s).
 AFTERMATH_S = 2.0
 """A manoeuvre that the non-ego begins at most this long after the end of the ego's response belongs to the same event;
 a later one is a new cause. Our own."""
+HALF_LANE_M = 1.6
+"""From the centre of a lane to its mark, where no other lane is nearer, as inside a junction: SUMO's default lane has
+3.2 m."""
