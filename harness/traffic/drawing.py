@@ -13,6 +13,8 @@ from harness.game.arrays import FloatArray
 from harness.traffic.network import car_lanes, drivable_area, lane_line, paved_lanes
 from harness.traffic.scene import OpenScene
 
+_WALKERS_GOAL_M = 2.0  # length of the line at the end of a way
+
 
 def surfaces(net: Net) -> list[list[FloatArray]]:
     """The drivable area as polygons. Each polygon is a list of rings [n, 2]: its outline, then its holes."""
@@ -55,9 +57,18 @@ def _is_left_of(line: FloatArray, other: FloatArray) -> bool:
 
 
 def goal_lines(scene: OpenScene, net: Net) -> list[FloatArray]:
-    """The lines [2, 2] across the lanes at the players' goals, one for each goal."""
-    goals = {scene.document.goal_of(player)[1] for player in scene.document.players}
-    return [_goal_line(goal, net) for goal in sorted(goals, key=lambda goal: (goal.edge, goal.position_m))]
+    """The lines [2, 2] across the lanes at the players' goals, one for each goal, and across the ends of ways."""
+    players = scene.document.players
+    goals = {scene.document.goal_of(player)[1] for player in players if not player.on_foot}
+    ways = [np.array(player.way) for player in players if player.way is not None]
+    lines = [_goal_line(goal, net) for goal in sorted(goals, key=lambda goal: (goal.edge, goal.position_m))]
+    return lines + [_end_of(way) for way in ways]
+
+
+def _end_of(way: FloatArray) -> FloatArray:
+    along = way[-1] - way[-2]
+    across = 0.5 * _WALKERS_GOAL_M * np.array([-along[1], along[0]]) / np.hypot(*along)
+    return np.array([way[-1] - across, way[-1] + across])
 
 
 def _goal_line(goal: Goal, net: Net) -> FloatArray:

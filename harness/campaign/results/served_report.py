@@ -78,7 +78,7 @@ def _entry(game: Any) -> list[Any]:
 def server_of(report: ServedReport, port: int) -> ThreadingHTTPServer:
     """A server of this machine that answers with a report; port 0 takes a free one. Raises OSError for one in use."""
 
-    class Handler(BaseHTTPRequestHandler):
+    class Answers(BaseHTTPRequestHandler):
         def do_GET(self) -> None:
             known = self.headers.get("Host") in (f"{HOST}:{server.server_port}", f"localhost:{server.server_port}")
             found = report.answer(self.path) if known else None  # another name of this machine may be another site
@@ -95,5 +95,5 @@ def server_of(report: ServedReport, port: int) -> ThreadingHTTPServer:
         def log_message(self, format: str, *args: Any) -> None:
             """Requests are not printed."""
 
-    server = ThreadingHTTPServer((HOST, port), Handler)
+    server = ThreadingHTTPServer((HOST, port), Answers)
     return server
