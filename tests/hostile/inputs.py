@@ -22,6 +22,7 @@ from rich.console import Console
 
 from harness.campaign.results.results import write_results
 from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.storage.run_log import LOG
 from harness.cli.main import main
 from harness.drivers.policy_file import write_policy
 from tests.support.policies import some_policy
@@ -294,9 +295,12 @@ def _build_run(folder: Path) -> None:
 
 
 def traces_of(folder: Path) -> dict[str, str]:
-    """Everything below a folder: its kind, where a link leads, and what is in it."""
+    """Everything below a folder but logs of runs, which say what each command did: its kind, where a link leads, and
+    what is in it."""
     found = {}
     for path in sorted(folder.rglob("*")):
+        if path.name == LOG and not path.is_symlink():
+            continue
         status = path.lstat()
         text = f"{stat.S_IFMT(status.st_mode):o} {status.st_size if stat.S_ISREG(status.st_mode) else ''}"
         if path.is_symlink():

@@ -45,7 +45,7 @@ def run_log(folder: Path) -> Iterator[None]:
     Raises UsageError if the name is taken by something that is no file.
     """
     file = folder / LOG
-    if file.exists() and not file.is_file():
+    if file.is_symlink() or (file.exists() and not file.is_file()):
         raise UsageError.of(file, "", "is not a file", "remove it: the log of the run has this name")
     handler, level = _LogFile(file, encoding="utf-8"), LOGGER.level
     handler.setFormatter(RunLogFormatter())

@@ -51,3 +51,10 @@ def test_log_event__a_failure_is_an_error_and_can_not_imitate_a_line(tmp_path: P
         "ERROR   failed   naive-seed1: first",
         "    2026-01-01T00:00:00Z INFO \\x1b[2J",
     ]
+
+
+def test_run_log__follows_no_link(tmp_path: Path) -> None:
+    (tmp_path / LOG).symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(UsageError, match="is not a file"), run_log(tmp_path):
+        pass
+    assert not (tmp_path / "elsewhere").exists()
