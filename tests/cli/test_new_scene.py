@@ -96,11 +96,19 @@ def test_new__from_opendrive_the_players_meet(tmp_path: Path, new: Run) -> None:
 
 
 def test_write__scenes_of_other_kinds_are_in_order(town: OpenMap, tmp_path: Path) -> None:
-    kinds = {"ring": Kind.ROUNDABOUT, "zebra": Kind.ZEBRA, "ramp": Kind.LANE_END}
+    kinds = {"ring": Kind.ROUNDABOUT, "ramp": Kind.LANE_END}
     chosen = {name: next(plan for plan in town.plans if plan.candidate.kind is kind) for name, kind in kinds.items()}
     assert write_scenes(town, chosen, tmp_path) == (list(kinds), [])
     scenes = {name: open_scene(tmp_path / "networks" / name) for name in kinds}
-    assert [scene.document.players[1].on_foot for scene in scenes.values()] == [False, True, False]
+    assert [scene.document.players[1].on_foot for scene in scenes.values()] == [False, False]
+
+
+def test_write__a_zebra_crossing_inside_a_junction_is_refused(town: OpenMap, tmp_path: Path) -> None:
+    """SUMO's crossings are part of junctions, and a game does not know the conflicts of walkers there."""
+    zebra = next(plan for plan in town.plans if plan.candidate.kind is Kind.ZEBRA)
+    with pytest.raises(UsageError, match="crosses the road inside junction"):
+        write_scenes(town, {"zebra": zebra}, tmp_path)
+    assert not (tmp_path / "networks" / "zebra").exists()
 
 
 def test_new__of_a_number_makes_that_one(tmp_path: Path, new: Run) -> None:
