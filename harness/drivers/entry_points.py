@@ -83,8 +83,8 @@ def _code(module: str) -> str:
     for folder in map(Path, spec.submodule_search_locations or ()):
         for file in sorted(each for each in folder.rglob("*") if _counts(each.relative_to(folder)) and each.is_file()):
             digest.update(file.relative_to(folder).as_posix().encode() + b"\0" + sha256_of(file).encode())
-    if not spec.submodule_search_locations:
-        digest.update(sha256_of(Path(spec.origin or "")).encode())
+    if not spec.submodule_search_locations and spec.has_location and spec.origin:  # else it is part of Python
+        digest.update(sha256_of(Path(spec.origin)).encode())
     return digest.hexdigest()
 
 
