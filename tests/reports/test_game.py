@@ -414,7 +414,7 @@ def test_browser__a_table_downloads_as_its_csv_file(opened, found, tmp_path, nam
     page = opened()
     page.evaluate("for (const each of document.querySelectorAll('details')) each.open = true;")
     with page.expect_download() as download:
-        page.locator(f".filters:has(+ .scroll #{name}) button").click()
+        page.locator(f".filters:has(+ .holds-table #{name}) button").click()
     assert download.value.suggested_filename == f"{name}.csv"
     write_csv(getattr(found, name), tmp_path / "table.csv")
     assert download.value.path().read_bytes() == (tmp_path / "table.csv").read_bytes()
