@@ -71,7 +71,7 @@ def _checked(opened: OpenMap, name: str, plan: GamePlan, folder: Path) -> Path:
     scene = folder / name
     scene.mkdir()
     shutil.copyfile(opened.net_file, scene / f"{name}.net.xml")
-    for file, text in scene_files(name, plan, opened.source, opened.place_of(plan)).items():
+    for file, text in scene_files(name, plan, opened).items():
         (scene / file).write_text(text, encoding="utf-8")
     check_loads(open_scene(scene))
     return scene
