@@ -11,6 +11,7 @@ from harness.errors import plain
 from harness.traffic.maps.candidates import Kind
 from harness.traffic.maps.open_map import OpenMap
 from harness.traffic.maps.plans import GamePlan
+from harness.traffic.network import KEPT_M
 
 _ON_ROADS = ("speedy", "distracted")
 _PERSONAS = {
@@ -30,11 +31,13 @@ _MEANINGS = {
 }
 
 
-def scene_files(name: str, plan: GamePlan, opened: OpenMap) -> dict[str, str]:
-    """The texts of scene.toml and of the route file of a plan of a map, by the files' names."""
+def scene_files(name: str, plan: GamePlan, opened: OpenMap, *, is_part: bool) -> dict[str, str]:
+    """The texts of scene.toml and of the route file of a plan of a map, by the files' names. `is_part`: the scene's net
+    is a part of the map."""
     values = {
         "name": name,
         "plan": plan,
+        "part_m": KEPT_M if is_part else None,
         "time_limit_s": plan.time_limit_s(opened.reds_s),
         "source": plain(opened.source.name),
         "place": plain(opened.place_of(plan)),

@@ -64,6 +64,11 @@ class GamePlan:
         """The way of a person on foot, in centimetres' precision."""
         return [] if self.way is None else [[round(float(each), 2) for each in point] for point in self.way]
 
+    @property
+    def edges(self) -> set[str]:
+        """The edges of the players' routes."""
+        return {name for route in (self.ego_route, self.person_route) if route is not None for name in route.edges}
+
     def time_limit_s(self, reds_s: Mapping[str, float]) -> float:
         """Time enough for both from their farthest starts, at the speed of the slowest, and for the longest red of each
         traffic light on their ways, by its id."""
