@@ -81,7 +81,8 @@ def _why(persona: str, found: Results) -> Iterator[str]:
 
 
 def _prevented(personas: Sequence[str], found: Results) -> list[str]:
-    lines, all_avoided, all_failures = [], 0, 0
+    lines: list[str] = []
+    all_avoided, all_failures = 0, 0
     for persona in personas:
         judged = found.preventability.get(against_persona(NaiveEgo(), persona).name, ())
         avoided = sum(each.from_start.by_any for each in judged)
