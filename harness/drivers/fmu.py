@@ -75,13 +75,13 @@ def wiring(document: Fmu, file: Path) -> Wiring:
     except Exception as error:  # fmpy raises the exceptions of zipfile, lxml and its own checks
         message = " ".join(f"can't be read as an FMU: {error}".split())
         raise UsageError.of(file, "", message, "export it again") from None
-    problems = []
     if description.coSimulation is None or not str(description.fmiVersion).startswith(("2.", "3.")):
         kinds = ("coSimulation", "modelExchange", "scheduledExecution")
         has = ", ".join(kind for kind in kinds if getattr(description, kind, None) is not None) or "nothing"
         message = f"is an FMU of FMI {description.fmiVersion} for {has}"
-        problems.append(Problem(str(file), "", message, "export it for co-simulation, FMI 2.0 or 3.0"))
-    elif not {fmpy.platform, fmpy.platform_tuple} & {*platforms}:
+        raise UsageError.of(file, "", message, "export it for co-simulation, FMI 2.0 or 3.0")
+    problems = []
+    if not {fmpy.platform, fmpy.platform_tuple} & {*platforms}:
         message = f"has no binary for {fmpy.platform_tuple}, only for {', '.join(platforms) or 'nothing'}"
         problems.append(Problem(str(file), "", message, "export it for this platform"))
     variables = {each.name: each for each in description.modelVariables}
@@ -176,8 +176,10 @@ def _unsuitable(
         (list(outputs.values()), _OUTPUT_TYPES, "a single Real (FMI 2.0) or Float64 is needed"),
     ):
         for name in names:
-            if name in variables and (variables[name].type not in types or variables[name].dimensions):
-                found.append((name, f"is {_type_of(variables[name])}", needed))
+            if name in variables and variables[name].dimensions:
+                found.append((name, "is an array", "connect variables with a single value"))
+            elif name in variables and variables[name].type not in types:
+                found.append((name, f"is of type {variables[name].type}", needed))
     for name in document.start.keys() & variables.keys():
         found += [(name, *mistake) for mistake in _mistakes_of_start(document, name, variables[name])]
     quantities = {**entries, **{name: output for output, name in outputs.items()}}
@@ -185,10 +187,6 @@ def _unsuitable(
         if name in variables and (message := _unit_problem(variables[name], quantity, description)):
             found.append((name, message, "convert it in the FMU: the harness uses SI units"))
     return found
-
-
-def _type_of(variable: Any) -> str:
-    return "an array" if variable.dimensions else f"of type {variable.type}"
 
 
 def _mistakes_of_start(document: Fmu, name: str, variable: Any) -> Iterator[tuple[str, str]]:

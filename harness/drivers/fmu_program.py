@@ -98,7 +98,7 @@ class _Instance:
     def _with_log(self, error: Exception) -> Exception:
         log = f"; its log: {' / '.join(self._log)}" if self._log else ""
         self._log.clear()
-        return FmuFailed(f"{error}{log}")
+        return FmuFailed(f"{str(error).rstrip('.')}{log}")
 
 
 class FmuFailed(Exception):

@@ -118,13 +118,7 @@ def game_records(run: Path, chosen: GameList) -> dict[str, Any]:
 
 def _chosen(run: Path, episodes: pd.DataFrame, chosen: GameList) -> pd.DataFrame:
     """The games that fulfil the conditions. Raises UsageError where one is of no game."""
-    if chosen.arm is not None:
-        episodes = games_of_arm(run, episodes, chosen.arm)
-    if chosen.seed is not None:
-        seeds = sorted(set(episodes["seed"]))
-        if chosen.seed not in seeds:
-            raise UsageError.of(run, f"seed {chosen.seed}", "has no games", f"seeds are {', '.join(map(str, seeds))}")
-        episodes = episodes[episodes["seed"] == chosen.seed]
+    episodes = games_of(run, episodes, chosen.arm, chosen.seed)
     if chosen.outcome is not None:
         known = sorted({*FAILURES, *episodes["ego_outcome"], FAILURE} - {""})
         if chosen.outcome not in known:
@@ -268,6 +262,18 @@ def episodes_of(folder: RunFolder) -> pd.DataFrame:
     """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run."""
     folder.manifest()
     return read_csv(folder.path / "episodes.csv")
+
+
+def games_of(run: Path, episodes: pd.DataFrame, arm: str | None, seed: int | None) -> pd.DataFrame:
+    """The rows of an arm and of a training seed; None is every one. Raises UsageError if there are none."""
+    if arm is not None:
+        episodes = games_of_arm(run, episodes, arm)
+    if seed is not None:
+        seeds = sorted(set(episodes["seed"]))
+        if seed not in seeds:
+            raise UsageError.of(run, f"seed {seed}", "has no games", f"seeds are {', '.join(map(str, seeds))}")
+        episodes = episodes[episodes["seed"] == seed]
+    return episodes
 
 
 def games_of_arm(run: Path, episodes: pd.DataFrame, arm: str) -> pd.DataFrame:
