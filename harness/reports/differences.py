@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from harness.evaluation.research_questions import Verdict
-from harness.reports.numbers import MINUS, MISSING, NO_SPACE, SURE, number, p_text, trimmed
+from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, p_text, signed, trimmed
 
 Row = Mapping[Any, Any]
 
@@ -103,14 +103,8 @@ def effect(row: Row) -> str:
     if mean == 0:
         text = "none"
     if math.isfinite(low):
-        text += f" ({SURE}: {_signed(low * scale, digits)} to {_signed(high * scale, digits)})"
+        text += f" ({SURE}: {signed(low * scale, digits)} to {signed(high * scale, digits)})"
     return text
-
-
-def _signed(value: float, digits: int) -> str:
-    """A rounded number that keeps its sign: an end of an interval just below 0 is not 0."""
-    text = trimmed(value, digits)
-    return f"{MINUS}{-value:.1g}" if value < 0 and text == "0" else text
 
 
 def p_values(row: Row) -> str:

@@ -14,7 +14,7 @@ import pandas as pd
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.reports.differences import Row
-from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, trimmed
+from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, signed, trimmed
 from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, Tone, as_sentence, left_out
 
 QUESTION = "Equilibrium"
@@ -185,7 +185,7 @@ def _span(row: Row) -> str:
     """The gap's interval as shares of the payoff; empty where there is none."""
     if not (row["payoff"] and math.isfinite(row["ci_low"])):
         return ""
-    low, high = (trimmed(row[end] / abs(row["payoff"]) * 100, 1) for end in ("ci_low", "ci_high"))
+    low, high = (signed(row[end] / abs(row["payoff"]) * 100, 1) for end in ("ci_low", "ci_high"))
     return f" ({SURE}: {low} to {high}{NO_SPACE}%)"
 
 
@@ -286,7 +286,7 @@ def fewer_failures(difference: float, low: float, high: float) -> str:
     text = f"{trimmed(abs(difference) * 100, 1)} points {'fewer' if difference > 0 else 'more'}"
     if math.isfinite(low):
         low, high = (low * 100, high * 100) if difference > 0 else (-high * 100, -low * 100)
-        text += f" ({trimmed(low, 1)} to {trimmed(high, 1)})"
+        text += f" ({signed(low, 1)} to {signed(high, 1)})"
     return text
 
 

@@ -30,6 +30,12 @@ def trimmed(value: float, digits: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
+def signed(value: float, digits: int) -> str:
+    """The same, with the sign of a number that rounds to 0: an end of an interval just below 0 is not 0."""
+    text = trimmed(value, digits)
+    return f"{MINUS}{-value:.1g}" if value < 0 and text == "0" else text
+
+
 def short(value: float) -> str:
     """A number with four significant digits."""
     return f"{value:.4g}".replace("-", MINUS) if math.isfinite(value) else MISSING

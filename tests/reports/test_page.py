@@ -13,7 +13,7 @@ from harness.evaluation.worst_first import worst_first
 from harness.replay.selection import choose_games, replay_name
 from harness.reports import page as page_module
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, speed_sentence, too_few
-from harness.reports.numbers import duration, number, p_number, p_text, percent
+from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
 from harness.reports.page_wording import FAILS_ALONE, QUICK, as_many_failures
 from harness.reports.wording import (
     NO_DIFFERENCE,
@@ -318,6 +318,14 @@ def test_words__a_question_without_an_answer_in_any_seed_has_no_count():
     rq1, rq2 = verdict_texts(cannot_drive(campaign(personas=["speedy"], seeds=(1, 2)), [1, 2]))
     assert rq1 == ("RQ1: not answered: the person can't drive this scene", NO_SEED_ANSWERS)
     assert rq2[0].startswith("RQ2: not answered")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(-0.004, "\N{MINUS SIGN}0.004"), (-0.05, "\N{MINUS SIGN}0.05"), (0.004, "0"), (0.0, "0"), (-0.0, "0")],
+)
+def test_numbers__that_round_to_0_keep_their_sign(value, text):
+    assert signed(value, 2) == text
 
 
 def test_p_values__are_never_rounded_to_0_or_1():
