@@ -15,7 +15,7 @@ from markupsafe import Markup
 from harness.evaluation.game_theory.crossplay import Matrices, matrices
 from harness.evaluation.worst_first import worst_first
 from harness.reports.figures import GAME, INK, SERIES, figure_of, svg
-from harness.reports.game_wording import HEAT_TITLES, OPENS_A_GAME, heat_caption
+from harness.reports.game_wording import HEAT_TITLES, heat_caption
 from harness.reports.numbers import MISSING, number, trimmed
 from harness.reports.player_data import key
 
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
+OPENS_A_GAME = "A cell opens the worst of its games."
 PALEST, DARKEST = 0.04, 0.5
 """Opacity of the least and the greatest value: text on them is legible on a dark and on a light page."""
 _LINK = re.compile(rf'<a [^>]*href="{GAME}(?P<game>[^"]*)"[^>]*>(?P<cell>.*?)</a>', re.DOTALL)

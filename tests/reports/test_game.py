@@ -22,11 +22,10 @@ from harness.reports.game_wording import (
     NO,
     NO_GAME,
     OPEN,
-    OPENS_A_GAME,
     equilibrium_sentences,
     gap_verdicts,
 )
-from harness.reports.heatmaps import only_links_to, views
+from harness.reports.heatmaps import OPENS_A_GAME, only_links_to, views
 from tests.support.chromium import launched, opener
 from tests.support.game_tables import arm, findings, table
 from tests.support.pages import CONTRAST, Page, campaign, rendered
