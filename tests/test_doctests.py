@@ -10,18 +10,8 @@ import pytest
 
 import harness
 from tests.support.repository import REPOSITORY
+from tests.support.shipped import TWO_GAMES
 
-TWO_GAMES = """
-name = "two_games"
-scene = "merge"
-personas = ["speedy"]
-policies = "merge"
-[ego]
-persona = "careful"
-[assessment]
-episodes = 2
-reference_drivers = false
-"""
 IN_ANOTHER = {"Outcome": "DrivingEnv", "Persona": "read_document", "Step": "ArenaVecEnv"}
 """Names whose use the example of another name shows."""
 

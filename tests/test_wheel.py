@@ -18,6 +18,7 @@ import pytest
 
 from harness.shipped_documents import shipped_names
 from tests.support.repository import REPOSITORY
+from tests.support.shipped import TWO_GAMES
 from tests.support.sources import SOURCES, tree_of
 
 if sys.version_info >= (3, 11):
@@ -26,17 +27,6 @@ else:
     import tomli as tomllib
 
 DISTRIBUTION = "safedriverl-harness"
-GAMES = """
-name = "two_games"
-scene = "merge"
-personas = ["speedy"]
-policies = "merge"
-[ego]
-persona = "careful"
-[assessment]
-episodes = 2
-reference_drivers = false
-"""
 USER_TEST = """
 import harness
 
@@ -115,7 +105,7 @@ def test_wheel__a_new_project_is_in_order_and_shipped_campaigns_have_names(envir
 
 
 def test_wheel__plays_a_campaign_with_the_shipped_policies(environment: Path, tmp_path: Path) -> None:
-    (tmp_path / "games.toml").write_text(GAMES, encoding="utf-8")
+    (tmp_path / "games.toml").write_text(TWO_GAMES, encoding="utf-8")
     told = json.loads(run(environment, tmp_path, "harness", "campaign", "games.toml", "--json", "--jobs", "1").stdout)
     assert (told["exit_code"], told["failed_stages"], told["error_games"]) == (0, [], 0)
     assert (tmp_path / "reports" / "two_games" / "report.html").is_file()

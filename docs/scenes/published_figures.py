@@ -4,7 +4,8 @@
 
 reads the traces of the arms `naive_vs_<persona>` of all training seeds; arms that are not there yet are left out. The
 gap of a game is the least time that a vehicle would have needed to the lane, at constant speed, when the person entered
-it, whoever had priority. The speed of a game is the mean over its steps, with all waiting.
+it; on a marked crossing, where vehicles yield, gaps are not compared. The speed of a game is the mean over its steps on
+the carriageway of people on foot, and over all steps of others.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from typing import Annotated
 
@@ -69,7 +70,6 @@ FIGURES = {
         _speed(_WALK - _SPREAD, _WALK + _SPREAD, "Randles et al. 2010: 1.36 m/s, standard deviation 0.24 m/s"),
     ),
     "phone_walker": (
-        GAP,
         _speed(_WALK / _SLOWER - _SPREAD, _WALK / _SLOWER + _SPREAD, "the same, 18 % more time (Thompson et al. 2013)"),
     ),
     "older_walker": (
@@ -79,7 +79,8 @@ FIGURES = {
     "e_scooter": (_speed(4.47, 6.71, "Cicchino et al. 2023: 41 % ride at 10 mph or more, 9 % at 15 mph or more"),),
     "red_light_cyclist": (),
 }
-"""By persona. The sources are those of `personas/`; for the speed of cyclists there is none."""
+"""By persona. The sources are those of `personas/`. For the speed of cyclists there is none, nor for the gaps of people
+who look at a telephone: they are likelier to cross unsafely."""
 
 
 def main(runs: Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run folders.")]) -> None:
@@ -96,7 +97,9 @@ def rows_of(run: Path) -> Iterator[list[str]]:
         games = [game for file in files for game in _games(file, scene)]
         gaps, speeds = (np.array(each) for each in zip(*games, strict=True)) if games else (np.zeros(0),) * 2
         for figure in FIGURES.get(persona, ()):
-            values = gaps[np.isfinite(gaps)] if figure is GAP else speeds
+            if figure is GAP and scene.document.players[NON_EGO].marked_crossing:
+                continue
+            values = gaps[np.isfinite(gaps)] if figure is GAP else speeds[np.isfinite(speeds)]
             yield [run.name, persona, *_cells(figure, values)]
 
 
@@ -107,7 +110,10 @@ def _games(file: Path, scene: OpenScene) -> Iterator[tuple[float, float]]:
         quantities = quantities_of(trace, scene.world, sizes_by_name(trace, sizes_m))
         drove = drove_in(trace, scene.world.roles)[:, NON_EGO]
         gaps_s = [each.gap_s for each in encounters_of(quantities, NON_EGO, drove)]
-        yield min(gaps_s, default=inf), float(quantities.state.speed_mps[drove, NON_EGO].mean())
+        walking = scene.document.players[NON_EGO].on_foot
+        counted = drove & (quantities.on_carriageway[:, NON_EGO] > 0.0) if walking else drove
+        speeds = quantities.state.speed_mps[counted, NON_EGO]
+        yield min(gaps_s, default=inf), float(speeds.mean()) if speeds.size else nan
 
 
 def _cells(figure: Figure, values: FloatArray) -> Sequence[str]:

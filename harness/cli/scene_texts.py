@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.errors import plain
 from harness.traffic.maps.candidates import Kind
+from harness.traffic.maps.open_map import OpenMap
 from harness.traffic.maps.plans import GamePlan
+from harness.traffic.network import KEPT_M
 
 _ON_ROADS = ("speedy", "distracted")
 _PERSONAS = {
@@ -30,13 +31,16 @@ _MEANINGS = {
 }
 
 
-def scene_files(name: str, plan: GamePlan, source: Path, place: str) -> dict[str, str]:
-    """The texts of scene.toml and of the route file, by the files' names."""
+def scene_files(name: str, plan: GamePlan, opened: OpenMap, *, is_part: bool) -> dict[str, str]:
+    """The texts of scene.toml and of the route file of a plan of a map, by the files' names. `is_part`: the scene's net
+    is a part of the map."""
     values = {
         "name": name,
         "plan": plan,
-        "source": plain(source.name),
-        "place": plain(place),
+        "part_m": KEPT_M if is_part else None,
+        "time_limit_s": plan.time_limit_s(opened.reds_s),
+        "source": plain(opened.source.name),
+        "place": plain(opened.place_of(plan)),
         "meaning": _MEANINGS[plan.candidate.kind],
     }
     return {

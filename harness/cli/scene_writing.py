@@ -16,6 +16,7 @@ from harness.config.scene import Name
 from harness.errors import Problem, UsageError
 from harness.files import make_folder, write_atomically
 from harness.traffic.load_check import check_loads
+from harness.traffic.maps.net_part import write_part
 from harness.traffic.maps.open_map import OpenMap
 from harness.traffic.maps.plans import GamePlan
 from harness.traffic.scene import open_scene
@@ -70,8 +71,8 @@ def _checked(opened: OpenMap, name: str, plan: GamePlan, folder: Path) -> Path:
     """The folder of a scene, which is in order, in a folder."""
     scene = folder / name
     scene.mkdir()
-    shutil.copyfile(opened.net_file, scene / f"{name}.net.xml")
-    for file, text in scene_files(name, plan, opened.source, opened.place_of(plan)).items():
+    is_part = write_part(opened.net, opened.net_file, plan.edges, scene / f"{name}.net.xml")
+    for file, text in scene_files(name, plan, opened, is_part=is_part).items():
         (scene / file).write_text(text, encoding="utf-8")
     check_loads(open_scene(scene))
     return scene

@@ -31,7 +31,7 @@ _TRUCKS = (TRUCK, BUS, TRAM)
 
 
 def highd_tables(game: ExportedGame, number: int, courses: LaneCourses) -> dict[str, bytes]:
-    """The files of a game, by name. Obstacles and buildings are left out."""
+    """The files of a game, by name. Obstacles that are no vehicles, and buildings, are left out."""
     users = [body for body in game.bodies if body.kind.group != THING]
     tracks = _tracks(users, game, courses)
     meta = pd.DataFrame([_of_track(rows, body) for (_, rows), body in zip(tracks.groupby("id"), users, strict=True)])

@@ -14,6 +14,7 @@ import os
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from xml.etree import ElementTree
 
 import pandas as pd
@@ -26,7 +27,7 @@ from harness.replay.gui_settings import WINDOW_PX, Viewport, choose_view, view_s
 from harness.replay.lanes import Lanes
 from harness.replay.obstacles import painted, shapes_of
 from harness.replay.signals import programmes
-from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
+from harness.replay.vehicles import DrawnVehicle, legend, types_of_vehicles
 from harness.traffic.xml_file import xml_bytes
 
 _RING_RADIUS_M = 4.0
@@ -40,15 +41,17 @@ def write_replay(
     *,
     title: str,
     step_length_s: float,
+    names: Mapping[str, str] = MappingProxyType({}),
     rails: Sequence[FloatArray] = (),
     obstacles: Obstacles = NO_OBSTACLES,
     stripes: Sequence[FloatArray] = (),
 ) -> None:
     """Write one game's replay to `folder`, which is replaced. The folder appears only when it is complete.
 
-    `trace` is the game's rows (columns as in `traces/`), `route_files` define its vehicle types, `rails` are
-    polylines [n, 2] in net coordinates, `obstacles` are those of the scene, `stripes` are the corners [n, 2] of each
-    stripe of its marked crossings. The same arguments give the same bytes.
+    `trace` is the game's rows (columns as in `traces/`), `route_files` define its vehicle types, `names` are what
+    players are called in the title, by their names in the trace, `rails` are polylines [n, 2] in net coordinates,
+    `obstacles` are those of the scene, `stripes` are the corners [n, 2] of each stripe of its marked crossings. The
+    same arguments give the same bytes.
     Raises ValueError for a trace with no row or with more than one game.
     """
     if trace["episode"].nunique() != 1:
@@ -65,7 +68,8 @@ def write_replay(
     partial.mkdir()
     try:
         (partial / "scene.net.xml").write_bytes(xml_bytes(net_file))
-        scenery = _scenery(types=types, rails=rails, touches=touches, view=view, title=title)
+        shown_title = f"{title}   {legend(trace, names)}"
+        scenery = _scenery(types=types, rails=rails, touches=touches, view=view, title=shown_title)
         scenery.extend(painted(stripes))
         scenery.extend(shapes_of(trace, types, obstacles))
         scenery.extend(programmes(trace, step_length_s))
@@ -80,8 +84,9 @@ def write_replay(
         moments = [*(contact.time_s for contact in touches), float(trace["time_s"].max())]
         halts_s = sorted({shown_at(moment, step_length_s) for moment in moments})
         write_xml(view_settings(view, halts_s, lanes, signals=_has_signals(trace)), partial / "view.xml")
-        # one step after the one that shows the last sample: without an end SUMO would never stop
-        write_xml(_configuration(title, halts_s[-1] + step_length_s, step_length_s), partial / "scene.sumocfg")
+        # Without an end SUMO would never stop. At the end SUMO-GUI asks a question in front of the picture; the end is
+        # a step beyond the last halt, so that the picture stays free until the user presses the play button.
+        write_xml(_configuration(title, halts_s[-1] + 2 * step_length_s, step_length_s), partial / "scene.sumocfg")
         shutil.rmtree(folder, ignore_errors=True)
         partial.rename(folder)
     finally:
@@ -137,7 +142,7 @@ def _scenery(
         ]
         _line(root, f"contact_{number}", ring, colour="220,20,20", width_m=0.24, layer=6)
         side = -1 if number % 2 else 1  # the labels of two near contacts do not overlap
-        _text(root, f"contact_{number}_label", contact.label, contact.x_m, contact.y_m + side * 1.5 * _RING_RADIUS_M)
+        _text(root, f"contact_{number}_label", contact.label, contact.x_m, contact.y_m + side * 2.0 * _RING_RADIUS_M)
     _text(root, "title", title, view.x_m, view.y_m + 0.4 * view.height_m)
     return root
 
@@ -158,8 +163,11 @@ def _line(
 
 
 def _text(root: ElementTree.Element, name: str, text: str, x_m: float, y_m: float) -> None:
-    """SUMO-GUI has no text element, but it shows the type of an (invisible) point of interest."""
-    place = {"x": f"{x_m:.2f}", "y": f"{y_m:.2f}", "layer": "200"}
+    """SUMO-GUI has no text element, but it shows the type of an (invisible) point of interest.
+
+    The point is small: SUMO-GUI cuts its circle out of the road, also where the colour is transparent.
+    """
+    place = {"x": f"{x_m:.2f}", "y": f"{y_m:.2f}", "layer": "200", "width": "0.02", "height": "0.02"}
     ElementTree.SubElement(root, "poi", {"id": name, "type": text, "color": "0,0,0,0"} | place)
 
 

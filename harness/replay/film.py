@@ -1,7 +1,7 @@
 """A replay as a film: SUMO-GUI plays it on a virtual screen, and its pictures become a GIF or an MP4.
 
-The view follows the ego (after it has left, the other player), in real time. A caption names the cars, and the film
-stays on its last picture for two seconds.
+The view follows the ego (after it has left, the other player), in real time. Each player has its name beside it, a
+caption says which colour is whose, and the film stays on its last picture for two seconds.
 """
 
 from __future__ import annotations
@@ -11,29 +11,31 @@ import math
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pandas as pd
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from harness.errors import HarnessError, Problem, UsageError
 from harness.game.arrays import FloatArray
 from harness.replay.encoding import FORMATS, encode, encoding_problem
+from harness.replay.labels import captioned, labels_at
 from harness.replay.sumo_gui import find_sumo_gui, home_of, screen_problem
-from harness.replay.vehicles import PLAYER_COLOURS
+from harness.replay.vehicles import PLAYER_COLOURS, legend
 from harness.replay.virtual_screen import find_xvfb, virtual_screen
 from harness.traffic.gui import WindowClosed, gui_environment, steered_gui
+from harness.traffic.xml_file import parse_xml
 
 SIZE_PX = (960, 480)
 WIDTH_M = 80.0  # of visible road: a car of 4.6 m is 55 pixels long
+SMALL_WIDTH_M = 50.0  # with a player on foot or on a bicycle: a person of 0.5 m is then 10 pixels wide
+_SMALL_M = 2.5  # the length below which a player is small
 MOST_PER_S = 25.0  # pictures; with shorter steps some steps are skipped
 HOLD_S = 2.0  # the last picture stays this much longer: it shows how the game ended
-_COLOUR_NAMES = {"ego": "blue", "non_ego": "orange", "non_ego_1": "orange", "non_ego_2": "red"}
-_COLOUR_NAMES |= {"non_ego_3": "purple", "non_ego_4": "brown"}
 _SCREEN_PX = (1280, 800)
-_CAPTION_PX = 16
 
 
 def film_problems(file: Path) -> list[Problem]:
@@ -66,12 +68,14 @@ def write_film(
     *,
     title: str,
     step_length_s: float,
+    names: Mapping[str, str] = MappingProxyType({}),
     on_progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
     """Film a replay folder with its game's trace into a `.gif` or `.mp4`; returns the number of pictures.
 
-    `on_progress` is called after each picture with the number done and the total. The file appears only when it is
-    complete. Raises UsageError for the problems that `film_problems` lists, HarnessError if an installed program fails.
+    `names` are what players are called, by their names in the trace. `on_progress` is called after each picture with
+    the number done and the total. The file appears only when it is complete. Raises UsageError for the problems that
+    `film_problems` lists, HarnessError if an installed program fails.
     """
     if problems := film_problems(file):
         raise UsageError(problems)
@@ -88,6 +92,7 @@ def write_film(
                 shown=shown,
                 step_length_s=step_length_s,
                 title=title,
+                names=names,
                 work=work,
                 display=display,
             )
@@ -118,14 +123,6 @@ def _held(pictures: Iterator[Image.Image], times: int) -> Iterator[Image.Image]:
         yield last
 
 
-def _legend(trace: pd.DataFrame) -> str:
-    """Which car is whose, by its colour."""
-    present = [name for name in PLAYER_COLOURS if (trace["player"] == name).any()]
-    return ", ".join(
-        f"{_COLOUR_NAMES[name]}: {name.replace('non_ego', 'non-ego').replace('_', ' ')}" for name in present
-    )
-
-
 def _pictures(
     *,
     folder: Path,
@@ -133,6 +130,7 @@ def _pictures(
     shown: range,
     step_length_s: float,
     title: str,
+    names: Mapping[str, str],
     work: Path,
     display: str | None,
 ) -> Iterator[Image.Image]:
@@ -147,10 +145,10 @@ def _pictures(
         content = (folder / name).read_text(encoding="utf-8")
         (work / name).write_text(re.sub(left_out, "", content), encoding="utf-8")
         options += [option, str(work / name)]
-    legend = _legend(trace)
+    whose = legend(trace, names)
     centres, picture = _centres(trace), work / "picture.png"
-    font = ImageFont.load_default(_CAPTION_PX)
-    height_m = WIDTH_M * SIZE_PX[1] / SIZE_PX[0]
+    width_m = _width_m(folder)
+    height_m = width_m * SIZE_PX[1] / SIZE_PX[0]
     environment = gui_environment(home_of(program), display)
     with steered_gui(program, options, environment, patient=False) as window:
         try:
@@ -159,22 +157,29 @@ def _pictures(
                 if step == -1 or step in shown:
                     x_m, y_m = centres[max(step, 0)].tolist()
                     look = window.wait_until_it_looks_at if step == -1 else window.look_at
-                    look(x_m, y_m, WIDTH_M, height_m)
+                    look(x_m, y_m, width_m, height_m)
                     window.photograph_next(picture, SIZE_PX)
                 window.step()
                 if step in shown:
-                    yield _captioned(picture, f"{title}   {step * step_length_s:.1f} s\n{legend}", font)
+                    labels = labels_at(trace[trace["step"] == step], names, centres[step], SIZE_PX[0] / width_m)
+                    yield captioned(_taken(picture), f"{title}   {step * step_length_s:.1f} s\n{whose}", labels)
         except WindowClosed as error:
             raise HarnessError(f"the film could not be finished: {error}") from error
 
 
-def _captioned(file: Path, text: str, font: ImageFont.FreeTypeFont | ImageFont.ImageFont) -> Image.Image:
+def _width_m(folder: Path) -> float:
+    """The width of road to show: less with a small player."""
+    types = parse_xml(folder / "scene.add.xml").iter("vType")
+    lengths_m = [float(each.get("length", "nan")) for each in types if each.get("id") in PLAYER_COLOURS]
+    return SMALL_WIDTH_M if any(length_m < _SMALL_M for length_m in lengths_m) else WIDTH_M
+
+
+def _taken(file: Path) -> Image.Image:
     if not file.is_file():
         raise HarnessError("SUMO-GUI took no picture: check that its screen has OpenGL (libgl1-mesa-dri)")
     with Image.open(file) as opened:
         picture = opened.convert("RGB")
     file.unlink()
-    ImageDraw.Draw(picture).text((12, 10), text, fill=(20, 20, 20), font=font)
     return picture
 
 

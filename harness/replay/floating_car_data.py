@@ -7,7 +7,8 @@ Requirements of the device for an exact replay (measured on SUMO 1.28):
 - The device never removes a vehicle: after its last record SUMO drives it to the end of its route. So a vehicle
   that leaves before the game ends gets a last speed that takes it there within the next step. This is the only
   number of a replay that is not in the trace.
-- A vehicle that is present when the game ends gets one more record, after the end of the simulation.
+- A vehicle that is present when the game ends gets two more records: the last picture stays for one more step, and the
+  second one is after the end of the simulation.
 - Every record names a lane, and the vehicle's route consists of these lanes. The last one must belong to an edge,
   or the route would end before the junction in which the vehicle leaves.
 """
@@ -41,8 +42,9 @@ def write_recording(
     records = _records(trace, types, lanes, step_length_s)
     last_step = records["step"].max()
     first = records.drop_duplicates("id").assign(step=lambda rows: rows["step"] - 1)
-    after_end = records[records["step"] == last_step].assign(step=last_step + 1)
-    written = pd.concat([first, records, after_end]).sort_values(["step", "id"], kind="stable")
+    last = records[records["step"] == last_step]
+    after = [last.assign(step=last_step + more) for more in (1, 2)]
+    written = pd.concat([first, records, *after]).sort_values(["step", "id"], kind="stable")
 
     root = ElementTree.Element("fcd-export")
     for step, rows in groupby(_rows(written), itemgetter(0)):

@@ -35,12 +35,12 @@ def shapes_of(
 
 
 def painted(stripes: Sequence[FloatArray]) -> Iterator[ElementTree.Element]:
-    """The polygons of the stripes of marked crossings, below the vehicles."""
+    """The polygons of the stripes of marked crossings, above the lanes and below the vehicles."""
     for number, corners in enumerate(stripes):
-        yield _polygon(f"stripe_{number}", corners, "white", filled=True, layer=1)
+        yield _polygon(f"stripe_{number}", corners, "white", filled=True)
 
 
-def _polygon(name: str, corners: FloatArray, colour: str, *, filled: bool, layer: int = 4) -> ElementTree.Element:
+def _polygon(name: str, corners: FloatArray, colour: str, *, filled: bool) -> ElementTree.Element:
     shape = " ".join(f"{x:.3f},{y:.3f}" for x, y in corners)
-    look = {"color": colour, "layer": str(layer), "fill": "1" if filled else "0", "lineWidth": f"{0.5 * _WALL_M:g}"}
+    look = {"color": colour, "layer": "4", "fill": "1" if filled else "0", "lineWidth": f"{0.5 * _WALL_M:g}"}
     return ElementTree.Element("poly", {"id": name, "shape": shape} | look)

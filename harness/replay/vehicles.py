@@ -22,6 +22,8 @@ PLAYER_COLOURS = {
     "non_ego_3": "148,103,189",
     "non_ego_4": "140,86,75",
 }
+_COLOUR_NAMES = {"ego": "blue", "non_ego": "orange", "non_ego_1": "orange", "non_ego_2": "red"}
+_COLOUR_NAMES |= {"non_ego_3": "purple", "non_ego_4": "brown"}
 OBSTACLE_COLOUR = "110,110,120"
 _OBSTACLE_SHAPES = {
     "car": "passenger/sedan",
@@ -68,6 +70,22 @@ class DrawnVehicle:
             "maxSpeed": "1000",
             "emergencyDecel": "1000",
         }
+
+
+def names_in_pictures(persona: object) -> dict[str, str]:
+    """What the players of a game with one person are called; `persona` is of `episodes.csv`, empty for none."""
+    return {"non_ego": persona} if isinstance(persona, str) and persona else {}
+
+
+def shown_name(player: str, names: Mapping[str, str]) -> str:
+    """What a player is called in pictures: its entry in `names`, else its name in the trace."""
+    return names.get(player, player.replace("non_ego", "non-ego")).replace("_", " ")
+
+
+def legend(trace: pd.DataFrame, names: Mapping[str, str]) -> str:
+    """Which vehicle is whose, by its colour."""
+    present = [name for name in PLAYER_COLOURS if (trace["player"] == name).any()]
+    return ", ".join(f"{_COLOUR_NAMES[name]}: {shown_name(name, names)}" for name in present)
 
 
 def types_of_vehicles(

@@ -17,6 +17,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.edge import Edge
+from sumolib.net.node import Node
 
 from harness.config.road_user import WALKER_LENGTH_M, WALKER_RUN_MPS, WALKER_WIDTH_M, WALKING_MPS
 from harness.config.scene import Scene
@@ -167,10 +168,11 @@ def open_walker(
     if shapely.intersects(ground.carriageway, shapely.Point(way[-1])):
         message = f"ends on the carriageway, at [{way[-1][0]:.1f}, {way[-1][1]:.1f}]"
         raise problem(message, "end it on a pavement")
-    junction = _junction_crossed(net, line)
+    junction = _junction_crossed(net, line, marked=document.player(role).marked_crossing)
     if junction is not None:
-        message = f"crosses the road inside junction {junction!r}, where conflicts and signals of walkers are not known"
-        raise problem(message, "let it cross the lanes before or behind the junction")
+        message = f"crosses the road inside junction {junction!r}, where priority and signals on foot are not known"
+        remedy = "let it cross the lanes before or behind the junction, or mark a crossing that has no signals"
+        raise problem(message, remedy)
     vehicle = routes.vehicles[document.vehicles[document.roles.index(role)]]
     return OpenPlayer(
         route=way_table(way, ground.surface),
@@ -179,10 +181,11 @@ def open_walker(
     )
 
 
-def _junction_crossed(net: Net, way: shapely.LineString) -> str | None:
-    """The first junction inside which a way crosses a lane of traffic; None if there is none."""
+def _junction_crossed(net: Net, way: shapely.LineString, *, marked: bool) -> str | None:
+    """The first junction inside which a way crosses a lane of traffic; None if there is none. A marked crossing may lie
+    in a junction without signals: the walker has priority there, whichever way a vehicle goes."""
     for edge in net.getEdges(withInternal=True):
-        if edge.getFunction() != "internal":
+        if edge.getFunction() != "internal" or (marked and not _has_signals(edge.getFromNode())):
             continue
         for lane in edge.getLanes():
             line = lane_line(lane)
@@ -190,6 +193,10 @@ def _junction_crossed(net: Net, way: shapely.LineString) -> str | None:
             if is_road and way.intersects(shapely.LineString(line)):
                 return str(edge.getFromNode().getID())
     return None
+
+
+def _has_signals(node: Node) -> bool:
+    return any(link.getTLSID() for link in node.getConnections())
 
 
 def way_table(way: FloatArray, area: BaseGeometry) -> Route:

@@ -1,19 +1,19 @@
 """Conflicts between players on foot and traffic: a walker's way crosses lanes, and vehicles' routes cross its way.
 
-A lane that a way crosses is a stream for the walker, with the lanes that lead to it. The way is a stream for every
-player whose route crosses it. On a marked crossing the vehicle must yield, elsewhere the walker.
+A lane that a way crosses is a stream for the walker, with the lanes that lead to it; inside a junction, each link that
+a marked crossing crosses. The way is a stream for every player whose route crosses it. On a marked crossing the vehicle
+must yield, elsewhere the walker.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import shapely
 from sumolib.net import Net
-from sumolib.net.lane import Lane
 
 from harness.config.road_user import WALKER_WIDTH_M
 from harness.config.scene import Scene
@@ -21,11 +21,13 @@ from harness.game.arrays import FloatArray
 from harness.game.right_of_way import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic.network import lane_line
-from harness.traffic.stream import CORRIDOR_M, USERS, Feeders, Piece, samples_on
+from harness.traffic.route_table import line_over_junction
+from harness.traffic.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
 
 WALKERS_STREAM_M = 3.0
 """Width of a way: a walker that is farther beside it is not in its stream."""
 _WALKER_M = WALKER_WIDTH_M + 0.5  # what a walker needs
+_NEAR_M = 10.0  # lines that are farther apart have no corridors that overlap
 _BEFORE_CROSSING_M = 1.0  # a vehicle waits this far before a way
 _CORRIDOR_STYLE: dict[str, Any] = {"cap_style": "flat", "join_style": "mitre"}
 
@@ -47,6 +49,16 @@ class _Crossing:
     own_end_m: float
     other_m: float
     other_end_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Crossed:
+    """A stream of traffic that a way crosses."""
+
+    name: tuple[str, str]  # the lanes at both ends of its stop line
+    samples: FloatArray  # [N, 7]
+    place: _Crossing
+    width_m: float
 
 
 def ways_of(document: Scene) -> list[Way]:
@@ -72,26 +84,18 @@ def with_walkers_conflicts(
     feeders = Feeders(net)
     walkers = {way.player for way in ways}
 
-    def add(pieces: Iterator[Piece], name: tuple[str, str]) -> int:
-        found = np.concatenate([samples_on(piece) for piece in pieces])
+    def add(found: FloatArray, name: tuple[str, str]) -> int:
         samples.append(found)
         numbers.append(np.full(len(found), len(lanes), dtype=np.int64))
         lanes.append(name)
         return len(lanes) - 1
 
     for way in ways:
-        for lane, crossing in _lanes_crossed(net, way.line):
-            behind_m = shapely.LineString(lane_line(lane)).length - crossing.other_m
-            stream = add(feeders.approaches(lane, behind_m), (lane.getID(), lane.getID()))
-            shifted = _Crossing(
-                own_m=crossing.own_m,
-                own_end_m=crossing.own_end_m,
-                other_m=0.0,
-                other_end_m=crossing.other_end_m - crossing.other_m,
-            )
-            kerb_m = KERB_M + max(0.5 * (lane.getWidth() - CORRIDOR_M), 0.0)
-            rows.append(_row(way.player, stream, shifted, yields=not way.marked, before_m=kerb_m))
-        stream = add(iter([Piece(0.0, shapely.get_coordinates(way.line), WALKERS_STREAM_M)]), ("", ""))
+        for crossed in (*_lanes_crossed(feeders, way.line), *_links_crossed(feeders, way)):
+            stream = add(crossed.samples, crossed.name)
+            kerb_m = KERB_M + max(0.5 * (crossed.width_m - CORRIDOR_M), 0.0)
+            rows.append(_row(way.player, stream, crossed.place, yields=not way.marked, before_m=kerb_m))
+        stream = add(samples_on(Piece(0.0, shapely.get_coordinates(way.line), WALKERS_STREAM_M)), ("", ""))
         for player, route in enumerate(routes):
             if player in walkers:
                 continue
@@ -109,21 +113,42 @@ def with_walkers_conflicts(
     )
 
 
-def _lanes_crossed(net: Net, way: shapely.LineString) -> Iterator[tuple[Lane, _Crossing]]:
+def _lanes_crossed(feeders: Feeders, way: shapely.LineString) -> Iterator[_Crossed]:
     """The lanes of traffic that a way crosses, in the order of the net."""
-    for edge in net.getEdges(withInternal=False):
+    for edge in feeders.net.getEdges(withInternal=False):
         for lane in edge.getLanes():
             if not any(lane.allows(user) for user in USERS):
                 continue
-            width_m = min(CORRIDOR_M, lane.getWidth())
-            for crossing in _crossings(way, _WALKER_M, shapely.LineString(lane_line(lane)), width_m):
-                yield lane, crossing
+            line = shapely.LineString(lane_line(lane))
+            for place in _crossings(way, _WALKER_M, line, min(CORRIDOR_M, lane.getWidth())):
+                pieces = feeders.approaches(lane, line.length - place.other_m)
+                yield _Crossed(
+                    name=(lane.getID(), lane.getID()),
+                    samples=np.concatenate([samples_on(piece) for piece in pieces]),
+                    place=replace(place, other_m=0.0, other_end_m=place.other_end_m - place.other_m),
+                    width_m=lane.getWidth(),
+                )
+
+
+def _links_crossed(feeders: Feeders, way: Way) -> Iterator[_Crossed]:
+    """The links of junctions that a marked way crosses inside them, in the order of the net."""
+    if not way.marked:
+        return
+    for node in feeders.net.getNodes():
+        for link in filter(carries_traffic, node.getConnections()):
+            stream = Stream(link, feeders)
+            inner = shapely.LineString(line_over_junction(feeders.net, link))
+            for place in _crossings(way.line, _WALKER_M, inner, min(CORRIDOR_M, stream.width_m)):
+                name = (link.getFromLane().getID(), link.getToLane().getID())
+                yield _Crossed(name=name, samples=stream.samples, place=place, width_m=stream.width_m)
 
 
 def _crossings(
     own: shapely.LineString, own_width_m: float, other: shapely.LineString, other_width_m: float
 ) -> Iterator[_Crossing]:
     """Where the corridors of two lines overlap."""
+    if not shapely.dwithin(own, other, _NEAR_M):  # for large nets: quicker than the areas of corridors
+        return
     needed = own.buffer(0.5 * own_width_m, **_CORRIDOR_STYLE)
     overlap = needed.intersection(other.buffer(0.5 * other_width_m, **_CORRIDOR_STYLE))
     for part in shapely.get_parts(overlap):

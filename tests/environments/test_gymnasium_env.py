@@ -8,7 +8,7 @@ import os
 import subprocess
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -52,21 +52,6 @@ def busy(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     """A straight road with background traffic and a time limit of 3 s."""
     flow = '<flow id="f" type="van" begin="0" probability="0.5" departLane="random"><route edges="road"/></flow>'
     return build_scene(tmp_path_factory.mktemp("scenes") / "busy", others=flow, time_limit_s=3.0)
-
-
-@pytest.fixture
-def opened() -> Iterator[Open]:
-    """Makes environments, and closes them."""
-    environments = []
-
-    def opened(make: Open, *arguments: Any, **named: Any) -> Any:
-        environments.append(make(*arguments, **named))
-        return environments[-1]
-
-    yield opened
-    for each in environments:
-        each.close()
-    assert not libsumo.isLoaded()
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -25,20 +25,6 @@ from tests.support.repository import REPOSITORY
 
 BLUE, ORANGE = (tuple(map(int, PLAYER_COLOURS[name].split(","))) for name in ("ego", "non_ego"))
 Open = Callable[..., Any]
-
-
-@pytest.fixture
-def opened() -> Iterator[Open]:
-    """Makes environments, and closes them."""
-    environments = []
-
-    def opened(make: Open, *arguments: Any, **named: Any) -> Any:
-        environments.append(make(*arguments, **named))
-        return environments[-1]
-
-    yield opened
-    for each in environments:
-        each.close()
 
 
 def pixels_of(picture: Any, colour: tuple[int, ...]) -> Any:

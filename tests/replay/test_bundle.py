@@ -12,7 +12,7 @@ from defusedxml import ElementTree
 
 from harness.errors import UsageError
 from harness.evaluation.worst_first import worst_first
-from harness.replay import choose_games, open_in_sumo_gui, replay_name
+from harness.replay import choose_games, names_in_pictures, open_in_sumo_gui, replay_name
 from harness.replay import sumo_gui as sumo_gui_module
 from harness.replay.contact import contacts
 from harness.replay.gui_settings import choose_view
@@ -47,7 +47,8 @@ def test_replay__every_frame_is_the_trace(name: str, merge_net: Path, tmp_path: 
 def test_replay__ends_with_the_game(merge_net: Path, tmp_path: Path) -> None:
     trace = clean_game()
     played, _ = play(write(trace, merge_net, tmp_path / "replay"))
-    assert played["label_s"].max() == pytest.approx(trace["time_s"].max() + STEP_S)
+    # the last picture stays for one more step: see `test_gui__asks_no_question_at_the_end`
+    assert played["label_s"].max() == pytest.approx(trace["time_s"].max() + 2 * STEP_S)
     assert played[played["player"] == "ego"]["label_s"].max() == pytest.approx(153 * STEP_S + STEP_S)
 
 
@@ -94,8 +95,19 @@ def test_replay__is_of_one_game(merge_net: Path, tmp_path: Path) -> None:
 def test_title__is_text_whatever_it_holds(merge_net: Path, tmp_path: Path) -> None:
     folder = write(clean_game(), merge_net, tmp_path / "replay", title="<script> & -- 'quoted' --> \"")
     assert not play(folder)[0].empty
+    assert title_of(folder) == "<script> & -- 'quoted' --> \"   blue: ego, orange: non-ego"
+
+
+def test_title__calls_the_players_by_their_names(merge_net: Path, tmp_path: Path) -> None:
+    names = names_in_pictures("red_light_runner")
+    folder = write(clean_game(), merge_net, tmp_path / "replay", title="naive", names=names)
+    assert title_of(folder) == "naive   blue: ego, orange: red light runner"
+    assert names_in_pictures("") == {}
+
+
+def title_of(folder: Path) -> str:
     poi = ElementTree.parse(folder / "scene.add.xml").getroot().find("poi[@id='title']")
-    assert poi.get("type") == "<script> & -- 'quoted' --> \""
+    return str(poi.get("type"))
 
 
 def test_scenery__types_that_occur_in_the_colours_of_the_game(merge_net: Path, tmp_path: Path) -> None:

@@ -10,9 +10,10 @@ import pytest
 from PIL import Image
 
 from harness.errors import HarnessError, UsageError
-from harness.replay import write_film
+from harness.replay import write_film, write_replay
 from harness.replay.encoding import encode, find_ffmpeg
-from harness.replay.film import SIZE_PX, WIDTH_M, film_problems, shown_steps
+from harness.replay.film import SIZE_PX, SMALL_WIDTH_M, WIDTH_M, film_problems, shown_steps
+from harness.replay.labels import labels_at
 from tests.support.pictures import blue, orange, require_gui
 from tests.support.replays import STEP_S, clean_game, collision_game, drive, game, straight, write
 
@@ -98,6 +99,39 @@ def test_film__leaves_no_part_of_one_behind(merge_net: Path, tmp_path: Path, mon
 )
 def test_film__shows_no_more_than_25_a_second(steps: int, step_length_s: float, shown: list[int]) -> None:
     assert list(shown_steps(steps, step_length_s)) == shown
+
+
+def test_labels__two_cars_side_by_side_keep_theirs_apart() -> None:
+    frame = pd.DataFrame({"player": ["ego", "non_ego", "flow.0"], "x_m": [10.0, 12.0, 0.0], "y_m": [0.0, 3.0, 9.0]})
+    ego, speedy = labels_at(frame, {"non_ego": "very_speedy"}, np.array([10.0, 0.0]), 12.0)
+    assert (ego.name, ego.of_px, ego.at_px) == ("ego", (0.0, 0.0), (0.0, -42.0))
+    assert (speedy.name, speedy.of_px, speedy.at_px) == ("very speedy", (24.0, 36.0), (24.0, 78.0))
+
+
+def test_labels__of_one_car_is_above_it() -> None:
+    (label,) = labels_at(drive("non_ego_2", straight(5.0, 1.0, 9.0, 1)), {}, np.zeros(2), 10.0)
+    assert (label.name, label.at_px) == ("non-ego 2", (50.0, 45.0))
+
+
+def test_film__with_a_walker_shows_it_larger_on_its_stripes(merge_net: Path, tmp_path: Path) -> None:
+    require_gui()
+    routes = tmp_path / "walker.rou.xml"
+    routes.write_text(
+        '<routes><vType id="car" length="4.6" width="1.8"/>'
+        '<vType id="walker" vClass="pedestrian" length="0.5" width="0.5"/></routes>'
+    )
+    places = [(50.0, -1.6, 0.0, 9.0), (70.0, -4.8, 0.5 * np.pi, 1.0)]
+    trace = game(drive("ego", places[:1] * 2), drive("non_ego", places[1:] * 2, vehicle_type="walker"))
+    stripe = np.array([[68.0, -6.0], [72.0, -6.0], [72.0, -3.6], [68.0, -3.6], [68.0, -6.0]])
+    options = {"title": "", "step_length_s": STEP_S}
+    write_replay(trace, merge_net, [routes], tmp_path / "replay", stripes=[stripe], **options)  # type: ignore[arg-type]
+    write_film(tmp_path / "replay", trace, tmp_path / "film.gif", **options)  # type: ignore[arg-type]
+    px_per_m = SIZE_PX[0] / SMALL_WIDTH_M
+    x, y = (int(px_per_m * offset) for offset in (70.0 - 50.0, -4.8 + 1.6))
+    around = frames(tmp_path / "film.gif")[0][SIZE_PX[1] // 2 - y - 20 : SIZE_PX[1] // 2 - y + 20]
+    around = around[:, SIZE_PX[0] // 2 + x - 20 : SIZE_PX[0] // 2 + x + 20]
+    assert orange(around).sum() > 4  # pixels of the walker
+    assert (around > 230).all(-1).mean() > 0.5  # of the stripe, above the lane and below the walker
 
 
 # --- what is missing ---

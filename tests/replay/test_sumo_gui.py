@@ -25,6 +25,9 @@ from harness.traffic import gui
 from tests.support.pictures import blue, orange, require_gui
 from tests.support.replays import GAMES, RAILS, STEP_S, collision_game, write
 
+DIALOGUE_RGB = (212, 208, 200)
+"""The colour of SUMO-GUI's dialogues and tool bars."""
+
 
 @pytest.fixture(scope="module")
 def screen() -> Iterator[str]:
@@ -151,6 +154,28 @@ def test_gui__follows_the_ego_and_halts_at_the_contact(
     metre = (canvas.max(0) - canvas.min(0))[1] / sumo_gui.FOLLOWED_M[0]
     apart = (places["non_ego"][1] - places["ego"][1]) / metre
     assert apart == pytest.approx(expected.loc["non_ego", "x_m"] - expected.loc["ego", "x_m"], abs=0.8)
+
+
+def test_gui__asks_no_question_in_front_of_the_last_picture(
+    screen: str, merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = write(collision_game(), merge_net, tmp_path / "replay")
+    settings = (folder / "view.xml").read_text()
+    settings = re.sub(r"<delay [^>]*>", '<delay value="20"/>', settings)
+    settings = settings.replace('<breakpoint time="3.300" />', "")  # of the contact: the halt at the end is left
+    (folder / "view.xml").write_text(settings)
+    monkeypatch.setenv("DISPLAY", screen)
+    gui = open_in_sumo_gui(folder)
+    try:
+        picture = settled(screen)
+    finally:
+        gui.kill()
+        gui.wait(timeout=300)
+    rows, columns = np.nonzero(ground(picture))
+    canvas = picture[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    assert blue(canvas).any()
+    assert orange(canvas).any()
+    assert (canvas == DIALOGUE_RGB).all(-1).mean() < 0.01
 
 
 def settled(screen: str) -> np.ndarray:

@@ -60,6 +60,8 @@ def opener(browser: Any, report: Path) -> Iterator[Callable[..., Any]]:
         context = browser.new_context(viewport={"width": width, "height": height}, **settings)
         contexts.append(context)
         page = context.new_page()
+        page.measured = context.new_cdp_session(page)
+        page.measured.send("Performance.enable", {"timeDomain": "threadTicks"})
         page.seen = []
         ours = path.as_uri()
         page.on("console", lambda message: page.seen.append(message.text))
@@ -79,6 +81,16 @@ def opener(browser: Any, report: Path) -> Iterator[Callable[..., Any]]:
     yield open_page
     for context in contexts:
         context.close()
+
+
+def ready_s(page: Any) -> float:
+    """Seconds of processor time of the page's main thread until the games can be played.
+
+    On an idle machine that is the time a reader waits; other programs do not change it, as they do a clock's time.
+    """
+    page.wait_for_selector(".player[data-ready]", timeout=300_000)
+    metrics = page.measured.send("Performance.getMetrics")["metrics"]
+    return float(next(each["value"] for each in metrics if each["name"] == "TaskDuration"))
 
 
 def until(page: Any, expression: str, argument: Any = None, seconds: float = 300.0) -> None:

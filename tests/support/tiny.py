@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from harness.campaign.storage.run_log import LOG
 from harness.config.training import Training
 from harness.errors import NOT_ACCEPTED
 from tests.support.repository import REPOSITORY
@@ -168,6 +169,12 @@ def wait_for(condition: Callable[[], object], what: str, seconds: float = PATIEN
 def tables(run: Path) -> dict[str, bytes]:
     """The bytes of a run's tables."""
     return {name: (run / name).read_bytes() for name in TABLES}
+
+
+def files_in(run: Path) -> dict[str, bytes]:
+    """The bytes of every file of a run but its log, to which each command adds."""
+    files = (each for each in run.rglob("*") if each.is_file() and each.name != LOG)
+    return {each.relative_to(run).as_posix(): each.read_bytes() for each in files}
 
 
 def numbers(run: Path) -> dict[str, bytes]:

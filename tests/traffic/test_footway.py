@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from harness.errors import UsageError
 from harness.game.geometry import Box
 from harness.game.right_of_way import Control
 from harness.game.state import State
+from harness.traffic.network import read_net
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 
@@ -128,10 +130,11 @@ def test_pavements__are_for_cyclists_only(tmp_path: Path) -> None:
     assert "pavements is for kind" in problem(rider(tmp_path, ("scene.toml", 'kind = "bicycle"', 'kind = "car"')))
 
 
-def test_way__that_crosses_the_road_inside_a_junction_is_refused(tmp_path: Path) -> None:
-    walks = """kind = "pedestrian"
+@pytest.mark.parametrize("marked", ["", "marked_crossing = true\n"])
+def test_way__that_crosses_the_road_inside_a_junction_with_signals_is_refused(tmp_path: Path, marked: str) -> None:
+    walks = f"""kind = "pedestrian"
 way = [[100.0, 95.6], [145.0, 95.6]]                   # along the path beside the road, over the side road
-"""
+{marked}"""
     goal = """speed_mps = [4.0, 5.5]
 goal = { edge = "east_out", position_m = 40.0 }"""
     folder = changed(
@@ -140,6 +143,58 @@ goal = { edge = "east_out", position_m = 40.0 }"""
         ("cyclist.net.xml", 'allow="bicycle"', 'allow="bicycle pedestrian"'),
     )  # fmt: skip
     assert "crosses the road inside junction 'centre'" in problem(folder)
+
+
+STREET_NODES = '<node id="w" x="0" y="0"/><node id="m" x="150" y="0"/><node id="e" x="300" y="0"/>'
+STREET_EDGES = """
+    <edge id="wm" from="w" to="m" numLanes="1" speed="13.89" sidewalkWidth="2"/>
+    <edge id="me" from="m" to="e" numLanes="1" speed="13.89" sidewalkWidth="2"/>
+    <edge id="em" from="e" to="m" numLanes="1" speed="13.89" sidewalkWidth="2"/>
+    <edge id="mw" from="m" to="w" numLanes="1" speed="13.89" sidewalkWidth="2"/>"""
+STREET_CROSSING = '<crossing node="m" edges="me em" priority="true"/>'
+STREET_ROUTES = """<routes><vehicle id="ego" depart="0"><route edges="wm me"/></vehicle></routes>"""
+STREET = """name = "street"
+net = "test.net.xml"
+routes = "street.rou.xml"
+time_limit_s = 40.0
+[ego]
+vehicle = "ego"
+route_m = [60.0, 80.0]
+speed_mps = [8.0, 13.0]
+goal = { edge = "me", position_m = 50.0 }
+[non_ego]
+kind = "pedestrian"
+way = [[135.0, 4.2], [X, 4.2], [X, -4.2]]
+arrival_after_ego_s = [-2.0, 2.0]
+speed_mps = [1.0, 1.4]
+"""
+
+
+@pytest.fixture
+def street(tmp_path: Path, build_net: Callable[..., Path]) -> Path:
+    """The folder of a street with a crossing of SUMO, which is inside a junction."""
+    file = build_net(STREET_NODES, STREET_EDGES, STREET_CROSSING, "--walkingareas")
+    (crossing,) = [edge for edge in read_net(file).getEdges(withInternal=True) if edge.getFunction() == "crossing"]
+    folder = tmp_path / "street"
+    folder.mkdir()
+    shutil.copyfile(file, folder / "test.net.xml")
+    (folder / "street.rou.xml").write_text(STREET_ROUTES)
+    (folder / "scene.toml").write_text(STREET.replace("X", str(crossing.getLane(0).getShape()[0][0])))
+    return folder
+
+
+def test_way__over_a_crossing_inside_a_junction_is_refused_unless_it_is_marked(street: Path) -> None:
+    assert "crosses the road inside junction 'm'" in problem(street)
+    scene = street / "scene.toml"
+    scene.write_text(scene.read_text() + "marked_crossing = true\n")
+    tables = open_scene(street).world.right_of_way
+    of_walker = tables.conflicts.player == 1
+    lanes = [tables.stream_lanes[stream] for stream in tables.conflicts.stream]
+    assert lanes == [("", ""), ("em_1", "mw_1"), ("wm_1", "me_1")]
+    assert tables.conflicts.yields.tolist() == [True, False, False]
+    assert (tables.conflicts.zone_m[of_walker] >= 0.0).all()  # behind the stop lines
+    (before_m,) = tables.conflicts.begin_m[~of_walker] - tables.stop_lines.station_m[-1]
+    assert before_m == pytest.approx(1.0)
 
 
 def test_bicycle__rides_on_its_own_lane_and_the_turning_car_yields() -> None:

@@ -10,7 +10,7 @@ import pandas as pd
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from harness.campaign.results.replay_game import episodes_of, games_of_arm, played_game, traces_of
+from harness.campaign.results.replay_game import episodes_of, games_of, played_game, traces_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.evaluation.people import judged_outcomes
@@ -65,13 +65,7 @@ def export_failures(run: Path, chosen: Failures, folder: Path, formats: Formats,
 
 def _failures(run: Path, episodes: pd.DataFrame, chosen: Failures) -> pd.DataFrame:
     """The rows of the failures, worst first."""
-    if chosen.arm is not None:
-        episodes = games_of_arm(run, episodes, chosen.arm)
-    if chosen.seed is not None:
-        seeds = sorted(set(episodes["seed"]))
-        if chosen.seed not in seeds:
-            raise UsageError.of(run, f"seed {chosen.seed}", "has no games", f"seeds are {', '.join(map(str, seeds))}")
-        episodes = episodes[episodes["seed"] == chosen.seed]
+    episodes = games_of(run, episodes, chosen.arm, chosen.seed)
     failures = episodes[judged_outcomes(episodes).isin(FAILURES)]
     if failures.empty:
         raise UsageError.of(

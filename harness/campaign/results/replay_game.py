@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +26,8 @@ from harness.evaluation.people import people_in
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
 from harness.evaluation.worst_first import FAILURES, severities, worst_first
-from harness.replay import follow_in_sumo_gui, replay_name, write_film, write_replay
+from harness.replay import follow_in_sumo_gui, names_in_pictures, replay_name, write_film, write_replay
+from harness.replay.vehicles import legend
 from harness.traffic.scene import OpenScene, open_scene
 
 _OTHERS = "--page, --rows, --outcome and ARM choose others"
@@ -117,13 +118,7 @@ def game_records(run: Path, chosen: GameList) -> dict[str, Any]:
 
 def _chosen(run: Path, episodes: pd.DataFrame, chosen: GameList) -> pd.DataFrame:
     """The games that fulfil the conditions. Raises UsageError where one is of no game."""
-    if chosen.arm is not None:
-        episodes = games_of_arm(run, episodes, chosen.arm)
-    if chosen.seed is not None:
-        seeds = sorted(set(episodes["seed"]))
-        if chosen.seed not in seeds:
-            raise UsageError.of(run, f"seed {chosen.seed}", "has no games", f"seeds are {', '.join(map(str, seeds))}")
-        episodes = episodes[episodes["seed"] == chosen.seed]
+    episodes = games_of(run, episodes, chosen.arm, chosen.seed)
     if chosen.outcome is not None:
         known = sorted({*FAILURES, *episodes["ego_outcome"], FAILURE} - {""})
         if chosen.outcome not in known:
@@ -147,6 +142,8 @@ class FoundGame:
     replay: Path
     trace: pd.DataFrame
     title: str
+    names: Mapping[str, str]
+    """What players are called, by their names in the trace."""
     step_length_s: float
 
 
@@ -215,7 +212,7 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
     Raises UsageError if there is no such game, or it could not be played.
     """
     game = played_game(run, arm, episode, seed)
-    scene = game.scene
+    scene, names = game.scene, names_in_pictures(game.record.iloc[0]["persona"])
     with TemporaryDirectory(prefix="harness-replay-") as scratch:
         replay = Path(scratch) / game.name
         write_replay(
@@ -225,18 +222,21 @@ def found_game(run: Path, arm: str, episode: int, seed: int | None) -> Iterator[
             replay,
             title=game.title,
             step_length_s=scene.world.step_s,
+            names=names,
             rails=scene.rail_lines,
             obstacles=scene.obstacles,
             stripes=scene.stripes,
         )
-        yield FoundGame(replay=replay, trace=game.trace, title=game.title, step_length_s=scene.world.step_s)
+        yield FoundGame(
+            replay=replay, trace=game.trace, title=game.title, names=names, step_length_s=scene.world.step_s
+        )
 
 
 def watch(game: FoundGame, console: Console) -> None:
     """Show a game in SUMO-GUI until its user closes it. Raises UsageError if there is no screen or no SUMO-GUI."""
     message = (
-        f"SUMO-GUI plays {game.replay} at half of real time and follows the ego. It halts at a contact and at the "
-        "end; the play button continues. This command ends when SUMO-GUI is closed."
+        f"SUMO-GUI plays {game.replay} at half of real time and follows the ego ({legend(game.trace, game.names)}). It "
+        "halts at a contact and at the end; the play button continues. This command ends when SUMO-GUI is closed."
     )
     follow_in_sumo_gui(game.replay, lambda: console.print(message, highlight=False, markup=False, soft_wrap=True))
 
@@ -252,6 +252,7 @@ def film(game: FoundGame, file: Path, console: Console) -> None:
             file,
             title=game.title,
             step_length_s=game.step_length_s,
+            names=game.names,
             on_progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
     console.print(f"Wrote {file}: {pictures} pictures.", highlight=False, markup=False, soft_wrap=True)
@@ -261,6 +262,18 @@ def episodes_of(folder: RunFolder) -> pd.DataFrame:
     """The rows of `episodes.csv`. Raises UsageError unless the folder is one of a run."""
     folder.manifest()
     return read_csv(folder.path / "episodes.csv")
+
+
+def games_of(run: Path, episodes: pd.DataFrame, arm: str | None, seed: int | None) -> pd.DataFrame:
+    """The rows of an arm and of a training seed; None is every one. Raises UsageError if there are none."""
+    if arm is not None:
+        episodes = games_of_arm(run, episodes, arm)
+    if seed is not None:
+        seeds = sorted(set(episodes["seed"]))
+        if seed not in seeds:
+            raise UsageError.of(run, f"seed {seed}", "has no games", f"seeds are {', '.join(map(str, seeds))}")
+        episodes = episodes[episodes["seed"] == seed]
+    return episodes
 
 
 def games_of_arm(run: Path, episodes: pd.DataFrame, arm: str) -> pd.DataFrame:

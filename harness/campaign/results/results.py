@@ -52,7 +52,7 @@ from harness.evaluation.trace_file import TraceReader, check_traces
 from harness.evaluation.unplayed_games import reasons_of
 from harness.evaluation.worst_first import worst_first
 from harness.files import write_atomically
-from harness.replay import choose_games, replay_name, write_replay
+from harness.replay import choose_games, names_in_pictures, replay_name, write_replay
 from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions, warn
@@ -257,6 +257,7 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
             folder.replays / name,
             title=f"{game.arm}, seed {game.seed}, episode {game.episode}",
             step_length_s=scene.world.step_s,
+            names=names_in_pictures(game.persona),
             rails=scene.rail_lines,
             obstacles=scene.obstacles,
             stripes=scene.stripes,

@@ -26,6 +26,7 @@ _LAYER_M = 6.0  # of height between a road and the one that it passes over
 _NO_ROAD = ("has no road that cars may use", "export an area with roads for cars")
 _CUT = "cut out a part: netconvert -s FILE --keep-edges.in-boundary XMIN,YMIN,XMAX,YMAX -o part.net.xml"
 _OSM_TYPES = ("osmNetconvert", "osmNetconvertUrbanDe")
+_LIGHTS = ("--tls.cycle.time", "40")  # maps do not time their lights: red is short, so that games are
 _OSM_OPTIONS = (
     *("--geometry.remove", "--ramps.guess", "--junctions.join", "--no-turnarounds", "--remove-edges.isolated"),
     *("--tls.guess-signals", "--tls.discard-simple", "--tls.join", "--output.street-names"),
@@ -83,7 +84,7 @@ def _convert(path: Path, kind: MapKind, facts: MapFacts, net_file: Path, left_ha
     source = net_file.with_name("map.xml")  # netconvert splits names at commas and blanks
     with path.open("rb") as packed, source.open("wb") as plain:
         shutil.copyfileobj(gzip.GzipFile(fileobj=packed) if path.suffix.lower() == ".gz" else packed, plain)
-    options = ["--xml-validation", "never", "--output-file", net_file.name, "--aggregate-warnings", "1"]
+    options = ["--xml-validation", "never", "--output-file", net_file.name, "--aggregate-warnings", "1", *_LIGHTS]
     if kind is MapKind.OSM:
         types = Path(sumo.SUMO_HOME) / "data" / "typemap"
         files = ",".join(str(types / f"{name}.typ.xml") for name in _OSM_TYPES)

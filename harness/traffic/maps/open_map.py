@@ -12,6 +12,7 @@ from sumolib.net import Net
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.traffic.maps.import_map import import_map
+from harness.traffic.maps.lights import longest_reds_s
 from harness.traffic.maps.plans import GamePlan, Plans
 from harness.traffic.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lanes
 from harness.traffic.network import car_lanes, lane_line
@@ -25,6 +26,7 @@ class OpenMap:
     net_file: Path
     plans: Sequence[GamePlan]
     left_out: dict[str, int]  # reason and number of conflicts of which no scene can be made
+    reds_s: dict[str, float]  # the longest red of each traffic light
     net: Net = field(repr=False)
 
     def near(self, edge: str | None, within_m: float) -> list[GamePlan]:
@@ -62,4 +64,11 @@ def open_map(source: Path, folder: Path, *, left_hand: bool) -> OpenMap:
         reasons = "; ".join(f"{reason}: {count}" for reason, count in sorted(plans.left_out.items()))
         message = "has no conflict of which a scene can be made" + (f" ({reasons})" if reasons else "")
         raise UsageError.of(source, "", message, "choose an area with junctions and longer roads before them")
-    return OpenMap(source=source, net_file=net_file, net=net, plans=plans.all, left_out=plans.left_out)
+    return OpenMap(
+        source=source,
+        net_file=net_file,
+        net=net,
+        plans=plans.all,
+        left_out=plans.left_out,
+        reds_s=longest_reds_s(net_file),
+    )

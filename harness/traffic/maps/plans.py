@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -32,6 +32,8 @@ _NARROWEST_M = 2.5
 _NEAR_M = 25.0  # between the place of a candidate and that where the routes meet
 _BESIDE_M = 8.0
 _EXAMPLE = ", such as "
+_SPARE_S = 8.0
+_TIME_LIMITS_S = (30.0, 300.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +43,7 @@ class Start:
     key: str  # route_m, arrival_after_ego_s, or lane with position_m or beside_ego_m
     range: Range
     speed_mps: Range
+    first_m: float  # the farthest start, along the route
     lane: str = ""
 
 
@@ -62,16 +65,25 @@ class GamePlan:
         return [] if self.way is None else [[round(float(each), 2) for each in point] for point in self.way]
 
     @property
-    def has_signals(self) -> bool:
-        """Whether a player waits for a light in some games."""
-        return self.ego_route.has_signals or (self.person_route is not None and self.person_route.has_signals)
+    def edges(self) -> set[str]:
+        """The edges of the players' routes."""
+        return {name for route in (self.ego_route, self.person_route) if route is not None for name in route.edges}
 
-    @property
-    def time_limit_s(self) -> float:
-        """Time enough for both at half of their limits, and for a red light."""
-        routes = [each for each in (self.ego_route, self.person_route) if each is not None]
-        longest_s = max(len(each.line) * SPACING_M / (0.5 * each.limit_mps) for each in routes)
-        return float(np.clip(5.0 * np.ceil((longest_s + 10.0 + 45.0 * self.has_signals) / 5.0), 30.0, 300.0))
+    def time_limit_s(self, reds_s: Mapping[str, float]) -> float:
+        """Time enough for both from their farthest starts, at the speed of the slowest, and for the longest red of each
+        traffic light on their ways, by its id."""
+        starts = [(self.ego_route, self.ego)]
+        starts += [(self.person_route, self.person)] if self.person_route is not None else []
+        longest_s = max(_seconds(route, start.first_m, reds_s) for route, start in starts)
+        if self.way is not None:
+            longest_s = max(longest_s, shapely.LineString(self.way).length / _WALK_MPS[0])
+        return float(np.clip(5.0 * np.ceil((longest_s + _SPARE_S) / 5.0), *_TIME_LIMITS_S))
+
+
+def _seconds(route: PlannedRoute, from_m: float, reds_s: Mapping[str, float]) -> float:
+    """Time from a station to the goal, at the lowest share of the speed limit and through red lights."""
+    way_m = len(route.line) * SPACING_M - from_m
+    return way_m / (_SHARES[0] * route.limit_mps) + sum(reds_s[name] for at_m, name in route.lights if at_m > from_m)
 
 
 class Plans:
@@ -156,9 +168,19 @@ class Plans:
                     candidate=candidate,
                     ego_route=ego_route,
                     person_route=route,
-                    ego=Start(key="position_m", range=_rounded(low_m, high_m), speed_mps=speed, lane=lanes[0].getID()),
+                    ego=Start(
+                        key="position_m",
+                        range=_rounded(low_m, high_m),
+                        speed_mps=speed,
+                        first_m=ego_route.junction_m - length_m + low_m,
+                        lane=lanes[0].getID(),
+                    ),
                     person=Start(
-                        key="beside_ego_m", range=(-_BESIDE_M, _BESIDE_M), speed_mps=speed, lane=lanes[1].getID()
+                        key="beside_ego_m",
+                        range=(-_BESIDE_M, _BESIDE_M),
+                        speed_mps=speed,
+                        first_m=route.junction_m - length_m + low_m - _BESIDE_M,
+                        lane=lanes[1].getID(),
                     ),
                 )
         return None
@@ -177,7 +199,7 @@ class Plans:
                 continue
             start = _ego_start(found.ego_m, speed, seconds)
             if start.range[0] >= _FIRST_START_M and found.other_m >= _WALK_MPS[1] * most_s:
-                person = Start(key="arrival_after_ego_s", range=(-_WALK_APART_S, _WALK_APART_S), speed_mps=_WALK_MPS)
+                person = _arriving(_WALK_APART_S, _WALK_MPS, found.other_m - _WALK_MPS[1] * most_s)
                 return GamePlan(
                     number=number, candidate=candidate, ego_route=ego_route, ego=start, person=person, way=way
                 )
@@ -195,14 +217,15 @@ def _timed(
         speed, other = _speeds(ego_route.limit_mps, slower), _speeds(route.limit_mps, slower)
         start = _ego_start(found.ego_m, speed, seconds)
         most_s = seconds * speed[1] / speed[0] + _APART_S
-        if start.range[0] >= _FIRST_START_M and found.other_m - other[1] * most_s >= _FIRST_START_M:
+        first_m = found.other_m - other[1] * most_s
+        if min(start.first_m, first_m) >= _FIRST_START_M:
             return GamePlan(
                 number=number,
                 candidate=candidate,
                 ego_route=ego_route,
                 person_route=route,
                 ego=start,
-                person=Start(key="arrival_after_ego_s", range=(-_APART_S, _APART_S), speed_mps=other),
+                person=_arriving(_APART_S, other, first_m),
             )
     return None
 
@@ -217,8 +240,8 @@ def _one_behind_the_other(candidate: Candidate, number: int, route: PlannedRoute
         candidate=candidate,
         ego_route=route,
         person_route=route,
-        ego=Start(key="route_m", range=(10.0, 30.0), speed_mps=speed),
-        person=Start(key="route_m", range=(55.0, 75.0), speed_mps=speed),
+        ego=Start(key="route_m", range=(10.0, 30.0), speed_mps=speed, first_m=10.0),
+        person=Start(key="route_m", range=(55.0, 75.0), speed_mps=speed, first_m=55.0),
     )
 
 
@@ -231,7 +254,11 @@ def _tries() -> Iterator[tuple[float, float]]:
 
 def _ego_start(meeting_m: float, speed: Range, seconds: float) -> Start:
     farthest, nearest = (meeting_m - speed[1] * each for each in (seconds, seconds - _START_RANGE_S))
-    return Start(key="route_m", range=_rounded(farthest, nearest), speed_mps=speed)
+    return Start(key="route_m", range=_rounded(farthest, nearest), speed_mps=speed, first_m=farthest)
+
+
+def _arriving(apart_s: float, speed: Range, first_m: float) -> Start:
+    return Start(key="arrival_after_ego_s", range=(-apart_s, apart_s), speed_mps=speed, first_m=first_m)
 
 
 def _speeds(limit_mps: float, slower: float) -> Range:

@@ -36,7 +36,7 @@ class PlannedRoute:
     goal_edge: str
     goal_position_m: float
     limit_mps: float  # the lowest speed limit of the edges before the junction
-    has_signals: bool
+    lights: tuple[tuple[float, str], ...]  # up to the junction: station and id of each traffic light
 
 
 def planned_route(net: Net, way: Way, before_m: float, rings: Collection[str]) -> PlannedRoute | None:
@@ -85,7 +85,7 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
         goal_edge=edges[k].getID(),
         goal_position_m=float(np.floor(10.0 * share * edges[k].getLength()) / 10.0),
         limit_mps=min(edge.getSpeed() for edge in before),
-        has_signals=any(link.getTLSID() for edge in before for link in _onward(edge)),
+        lights=tuple((ends[k], name) for k, edge in enumerate(before) for name in _lights(edge)),
     )
 
 
@@ -126,6 +126,10 @@ def _cost(link: Connection, edge: Edge, rings: Collection[str]) -> tuple[float, 
     slow = edge.getSpeed() < _SLOWER * other.getSpeed()
     cost = _BEND_COST * bend + _YIELD_COST * must_yield + 0.5 * slow + _RING_COST * (edge.getID() in rings)
     return cost, edge.getID()
+
+
+def _lights(edge: Edge) -> list[str]:
+    return sorted({link.getTLSID() for link in _onward(edge) if link.getTLSID()})
 
 
 def _onward(edge: Edge) -> list[Connection]:
