@@ -16,6 +16,7 @@ from typing import Any
 from harness.campaign.named_documents import NamedDocuments, find_named, read_named_persona, read_names
 from harness.campaign.plan.name_checks import check_names
 from harness.campaign.plan.people_checks import check_people
+from harness.campaign.plan.persona_remarks import persona_remarks
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.strategy_drivers import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
@@ -66,6 +67,11 @@ class OpenCampaign:
     def tunable(self) -> bool:
         """Whether the ego is external and has tunable parameters."""
         return _is_tunable(self.ego_driver)
+
+    @property
+    def persona_remarks(self) -> list[str]:
+        """What in the payoffs of the personas does not suit the scene: a sentence each."""
+        return persona_remarks(self.personas, self.scene.world, self.document.training.discount)
 
     def hash_of(self, path: Path) -> str:
         """SHA-256 of one of those files."""

@@ -148,11 +148,12 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     notes = opened.ego_driver.notes if opened.ego_driver is not None else ()
     ego = [] if opened.document.ego.driver == LEARNED else [wording.ego(opened), *notes]
     ego = [plain(each) for each in (*ego, *(f"{driver}: {told}" for driver, told in varying.items()))]
-    print_plain([wording.in_order(file), *opened.scene.warnings, *ego], console)
+    remarks = [*opened.scene.warnings, *opened.persona_remarks, *ego]
+    print_plain([wording.in_order(file), *remarks], console)
     print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
     if as_json:
         checked = {"campaign": opened.document.name, "file": str(file), "in_order": True}
-        print_json({**checked, "remarks": [*opened.scene.warnings, *ego], "stages": wording.stage_records(stages)})
+        print_json({**checked, "remarks": remarks, "stages": wording.stage_records(stages)})
 
 
 def schema(

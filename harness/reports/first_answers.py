@@ -21,6 +21,7 @@ PREVENTED = (
     "Against {persona} a reference driver (a model of a careful human driver) in the seat of the {naive} avoids "
     "{avoided} of its {failures} failures."
 )
+ALSO = "Against {persona}: {avoided} of {failures}."
 NOT_JUDGED = "Not known: reference drivers have judged no failure of this run."
 NOTHING_TO_PREVENT = "There is nothing to prevent: the {naive} does not fail."
 
@@ -33,6 +34,8 @@ class FirstAnswer:
     lines: Sequence[str]
     command: str = ""
     """What to type, if the answer is something to do."""
+    game: str = ""
+    """The key of the game that it is about, empty for none."""
 
 
 def first_answers(personas: Sequence[str], found: Results, steps: Sequence[NextStep]) -> list[FirstAnswer]:
@@ -44,7 +47,9 @@ def first_answers(personas: Sequence[str], found: Results, steps: Sequence[NextS
         FirstAnswer(question=WHY, lines=lines),
         FirstAnswer(question=PREVENTABLE, lines=_prevented(personas, found)),
     ]
-    answers += [FirstAnswer(question=NOW, lines=[step.sentence], command=step.command) for step in steps[:1]]
+    answers += [
+        FirstAnswer(question=NOW, lines=[step.sentence], command=step.command, game=step.game) for step in steps[:1]
+    ]
     return answers
 
 
@@ -76,13 +81,15 @@ def _why(persona: str, found: Results) -> Iterator[str]:
 
 
 def _prevented(personas: Sequence[str], found: Results) -> list[str]:
-    lines, all_avoided, all_failures = [], 0, 0
+    lines: list[str] = []
+    all_avoided, all_failures = 0, 0
     for persona in personas:
         judged = found.preventability.get(against_persona(NaiveEgo(), persona).name, ())
         avoided = sum(each.from_start.by_any for each in judged)
         failures = sum(each.from_start.judged for each in judged)
         if failures:
-            lines.append(PREVENTED.format(persona=persona, naive=found.naive, avoided=avoided, failures=failures))
+            sentence = ALSO if lines else PREVENTED
+            lines.append(sentence.format(persona=persona, naive=found.naive, avoided=avoided, failures=failures))
         all_avoided, all_failures = all_avoided + avoided, all_failures + failures
     if not lines:
         arms = [against_persona(NaiveEgo(), persona).name for persona in personas]

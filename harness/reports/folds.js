@@ -20,7 +20,7 @@ document.addEventListener("click", event => {
 window.addEventListener("hashchange", () => unfoldAddressed(location.hash));
 unfoldAddressed(location.hash);
 
-// On paper the evidence is unfolded.
-matchMedia("print").addEventListener("change", event => {
-  if (event.matches) for (const each of document.querySelectorAll("details.evidence")) each.open = true;
+// On paper the evidence is unfolded, by the style where a browser can do that, and here for the others.
+window.addEventListener("beforeprint", () => {
+  for (const each of document.querySelectorAll("details.evidence")) each.open = true;
 });

@@ -10,6 +10,7 @@ from typing import Any
 from harness.evaluation.acceptance import Check
 from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports.header import command_of
+from harness.reports.player_data import key
 from harness.reports.replays import most_severe
 from harness.reports.results import Results
 from harness.reports.wording import failures
@@ -30,6 +31,8 @@ class NextStep:
 
     sentence: str
     command: str = ""
+    game: str = ""
+    """The key of the game to watch (`player_data.key`); empty: the step is about no game."""
 
 
 def next_steps(
@@ -67,7 +70,9 @@ def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:
             game = most_severe(found.games[found.games["arm"] == arm])
             command = f"harness replay . {shlex.quote(arm)} {game['episode']}"
             command += f" --seed {game['seed']}" if len(found.seeds) > 1 else ""
-            yield NextStep(sentence=sentence.format(made=made, persona=persona, naive=found.naive), command=command)
+            watched = key(arm, int(game["seed"]), int(game["episode"]))
+            words = sentence.format(made=made, persona=persona, naive=found.naive)
+            yield NextStep(sentence=words, command=command, game=watched)
             yield NextStep(sentence=MINIMISE, command=command.replace("harness replay", "harness minimise", 1))
             return
 

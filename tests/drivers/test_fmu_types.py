@@ -1,7 +1,7 @@
 """Variables of every type in FMUs of FMI 3.0, and the Reference-FMUs of the Modelica Association.
 
 The Reference-FMUs are in no package and are not part of this repository. Where REFERENCE_FMUS names the folder of an
-unpacked release (https://github.com/modelica/Reference-FMUs/releases), the one with inputs drives; elsewhere that test is
+unpacked release (https://github.com/modelica/Reference-FMUs/releases), they are tested; elsewhere these tests are
 skipped. The first tests build FMUs with the same types of variables from the example's source.
 """
 
@@ -156,7 +156,7 @@ def test_fmi3__an_array_is_refused(typed_twin: Path, tmp_path: Path) -> None:
         wiring(document(inputs={"row": "goal_m"}), declared(typed_twin, tmp_path, {}, row))
 
 
-# --- the Reference-FMUs of the Modelica Association ---------------------------------------------------------------------
+# --- the Reference-FMUs of the Modelica Association -------------------------------------------------------------------
 
 REAL = {"Float64_continuous_input": "speed_over_limit", "Float64_discrete_input": "road_steering_rad"}
 OTHERS = {"Int32_input": "goal_m", "Boolean_input": "other0_seen"}
@@ -180,7 +180,7 @@ def reference_fmu(version: str, name: str) -> Path:
 
 @pytest.mark.parametrize("version", ["2", "3"])
 def test_reference_fmus__what_goes_in_comes_out(version: str, merge: OpenScene, car: Car) -> None:
-    """Feedthrough has inputs of every type, and an output for each, which drives here: it follows the route at the limit."""
+    """Feedthrough has inputs of every type, and an output for each: here they hold the limit and follow the route."""
     file = reference_fmu(version, "Feedthrough")
     inputs = REAL | OTHERS | (OF_FMI_3 if version == "3" else {})
     driver = fmu_driver(document(inputs=inputs, **FEEDTHROUGH), file, car)

@@ -52,6 +52,7 @@ def test_report__the_four_answers_are_on_the_first_screen(opened):
     assert page.get_by_text("Quick run").is_visible()
     assert page.get_by_text("Against speedy the naive ego fails in 18 of 60 games").is_visible()
     assert page.get_by_text("The speedy driver makes the naive ego fail in 18 of 60 games").is_visible()
+    assert page.get_by_role("link", name="Watch it here").first.get_attribute("href").startswith("#game=")
 
 
 @pytest.mark.parametrize("width", [400, 320, 1280])
@@ -116,3 +117,17 @@ def test_report__prints_with_its_verdicts_and_figures(opened):
     for gone in ("nav", ".clock", ".filters"):
         assert not page.locator(gone).first.is_visible()
     assert page.pdf().startswith(b"%PDF")
+
+
+def test_report__no_column_and_no_fold_is_cut_on_paper(opened):
+    page = opened(width=700)
+    page.emulate_media(media="print")
+    unfolded = "[...document.querySelectorAll('details.evidence')].map(each => each.getBoundingClientRect().height)"
+    assert min(page.evaluate(unfolded)) > 60  # pixels; a heading alone is lower
+    cut = """[...document.querySelectorAll('body *')].filter(each => each.getClientRects().length
+        && !each.closest('canvas, svg, .player, option')
+        && getComputedStyle(each).overflowX !== 'visible'
+        && (each.scrollWidth > each.clientWidth + 1 || each.scrollHeight > each.clientHeight + 1))
+        .map(each => each.outerHTML.slice(0, 80))"""
+    assert page.evaluate(cut) == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= 700
