@@ -10,12 +10,12 @@ PYTEST := $(BIN)/pytest -n auto --maxprocesses 4 --dist worksteal
 INSTALLED := .venv/installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo campaign quick test test-esmini test-fast coverage bench publish docs check lock clean
+.PHONY: help install demo campaign quick test test-esmini test-fast wheel coverage bench publish docs check lock clean
 
 help: ## list the targets
 	@echo "make TARGET [ARGS='...'] [PYTHON=python3.x]"
 	@sed -n 's/^\([a-z-]*\):.*## \(.*\)/  \1|\2/p' Makefile | while IFS='|' read -r target text; do \
-	    printf '%-12s%s\n' "$$target" "$$text"; done
+	    printf '%-15s%s\n' "$$target" "$$text"; done
 
 install: $(INSTALLED) ## set up .venv from requirements.lock (again only when it or pyproject.toml changes)
 
@@ -36,6 +36,12 @@ test-esmini: install ## run the tests that play exports in esmini: make test-esm
 
 test-fast: install ## run the tests of every room that take a moment, in about a minute: after each edit
 	$(PYTEST) -m "not slow" $(ARGS)
+
+wheel: install ## test the wheel in an environment of its own, with the locked versions: make wheel PYTHON=python3.13
+	rm -rf build/wheel && $(PYTHON) -m venv build/wheel/venv
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --no-build-isolation -w build/wheel .
+	build/wheel/venv/bin/python -m pip install --quiet --disable-pip-version-check -c requirements.lock build/wheel/*.whl pytest
+	HARNESS_WHEEL_ENVIRONMENT=build/wheel/venv $(BIN)/pytest -n 0 tests/test_wheel.py $(ARGS)
 
 coverage: install ## run every test and print the share of each module's lines that they run
 	$(PYTEST) --cov=harness --cov-report=term $(ARGS)

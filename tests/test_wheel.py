@@ -39,7 +39,10 @@ def test_my_ego_drives_alone():
 
 @pytest.fixture(scope="session")
 def environment(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a new virtual environment with the wheel in it, beside the libraries that the tests run with."""
+    """The folder of a virtual environment with the wheel: a new one, beside the libraries that the tests run with,
+    or the one that HARNESS_WHEEL_ENVIRONMENT names, which `make wheel` makes of any Python."""
+    if named := os.environ.get("HARNESS_WHEEL_ENVIRONMENT"):
+        return Path(named).absolute()
     folder = tmp_path_factory.mktemp("wheel")
     pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
     build = [*pip, "wheel", "--no-deps", "--no-build-isolation", "-w", folder, REPOSITORY]

@@ -34,6 +34,7 @@ def output(as_json: bool, quiet: bool = False, verbose: bool = False) -> Iterato
     from rich.console import Console
 
     console = Console(stderr=as_json, quiet=quiet)
+    console.soft_wrap = not console.is_terminal  # a file is searched and compared by lines
     with _problems_as_json(as_json), _log_shown(verbose, console):
         if quiet and verbose:
             raise UsageError.of("--quiet", "--verbose", "are opposites", "leave one of them out")
