@@ -15,7 +15,7 @@ function unfoldAddressed(hash) {
 }
 document.addEventListener("click", event => {
   const link = event.target.closest('a[href^="#"]');
-  if (link) unfoldAddressed(link.hash);
+  if (link) unfoldAddressed(link.getAttribute("href"));  // a link of a figure has no `hash`
 });
 window.addEventListener("hashchange", () => unfoldAddressed(location.hash));
 unfoldAddressed(location.hash);

@@ -85,8 +85,8 @@ class GameSection:
         return tables + sum(len(each.figure) for view in self.views for each in view.maps) + _REST_BYTES
 
 
-def game_section(findings: GameFindings | None) -> GameSection | None:
-    """The section of a run's findings; None where it has none."""
+def game_section(findings: GameFindings | None, episodes: pd.DataFrame | None = None) -> GameSection | None:
+    """The section of a run's findings; None where it has none. `episodes` are the games that cells link to."""
     if findings is None:
         return None
     frames = {name: typed(getattr(findings, name)) for name in CAPTIONS}
@@ -96,7 +96,7 @@ def game_section(findings: GameFindings | None) -> GameSection | None:
         verdicts=gap_verdicts(gaps),
         others=other_pairs(gaps),
         gaps=[_gap(row) for name in dict.fromkeys(gaps["persona"]) for row in _last(gaps[gaps["persona"] == name])],
-        views=views(frames["crossplay"]),
+        views=views(frames["crossplay"], episodes),
         solutions=equilibrium_sentences(frames["equilibria"]),
         new_personas=_new_personas(frames["generalisation"]),
         tables={name: table(name, CAPTIONS[name], frame) for name, frame in frames.items()},

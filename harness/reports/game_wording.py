@@ -290,6 +290,9 @@ def fewer_failures(difference: float, low: float, high: float) -> str:
     return text
 
 
+OPENS_A_GAME = "A cell opens the worst of its games."
+
+
 def heat_caption(quantity: str, *, is_rate: bool, is_mean: bool, unpaid: bool) -> str:
     """The caption of a heat map; `is_mean`: over seeds, `unpaid`: a column has no payoff."""
     spread = "least to most of the seeds that played it"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+import re
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,9 +13,11 @@ import pandas as pd
 from markupsafe import Markup
 
 from harness.evaluation.game_theory.crossplay import Matrices, matrices
-from harness.reports.figures import INK, SERIES, figure_of, svg
-from harness.reports.game_wording import HEAT_TITLES, heat_caption
+from harness.evaluation.worst_first import worst_first
+from harness.reports.figures import GAME, INK, SERIES, figure_of, svg
+from harness.reports.game_wording import HEAT_TITLES, OPENS_A_GAME, heat_caption
 from harness.reports.numbers import MISSING, number, trimmed
+from harness.reports.player_data import key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,6 +27,7 @@ Floats = npt.NDArray[np.float64]
 
 PALEST, DARKEST = 0.04, 0.5
 """Opacity of the least and the greatest value: text on them is legible on a dark and on a light page."""
+_LINK = re.compile(rf'<a [^>]*href="{GAME}(?P<game>[^"]*)"[^>]*>(?P<cell>.*?)</a>', re.DOTALL)
 COLUMN_IN, ROW_IN, LETTER_IN = 0.8, 0.46, 0.085
 
 
@@ -66,29 +70,59 @@ QUANTITIES = (
 )
 
 
-def views(crossplay: pd.DataFrame) -> list[MatrixView]:
-    """The heat maps of `crossplay`: of its seed, or of the mean over its seeds first and then of each."""
+def views(crossplay: pd.DataFrame, episodes: pd.DataFrame | None = None) -> list[MatrixView]:
+    """The heat maps of `crossplay`: of its seed, or of the mean over its seeds first and then of each.
+
+    A cell links to the worst of its games in `episodes`, whether or not the page contains it: `only_links_to` takes out
+    the other links.
+    """
+    worst = _worst_games(episodes)
     seeds = list(dict.fromkeys(crossplay["seed"]))
     shown = [(f"seed {seed}", crossplay[crossplay["seed"] == seed]) for seed in seeds]
     if len(seeds) > 1:
         shown.insert(0, (f"mean over {len(seeds)} seeds", _mean(crossplay)))
     return [
-        MatrixView(label=label, maps=[_map(quantity, rows, label, place) for quantity in QUANTITIES])
+        MatrixView(label=label, maps=[_map(quantity, rows, label, place, worst) for quantity in QUANTITIES])
         for place, (label, rows) in enumerate(shown)
     ]
 
 
+def only_links_to(embedded: Container[str], view: MatrixView) -> MatrixView:
+    """The view with links to these games alone, and a caption that says that there are links."""
+
+    def kept(link: re.Match[str]) -> str:
+        return link[0] if link["game"] in embedded else link["cell"]
+
+    def linked(drawn: HeatMap) -> HeatMap:
+        figure = Markup(_LINK.sub(kept, drawn.figure))
+        caption = f"{drawn.caption} {OPENS_A_GAME}" if GAME in figure else drawn.caption
+        return replace(drawn, figure=figure, caption=caption)
+
+    return replace(view, maps=[linked(each) for each in view.maps])
+
+
+def _worst_games(episodes: pd.DataFrame | None) -> dict[tuple[str, int | None], str]:
+    """The key of the worst game of each arm and seed, and under the seed None of each arm."""
+    worst: dict[tuple[str, int | None], str] = {}
+    for game in () if episodes is None else worst_first(episodes).itertuples():
+        for seed in (int(game.seed), None):
+            worst.setdefault((game.arm, seed), key(game.arm, int(game.seed), int(game.episode)))
+    return worst
+
+
 def _mean(crossplay: pd.DataFrame) -> pd.DataFrame:
     """Each cell's mean over the seeds that have it, with the least and the most in place of an interval."""
-    cells = crossplay.groupby(["ego", "non_ego", "persona"], sort=False)
+    cells = crossplay.groupby(["ego", "non_ego", "persona", "arm"], sort=False)
     means = {quantity.name: cells[quantity.name].mean() for quantity in QUANTITIES}
     means |= {f"{quantity.name}_low": cells[quantity.name].min() for quantity in QUANTITIES}
     means |= {f"{quantity.name}_high": cells[quantity.name].max() for quantity in QUANTITIES}
     return pd.DataFrame(means).reset_index()
 
 
-def _map(quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int) -> HeatMap:
-    """One heat map; `place` makes its ids unique."""
+def _map(
+    quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int, worst: Mapping[tuple[str, int | None], str]
+) -> HeatMap:
+    """One heat map; `place` makes its ids unique. `worst` has the game that a cell of an arm and seed links to."""
     table = _by_persona(matrices(crossplay))
     cells = {(row["ego"], row["non_ego"]): row for row in crossplay.to_dict("records")}
     values = {
@@ -107,7 +141,7 @@ def _map(quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int) -
     height_in = ROW_IN * len(table.egos) + 0.35 + LETTER_IN * longest[1] * 0.55
     with figure_of(width_in, height_in) as figure:
         axes = _axes(figure, table)
-        _draw_cells(axes, quantity, table, values, cells)
+        _draw_cells(axes, quantity, table, values, cells, worst)
         for drawing in (*axes.texts, *axes.patches):
             drawing.set_in_layout(False)  # they are within the axes; to measure them again is slow
         name = f"heat-{quantity.name.replace('_', '-')}-{place}"
@@ -143,7 +177,8 @@ def _draw_cells(
     quantity: _Quantity,
     table: Matrices,
     values: Floats,
-    cells: Mapping[tuple[str, str], Mapping[str, float]],
+    cells: Mapping[tuple[str, str], Mapping[str, Any]],
+    worst: Mapping[tuple[str, int | None], str],
 ) -> None:
     """Shade each cell by its value, and write the value and its interval in it."""
     shades = _shades(quantity, table, values)
@@ -152,13 +187,15 @@ def _draw_cells(
             if not np.isfinite(values[row, column]):
                 axes.text(column + 0.5, row + 0.5, MISSING, ha="center", va="center")
                 continue
-            axes.bar(
+            (bar,) = axes.bar(
                 column + 0.5, 0.92, 0.95, bottom=row + 0.04, linewidth=0,
                 color=SERIES[quantity.series], alpha=PALEST + (DARKEST - PALEST) * shades[row, column],
             )  # fmt: skip
+            cell = cells[ego, non_ego]
+            game = worst.get((cell["arm"], cell.get("seed")), "")
+            bar.set_url(f"{GAME}{game}" if game else None)
             axes.text(column + 0.5, row + 0.46, _text(quantity, values[row, column]), ha="center", color=INK)
-            span = _span(quantity, cells[ego, non_ego])
-            axes.text(column + 0.5, row + 0.82, span, ha="center", fontsize=8, color=INK)
+            axes.text(column + 0.5, row + 0.82, _span(quantity, cell), ha="center", fontsize=8, color=INK)
 
 
 def _by_persona(table: Matrices) -> Matrices:
@@ -188,7 +225,7 @@ def _text(quantity: _Quantity, value: float) -> str:
     return f"{trimmed(value * 100, 1)} %" if quantity.per_cent else number(value, 1)
 
 
-def _span(quantity: _Quantity, cell: Mapping[str, float]) -> str:
+def _span(quantity: _Quantity, cell: Mapping[str, Any]) -> str:
     low, high = cell[f"{quantity.name}_low"], cell[f"{quantity.name}_high"]
     if not (np.isfinite(low) and np.isfinite(high)):
         return ""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
@@ -21,6 +22,7 @@ from harness.reports.first_answers import first_answers
 from harness.reports.game import GameSection, game_section
 from harness.reports.game_links import GameLinks
 from harness.reports.header import command_of, facts, made_by
+from harness.reports.heatmaps import only_links_to
 from harness.reports.learning import learning
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
 from harness.reports.next_steps import next_steps
@@ -50,7 +52,7 @@ def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: Sc
     none is. Raises ValueError when a frame of `tables` does not have a table's columns.
     """
     tables = tables.with_types()
-    found, section = results(tables), game_section(tables.game)
+    found, section = results(tables), game_section(tables.game, tables.episodes)
     listed = tables.episodes if len(tables.episodes) <= MOST_ROWS else tables.episodes[:0]
     shown = _shown_tables(tables, listed)
     room = _room_for_games(_dots_bytes(tables), shown.values(), section)
@@ -67,13 +69,18 @@ def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: Sc
         **_tables(tables, shown, listed),
         **_replays(tables, embedded.keys),
         **_method(tables, found),
-        game=section,
+        game=_linked(section, embedded.keys),
         content_policy=CONTENT_POLICY,
         elsewhere=ELSEWHERE.format("[]"),
         libraries=libraries(environment),
         script=script(environment),
     )
     return page.strip() + "\n"
+
+
+def _linked(section: GameSection | None, embedded: Container[str]) -> GameSection | None:
+    """The section with links to embedded games alone."""
+    return section and replace(section, views=[only_links_to(embedded, view) for view in section.views])
 
 
 def _room_for_games(dots_bytes: int, shown: Iterable[Table], section: GameSection | None) -> int:

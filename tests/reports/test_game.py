@@ -22,10 +22,11 @@ from harness.reports.game_wording import (
     NO,
     NO_GAME,
     OPEN,
+    OPENS_A_GAME,
     equilibrium_sentences,
     gap_verdicts,
 )
-from harness.reports.heatmaps import views
+from harness.reports.heatmaps import only_links_to, views
 from tests.support.chromium import launched, opener
 from tests.support.game_tables import arm, findings, table
 from tests.support.pages import CONTRAST, Page, campaign, rendered
@@ -98,6 +99,22 @@ def test_heat_map__has_the_tables_number_in_every_cell(found):
         assert f">{row['failure_rate'] * 100:g} %<" in failures  # and not only for those who can't see it
     naive = found.crossplay[(found.crossplay["ego"] == "naive") & (found.crossplay["non_ego"] == "speedy")]
     assert f"naive against speedy {naive['ego_payoff'].mean():.1f}" in mean.maps[1].figure
+
+
+def test_heat_map__a_cell_links_to_the_worst_of_its_games(found):
+    games = campaign(personas=["speedy"])["episodes"]
+    games = games[games["arm"] == "naive_vs_speedy"].head(3)
+    episodes = games.assign(seed=[1, 1, 2], episode=[0, 7, 3], ego_outcome=["goal", "collision", "goal"])
+    mean, first, second = views(found.crossplay, episodes)
+    worst = "naive_vs_speedy,1,7"
+    assert f'href="#game={worst}"' in first.maps[0].figure
+    assert f'href="#game={worst}"' in mean.maps[0].figure
+    assert 'href="#game=naive_vs_speedy,2,3"' in second.maps[0].figure
+    assert OPENS_A_GAME in only_links_to({worst}, first).maps[0].caption
+    without = only_links_to({worst}, second).maps[0]
+    assert "#game=" not in without.figure
+    assert without.figure.count("<path") == second.maps[0].figure.count("<path")  # the cell stays
+    assert OPENS_A_GAME not in without.caption
 
 
 def test_heat_map__of_one_seed_there_is_nothing_to_choose():

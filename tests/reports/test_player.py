@@ -318,6 +318,7 @@ def test_figure__a_dot_names_its_game_and_opens_it(opened):
     assert dot.get_attribute("aria-label").startswith("retrained_vs_speedy, game 6: ")
     dot.evaluate("link => link.dispatchEvent(new MouseEvent('click', {bubbles: true, cancelable: true}))")
     until(page, "key => document.querySelector('.player').dataset.game === key", OTHER)
+    assert page.seen == []
 
 
 # --- addresses ---

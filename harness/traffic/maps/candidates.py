@@ -78,7 +78,7 @@ class Candidate:
 
 
 def candidates(net: Net) -> list[Candidate]:
-    """All candidates of a net, in the order of their numbers. A net without any has the longest roads instead."""
+    """The places where two ways meet on a net, in the order of their numbers."""
     feeders, rings = Feeders(net), {name for each in net.getRoundabouts() for name in each.getEdges()}
     found: dict[tuple[object, ...], Candidate] = {}
     for node in sorted(net.getNodes(), key=lambda node: str(node.getID())):
@@ -90,7 +90,7 @@ def candidates(net: Net) -> list[Candidate]:
     for edge in net.getEdges(withInternal=False):
         for each in _lane_ends(edge):
             found.setdefault(each.order, each)
-    return sorted(found.values(), key=lambda each: each.order) or list(_following(net))
+    return sorted(found.values(), key=lambda each: each.order)
 
 
 def for_cars(links: Iterable[Connection]) -> list[Connection]:
@@ -217,8 +217,8 @@ def _over(net: Net, link: Connection) -> shapely.LineString:
     return shapely.LineString(np.concatenate((ends[0], line_over_junction(net, link), ends[1])))
 
 
-def _following(net: Net) -> Iterator[Candidate]:
-    """The longest roads of a net without conflicts, on which one player follows the other."""
+def following(net: Net) -> Iterator[Candidate]:
+    """The longest roads of a net, on which one player may follow the other."""
     edges = [edge for edge in net.getEdges(withInternal=False) if car_lanes(edge)]
     for edge in sorted(edges, key=lambda edge: (-edge.getLength(), edge.getID()))[:10]:
         lane = car_lanes(edge)[0]

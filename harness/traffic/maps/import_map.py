@@ -6,6 +6,7 @@ import errno
 import gzip
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,7 +51,10 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> tuple[Path, Net]
     is_left = left_hand if kind is MapKind.OSM else _is_left(path, facts, left_hand)
     file = folder / "converted.net.xml"
     _convert(path, kind, facts, file, is_left)
-    check_net(file)
+    try:
+        check_net(file)
+    except UsageError as error:  # about a file that the user does not know
+        raise UsageError(replace(problem, file=str(path)) for problem in error.problems) from None
     try:
         net = read_net(file)
     except UsageError:

@@ -12,9 +12,9 @@ from sumolib.net import Net
 
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
-from harness.traffic.maps.candidates import Candidate, Kind, Way, candidates
+from harness.traffic.maps.candidates import Candidate, Kind, Way, candidates, following
 from harness.traffic.maps.footways import way_over
-from harness.traffic.maps.routes import PlannedRoute, meeting_near, planned_route
+from harness.traffic.maps.routes import PlannedRoute, following_m, meeting_near, planned_route
 from harness.traffic.start_ranges import meeting_of_lines
 
 Range = tuple[float, float]
@@ -31,6 +31,7 @@ _BEFORE_S = 12.0  # of road before the place, at the highest speed of a start
 _NARROWEST_M = 2.5
 _NEAR_M = 25.0  # between the place of a candidate and that where the routes meet
 _BESIDE_M = 8.0
+_LEAST_FOLLOWING = 0.7
 _EXAMPLE = ", such as "
 _SPARE_S = 8.0
 _TIME_LIMITS_S = (30.0, 300.0)
@@ -97,16 +98,17 @@ class Plans:
 
     @cached_property
     def all(self) -> list[GamePlan]:
-        """A plan of each candidate."""
+        """A plan of each candidate. A net on which no two ways meet has the longest roads instead."""
         found: list[GamePlan] = []
         reasons: dict[str, str] = {}  # the first of each with its example
-        for candidate in candidates(self.net):
-            plan = self._plan(candidate, len(found) + 1)
-            if isinstance(plan, GamePlan):
-                found.append(plan)
-            else:
-                reason = reasons.setdefault(plan.partition(_EXAMPLE)[0], plan)
-                self.left_out[reason] = self.left_out.get(reason, 0) + 1
+        for group in (candidates, following):
+            for candidate in group(self.net) if not found else ():
+                plan = self._plan(candidate, len(found) + 1)
+                if isinstance(plan, GamePlan):
+                    found.append(plan)
+                else:
+                    reason = reasons.setdefault(plan.partition(_EXAMPLE)[0], plan)
+                    self.left_out[reason] = self.left_out.get(reason, 0) + 1
         return found
 
     def _plan(self, candidate: Candidate, number: int) -> GamePlan | str:
@@ -232,7 +234,7 @@ def _timed(
 
 def _one_behind_the_other(candidate: Candidate, number: int, route: PlannedRoute) -> GamePlan | str:
     speed = _speeds(route.limit_mps, 1.0)
-    length_m, needed_m = len(route.line) * SPACING_M, 10.0 * speed[1] + 90.0
+    length_m, needed_m = len(route.line) * SPACING_M, _LEAST_FOLLOWING * following_m(route.limit_mps)
     if length_m < needed_m:
         return f"too short a road: {length_m:.0f} m of {needed_m:.0f} m"
     return GamePlan(

@@ -21,6 +21,7 @@ BEYOND_M = 45.0  # of the goal behind the junction
 _ROOM_M = 8.0  # behind a goal, at the end of the last edge
 _NEAREST_GOAL_M = 12.0
 _MOST_EDGES = 40
+_FOLLOWING_S, _AHEAD_M = 15.0, 75.0  # from the farthest start of the player ahead
 _BEND_COST, _YIELD_COST, _RING_COST = 2.0, 1.0, 3.0
 _SLOWER = 0.9
 _FREE_STATES = "MO"
@@ -61,6 +62,11 @@ def planned_route(net: Net, way: Way, before_m: float, rings: Collection[str]) -
     return _with_goal(net, edges, place)
 
 
+def following_m(limit_mps: float) -> float:
+    """The station of the goal on a road without a junction, where one player follows the other."""
+    return _FOLLOWING_S * limit_mps + _AHEAD_M
+
+
 def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | None:
     """The route along edges whose junction is behind the one in `place`, with its goal."""
     try:
@@ -71,20 +77,21 @@ def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | No
     ends = [*starts[1::2], line.length]  # of the edges
     has_junction = place + 1 < len(edges)
     begin_m = starts[2 * place + 2] if has_junction else 0.0
-    goal_m = min(begin_m + BEYOND_M if has_junction else line.length, line.length - _ROOM_M)
+    before = edges[: place + 1]
+    limit_mps = min(edge.getSpeed() for edge in before)
+    goal_m = min(begin_m + BEYOND_M if has_junction else following_m(limit_mps), line.length - _ROOM_M)
     if goal_m < begin_m + _NEAREST_GOAL_M:
         return None
     k = next(index for index, end_m in enumerate(ends) if goal_m <= end_m)
     goal_m = max(goal_m, starts[2 * k] + 1.0)  # a goal is on an edge
     share = (goal_m - starts[2 * k]) / max(ends[k] - starts[2 * k], 1e-9)
-    before = edges[: place + 1]
     return PlannedRoute(
         edges=tuple(edge.getID() for edge in edges),
         line=_sampled(line, goal_m),
         junction_m=ends[place],
         goal_edge=edges[k].getID(),
         goal_position_m=float(np.floor(10.0 * share * edges[k].getLength()) / 10.0),
-        limit_mps=min(edge.getSpeed() for edge in before),
+        limit_mps=limit_mps,
         lights=tuple((ends[k], name) for k, edge in enumerate(before) for name in _lights(edge)),
     )
 

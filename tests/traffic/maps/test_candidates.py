@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.traffic.maps.candidates import Candidate, Kind, candidates
+from harness.traffic.maps.candidates import Candidate, Kind, candidates, following
 from harness.traffic.maps.import_map import import_map
 from harness.traffic.net_conflicts import Priority
 from harness.traffic.network import read_net
@@ -67,5 +67,7 @@ def test_candidates__a_zebra_crossing_is_crossed_from_both_directions(town: list
 
 
 def test_candidates__a_net_without_conflicts_offers_its_roads(build_net: Callable[..., Path]) -> None:
-    (road,) = found_in(build_net(STRAIGHT_NODES, STRAIGHT_EDGES))
+    net = read_net(build_net(STRAIGHT_NODES, STRAIGHT_EDGES))
+    assert candidates(net) == []
+    (road,) = following(net)
     assert (road.kind, road.first.start.getEdge().getID()) == (Kind.FOLLOWING, "road")

@@ -77,3 +77,20 @@ def test_plans__what_is_left_out_has_a_reason(edges: str, reason: str, build_net
     plans = Plans(read_net(build_net(CROSSING_NODES, edges, "", "--no-turnarounds")))
     assert plans.all == []
     assert [each for each in plans.left_out if each.startswith(reason)]
+
+
+STUBS = (
+    '<node id="a" x="0" y="0"/><node id="b" x="600" y="0"/><node id="c" x="600" y="-15"/><node id="d" x="615" y="0"/>'
+)
+TO_STUBS = '<edge id="{0}{1}" from="{0}" to="{1}" speed="13.89"/>'
+
+
+# 15 s at the limit of 13.89 m/s, and 75 m from the farthest start of the player ahead
+def test_plans__on_a_road_without_conflicts_one_follows_the_other(build_net: Callable[..., Path]) -> None:
+    edges = "".join(TO_STUBS.format(*each) for each in ("ab", "cb", "bd"))
+    plans = Plans(read_net(build_net(STUBS, edges, "", "--no-turnarounds")))
+    assert [plan.candidate.kind for plan in plans.all] == [Kind.FOLLOWING]
+    assert "no room for a goal behind it" in plans.left_out  # of the merge before the short road
+    (plan,) = plans.all
+    assert plan.ego_route.goal_position_m == pytest.approx(283.3, abs=0.1)
+    assert plan.time_limit_s({}) == 40.0  # 273 m at 65 % of the limit, and 8 s

@@ -105,6 +105,16 @@ def test_import__roads_that_forbid_cars_are_no_roads(tmp_path: Path) -> None:
         import_map(written(tmp_path, "quiet.osm", text), tmp_path, left_hand=False)
 
 
+def test_import__a_map_of_a_country_is_refused_by_its_own_name(tmp_path: Path) -> None:
+    text = JUNCTION.read_text(encoding="utf-8")
+    road = re.search(r"<road .*?</road>", text, re.DOTALL)
+    assert road is not None
+    copy = re.sub(r"<link>.*?</link>", "", road[0], flags=re.DOTALL).replace(' id="1"', ' id="99"')
+    far = text.replace("</OpenDRIVE>", copy.replace('x="-210"', 'x="-200000"') + "</OpenDRIVE>")
+    with pytest.raises(UsageError, match=r"wide\.xodr: is too large for a scene: .* km \(cut out the part"):
+        import_map(written(tmp_path, "wide.xodr", far), tmp_path, left_hand=False)
+
+
 def test_import__a_name_with_commas_and_blanks_is_one_name(tmp_path: Path) -> None:
     odd = written(tmp_path, "a, b=<c>.xodr", JUNCTION.read_text(encoding="utf-8"))
     assert import_map(odd, tmp_path, left_hand=False)[1].hasEdge("-1")
