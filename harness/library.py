@@ -120,6 +120,9 @@ class _Policies(Mapping[str, Policy]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
+    def __repr__(self) -> str:
+        return f"<policies {', '.join(self) or '(none)'}>"
+
 
 def run(
     campaign: str | Path,

@@ -65,17 +65,23 @@ def find_document(written: str, folder: Path, kind: Kind) -> Path:
     return beside
 
 
+def named_document(written: str, kind: Kind) -> Path:
+    """The absolute path of a document that Python code names, by a path or a name; of a path, it may not exist.
+
+    Raises UsageError if it is a name of no document.
+    """
+    found = find_document(written, Path(), kind)
+    if is_name(written) and not os.path.exists(found):
+        raise UsageError.of(written, "", *missing_document(written, Path(), kind))
+    return found
+
+
 def document_at(path: Path, kind: Kind) -> Path:
     """A path of a command line as it is, or the path of the document of that name where there is no such file.
 
     Raises UsageError if it is a name of no document.
     """
-    if os.path.exists(path) or not is_name(str(path)):
-        return path
-    found = find_document(str(path), Path(), kind)
-    if not os.path.exists(found):
-        raise UsageError.of(path, "", *missing_document(str(path), Path(), kind))
-    return found
+    return path if os.path.exists(path) or not is_name(str(path)) else named_document(str(path), kind)
 
 
 def missing_document(written: str, folder: Path, kind: Kind) -> tuple[str, str]:

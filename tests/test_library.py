@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 import harness
+from harness.library import _Policies
+from tests.support.repository import REPOSITORY
 from tests.support.tiny import BY_SUMO, tables, write_campaign
 from tests.support.tiny import harness as command
 
@@ -37,3 +39,11 @@ def test_load__a_folder_without_a_run_is_refused(tmp_path: Path) -> None:
 def test_table__a_name_that_the_run_has_not_is_refused(tmp_path: Path) -> None:
     with pytest.raises(harness.UsageError, match=r"none\.csv"):
         harness.Results(tmp_path).table("none")
+
+
+def test_policies__are_shown_by_their_names_and_shapes() -> None:
+    folder = REPOSITORY / "policies" / "merge"
+    assert repr(_Policies(folder)).startswith("<policies distracted-seed1, naive-seed1,")
+    shown = repr(harness.read_policy(folder / "naive-seed1"))
+    assert shown.startswith("Policy(naive-seed1: actor.0.bias [64], actor.0.weight [64, 98],")
+    assert len(shown) < 500

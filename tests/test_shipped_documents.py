@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import harness
 from harness.errors import UsageError
 from harness.shipped_documents import document_at, find_document, missing_document, shipped
 
@@ -47,3 +48,10 @@ def test_document_at__an_existing_path_wins_and_an_unknown_name_is_refused(tmp_p
     assert document_at(Path("merge-demo"), "campaigns") == shipped("campaigns") / "merge-demo.toml"
     with pytest.raises(UsageError, match="there is no campaign 'merge-dem'"):
         document_at(Path("merge-dem"), "campaigns")
+
+
+def test_names_in_python__an_unknown_one_is_refused_with_the_nearest() -> None:
+    with pytest.raises(UsageError, match=r"there is no scene 'mergee' .did you mean 'merge'"):
+        harness.open_scene("mergee")
+    with pytest.raises(UsageError, match=r"there is no persona 'speedyy' .did you mean 'speedy'"):
+        harness.DrivingEnv(persona="speedyy")

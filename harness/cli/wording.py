@@ -198,12 +198,17 @@ def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
     responses = sum(stage.is_best_response for stage in trainings)
     arms = sum(isinstance(stage, AssessmentStage) for stage in stages)
     if campaign.policies is None:
-        parts = [f"{len(trainings) - responses} trainings of up to {document.training.steps:,} steps"]
+        parts = [f"{_counted(len(trainings) - responses, 'training')} of up to {document.training.steps:,} steps"]
     else:
         parts = [f"Trained players are read from {campaign.policies}: nothing is trained"]
     if document.best_response is not None:
-        parts.append(f"{responses} trainings of best responses of up to {document.best_response.steps:,} steps")
-    return ", ".join([*parts, f"{arms} arms of {document.assessment.episodes} episodes:"])
+        budget = f"of up to {document.best_response.steps:,} steps"
+        parts.append(f"{_counted(responses, 'training')} of best responses {budget}")
+    return ", ".join([*parts, f"{_counted(arms, 'arm')} of {_counted(document.assessment.episodes, 'episode')}:"])
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def stage_lines(stages: Sequence[Stage]) -> Iterator[str]:

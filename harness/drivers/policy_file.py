@@ -50,6 +50,11 @@ class Policy:
     tensors: Mapping[str, FloatArray]
     card: Mapping[str, Any] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """The names of the arrays and their shapes, without the thousands of numbers."""
+        shapes = ", ".join(f"{name} {list(self.tensors[name].shape)}" for name in sorted(self.tensors))
+        return f"Policy({self.card.get('stage', 'without a card')}: {shapes})"
+
     def layers(self, part: str) -> list[tuple[FloatArray, FloatArray]]:
         """Weights [out, in] and biases [out] of `actor` or `critic`, in order."""
         count = sum(name.startswith(f"{part}.") and name.endswith(".weight") for name in self.tensors)

@@ -13,7 +13,7 @@ from harness.environments.seats import Seat
 from harness.errors import UsageError
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution
-from harness.shipped_documents import Kind, find_document
+from harness.shipped_documents import Kind, named_document
 from harness.traffic.scene import OpenScene, open_scene
 
 SCENE, PERSONA = "merge", "careful"
@@ -80,4 +80,4 @@ def read_persona(written: Place) -> Persona:
 
 
 def _find(written: Place, kind: Kind) -> Path:
-    return find_document(written, Path(), kind) if isinstance(written, str) else written
+    return named_document(written, kind) if isinstance(written, str) else written

@@ -24,7 +24,7 @@ from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
 from harness.game.world import World
-from harness.shipped_documents import find_document
+from harness.shipped_documents import named_document
 from harness.traffic import network
 from harness.traffic.blocked_lanes import LaneStrip, strips_near
 from harness.traffic.departures import background_departures, check_departures, edges_of
@@ -155,7 +155,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     >>> open_scene("merge").document.name
     'merge'
     """
-    folder = find_document(folder, Path(), "networks") if isinstance(folder, str) else folder
+    folder = named_document(folder, "networks") if isinstance(folder, str) else folder
     document_file = scene_file(folder)
     problems: list[Problem] = []
     collect(problems, lambda: check_within(document_file, folder))
