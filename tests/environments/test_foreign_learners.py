@@ -7,11 +7,10 @@ before their policies drive.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
-import libsumo
 import numpy as np
 import pytest
 import torch
@@ -38,21 +37,6 @@ CHOICES = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, 0.0]], dtype=np.float32)
 def short(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     """A straight road with a time limit of 3 s."""
     return build_scene(tmp_path_factory.mktemp("scenes") / "short", time_limit_s=3.0)
-
-
-@pytest.fixture
-def opened() -> Iterator[Open]:
-    """Makes environments, and closes them."""
-    environments = []
-
-    def opened(make: Open, *arguments: Any, **named: Any) -> Any:
-        environments.append(make(*arguments, **named))
-        return environments[-1]
-
-    yield opened
-    for each in environments:
-        each.close()
-    assert not libsumo.isLoaded()
 
 
 # --- checkers ---------------------------------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
@@ -25,21 +25,6 @@ GAMES = 4
 def short(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     """A straight road with a time limit of 3 s."""
     return build_scene(tmp_path_factory.mktemp("scenes") / "short", time_limit_s=3.0)
-
-
-@pytest.fixture
-def opened() -> Iterator[Callable[..., Any]]:
-    """Makes environments, and closes them."""
-    environments = []
-
-    def opened(make: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-        environments.append(make(*arguments, **named))
-        return environments[-1]
-
-    yield opened
-    for each in environments:
-        each.close()
-    assert not libsumo.isLoaded()
 
 
 def actions(pedals: float = 0.0, wheel: float = 0.0) -> Any:
