@@ -257,7 +257,10 @@ def test_campaign__sumo_plays_a_replay_as_it_was_recorded(arm: str, run: Path, t
     ).astype({"x": float, "y": float})
     played = played[played["step"] >= 0]  # the step before is SUMO putting them there
     recorded = read_trace(run / "traces" / f"{arm}-seed1.parquet", episode)
-    both = recorded.merge(played, on=["player", "step"], how="outer", indicator=True)
+    last = recorded["step"].max()
+    (shown, held) = (played[played["step"] == step].set_index("player").sort_index() for step in (last, last + 1))
+    pd.testing.assert_frame_equal(held[["x", "y"]], shown[["x", "y"]])  # the last picture stays for one more step
+    both = recorded.merge(played[played["step"] <= last], on=["player", "step"], how="outer", indicator=True)
     assert (both["_merge"] == "both").all()
     half = 0.5 * both["player"].map(length_m)
     assert np.abs(both["x"] - (both["x_m"] + half * np.cos(both["heading_rad"]))).max() <= 1e-3
