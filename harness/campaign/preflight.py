@@ -92,7 +92,7 @@ def open_campaign(
     named = document or read_names(file)
     if named is None:
         raise UsageError(problems)
-    found = _find_documents(file, document, named, allow_code, problems)
+    found = _find_documents(file, document, named, allow_code, policies_exist, problems)
     if problems or document is None or found.scene is None:
         raise UsageError(problems)
     ego_persona, *personas = (persona for persona in found.personas if persona is not None)
@@ -146,7 +146,12 @@ class _Documents:
 
 
 def _find_documents(
-    file: Path, document: Campaign | None, named: Campaign | NamedDocuments, allow_code: bool, problems: list[Problem]
+    file: Path,
+    document: Campaign | None,
+    named: Campaign | NamedDocuments,
+    allow_code: bool,
+    policies_exist: bool,
+    problems: list[Problem],
 ) -> _Documents:
     """Read and check what a campaign names; what is wrong is added to `problems`."""
     ego_driver = collect(problems, lambda: _find_ego(file, named.ego.driver, allow_code))
@@ -161,7 +166,7 @@ def _find_documents(
         collect(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, games))
     collect(problems, lambda: _check_round_2(file, document, ego_driver))
     other_egos = _find_other_egos(file, document, scene, allow_code, problems)
-    policies = collect(problems, lambda: find_policies(file, named.policies))
+    policies = collect(problems, lambda: find_policies(file, named.policies, policies_exist))
     problems += _same_names(file, named.personas, personas[1:])
     if not problems and scene is not None:
         collect(problems, lambda: check_loads(scene))

@@ -36,13 +36,13 @@ class ReadPolicies:
     """Those of others, by the name of their folder."""
 
 
-def find_policies(file: Path, written: str | None) -> Path | None:
-    """The folder of policies that a campaign names. Raises UsageError if there is none."""
+def find_policies(file: Path, written: str | None, exist: bool = True) -> Path | None:
+    """The folder of policies that a campaign names. Raises UsageError if there is none although it should `exist`."""
     if written is None:
         return None
     folder = find_document(written, file.parent, "policies")
     check_no_archive(file, "policies", written, folder)
-    if not os.path.isdir(folder):
+    if exist and not os.path.isdir(folder):
         remedy = f"name one laid out as <run>/policies/; {_folders_beside(folder)}"
         raise UsageError.of(file, "policies", f"{written!r}: there is no such folder", remedy)
     return folder

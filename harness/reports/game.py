@@ -24,7 +24,7 @@ from harness.reports.game_wording import (
     pair_name,
 )
 from harness.reports.heatmaps import MatrixView, views
-from harness.reports.numbers import MISSING, interval, number, p_number, percent
+from harness.reports.numbers import MISSING, interval, number, p_number, percent, signed
 from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, as_sentence
 
 _REST_BYTES = 50_000
@@ -110,7 +110,7 @@ def _last(gaps: pd.DataFrame) -> list[Row]:
 def _gap(row: Row) -> Gap:
     gap = number(row["gap"], 2)
     if math.isfinite(row["ci_low"]):
-        gap += f" ({number(row['ci_low'], 2)} to {number(row['ci_high'], 2)})"
+        gap += f" ({signed(row['ci_low'], 2)} to {signed(row['ci_high'], 2)})"
     return Gap(
         seed=row["seed"],
         pair=pair_name(row),

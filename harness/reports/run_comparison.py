@@ -10,7 +10,7 @@ from typing import Any
 from harness.evaluation.run_comparison import Difference, Side
 from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
 from harness.reports.header import command_of, facts, made_by
-from harness.reports.numbers import NO_SPACE, interval, number, p_number, percent
+from harness.reports.numbers import NO_SPACE, interval, number, p_number, percent, signed
 from harness.reports.page_template import environment_of
 
 BETTER, WORSE, SAME, UNKNOWN = "better", "worse", "no difference shown", "not the same games"
@@ -138,7 +138,7 @@ def _statistics(found: Difference) -> str:
     if not found.pairs:
         return ""
     scale, digits, unit = (100.0, 1, " points") if found.is_rate else (1.0, 3, f"{NO_SPACE}m/s")
-    text = f"{number(found.mean * scale, digits)}{unit}"
+    text = f"{signed(found.mean * scale, digits)}{unit}"
     if math.isfinite(found.low):
-        text += f" (95{NO_SPACE}%: {number(found.low * scale, digits)} to {number(found.high * scale, digits)})"
+        text += f" (95{NO_SPACE}%: {signed(found.low * scale, digits)} to {signed(found.high * scale, digits)})"
     return f"{text}; p {p_number(found.p_value)}; after Holm {p_number(found.p_holm)}; {found.pairs} pairs"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -62,6 +63,8 @@ from harness.reports.treatment import ARMS
 from harness.reports.wording import Conclusion
 from harness.traffic.scene import OpenScene, open_scene
 
+WRITING_REPLAYS = "writing replays"
+
 
 def write_results(folder: RunFolder, console: Console) -> RunResult:
     """Write tables, replays and report of the finished stages, from the run folder alone."""
@@ -73,7 +76,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     played = _gather(folder, done, "assessment", "episodes.csv", list(PLAYED_COLUMNS))
     _check_traces(folder, played)
     scene = open_scene(folder.scene)
-    with console.status("working out how severe each game is, and why the ego failed"):
+    with _doing(console, "working out how severe each game is, and why the ego failed"):
         episodes = with_severity(played, [severity_table(folder, name, scene) for name in _arms(done)])
         causes = _joined([cause_table(folder, name, scene) for name in _arms(done)], CAUSE_COLUMNS)
     entries = judged(written["stages"], campaign, stages, _goals(stages, episodes))
@@ -97,7 +100,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     write_model_cards(folder, manifest, summary)
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
-    with console.status("naming manoeuvres"):
+    with _doing(console, "naming manoeuvres"):
         manoeuvres = _manoeuvres(folder, done, scene)
     write_csv(manoeuvres, folder.path / "manoeuvres.csv")
     replays = _write_replays(folder, scene, episodes, console)
@@ -129,7 +132,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         **prevented,
         acceptance=checks,
     )
-    with console.status("writing the report"):
+    with _doing(console, "writing the report"):
         games = recorded_games(episodes, arms, lambda arm, seed: folder.traces(stage_id(arm, seed)), scene)
         page = render_page(report, games, scene_drawing(scene))
     write_atomically(folder.path / "report.html", page.encode())
@@ -160,6 +163,20 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
 def _shown(persona: str, verdict: Conclusion, causes: tuple[str, ...] = ()) -> ShownVerdict:
     told = {name: getattr(verdict, name) for name in ("question", "label", "tone", "sentence", "speed")}
     return ShownVerdict(persona=persona, causes=causes, **told)
+
+
+@contextmanager
+def _doing(console: Console, what: str) -> Iterator[None]:
+    """Show what is being done: as long as it takes on a terminal, as a line elsewhere."""
+    _say(console, what)
+    with console.status(what):
+        yield
+
+
+def _say(console: Console, what: str) -> None:
+    """A line where the output is not a terminal, as `StageProgress` prints it for stages."""
+    if not console.is_terminal:
+        console.print(f"results  {what}", highlight=False, markup=False)
 
 
 def _goals(stages: Iterable[Stage], episodes: pd.DataFrame) -> dict[str, Goals]:
@@ -248,8 +265,9 @@ def _write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, 
     folder.replays.mkdir(exist_ok=True)
     names = [replay_name(game.arm, game.seed, game.episode) for game in chosen.itertuples()]
     games = list(zip(chosen.itertuples(), names, strict=True))
-    quiet, reader = not console.is_terminal, TraceReader()
-    for game, name in track(games, "writing replays", console=console, transient=True, disable=quiet):
+    reader = TraceReader()
+    _say(console, WRITING_REPLAYS)
+    for game, name in track(games, WRITING_REPLAYS, console=console, transient=True, disable=not console.is_terminal):
         write_replay(
             reader.read(folder.traces(stage_id(game.arm, game.seed)), game.episode),
             scene.net_file,
