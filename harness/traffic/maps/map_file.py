@@ -6,6 +6,7 @@ converted.
 
 from __future__ import annotations
 
+import math
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -25,6 +26,18 @@ _FOR_CARS = {
     *("motorway", "trunk", "primary", "secondary", "tertiary", "unclassified", "residential", "living_street"),
     *("motorway_link", "trunk_link", "primary_link", "secondary_link", "tertiary_link", "service", "road"),
 }
+_CUBIC = ("a", "b", "c", "d")
+_NUMBERS: dict[str, tuple[str, ...]] = {  # attributes of OpenDRIVE from which netconvert makes a net, whatever they are
+    "road": ("length",),
+    "geometry": ("s", "x", "y", "hdg", "length"),
+    "arc": ("curvature",),
+    "spiral": ("curvStart", "curvEnd"),
+    "elevation": ("s", *_CUBIC),
+    "laneOffset": ("s", *_CUBIC),
+    "laneSection": ("s",),
+    "width": ("sOffset", *_CUBIC),
+}
+_OPEN_ROAD = "-1"  # the junction of an OpenDRIVE road outside junctions
 _DRIVING = ("driving", "bidirectional", "entry", "exit", "onRamp", "offRamp")  # lanes of OpenDRIVE
 
 
@@ -43,6 +56,7 @@ class MapFacts:
     roads: int = 0
     has_layers: bool = False  # some roads of an OpenStreetMap file pass over or under others
     rules: set[str] = field(default_factory=set)  # RHT and LHT, of the roads of an OpenDRIVE file
+    broken: tuple[str, str] | None = None  # the first road of an OpenDRIVE file that is not sound, and why
     uneven: str = ""  # the first road with left-hand traffic whose two directions have different lanes
 
 
@@ -61,8 +75,8 @@ def kind_of(path: Path) -> MapKind:
 def facts_of(path: Path, kind: MapKind) -> MapFacts:
     """What an OpenStreetMap or OpenDRIVE file says of itself.
 
-    Raises UsageError for a file that is missing, too large, not XML or of another kind, that has a document type, and
-    for one without roads.
+    Raises UsageError for a file that is missing, too large, not XML or of another kind, that has a document type, for
+    one without roads, and for one with a road that is not sound.
     """
     facts = MapFacts()
     reader = _OsmReader(facts) if kind is MapKind.OSM else _OpenDriveReader(facts)
@@ -84,6 +98,8 @@ def facts_of(path: Path, kind: MapKind) -> MapFacts:
         parser.Parse(b"", True)
     except expat.ExpatError as error:
         raise UsageError.of(path, "", f"is not readable XML: {error}", "export it again") from None
+    if facts.broken is not None:
+        raise UsageError.of(path, *facts.broken, "repair the map, or export it again")
     if not facts.roads:
         raise UsageError.of(path, "", f"has no road for cars: {reader.missing}", "export an area with roads")
     return facts
@@ -113,18 +129,26 @@ class _OsmReader:
 
 
 class _OpenDriveReader:
-    """Counts the roads of an OpenDRIVE file, and compares the lanes of the two directions of left-hand roads."""
+    """Counts the roads of an OpenDRIVE file, and compares the lanes of the two directions of left-hand roads.
+
+    Finds what netconvert takes for sound although it is not: numbers that are none, roads in a missing junction.
+    """
 
     root, missing = "OpenDRIVE", "it has no element road with a lane for driving"
 
     def __init__(self, facts: MapFacts) -> None:
         self._facts, self._road, self._rule, self._side = facts, "", "RHT", ""
         self._lanes = {"left": 0, "right": 0}
+        self._junctions: set[str] = {_OPEN_ROAD}
+        self._road_within: dict[str, str] = {}  # the first road of each junction that roads name
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
         if tag == "road":
             self._road, self._rule = attributes.get("id", ""), attributes.get("rule", "RHT")
             self._facts.rules.add(self._rule)
+            self._road_within.setdefault(attributes.get("junction", _OPEN_ROAD), self._road)
+        elif tag == "junction":
+            self._junctions.add(attributes.get("id", ""))
         elif tag in ("left", "center", "right"):
             self._side = tag
         elif tag == "laneSection":
@@ -132,10 +156,27 @@ class _OpenDriveReader:
         elif tag == "lane" and attributes.get("type") in _DRIVING and self._side in self._lanes:
             self._facts.roads += not any(self._lanes.values())
             self._lanes[self._side] += 1
+        for name in _NUMBERS.get(tag, ()):
+            if name in attributes and not _is_number(attributes[name]):
+                self._note_broken(self._road, f"{name} of its {tag} is {attributes[name]!r}, not a number")
 
     def end(self, tag: str) -> None:
         if tag == "laneSection" and self._rule == "LHT" and self._lanes["left"] != self._lanes["right"]:
             self._facts.uneven = self._facts.uneven or self._road
+        elif tag == self.root:
+            for junction, road in self._road_within.items():
+                if junction not in self._junctions:
+                    self._note_broken(road, f"it lies in junction {junction!r}, which the map does not have")
+
+    def _note_broken(self, road: str, why: str) -> None:
+        self._facts.broken = self._facts.broken or (f"road {road}", why)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
 
 
 def _parts(path: Path) -> Iterator[bytes]:

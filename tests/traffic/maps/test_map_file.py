@@ -66,6 +66,25 @@ def test_facts__of_opendrive_name_the_side_of_the_road(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    ("sound", "broken", "message"),
+    [
+        ('length="200"', 'length="nan"', r"road 1: length of its road is 'nan', not a number"),
+        (' a="3.25"', ' a="wide"', r"road 1: a of its width is 'wide', not a number"),
+        ('<junction id="100"', '<junction id="9"', r"road 11: it lies in junction '100', which the map does not have"),
+    ],
+)
+def test_facts__what_netconvert_would_take_for_sound_is_refused(
+    sound: str, broken: str, message: str, tmp_path: Path
+) -> None:
+    text = (MAPS / "t_junction.xodr").read_text()
+    assert sound in text
+    file = tmp_path / "broken.xodr"
+    file.write_text(text.replace(sound, broken))
+    with pytest.raises(UsageError, match=message):
+        facts_of(file, MapKind.OPENDRIVE)
+
+
+@pytest.mark.parametrize(
     ("content", "message"),
     [
         (osm('<way id="1"><tag k="waterway" v="river"/></way>'), "has no road for cars"),
