@@ -42,7 +42,9 @@ def new_scene(
     conflict: Annotated[
         int | None,
         typer.Option(
-            metavar="K", help="Make the scene of this conflict.  [default: the first one]", show_default=False
+            metavar="K",
+            help="Make the scene of this conflict.  [default: the first one without traffic lights, if there is one]",
+            show_default=False,
         ),
     ] = None,
     every: Annotated[
@@ -92,7 +94,7 @@ def new_scene(
         with console.status(wording.reading(source)):
             opened = open_map(source, Path(folder), left_hand=left_hand)
         plans = _wanted(opened, kind, near, within)
-        chosen = {name: _numbered(opened, conflict) if conflict is not None else plans[0]}
+        chosen = {name: _numbered(opened, conflict) if conflict is not None else _first(plans)}
         if every:
             chosen = {f"{name}_{plan.number}": plan for plan in plans}
             check_new(name, [] if only_list else list(chosen), out)
@@ -122,6 +124,11 @@ def _numbered(opened: OpenMap, number: int) -> GamePlan:
     if not 1 <= number <= len(opened.plans):
         raise UsageError.of("--conflict", str(number), *wording.no_such_conflict(len(opened.plans)))
     return opened.plans[number - 1]
+
+
+def _first(plans: Sequence[GamePlan]) -> GamePlan:
+    """The first one without signals, which take long to learn, if there is one."""
+    return next((plan for plan in plans if not plan.candidate.with_signals), plans[0])
 
 
 def _show(opened: OpenMap, plans: Sequence[GamePlan], console: Console) -> None:

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sumo
 from typer.testing import CliRunner
 
 from harness.campaign.preflight import open_campaign
@@ -24,6 +25,7 @@ from tests.support.repository import REPOSITORY
 
 MAPS = REPOSITORY / "tests" / "data" / "maps"
 TOWN, JUNCTION = MAPS / "town.osm", MAPS / "t_junction.xodr"
+REAL_TOWN = Path(sumo.SUMO_HOME) / "tools" / "game" / "DRT" / "osm.net.xml"  # Berlin-Adlershof, of OpenStreetMap
 Run = Callable[..., list[str]]
 
 
@@ -116,6 +118,22 @@ def test_write__a_zebra_crossing_of_a_map_the_ego_must_yield(town: OpenMap, tmp_
 def test_new__of_a_number_makes_that_one(tmp_path: Path, new: Run) -> None:
     new("t", "--from", JUNCTION, "--conflict", 3)
     assert "conflict 3" in (tmp_path / "out" / "networks" / "t" / "scene.toml").read_text(encoding="utf-8")
+
+
+def test_new__of_no_number_makes_the_first_without_traffic_lights(tmp_path: Path, new: Run) -> None:
+    lines = new("t", "--from", TOWN, "--kind", "turn across")
+    rows = [line for line in lines if re.match(r"\d+ +turn across ", line)]
+    assert "signals" in rows[0]
+    first = next(re.match(r"\d+", line)[0] for line in rows if "signals" not in line)  # type: ignore[index]
+    assert f"conflict {first}" in (tmp_path / "out" / "networks" / "t" / "scene.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.skipif(not REAL_TOWN.is_file(), reason="SUMO's wheel does not ship this net")
+def test_new__from_the_net_of_a_real_town(tmp_path: Path, new: Run) -> None:
+    lines = new("adlershof", "--from", REAL_TOWN, "--kind", "turn across")
+    assert len(numbers_of(lines, "turn across")) == 40  # as many as are listed unless more are asked for
+    campaign = open_campaign(tmp_path / "out" / "campaigns" / "adlershof.toml")
+    assert campaign.scene.net_file.stat().st_size < REAL_TOWN.stat().st_size / 4  # the part near the players' routes
 
 
 def test_new__of_all_makes_a_scene_of_each_that_is_listed(tmp_path: Path, new: Run) -> None:

@@ -24,7 +24,7 @@ from harness.traffic.xml_file import parse_xml, xml_bytes
 
 _PATIENCE_S = 900.0
 _LAYER_M = 6.0  # of height between a road and the one that it passes over
-_NO_ROAD = ("has no road that cars may use", "export an area with roads for cars")
+_NO_ROAD = ("has no road that cars may use and that meets another", "export an area with junctions of roads for cars")
 _CUT = "cut out a part: netconvert -s FILE --keep-edges.in-boundary XMIN,YMIN,XMAX,YMAX -o part.net.xml"
 _OSM_TYPES = ("osmNetconvert", "osmNetconvertUrbanDe")
 _LIGHTS = ("--tls.cycle.time", "40")  # maps do not time their lights: red is short, so that games are
