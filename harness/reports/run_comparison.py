@@ -10,13 +10,24 @@ from typing import Any
 from harness.evaluation.run_comparison import Difference, Side
 from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
 from harness.reports.header import command_of, facts, made_by
-from harness.reports.numbers import NO_SPACE, interval, number, p_number, percent, signed
+from harness.reports.numbers import MISSING, NO_SPACE, interval, number, p_number, percent, signed
 from harness.reports.page_template import environment_of
 
-BETTER, WORSE, SAME, UNKNOWN = "better", "worse", "no difference shown", "not the same games"
+BETTER, WORSE, UNKNOWN = "better", "worse", "not the same games"
+EQUAL, NOT_SHOWN = "no difference", "no difference shown"
 TONES = {BETTER: "mended", WORSE: "harm"}
 NOTHING_IN_COMMON = "The runs have no arm and seed in common."
 DIFFERENT_SCENES = "The scenes differ, so games have different starts: there are no pairs and no tests."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Statistics:
+    """The test behind a difference."""
+
+    interval: str
+    p_value: str
+    p_holm: str
+    pairs: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,7 +42,9 @@ class ComparedRow:
     verdict: str
     tone: str
     sentence: str
-    statistics: str
+    difference: str
+    statistics: Statistics | None
+    """None without pairs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,18 +115,21 @@ def _row(found: Difference, significance: float) -> ComparedRow:
         after=_with_interval(found, found.after),
         verdict=verdict,
         tone=TONES.get(verdict, "open"),
-        sentence=f"{sentence}: {CHANCE if verdict == SAME else verdict}",
-        statistics=_statistics(found),
+        sentence=f"{sentence}: {CHANCE if verdict == NOT_SHOWN else verdict}",
+        difference=_with_unit(found, found.mean) if found.pairs else "",
+        statistics=_statistics(found) if found.pairs else None,
     )
 
 
 def _verdict(found: Difference, significance: float) -> str:
     if not found.pairs:
         return UNKNOWN
+    if found.mean == 0.0:
+        return EQUAL
     if not found.is_rate and all(abs(end) < RELEVANT_SPEED_MPS for end in _ends(found)):
         return NO_RELEVANT_DIFFERENCE
     if not found.p_holm < significance:
-        return SAME
+        return NOT_SHOWN
     return BETTER if (found.mean > 0) != found.is_rate else WORSE
 
 
@@ -134,11 +150,15 @@ def _with_interval(found: Difference, side: Side) -> str:
     return f"{_value(found, side)}{ends}"
 
 
-def _statistics(found: Difference) -> str:
-    if not found.pairs:
-        return ""
-    scale, digits, unit = (100.0, 1, " points") if found.is_rate else (1.0, 3, f"{NO_SPACE}m/s")
-    text = f"{signed(found.mean * scale, digits)}{unit}"
-    if math.isfinite(found.low):
-        text += f" (95{NO_SPACE}%: {signed(found.low * scale, digits)} to {signed(found.high * scale, digits)})"
-    return f"{text}; p {p_number(found.p_value)}; after Holm {p_number(found.p_holm)}; {found.pairs} pairs"
+def _with_unit(found: Difference, value: float) -> str:
+    return f"{signed(value * 100.0, 1)} points" if found.is_rate else f"{signed(value, 3)}{NO_SPACE}m/s"
+
+
+def _statistics(found: Difference) -> Statistics:
+    ends = [_with_unit(found, end) for end in (found.low, found.high)]
+    return Statistics(
+        interval=" to ".join(ends) if math.isfinite(found.low) else MISSING,
+        p_value=p_number(found.p_value),
+        p_holm=p_number(found.p_holm),
+        pairs=found.pairs,
+    )

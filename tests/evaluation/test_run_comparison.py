@@ -7,7 +7,7 @@ import pytest
 
 from harness.evaluation.run_comparison import differences_of
 from harness.reports.differences import NO_RELEVANT_DIFFERENCE
-from harness.reports.run_comparison import BETTER, SAME, UNKNOWN, WORSE, compared_rows, headline
+from harness.reports.run_comparison import BETTER, EQUAL, NOT_SHOWN, UNKNOWN, WORSE, compared_rows, headline
 from tests.support.game_tables import arm, table
 
 
@@ -21,7 +21,7 @@ def verdicts(before, after, same_scene=True):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "verdict"), [(30, 5, BETTER), (5, 30, WORSE), (30, 28, SAME), (30, 30, SAME)]
+    ("before", "after", "verdict"), [(30, 5, BETTER), (5, 30, WORSE), (30, 28, NOT_SHOWN), (30, 30, EQUAL)]
 )
 def test_failures__are_compared_in_pairs(before, after, verdict):
     assert verdicts(failing(before), failing(after))["failures"] == verdict
@@ -44,6 +44,19 @@ def test_failures__without_the_same_scene_there_are_rates_and_no_test():
 
 def test_speed__a_small_difference_is_not_relevant_however_certain():
     assert verdicts(failing(0), failing(0, speed=13.1))["average speed"] == NO_RELEVANT_DIFFERENCE
+
+
+def test_statistics__have_the_interval_of_the_difference_and_both_p_values():
+    (row,) = [
+        each
+        for each in compared_rows(differences_of(failing(30), failing(20), True), 0.01)
+        if each.measure == "failures"
+    ]
+    assert row.difference == "−10 points"
+    # mean -0.1 of 100 pairs, standard error 0.3015 / 10, t = 1.984
+    assert row.statistics is not None
+    assert row.statistics.interval == "−16 points to −4 points"
+    assert (row.statistics.p_value, row.statistics.pairs) == ("0.00195", 100)
 
 
 def test_headline__counts_what_is_better_and_worse():
