@@ -11,11 +11,11 @@ from pydantic import Field, field_validator, model_validator
 from harness.config.acceptance import Acceptance
 from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
-from harness.config.training import NonEgoTraining, Reconfiguration, Retraining, Training
+from harness.config.training import NaiveTraining, NonEgoTraining, Reconfiguration, Retraining, Training
 from harness.game.state import MOST_PEOPLE
 
 LEARNED, SUMO = "learned", "sumo"  # drivers of an ego that have a name
-TRAINING_TABLES = ("training", "non_ego_training", "retraining")
+TRAINING_TABLES = ("training", "naive_training", "non_ego_training", "retraining")
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]
 CampaignName = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
@@ -135,6 +135,7 @@ class Campaign(Document):
     player is read from this folder."""
     ego: Ego = Ego()
     training: Training = Training()
+    naive_training: NaiveTraining = NaiveTraining()
     non_ego_training: NonEgoTraining = NonEgoTraining()
     retraining: Retraining = Retraining()
     reconfiguration: Reconfiguration = Reconfiguration()

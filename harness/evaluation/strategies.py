@@ -31,7 +31,7 @@ PAPER_ROUNDS = 2
 
 @dataclass(frozen=True, kw_only=True)
 class NaiveEgo:
-    """The ego of round 0: trained alone, or an external driver as it is."""
+    """The ego of round 0: trained alone or beside SUMO's driver, or an external driver as it is."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -48,9 +48,7 @@ def plan_paper_rounds(campaign: Campaign, personas: Sequence[str], seed: int) ->
     naive = driver_of(campaign, NaiveEgo(), seed)
     stages: list[Stage] = []
     if ego_learns(campaign):
-        stages.append(
-            TrainingStage(seed=seed, persona="", strategy=NaiveEgo(), opponent=None, initial=None, alone_share=1.0)
-        )
+        stages.append(_naive_training(campaign, seed))
     stages += [_persona_training(campaign, persona, naive, seed) for persona in personas]
     stages.append(AssessmentStage(seed=seed, persona="", arm=Arm(ego=NaiveEgo()), ego=naive, non_ego=None))
     sumo = SumoNonEgo()
@@ -96,6 +94,14 @@ def plan_robust(campaign: Campaign, personas: Sequence[str], seed: int) -> list[
             )
         )
     return stages
+
+
+def _naive_training(campaign: Campaign, seed: int) -> TrainingStage:
+    alone_share = campaign.naive_training.alone_share
+    opponent = driver_of(campaign, SumoNonEgo(), seed) if alone_share < 1.0 else None
+    return TrainingStage(
+        seed=seed, persona="", strategy=NaiveEgo(), opponent=opponent, initial=None, alone_share=alone_share
+    )
 
 
 def _persona_training(campaign: Campaign, persona: str, naive: PlannedDriver, seed: int) -> TrainingStage:

@@ -27,6 +27,7 @@ from harness.config.toml_reading import Document
 from harness.drivers.policy_file import policy_files, read_card
 from harness.errors import UsageError
 from harness.evaluation.competence import DID_NOT_LEARN
+from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.state import EGO, NON_EGO, ROLES
@@ -99,7 +100,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
     environment.filters["one_line"] = _one_line
     text = environment.get_template("model_card.md.jinja").render(
         stage=stage,
-        intro=_intro(entry, is_ego),
+        intro=_intro(entry, policy["against"], is_ego),
         campaign=manifest["name"],
         version=versions["harness"],
         quick=manifest.get("quick"),
@@ -127,11 +128,13 @@ def _one_line(text: str) -> str:
     return " ".join(text.split()).replace("&", "&amp;").replace("<", "&lt;").replace("|", "\\|")
 
 
-def _intro(entry: Mapping[str, Any], is_ego: bool) -> str:
+def _intro(entry: Mapping[str, Any], against: str | None, is_ego: bool) -> str:
     if not is_ego:
         return f"A non-ego: a selfish driver with the persona `{entry['persona']}`."
     if entry["persona"]:
         return f"The ego, retrained against the persona `{entry['persona']}`."
+    if against is not None:
+        return "The naive ego: it was trained alone on the road, and beside SUMO's own driver."
     return "The naive ego: it was trained alone on the road."
 
 
@@ -149,8 +152,7 @@ def _facts(
         learns = "it learned in each place, beside SUMO's own driver in the others"
         yield "people in a game", f"{people}" if policy["player"] == ROLES[EGO] else f"{people}; {learns}"
     if against is not None:
-        how = campaign.retraining if entry["name"] != entry["persona"] else campaign.non_ego_training
-        yield "games without the other player", percent(how.alone_share)
+        yield "games without the other player", percent(_alone_share(entry, campaign))
     yield "initial policy", f"`{policy['began_from']}`" if policy["began_from"] else "none"
     reason = {"converged": "stopped by convergence", "budget": "the whole budget"}.get(entry["stopped"], "")
     reason = stopped(entry) if entry["stopped"] == DID_NOT_LEARN else reason
@@ -179,6 +181,13 @@ def _facts(
         shares = (uses.throttle_share, uses.braking_share, uses.steering_share)
         throttle, braking, steering = map(percent, shares)
         yield "use of the car", f"{throttle} of the acceleration, {braking} of the braking, {steering} of the steering"
+
+
+def _alone_share(entry: Mapping[str, Any], campaign: Campaign) -> float:
+    if entry["name"] == strategy_name(NaiveEgo()):
+        return campaign.naive_training.alone_share
+    how = campaign.retraining if entry["name"] != entry["persona"] else campaign.non_ego_training
+    return how.alone_share
 
 
 def _sight(perception: Perception) -> Iterator[tuple[str, str]]:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.planned_drivers import Trained, description
+from harness.campaign.plan.planned_drivers import SumoDriven, Trained, description
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.drivers.policy_file import write_policy
@@ -68,6 +68,16 @@ def test_plan__trainings_of_a_learned_ego(tmp_path: Path, personas: list[str]) -
     assert anna.opponent == Trained(stage="naive-seed1")
     assert (retrained.learner, retrained.initial, retrained.alone_share) == (EGO, Trained(stage="naive-seed1"), 0.5)
     assert retrained.opponent == Trained(stage="anna-seed1", persona="anna")
+
+
+def test_plan__the_naive_ego_may_train_beside_sumos_driver(tmp_path: Path, personas: list[str]) -> None:
+    stages, alone = planned(tmp_path, personas=personas[:1])
+    beside, keys = planned(tmp_path, personas=personas[:1], naive_training={"alone_share": 0.25})
+    naive = beside["naive-seed1"]
+    assert isinstance(naive, TrainingStage)
+    assert (naive.opponent, naive.alone_share) == (SumoDriven(), 0.25)
+    assert (naive.needs, list(beside)) == ((), list(stages))
+    assert keys["naive-seed1"] != alone["naive-seed1"]
 
 
 def test_plan__without_a_warm_start_everyone_begins_from_nothing_but_still_needs_the_opponent(

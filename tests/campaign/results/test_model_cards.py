@@ -180,6 +180,17 @@ def test_card__of_a_persona_with_human_factors() -> None:
     assert not any(line.startswith("| no blind-spot check |") for line in card)
 
 
+def test_card__of_a_naive_ego_that_met_sumos_driver() -> None:
+    campaign = {**MANIFEST["campaign"], "naive_training": {"alone_share": 0.5}}
+    card = lines(model_card("naive-seed1", {**MANIFEST, "campaign": campaign}, SUMMARY, {**POLICY, "against": "sumo"}))
+    for row in (
+        "The naive ego: it was trained alone on the road, and beside SUMO's own driver.",
+        "| against | SUMO's own driver |",
+        "| games without the other player | 50 % |",
+    ):
+        assert row in card, row
+
+
 def test_card__of_the_retrained_ego() -> None:
     policy = {**POLICY, "against": "distracted-seed1", "began_from": "naive-seed1"}
     card = lines(model_card("retrained_distracted-seed1", MANIFEST, SUMMARY, policy))
