@@ -169,7 +169,7 @@ class Strips {
       head.style.transform = `translateX(${Math.min(shown, this.until) / (this.until || 1) * width}px)`;
       this.game.players.forEach((track, place) => {
         const value = valueAt(this.game, track, column, shown) * factor;
-        const text = Number.isNaN(value) ? "" : value.toFixed(Math.abs(value) < 99.95 ? 1 : 0).replace("-", "−");
+        const text = Number.isNaN(value) ? "" : value.toFixed(Math.abs(value) < 99.95 ? 1 : 0).replace(/^-(?=[0.]+$)/, "").replace("-", "−");
         if (values[place].textContent !== text) values[place].textContent = text;
       });
     }
