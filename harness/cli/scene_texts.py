@@ -20,6 +20,7 @@ _PERSONAS = {
     Kind.FOLLOWING: _ON_ROADS,
     Kind.ZEBRA: ("jaywalker", "phone_walker"),
 }
+_EGO_WAITS = (Kind.ZEBRA, Kind.FOLLOWING)  # for the non-ego, which is before it or has priority
 _MEANINGS = {
     Kind.TURN_ACROSS: "the non-ego comes towards the ego and turns across its way",
     Kind.CROSSING: "the non-ego crosses the ego's way",
@@ -51,7 +52,8 @@ def scene_files(name: str, plan: GamePlan, opened: OpenMap, *, is_part: bool) ->
 
 def campaign_text(name: str, plan: GamePlan) -> str:
     """A campaign on a scene with the shipped personas that suit its kind."""
-    values = {"name": name, "personas": personas_for(plan), "meaning": _MEANINGS[plan.candidate.kind]}
+    kind = plan.candidate.kind
+    values = {"name": name, "personas": personas_for(plan), "meaning": _MEANINGS[kind], "ego_waits": kind in _EGO_WAITS}
     return _rendered("new_scene_campaign.toml.jinja", values)
 
 

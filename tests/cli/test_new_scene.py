@@ -113,6 +113,14 @@ def test_write__a_zebra_crossing_of_a_map_the_ego_must_yield(town: OpenMap, tmp_
     assert table.yields[table.player == 0].any()
     assert not table.yields[table.player == 1].any()
     assert len(scene.stripes) > 3
+    campaign = open_campaign(tmp_path / "campaigns" / "zebra.toml").document
+    assert campaign.naive_training.alone_share == 0.3
+
+
+def test_write__where_the_ego_need_not_wait_it_trains_alone(town: OpenMap, tmp_path: Path) -> None:
+    crossing = next(plan for plan in town.plans if plan.candidate.kind is Kind.CROSSING)
+    write_scenes(town, {"crossing": crossing}, tmp_path)
+    assert open_campaign(tmp_path / "campaigns" / "crossing.toml").document.naive_training.alone_share == 1.0
 
 
 def test_new__of_a_number_makes_that_one(tmp_path: Path, new: Run) -> None:
