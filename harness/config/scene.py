@@ -89,6 +89,11 @@ class Player(Document):
         """Whether it walks."""
         return self.kind == "pedestrian"
 
+    @property
+    def drives(self) -> bool:
+        """Whether it is a driver: neither on foot nor on a bicycle or e-scooter."""
+        return not self.on_foot and self.kind not in CYCLING
+
     @model_validator(mode="after")
     def _one_start(self) -> Player:
         on_lane = [name for name in ("position_m", "beside_ego_m") if getattr(self, name) is not None]

@@ -41,6 +41,8 @@ class Results:
     """The ego before round 2 in sentences, after "the"."""
     people: int
     """Non-egos of the scene."""
+    non_ego_drives: bool
+    """Whether they are drivers."""
     crowds: Mapping[str, Sequence[str]]
     """The personas of each crowd, in the order of the scene's people."""
     preventability: Mapping[str, Sequence[Preventability]]
@@ -94,7 +96,9 @@ class Results:
         """What the ego meets, if it is not one driver with a persona; else empty."""
         if persona in self.crowds:
             return f"the crowd {persona}"
-        return f"the group of {self.people} {persona} drivers" if self.people > 1 else ""
+        if self.people > 1:
+            return f"the group of {self.people} {persona} {'drivers' if self.non_ego_drives else 'players'}"
+        return "" if self.non_ego_drives else f"the {persona}"
 
     def _rows(self, question: str, persona: str) -> list[Row]:
         return [row for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)]
@@ -115,6 +119,7 @@ def results(tables: RunTables) -> Results:
         planned=tables.stages,
         is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),
         people=len(people_in(tables.episodes.columns)),
+        non_ego_drives=tables.non_ego_drives,
         crowds={each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())},
         preventability={
             arm: preventability_of(tables.preventability, tables.reference_drivers, arm)

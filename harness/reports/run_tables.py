@@ -43,6 +43,8 @@ class RunTables:
     """None: the report has no section on manoeuvres."""
     game: GameFindings | None = None
     """None: the report has no section on the game."""
+    non_ego_drives: bool = True
+    """Whether the people are drivers; else they are on foot, on bicycles or on e-scooters."""
     acceptance: Sequence[Check] | None = None
     """The checks of the campaign's bounds; None: it has none."""
     replays: Sequence[str] = ()

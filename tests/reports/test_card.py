@@ -59,6 +59,12 @@ def test_verdict__an_ego_that_comes_too_close_is_mended_only_in_part(share, labe
     assert (shown.label, shown.tone, bool(shown.caution)) == (label, tone, label == PARTLY)
 
 
+@pytest.mark.parametrize(("drives", "who"), [(True, "The speedy driver"), (False, "The speedy")])
+def test_verdict__people_on_foot_are_not_called_drivers(drives, who):
+    run = found(campaign(personas=["speedy"]) | {"non_ego_drives": drives})
+    assert run.verdicts("RQ1", "speedy").sentence.startswith(f"{who} makes the naive ego fail")
+
+
 def test_worst_known_opponent__is_the_one_of_a_later_round():
     ego = RetrainedEgo(against="speedy")
     later = Arm(ego=ego, non_ego=PersonaNonEgo(persona="speedy", round=3))

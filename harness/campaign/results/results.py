@@ -128,6 +128,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
         causes=causes,
         game=game,
         replays=replays,
+        non_ego_drives=all(each.drives for each in scene.document.players[1:]),
         populations=populations,
         **prevented,
         acceptance=checks,
