@@ -8,6 +8,7 @@ const STRIPS = [
   { name: "time to collision", unit: "s", column: "time", from: 0, most: 10 },
 ];
 const ROW = 46, AXIS = 20, LEFT = 34, RIGHT = 10;
+const TOGETHER = 8; // in % of the width: manoeuvres that begin closer to one another share a label
 
 /** The range of each strip over some games, so that games side by side have the same axes. */
 function rangesOf(shown) {
@@ -80,6 +81,7 @@ class Strips {
     const marked = this.game.players.filter(track => this.game.marks.some(mark => mark.player === track.name));
     return marked.map(track => {
       const lane = make("div", { class: `lane ${track.name === "ego" ? "of-ego" : "of-non-ego"}` });
+      let labelled = null, labelledAt = -Infinity;
       for (const mark of this.game.marks.filter(each => each.player === track.name)) {
         const [from, to] = [mark.from, mark.until].map(time => 100 * time / (this.until || 1));
         const span = make("span", { text: mark.name, title: `${mark.from.toFixed(1)} s: ${mark.name} ${mark.text ?? ""}`.trim() });
@@ -90,6 +92,12 @@ class Strips {
         bar.style.left = `${from}%`;
         bar.style.width = `${Math.max(to - from, 0.4)}%`;
         lane.append(bar, span);
+        if (from - labelledAt < TOGETHER) {
+          labelled.textContent += `, ${mark.name}`;
+          span.textContent = "";
+        } else {
+          [labelled, labelledAt] = [span, from];
+        }
       }
       return lane;
     });
