@@ -50,8 +50,9 @@ class Training(Document):
     """Factor of the payoffs that PPO receives; tables show the payoffs without it. The gradients of actor and critic
     are clipped together: with large payoffs, the errors of the critic would leave little of the step to the actor."""
     along_route_share: float = Field(0.7, ge=0.0, le=1.0)
-    """Share of the games that start anywhere along the players' routes, at any legal speed, without contact. The other
-    games, and all games of an assessment, start as the scene says."""
+    """Share of the games without another player that start anywhere along the route, at any legal speed: a learner that
+    fails early sees the rest of its route too. Games with another player, and all games of an assessment, start as the
+    scene says: players that start apart seldom meet."""
     segment_steps: int = Field(131_072, ge=1_024, le=100_000_000)
     """A checkpoint is written, and the learning curve evaluated, each time after this many steps."""
     learner: Literal["compiled", "stable_baselines3"] = "compiled"

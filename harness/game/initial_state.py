@@ -160,6 +160,7 @@ class StartDistribution:
     Players that do not take part in every game take part in the same games, as far as their probabilities are equal.
     A player may have several drivers. Each game draws one of them by the `shares`, with its human factors.
     In `along_route_share` of the games, the players start anywhere along their `routes` instead, up to their goals.
+    With `meet_in_place` they do so only in games of a player alone.
     """
 
     places: Sequence[StartRange]
@@ -173,6 +174,7 @@ class StartDistribution:
     routes: Routes
     conditions: Conditions
     along_route_share: float = 0.0
+    meet_in_place: bool = False
     obstacles: Obstacles = NO_OBSTACLES
 
     @cached_property
@@ -206,7 +208,7 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
     ]
     x, y, heading, speeds, positions = np.array(poses).T
     stations = positions - 0.5 * start_distribution.length_m
-    if start_distribution.along_route_share:
+    if start_distribution.along_route_share and not (start_distribution.meet_in_place and sum(present) > 1):
         along = draw_along_route(
             start_distribution.routes,
             start_distribution.length_m,

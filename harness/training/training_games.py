@@ -115,7 +115,8 @@ def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) ->
     human_factors[place.learner], shares[place.learner] = [own_factors], [1.0]
     if steps < attentive_steps(spec):
         human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
-    return spec.scene.start_distribution(human_factors, present, shares, spec.settings.along_route_share)
+    starts = spec.scene.start_distribution(human_factors, present, shares, spec.settings.along_route_share)
+    return replace(starts, meet_in_place=True)
 
 
 def _factors_beside(spec: TrainingSpec, place: LearningPlace) -> tuple[list[list[HumanFactors]], list[list[float]]]:

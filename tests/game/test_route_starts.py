@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -116,6 +117,13 @@ def test_initial_state__along_the_route_changes_no_other_draw(merge: OpenScene) 
         assert (one.lapses[1].lapsed == other.lapses[1].lapsed).all()
         assert one.limits[1].delay_steps == other.limits[1].delay_steps
         assert (one.x_m != other.x_m).all() == is_moved
+
+
+def test_initial_state__players_that_meet_start_in_their_places(merge: OpenScene) -> None:
+    starts = merge.start_distribution((HumanFactors(), HumanFactors()), (1.0, 0.5), along_route_share=1.0)
+    drawn = [draw_initial_state(replace(starts, meet_in_place=True), "test", k) for k in range(60)]
+    assert 15 < sum(each.present[1] for each in drawn) < 45
+    assert all(np.isnan(each.position_m).all() != each.present[1] for each in drawn)
 
 
 def test_initial_state__along_the_route_is_the_same_for_the_same_parts(merge: OpenScene) -> None:
