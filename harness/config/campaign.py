@@ -184,7 +184,9 @@ class Campaign(Document):
         given = [name for name in TRAINING_TABLES if name in self.model_fields_set]
         if self.retraining.model_fields_set <= {"against"} and "retraining" in given:
             given.remove("retraining")  # `against` names the arms of the robust ego, which exist without training too
-        return given if self.best_response is None else [name for name in given if name == "retraining"]
+        if self.best_response is None:
+            return given
+        return [name for name in given if name in ("naive_training", "retraining")]  # best responses are trained
 
     @property
     def mixed_people(self) -> list[str]:
@@ -204,6 +206,7 @@ class Campaign(Document):
         unused |= {} if self.acceptance else {"acceptance": True}
         if self.policies is None:
             return self.model_dump(mode="json", exclude=unused)
+        unused["naive_training"] = True
         unused["retraining"] = {"alone_share", "warm_start"} if self.retraining.against else True
         if self.best_response is None:
             unused |= {"training": True, "non_ego_training": True}

@@ -265,6 +265,12 @@ REFUSED: dict[str, tuple[Callable[[Path], dict[str, Any]], str, str, list[str]]]
         "training",
         ["nothing is trained", "would be ignored", "leave out"],
     ),
+    "training of the naive ego, which would be ignored": (
+        lambda policies: {"naive_training": {"alone_share": 0.5}},
+        "played.toml",
+        "naive_training",
+        ["would be ignored"],
+    ),
     "retraining, which would be ignored": (
         lambda policies: {"retraining": {"alone_share": 0.5}},
         "played.toml",
@@ -339,7 +345,7 @@ def test_played__the_manifest_records_the_policies_and_no_training(played: Path)
     manifest = json.loads((played / "manifest.json").read_text())
     assert not manifest["quick"]
     assert manifest["campaign"]["policies"] == "policies"
-    assert not {"training", "non_ego_training", "retraining"} & set(manifest["campaign"])
+    assert not {"training", "naive_training", "non_ego_training", "retraining"} & set(manifest["campaign"])
     assert {stage["kind"] for stage in manifest["stages"].values()} == {"assessment"}
     hashed = {f"policies/{name}-seed1/policy.{ending}" for name in NAMES for ending in ("json", "safetensors")}
     assert hashed <= set(manifest["hashes"])
