@@ -11,7 +11,7 @@ from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, percent
 PASS, FAIL = "PASS", "FAIL"
 TITLES = {
     "failure_rate": "failures",
-    "failure_rate_alone": "failures without the other driver",
+    "failure_rate_alone": "failures without the non-ego",
     "preventable_failure_rate": "preventable failures",
     "near_miss_rate": "near misses",
     "speed_loss_mps": "average speed lost",

@@ -343,7 +343,7 @@ def test_report__judges_the_bounds_of_the_campaign(
     result = run_command("report", run)
     assert result.code == code, result.err
     assert f"{word}  failures, speedy: " in result.out
-    assert "PASS  failures without the other driver, speedy: " in result.out
+    assert "PASS  failures without the non-ego, speedy: " in result.out
     written = json.loads((run / "result.json").read_text(encoding="utf-8"))
     assert (written["accepted"], written["exit_code"]) == (code == 0, code)
     assert [each["passed"] for each in written["acceptance"]] == [code == 0, True]

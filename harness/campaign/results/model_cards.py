@@ -49,17 +49,27 @@ class _Term:
     meaning: str
 
 
-def write_model_cards(folder: RunFolder, manifest: Mapping[str, Any], summary: pd.DataFrame) -> None:
-    """Write the card of every policy that a run trained. A run of an older version without cards gets none."""
+def trained_policies(folder: RunFolder, manifest: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """The content of the policy.json of every policy that a run trained, by stage.
+
+    Empty for a run of an older version without cards. Raises UsageError where a file is damaged.
+    """
     if "persona_documents" not in manifest:
-        return
-    cards = {
-        folder.policy(stage) / CARD: model_card(stage, manifest, summary, _policy_card(folder.policy(stage)))
+        return {}
+    return {
+        stage: _policy_card(folder.policy(stage))
         for stage, entry in manifest["stages"].items()
         if entry["kind"] == "training" and entry["status"] == "done"
     }
-    for file, card in cards.items():
-        write_atomically(file, card.encode())
+
+
+def write_model_cards(
+    folder: RunFolder, manifest: Mapping[str, Any], policies: Mapping[str, Mapping[str, Any]], summary: pd.DataFrame
+) -> None:
+    """Write the card of every policy of `policies` (`trained_policies`)."""
+    cards = {stage: model_card(stage, manifest, summary, policy) for stage, policy in policies.items()}
+    for stage, card in cards.items():
+        write_atomically(folder.policy(stage) / CARD, card.encode())
 
 
 class _PolicyCard(Document):

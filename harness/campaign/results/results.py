@@ -20,7 +20,7 @@ from harness.campaign.results.acceptance import checks_of, shown_lines, write_ci
 from harness.campaign.results.judged_failures import preventability_tables
 from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownVerdict, keep_result
 from harness.campaign.results.matchups import matchups_of
-from harness.campaign.results.model_cards import write_model_cards
+from harness.campaign.results.model_cards import trained_policies, write_model_cards
 from harness.campaign.results.population_summary import by_who_drove
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
 from harness.campaign.storage.learned import did_not_learn, judged
@@ -75,15 +75,16 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     done = {name: entry for name, entry in written["stages"].items() if entry["status"] == "done"}
     played = _gather(folder, done, "assessment", "episodes.csv", list(PLAYED_COLUMNS))
     _check_traces(folder, played)
+    training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
+    reconfiguration = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
+    policies = trained_policies(folder, written)
     scene = open_scene(folder.scene)
     with _doing(console, "working out how severe each game is, and why the ego failed"):
         episodes = with_severity(played, [severity_table(folder, name, scene) for name in _arms(done)])
         causes = _joined([cause_table(folder, name, scene) for name in _arms(done)], CAUSE_COLUMNS)
     entries = judged(written["stages"], campaign, stages, _goals(stages, episodes))
     manifest = {**written, "stages": entries}
-    training = _gather(folder, done, "training", "training.csv", list(TRAINING_COLUMNS))
     training = _with_ends(training, entries)
-    reconfiguration = _gather(folder, done, "reconfiguration", "reconfiguration.csv", list(RECONFIGURATION_COLUMNS))
     summary = summarise(episodes)
     arms = {stage.name: stage.arm for stage in stages if isinstance(stage, AssessmentStage)}
     asked = _questions(campaign, manifest)
@@ -97,7 +98,7 @@ def write_results(folder: RunFolder, console: Console) -> RunResult:
     populations = by_who_drove(campaign, episodes)
     tables |= {"populations": populations} if campaign.population else {}
     tables |= {"reconfiguration": reconfiguration} if is_tuned(manifest) else {}
-    write_model_cards(folder, manifest, summary)
+    write_model_cards(folder, manifest, policies, summary)
     for name, table in tables.items():
         write_csv(table, folder.path / f"{name}.csv")
     with _doing(console, "naming manoeuvres"):

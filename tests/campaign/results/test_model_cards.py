@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from harness.campaign.results.model_cards import model_card, write_model_cards
+from harness.campaign.results.model_cards import model_card, trained_policies, write_model_cards
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
@@ -263,7 +263,7 @@ def test_run__of_an_older_version_without_cards_gets_none(tmp_path: Path) -> Non
         manifest.pop(name)
     for file in folder.path.glob("policies/*/README.md"):
         file.unlink()
-    write_model_cards(folder, manifest, read_csv(folder.path / "summary.csv"))
+    write_model_cards(folder, manifest, trained_policies(folder, manifest), read_csv(folder.path / "summary.csv"))
     assert not list(folder.path.glob("policies/*/README.md"))
 
 
