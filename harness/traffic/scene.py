@@ -17,12 +17,13 @@ from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.bicycle import Actuators
-from harness.game.initial_state import Conditions, StartDistribution, StartRange
+from harness.game.initial_state import Conditions, StartDistribution
 from harness.game.obstacles import NO_OBSTACLES, Obstacles
 from harness.game.quantities import REACH_M
 from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.seeding import between
+from harness.game.start_range import StartRange
 from harness.game.world import World
 from harness.shipped_documents import named_document
 from harness.traffic import network

@@ -12,8 +12,8 @@ from sumolib.net.lane import Lane
 from harness.config.scene import Player, Scene
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.initial_state import ArrivesAfterEgo, BesideEgo, OnLine, StartRange
 from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.game.start_range import ArrivesAfterEgo, BesideEgo, OnLine, StartRange
 from harness.traffic import network
 
 _MEETS_M = 1.6  # routes whose lines are closer than half a lane meet

@@ -106,7 +106,8 @@ def test_preventability__running_the_campaign_again_judges_nothing_again(run: Pa
 
 def test_minimise__the_start_lies_between_the_campaigns_and_one_without_a_failure(pinned: Path) -> None:
     game = game_of(pinned)
-    assert (game.arm, game.seed, game.outcome) == (ARM, 1, "collision")
+    assert (game.arm, game.seed) == (ARM, 1)
+    assert game.outcome in ("collision", "rail")
     assert game.no_failure_from is not None
     fails, passes = (pd.Series([*each.position_m, *each.speed_mps]) for each in (game.start, game.no_failure_from))
     assert (fails - passes).abs().max() <= 0.05

@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from harness.errors import UsageError
-from harness.game.initial_state import ArrivesAfterEgo, InitialState, OnLine, StartRange
+from harness.game.initial_state import InitialState
+from harness.game.start_range import ArrivesAfterEgo, OnLine, StartRange
 from harness.traffic import network
 from harness.traffic.scene import OpenScene, open_scene
 from harness.traffic.start_ranges import meeting

@@ -20,7 +20,8 @@ from harness.campaign.results.acceptance import checks_of, shown_lines, write_ci
 from harness.campaign.results.judged_failures import preventability_tables
 from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownVerdict, keep_result
 from harness.campaign.results.matchups import matchups_of
-from harness.campaign.results.model_cards import trained_policies, write_model_cards
+from harness.campaign.results.model_cards import write_model_cards
+from harness.campaign.results.policy_cards import trained_policies
 from harness.campaign.results.population_summary import by_who_drove
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
 from harness.campaign.storage.learned import did_not_learn, judged

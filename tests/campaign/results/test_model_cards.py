@@ -10,7 +10,8 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from harness.campaign.results.model_cards import model_card, trained_policies, write_model_cards
+from harness.campaign.results.model_cards import model_card, write_model_cards
+from harness.campaign.results.policy_cards import trained_policies
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
@@ -95,7 +96,7 @@ def test_card__of_the_naive_ego() -> None:
         "| initial policy | none |",
         "| trained for | 1,703,936 of at most 3,000,000 steps: stopped by convergence |",
         "| convergence | stop when settled |",
-        "| safety | `collision` | 10 | per event | touching a vehicle or person, once |",
+        "| safety | `collision` | 20 | per event | touching a vehicle or person, once |",
         "| safety | `clearance` | 2 | per second | nearness to the nearest surface, rail or vehicle, within 0.6 m |",
         "| learning_rate | 0.0001 |",
         "| network | 64, 64 |",
