@@ -35,8 +35,10 @@ class Training(Document):
     """Passes over the buffer per update."""
     network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)
     """Sizes of the hidden layers of the actor, and of the critic."""
-    initial_deviation: float = Field(0.5, gt=0.0, le=2.0)
-    """Standard deviation of the actions of a new policy."""
+    initial_deviation: float = Field(0.25, gt=0.0, le=2.0)
+    """Standard deviation of the actions of a new policy. The mean action of a new policy follows its lane at the speed
+    that it has. With a wide deviation nearly all games end at the rail at first, and the player learns to stand still,
+    or to crash early, before it learns to drive."""
     max_deviation: float = Field(0.5, gt=0.0, le=2.0)
     """Upper bound of that standard deviation. Without it, the entropy term raises the standard deviation without limit
     once little is left to learn."""
