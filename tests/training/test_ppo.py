@@ -17,6 +17,7 @@ from safetensors.numpy import load_file, save_file
 import harness.training.ppo
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
+from harness.config.training import Training
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import write_policy
 from harness.drivers.sumo import SumoDriver
@@ -214,7 +215,7 @@ def test_train__starts_from_the_initial_policy(
     for name, tensor in trained.policy.tensors.items():
         if name != "log_deviation":
             np.testing.assert_array_equal(warm.policy.tensors[name], tensor)
-    assert np.exp(warm.policy.tensors["log_deviation"]) == pytest.approx([0.5, 0.5])
+    assert np.exp(warm.policy.tensors["log_deviation"]) == pytest.approx([Training().initial_deviation] * 2)
 
 
 def test_train__an_initial_policy_of_another_network_is_refused(
@@ -238,7 +239,8 @@ def test_train__alone_share_is_the_share_of_games_without_opponent(
         reset(arena, starts, departures)
 
     monkeypatch.setattr(harness.environments.vector_env.Arena, "reset", recording)
-    spec = replace(alone, opponent=SumoDriver(), alone_share=share)
+    short_games = alone.settings.model_copy(update={"initial_deviation": 0.5})  # most of them end at the rail
+    spec = replace(alone, opponent=SumoDriver(), alone_share=share, settings=short_games)
     progress = in_one_go(spec, tmp_path).progress
     assert len(present) > 60
     tolerance = 0.15 if 0.0 < share < 1.0 else 0.0
@@ -290,7 +292,12 @@ def test_train__the_learner_checks_its_blind_spot_and_the_opponent_does_not(
 def test_train__the_deviation_of_actions_is_bounded(alone: TrainingSpec, tmp_path: Path) -> None:
     def deviations(bound: float) -> np.ndarray:
         rewarded = settings(
-            steps=1024, learning_rate=0.01, entropy_coefficient=1.0, max_deviation=bound, final_deviation=bound
+            steps=1024,
+            learning_rate=0.01,
+            entropy_coefficient=1.0,
+            initial_deviation=0.5,
+            max_deviation=bound,
+            final_deviation=bound,
         )
         folder = tmp_path / f"{bound}"
         folder.mkdir()

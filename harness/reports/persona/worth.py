@@ -174,7 +174,6 @@ def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]
         return np.array([[quantities.get(name, calm)]])
 
     far = {name: array(name, np.inf) for name in LIMITED.values()}
-    not_passed = {name: array(name, -1.0) for name in FROM.values()}
     state: Any = SimpleNamespace(
         step=np.array([0]),
         x_m=np.zeros((1, 1)),
@@ -187,12 +186,12 @@ def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]
         state=state,
         advanced_m=array("advanced_m", 0.0),
         speed_over_permitted=array("speed_over_permitted", 0.0),
-        wrong_way=array("wrong_way", 0.0),
+        along=SimpleNamespace(wrong_way=array("wrong_way", 0.0)),
+        rules=SimpleNamespace(**{name: array(name, -1.0) for name in FROM.values()}),
         on_carriageway=array("on_carriageway", 0.0),
         stands=array("stands", 0.0),
         lane_offset_m=array("lane_offset_m", 0.0),
         lateral_acceleration_mps2=array("lateral_acceleration_mps2", 0.0),
         **far,
-        **not_passed,
     )
     return float(Payoff(alpha=payoff.alpha, terms=(term,), fuzzy={}).evaluate(moment, 0)[term.name][0])
