@@ -101,7 +101,7 @@ class ArenaVecEnv(GamesVecEnv):
         payoff_scale: float = 1.0,
     ) -> None:
         super().__init__(arena.games, OBSERVATION_SPACE, ACTION_SPACE)
-        self.arena, self._learner, self._payoff_scale = arena, learner, payoff_scale
+        self.arena, self.learner, self._payoff_scale = arena, learner, payoff_scale
         self._actions = np.zeros((arena.games, len(arena.seats), ACTIONS))
         self._finished: list[Finished] = []
         self.sample_from(start_distribution, *parts)
@@ -114,13 +114,13 @@ class ArenaVecEnv(GamesVecEnv):
     def reset(self) -> FloatArray:
         """Reset every game. Returns observations [G, SIZE]."""
         self._games.reset(range(self.num_envs))
-        return self.arena.observation[:, self._learner].copy()
+        return self.arena.observation[:, self.learner].copy()
 
     def step_async(self, actions: FloatArray) -> None:
         """Store the learner's actions [G, 2] for `step_wait`. Raises ValueError for another shape."""
         if np.shape(actions) != (self.num_envs, ACTIONS):
             raise ValueError(f"actions have the shape {np.shape(actions)}, not {(self.num_envs, ACTIONS)}")
-        self._actions[:, self._learner] = actions
+        self._actions[:, self.learner] = actions
 
     def step_wait(self) -> tuple[FloatArray, FloatArray, Any, list[dict[str, Any]]]:
         """Play a step, and reset the games that ended; their last observations are in `infos`.
@@ -128,17 +128,17 @@ class ArenaVecEnv(GamesVecEnv):
         Raises as `Arena.step` does.
         """
         step = self.arena.step(self._actions)
-        payoff = step.payoff[:, self._learner].astype(np.float32)
+        payoff = step.payoff[:, self.learner].astype(np.float32)
         self._payoff += payoff
-        done = ~self.arena.state.running[:, self._learner]
+        done = ~self.arena.state.running[:, self.learner]
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
         ended = np.flatnonzero(done)
         if len(ended):
             for game in ended:
-                infos[game] = {"terminal_observation": self.arena.observation[game, self._learner].copy()}
+                infos[game] = {"terminal_observation": self.arena.observation[game, self.learner].copy()}
                 self._finish(int(game))
             self._games.reset(ended.tolist())
-        return self.arena.observation[:, self._learner].copy(), payoff * self._payoff_scale, done, infos
+        return self.arena.observation[:, self.learner].copy(), payoff * self._payoff_scale, done, infos
 
     def take_finished(self) -> list[Finished]:
         """The games that ended since the last call, removed from the list."""
@@ -155,7 +155,7 @@ class ArenaVecEnv(GamesVecEnv):
 
     def _finish(self, game: int) -> None:
         state = self.arena.state
-        outcome = Outcome(int(state.outcome[game, self._learner]))
+        outcome = Outcome(int(state.outcome[game, self.learner]))
         took_part = state.present[game] | (state.outcome[game] != Outcome.RUNNING)  # a player at its goal has left
         self._finished.append(
             Finished(

@@ -27,6 +27,7 @@ from harness.training.callbacks import CurveRecorder, DeviationBound
 from harness.training.checkpoint import Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import has_converged, still_fails
+from harness.training.imitation import imitate
 from harness.training.narrowing import Narrowing
 from harness.training.torch_without_compiler import leave_out_compiler
 from harness.training.training_games import TrainingSpec, attentive_steps, open_games, sample
@@ -66,8 +67,10 @@ def train(
     environment = open_games(spec)
     try:
         model = _learner(spec, environment, tensorboard)
-        new = Progress(segments=0, steps=0, segment_payoffs=[], curve=[], alone_games=[], alone_failures=[])
-        progress = read_checkpoint(model, key, checkpoint) or new
+        progress = read_checkpoint(model, key, checkpoint)
+        if progress is None:
+            progress = Progress(segments=0, steps=0, segment_payoffs=[], curve=[], alone_games=[], alone_failures=[])
+            _imitate(spec, model, environment)
         while (stopped := _stop_reason(spec, progress)) is None:
             on_start(progress.segments)
             progress = _segment(spec, model, environment, progress=progress, on_progress=on_progress)
@@ -122,6 +125,17 @@ def _learner(spec: TrainingSpec, environment: GamesVecEnv, tensorboard: Path | N
     else:
         _zero_other_weights(model)
     return model
+
+
+def _imitate(spec: TrainingSpec, model: PPO, environment: GamesVecEnv) -> None:
+    """Let a policy without a past imitate the demonstrator."""
+    settings = spec.settings
+    if spec.initial is None:
+        steps, seed = min(settings.demonstration_steps, settings.steps // 5), seed_of(*spec.parts, "demonstration")
+        try:
+            imitate(model, environment, steps=steps, deviation=settings.initial_deviation, seed=seed % 2**31)
+        except FloatingPointError as error:
+            raise FloatingPointError(f"{error}, in a demonstration") from error
 
 
 def _zero_other_weights(model: PPO) -> None:

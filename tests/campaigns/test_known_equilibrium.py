@@ -107,6 +107,7 @@ TRAINING: dict[str, Any] = {
     "clip": 0.3,
     "discount": 1.0,
     "entropy_coefficient": 0.0,
+    "demonstration_steps": 0,
     "initial_deviation": 1.0,
     "max_deviation": 1.0,
     "payoff_scale": 1.0,

@@ -337,17 +337,24 @@ def test_train__ppo_sees_scaled_payoffs_and_the_curve_does_not(
     assert curves[0.25] == pytest.approx(curves[1.0])
 
 
+@pytest.mark.parametrize(("demonstration_steps", "place"), [(0, r"after \d+ steps"), (512, "in a demonstration")])
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_train__a_payoff_that_is_not_finite_ends_it_with_its_place(
-    value: float, alone: TrainingSpec, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    value: float,
+    demonstration_steps: int,
+    place: str,
+    alone: TrainingSpec,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def broken(q: Quantities) -> np.ndarray:
         return np.where(q.state.step[:, None] == 17, value, q.advanced_m)
 
     monkeypatch.setattr(Quantities, "broken", property(broken), raising=False)
     monkeypatch.setitem(TERMS, "progress", replace(TERMS["progress"], quantity="broken"))  # type: ignore[index]
-    with pytest.raises(FloatingPointError, match=r"payoff of ego is (nan|inf) in step 17 of game \d+, after \d+ steps"):
-        in_one_go(alone, tmp_path)
+    spec = replace(alone, settings=settings(steps=3072, demonstration_steps=demonstration_steps))
+    with pytest.raises(FloatingPointError, match=rf"payoff of ego is (nan|inf) in step 17 of game \d+, {place}"):
+        in_one_go(spec, tmp_path)
     assert not (tmp_path / "checkpoint.safetensors").exists()
 
 
@@ -382,7 +389,14 @@ def test_train__a_flat_curve_of_failures_is_not_convergence(
 @pytest.mark.slow
 def test_train__an_ego_alone_learns_to_drive(alone: TrainingSpec, tmp_path: Path) -> None:
     budget = settings(
-        steps=262_144, segment_steps=131_072, games=64, buffer=2048, minibatch=512, epochs=10, network=[64, 64]
+        steps=262_144,
+        segment_steps=131_072,
+        games=64,
+        buffer=2048,
+        minibatch=512,
+        epochs=10,
+        network=[64, 64],
+        demonstration_steps=0,
     )
     began = time.process_time()
     learned = in_one_go(replace(alone, settings=budget), tmp_path)

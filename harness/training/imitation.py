@@ -1,0 +1,123 @@
+"""Imitation of a rule-based driver by a new policy, before its training (behaviour cloning).
+
+An untrained driver ends nearly all games at the rail. Where the road bends, the first thing that it learns from its
+payoff is to stand still, because that costs less, and it may never learn to drive. So a new policy first imitates an
+adaptive cruise control with lane keeping. Noise is added to what the demonstrator does, so that its corrections are
+seen as well (Laskey et al. 2017, DART). The critic learns the discounted payoffs of the same games. Everything after
+that is learned from the payoff alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from stable_baselines3 import PPO
+
+from harness.config.rule_driver import Cruise, LaneKeeping, Rules
+from harness.drivers.car import car_of
+from harness.drivers.rules import RulesDriver
+from harness.environments.joined_vec_env import JoinedVecEnv
+from harness.environments.vector_env import ArenaVecEnv, GamesVecEnv
+from harness.game.arrays import BoolArray, FloatArray
+
+_EPOCHS, _MINIBATCH, _LEARNING_RATE = 30, 512, 1e-3
+_DEMONSTRATOR = Rules(
+    kind="rules",
+    name="demonstrator",
+    description="Cruises and keeps its lane, with so little inertia that its actions follow from what it sees.",
+    cruise=Cruise(max_jerk_mps3=50.0),
+    lane_keeping=LaneKeeping(max_lateral_jerk_mps3=20.0),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Demonstrations:
+    """What the demonstrator saw and did in T steps of G games."""
+
+    observations: FloatArray  # [T, G, SIZE]
+    actions: FloatArray  # [T, G, 2], without the noise
+    returns: FloatArray  # [T, G], NaN in games that had not ended
+
+
+def imitate(model: PPO, environment: GamesVecEnv, *, steps: int, deviation: float, seed: int) -> None:
+    """Fit a new model's actor to the demonstrator's actions, and its critic to the payoffs, in `steps` steps over all
+    games. The noise added to an action has the standard deviation `deviation`, which is that of the new policy.
+
+    A learner on foot keeps to no lane and has no demonstrator: its model is left as it is.
+    Raises SimulationError if SUMO fails, FloatingPointError if a number of a game is impossible.
+    """
+    places = environment.environments if isinstance(environment, JoinedVecEnv) else (environment,)
+    driven = [
+        place for place in places if isinstance(place, ArenaVecEnv) and not place.arena.world.walks[place.learner]
+    ]
+    rounds = steps // environment.num_envs
+    if not driven or not rounds:
+        return
+    noise = np.random.default_rng(seed)
+    shown = [_demonstrate(place, rounds, discount=model.gamma, deviation=deviation, noise=noise) for place in driven]
+    _fit(model, shown, torch.Generator().manual_seed(seed))
+
+
+def _demonstrate(
+    environment: ArenaVecEnv, rounds: int, *, discount: float, deviation: float, noise: np.random.Generator
+) -> _Demonstrations:
+    driver = RulesDriver(_DEMONSTRATOR, car_of(environment.arena.world, environment.learner))
+    games = np.arange(environment.num_envs)
+    driver.reset(games)
+    observation = environment.reset()
+    observations, actions, payoffs, ended = [], [], [], []
+    for _ in range(rounds):
+        wanted = driver.decide(games, observation, np.zeros((len(games), 2)))
+        observations.append(observation)
+        actions.append(wanted)
+        environment.step_async(np.clip(wanted + noise.normal(0.0, deviation, wanted.shape), -1.0, 1.0))
+        observation, payoff, done, _ = environment.step_wait()
+        payoffs.append(payoff)
+        ended.append(done)
+        driver.reset(np.flatnonzero(done))
+    environment.take_finished()  # they are not games of the training
+    return _Demonstrations(
+        observations=np.array(observations),
+        actions=np.array(actions),
+        returns=returns_of(np.array(payoffs), np.array(ended), discount),
+    )
+
+
+def returns_of(payoffs: FloatArray, ended: BoolArray, discount: float) -> FloatArray:
+    """[T, G] sum of the payoffs [T, G] from each step to the end of its game, each step discounted once more.
+
+    `ended` [T, G] marks the last steps of games. NaN where the game had not ended after T steps.
+
+    >>> returns_of(np.array([[1.0], [2.0], [4.0], [8.0]]), np.array([[False], [False], [True], [False]]), 0.5).ravel()
+    array([ 3.,  4.,  4., nan])
+    """
+    returns = np.empty(payoffs.shape)
+    after = np.full(payoffs.shape[1], np.nan)
+    for step in reversed(range(len(payoffs))):
+        after = payoffs[step] + discount * np.where(ended[step], 0.0, after)
+        returns[step] = after
+    return returns
+
+
+def _fit(model: PPO, shown: list[_Demonstrations], order: torch.Generator) -> None:
+    """Fit actor and critic by Adam, with a step size that falls to zero. The training has an optimiser of its own."""
+    observations, actions, returns = (
+        torch.from_numpy(np.concatenate([getattr(each, name).reshape(-1, *shape) for each in shown])).float()
+        for name, shape in (("observations", shown[0].observations.shape[2:]), ("actions", (2,)), ("returns", ()))
+    )
+    known = torch.isfinite(returns)
+    returns = torch.where(known, returns, 0.0)
+    policy = model.policy
+    optimizer = torch.optim.Adam(policy.parameters(), lr=_LEARNING_RATE)
+    schedule = torch.optim.lr_scheduler.LinearLR(optimizer, 1.0, 1.0 / _EPOCHS, total_iters=_EPOCHS)
+    for _ in range(_EPOCHS):
+        for batch in torch.randperm(len(observations), generator=order).split(_MINIBATCH):
+            actor, critic = policy.mlp_extractor(observations[batch])
+            wrong = (policy.action_net(actor) - actions[batch]).square().mean()
+            misjudged = ((policy.value_net(critic)[:, 0] - returns[batch]).square() * known[batch]).mean()
+            optimizer.zero_grad()
+            (wrong + misjudged).backward()
+            optimizer.step()
+        schedule.step()

@@ -1,0 +1,67 @@
+"""Imitation: a new policy drives through bends before it has learned anything from its payoff."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.drivers.policy_file import Policy
+from harness.game.state import NON_EGO
+from harness.traffic.scene import OpenScene, open_scene
+from harness.training.imitation import returns_of
+from tests.support.tiny import settings
+from tests.support.trainings import in_one_go, naive_ego
+
+NO_LEARNING = 1e-9  # step size of Adam in the training after the imitation
+
+
+@pytest.fixture(scope="module")
+def left_turn(repository: Path) -> OpenScene:
+    return open_scene(repository / "tests" / "data" / "scenes" / "left_turn")
+
+
+def failures(scene: OpenScene, folder: Path, demonstration_steps: int) -> float:
+    """The share of games that a new policy fails, alone, after a demonstration of so many steps."""
+    chosen = settings(
+        steps=48_000, games=32, network=[64, 64], learning_rate=NO_LEARNING, demonstration_steps=demonstration_steps
+    )
+    curve = in_one_go(replace(naive_ego(scene), settings=chosen), folder).progress.curve
+    games = np.array([window.games for window in curve])
+    return float(games @ [window.failure_rate for window in curve] / games.sum())
+
+
+def test_imitation__a_new_policy_makes_the_turn(left_turn: OpenScene, tmp_path: Path) -> None:
+    shown, not_shown = tmp_path / "shown", tmp_path / "not_shown"
+    for each in (shown, not_shown):
+        each.mkdir()
+    assert failures(left_turn, shown, demonstration_steps=9_600) < 0.3
+    assert failures(left_turn, not_shown, demonstration_steps=0) > 0.6
+
+
+def first_policy(scene: OpenScene, folder: Path, learner: int, demonstration_steps: int) -> Policy:
+    """The policy with which a training begins."""
+    folder.mkdir()
+    chosen = settings(steps=1024, learning_rate=NO_LEARNING, demonstration_steps=demonstration_steps)
+    spec = naive_ego(scene)
+    return in_one_go(replace(spec, learner=learner, settings=chosen), folder).policy
+
+
+def test_imitation__a_learner_on_foot_has_no_demonstrator(repository: Path, tmp_path: Path) -> None:
+    crossing = open_scene(repository / "networks" / "crossing")
+    shown, not_shown = (
+        first_policy(crossing, tmp_path / str(steps), NON_EGO, demonstration_steps=steps).tensors
+        for steps in (0, 10_000)
+    )
+    for name, tensor in shown.items():
+        np.testing.assert_array_equal(tensor, not_shown[name])
+
+
+def test_returns__are_the_discounted_payoffs_until_the_end_of_the_game() -> None:
+    payoffs = np.array([[1.0, 3.0], [2.0, 5.0], [4.0, 7.0], [8.0, 9.0]])
+    ended = np.array([[False, False], [False, True], [True, False], [False, False]])
+    returns = returns_of(payoffs, ended, discount=0.5)
+    np.testing.assert_array_equal(returns[:, 0], [1.0 + 1.0 + 1.0, 2.0 + 2.0, 4.0, np.nan])
+    np.testing.assert_array_equal(returns[:, 1], [3.0 + 2.5, 5.0, np.nan, np.nan])
