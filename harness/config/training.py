@@ -36,12 +36,12 @@ class Training(Document):
     network: list[Annotated[int, Field(ge=1, le=1024)]] = Field([64, 64], min_length=1, max_length=6)
     """Sizes of the hidden layers of the actor, and of the critic."""
     demonstration_steps: int = Field(38_400, ge=0, le=10_000_000)
-    """Steps, over all games, in which a rule-based driver (adaptive cruise control and lane keeping) shows a new policy
+    """Steps, over all games, in which a rule-based driver (adaptive cruise control and lane keeping) shows a new ego
     how to drive; at most a fifth of `steps`. The policy imitates it before its training, and the critic learns the
-    payoffs of these games. 0: the policy begins with random parameters. A player on foot has no such driver."""
-    initial_deviation: float = Field(0.1, gt=0.0, le=2.0)
-    """Standard deviation of the actions of a new policy. With a wide deviation many games end at the rail at first, and
-    the player learns to stand still, or to crash early, before it learns to drive well."""
+    payoffs of these games. 0: the policy begins with random parameters, as those of people do."""
+    initial_deviation: float = Field(0.25, gt=0.0, le=2.0)
+    """Standard deviation of the actions of a new policy. With a wide deviation nearly all games end at the rail at
+    first, and the player learns to stand still, or to crash early, before it learns to drive."""
     max_deviation: float = Field(0.5, gt=0.0, le=2.0)
     """Upper bound of that standard deviation. Without it, the entropy term raises the standard deviation without limit
     once little is left to learn."""
@@ -98,6 +98,9 @@ class NonEgoTraining(Document):
     """Share of the budget, at its start, without lapses of attention: people learn to drive before they text."""
     warm_start: bool = False
     """Start from the parameters of the naive ego, which can drive on the empty road, instead of random ones."""
+    imitation: bool = False
+    """Let the new policies of people imitate the rule-based driver as well (`training.demonstration_steps`). Some of
+    its courtesy stays in what they learn afterwards."""
 
 
 class Retraining(Document):

@@ -6,15 +6,19 @@ from harness.campaign.plan.planned_drivers import Crowd, members_of, persona_of
 from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign
 from harness.config.training import Training
+from harness.game.state import EGO
 
 
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     """The settings of one training.
 
-    A best response has a budget of its own. A training against several personas has the budget, and the segment length
-    by which its learning curve is judged, times their number.
+    A person has no demonstrator, unless the campaign says so. A best response has a budget of its own. A training
+    against several personas has the budget, and the segment length by which its learning curve is judged, times their
+    number.
     """
     settings = campaign.training
+    if stage.learner != EGO and not campaign.non_ego_training.imitation:
+        settings = settings.model_copy(update={"demonstration_steps": 0})
     if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})

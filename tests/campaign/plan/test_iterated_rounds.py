@@ -200,8 +200,20 @@ def test_settings__who_meets_several_people_has_the_budget_of_as_many_trainings(
     for name in ("robust", "retrained_town"):
         settings = training_settings(campaign, training(stages, name))
         assert (settings.steps, settings.segment_steps) == (2 * once.steps, 2 * once.segment_steps)
-    for name in ("naive", "anna", "retrained_anna", "retrained_anna_round4"):  # of one person's strategies it meets one
+    for name in ("naive", "retrained_anna", "retrained_anna_round4"):  # of one person's strategies it meets one
         assert training_settings(campaign, training(stages, name)) == once
+
+
+@pytest.mark.parametrize("imitation", [False, True])
+def test_settings__a_person_has_a_demonstrator_only_if_the_campaign_says_so(
+    imitation: bool, tmp_path: Path, anna: list[str]
+) -> None:
+    stages, _ = planned(tmp_path, personas=anna, non_ego_training={"imitation": imitation}, rounds={"count": 4})
+    campaign = open_campaign(tmp_path / "tiny.toml").document
+    steps = {
+        name: training_settings(campaign, training(stages, name)).demonstration_steps for name in ("naive", "anna")
+    }
+    assert steps == {"naive": 38_400, "anna": 38_400 if imitation else 0}
 
 
 def test_plan__an_exchange_may_end_after_each_answer_of_the_ego(tmp_path: Path, anna: list[str]) -> None:
