@@ -122,7 +122,7 @@ def _facts(
         yield "people in a game", f"{people}" if policy["player"] == ROLES[EGO] else f"{people}; {learns}"
     if against is not None:
         yield "games without the other player", percent(_alone_share(entry, campaign))
-    yield "initial policy", f"`{policy['began_from']}`" if policy["began_from"] else "none"
+    yield "initial policy", f"`{policy['began_from']}`" if policy["began_from"] else _beginning(policy["training"])
     reason = {"converged": "stopped by convergence", "budget": "the whole budget"}.get(entry["stopped"], "")
     reason = stopped(entry) if entry["stopped"] == DID_NOT_LEARN else reason
     yield "trained for", f"{entry['steps']:,} of at most {entry['budget_steps']:,} steps: {reason}"
@@ -150,6 +150,12 @@ def _facts(
         shares = (uses.throttle_share, uses.braking_share, uses.steering_share)
         throttle, braking, steering = map(percent, shares)
         yield "use of the car", f"{throttle} of the acceleration, {braking} of the braking, {steering} of the steering"
+
+
+def _beginning(settings: Mapping[str, Any]) -> str:
+    """What a policy without an initial policy began with; `settings` are those of its training."""
+    shown = min(settings.get("demonstration_steps", 0), settings["steps"] // 5)
+    return f"none; it imitated a rule-based driver, shown in {shown:,} steps" if shown else "none"
 
 
 def _alone_share(entry: Mapping[str, Any], campaign: Campaign) -> float:

@@ -192,6 +192,15 @@ def test_card__of_a_naive_ego_that_met_sumos_driver() -> None:
         assert row in card, row
 
 
+def test_card__says_what_a_policy_began_with() -> None:
+    shown = {**POLICY["training"], "steps": 1_000_000, "demonstration_steps": 38_400}
+    card = lines(model_card("naive-seed1", MANIFEST, SUMMARY, {**POLICY, "training": shown}))
+    assert "| initial policy | none; it imitated a rule-based driver, shown in 38,400 steps |" in card
+    brief = {**shown, "steps": 1_000}
+    card = lines(model_card("naive-seed1", MANIFEST, SUMMARY, {**POLICY, "training": brief}))
+    assert "| initial policy | none; it imitated a rule-based driver, shown in 200 steps |" in card
+
+
 def test_card__of_the_retrained_ego() -> None:
     policy = {**POLICY, "against": "distracted-seed1", "began_from": "naive-seed1"}
     card = lines(model_card("retrained_distracted-seed1", MANIFEST, SUMMARY, policy))
