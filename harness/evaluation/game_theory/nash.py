@@ -10,7 +10,8 @@ repeatedly. Pure equilibria are found by checking every cell. Mixed ones come fr
 continuum of equilibria (Nisan et al., "Algorithmic Game Theory", 2007, algorithms 3.4 and 3.5). With more supports, or
 when nothing verifies, a mixed-integer program (Sandholm, Gilpin and Conitzer, "Mixed-Integer Programming Methods for
 Finding Nash Equilibria", AAAI 2005, formulation 1, by HiGHS) finds the equilibrium of the highest ego payoff. Every
-candidate is verified: the regret of a returned equilibrium is at most `TOLERANCE` of its player's range of payoffs.
+candidate is verified: the regret of a returned equilibrium is at most `TOLERANCE` of its player's range of payoffs, to
+the accuracy of the linear programs.
 """
 
 from __future__ import annotations

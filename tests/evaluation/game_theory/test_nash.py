@@ -8,6 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from harness.evaluation.game_theory import nash
 from harness.evaluation.game_theory.nash import (
+    LP_ACCURACY,
     TOLERANCE,
     VALUE_ACCURACY,
     Equilibrium,
@@ -117,8 +118,13 @@ def games(draw):
     return tuple(draw(arrays(np.float64, shape, elements=numbers)) for _ in range(2))
 
 
+BARELY = np.zeros((2, 3)), np.array([[6.617499e-06, -36.0, 0.0], [0.0, 29.0, 0.0]])
+"""A game with a pure profile whose regret is 1.018e-7 of the range, between `TOLERANCE` and what is verified."""
+
+
 @settings(deadline=None, max_examples=60)
 @given(games())
+@example(BARELY)
 def test_solve__finds_an_equilibrium_and_no_equilibrium_has_a_regret(game):
     solution = solve(*game)
     assert solution.equilibria
@@ -128,7 +134,8 @@ def test_solve__finds_an_equilibrium_and_no_equilibrium_has_a_regret(game):
             assert (shares >= 0).all()
             assert shares.sum() == pytest.approx(1)
         for regret, payoffs in zip(regrets(*game, each), game, strict=True):
-            assert regret <= 1.01 * TOLERANCE * np.ptp(payoffs) + 1e-14 * np.abs(payoffs).max()
+            verified = TOLERANCE + 2.0 * LP_ACCURACY
+            assert regret <= verified * np.ptp(payoffs) + 1e-14 * np.abs(payoffs).max()
 
 
 @settings(deadline=None, max_examples=25)
