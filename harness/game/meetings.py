@@ -224,7 +224,7 @@ def _must_yield(
 
 @compiled
 def has_duty(c: int, own: int, other: int, other_first: bool, conflicts: FloatArray) -> bool:
-    """Whether the player must yield in conflict `c` of a table [C, 17], given the signals of both sides.
+    """Whether the player must yield in conflict `c` of a table [C, 18], given the signals of both sides.
 
     A stream on red has no priority, a player on red has none over a stream that is not, a player on 'G' yields to no
     stream, and any other player at these lights yields to a stream on 'G'. Otherwise the signs of the junction decide.

@@ -71,6 +71,7 @@ class Conflicts(NamedTuple):
     yields: BoolArray  # the player must yield to the stream while no signal says otherwise
     first_come: BoolArray  # the side that arrives first has priority: all-way stops, zippers
     stop_m: FloatArray  # station of the player's stop line
+    wait_m: FloatArray  # station where a car waits for the stream: the stop line, or a place inside the junction
     right_m: FloatArray  # lateral offsets from the route's line between which the player is in the conflicting lane
     left_m: FloatArray
     own_link: IntArray  # columns of the table of signals; -1 without a signal
@@ -106,7 +107,7 @@ class Streams(NamedTuple):
     rows: IntArray
     first_conflict: IntArray  # [P, S] the player's conflicts with a stream: the first row of `conflicts`
     last_conflict: IntArray  # [P, S] and the row after the last one
-    conflicts: FloatArray  # [C, 17] the columns of `Conflicts` in one array
+    conflicts: FloatArray  # [C, 18] the columns of `Conflicts` in one array
 
     @classmethod
     def of(cls, samples: FloatArray, stream: IntArray, conflicts: Conflicts, players: int) -> Streams:

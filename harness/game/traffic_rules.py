@@ -18,6 +18,7 @@ from harness.game.road import COMFORTABLE_MPS2
 AMBER_MPS2 = 3.0  # yellow means stop, unless it takes more braking than this (ITE: 10 ft/s2)
 YIELDS_WITHIN_S = 4.0  # a body with priority that arrives sooner is waited for
 WAITS_WITHIN_M = 10.0  # of a line: a car that stands there, or moves up to it, is not late
+WAITS_INSIDE_WITHIN_M = 3.0  # of a place inside a junction: cars that turn across traffic clear it while they can
 ROLLING_MPS = 0.5  # speed at a stop sign that the rules take for a stop
 # plain integers: compiled code can't convert a member
 _OFF, _YELLOW, _RED = int(Signal.OFF), int(Signal.YELLOW), int(Signal.RED)
@@ -76,11 +77,13 @@ def rules(
         for b in range(meetings.conflict.shape[2]):
             conflict = meetings.conflict[g, p, b]
             if conflict >= 0 and meetings.must_yield[g, p, b] and meetings.other_s[g, p, b] < YIELDS_WITHIN_S:
-                room_m = conflicts.stop_m[conflict] - front_m
-                if room_m < 0.0:  # inside the junction: before the zone
-                    room_m = meetings.own_m[g, p, b]
+                room_m = conflicts.wait_m[conflict] - front_m
+                inside = conflicts.wait_m[conflict] > conflicts.stop_m[conflict]
+                within_m = WAITS_INSIDE_WITHIN_M if inside else WAITS_WITHIN_M
+                if room_m < 0.0:  # past the place: before the zone
+                    room_m, within_m = meetings.own_m[g, p, b], WAITS_WITHIN_M
                 if room_m >= 0.0:
-                    waits = waits or room_m < WAITS_WITHIN_M
+                    waits = waits or room_m < within_m
                     permitted_mps = min(permitted_mps, _braking_mps(room_m))
         numbers[0, g, p], numbers[1, g, p] = permitted_mps, 0.0 if waits else permitted_mps
     return next_line, numbers

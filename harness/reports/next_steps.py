@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from harness.evaluation.acceptance import Check
+from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports.header import command_of
 from harness.reports.player_data import key
@@ -16,6 +17,11 @@ from harness.reports.results import Results
 from harness.reports.wording import failures
 
 FINISH = "Some stages are not done. The same command continues; finished stages are skipped."
+LEARN_BY_EXAMPLE = (
+    "{persona} did not learn to drive here. Let people imitate a rule-based driver before their training: add this to "
+    "the campaign, and run it again."
+)
+IMITATION = "[non_ego_training]\nimitation = true"
 WATCH_REMAINING = "See how the {made} ego still fails against {persona}: its worst game."
 WATCH_NAIVE = "See how {persona} makes the {naive} fail: its worst game."
 RETRAIN_AGAINST_SEVERAL = "Retrain one ego against several personas: add this to the campaign, and run it again."
@@ -45,6 +51,7 @@ def next_steps(
     """The first few steps that this run suggests, the most urgent first."""
     steps = [
         *_finish(manifest, unfinished),
+        *_learn(manifest, personas, found),
         *_watch(personas, found),
         *_widen(personas, found, checks),
     ]
@@ -54,6 +61,16 @@ def next_steps(
 def _finish(manifest: Mapping[str, Any], unfinished: int) -> Iterator[NextStep]:
     if unfinished:
         yield NextStep(sentence=FINISH, command=command_of(manifest))
+
+
+def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
+    """What helps people who did not learn to drive. Nobody on foot has a rule-based driver to imitate."""
+    imitates = manifest.get("campaign", {}).get("non_ego_training", {}).get("imitation")
+    stages = manifest.get("stages", {})
+    unable = [name for name, each in stages.items() if each.get("stopped") == DID_NOT_LEARN]
+    names = [persona for persona in personas if any(name.startswith(f"{persona}-seed") for name in unable)]
+    if names and found.non_ego_drives and not imitates:
+        yield NextStep(sentence=LEARN_BY_EXAMPLE.format(persona=" and ".join(names)), command=IMITATION)
 
 
 def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:

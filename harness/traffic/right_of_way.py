@@ -101,6 +101,7 @@ class _Builder:
                         "yields": yields,
                         "first_come": first_come,
                         "stop_m": junction.begin_m,
+                        "wait_m": junction.begin_m + self._wait_m(own.link, zone["begin_m"] - junction.begin_m),
                         "right_m": own.right_m,
                         "left_m": own.left_m,
                         "own_link": self._column(own.link),
@@ -108,6 +109,11 @@ class _Builder:
                         "across": zone["crossing"] and self._turns_across(own.link, foe),
                         **zone,
                     }
+
+    def _wait_m(self, own: Connection, zone_m: float) -> float:
+        """Where a car on a link waits for the traffic of a zone, both in metres behind the stop line."""
+        inside_m = self._stream(own).inner_wait_m
+        return inside_m if inside_m < zone_m else 0.0
 
     def _turns_across(self, own: Connection, foe: Connection) -> bool:
         """Whether a link turns, and a foe comes from the opposite direction."""

@@ -89,6 +89,15 @@ class Stream:
         return line_over_junction(self._feeders.net, self.link)
 
     @cached_property
+    def inner_wait_m(self) -> float:
+        """The place inside the junction where cars on the link wait, as at a left turn: SUMO divides the link's lane
+        there. 0 where they wait at the stop line."""
+        net, via = self._feeders.net, self.link.getViaLaneID()
+        if not via or not any(each.getViaLaneID() for each in net.getLane(via).getOutgoing()):
+            return 0.0
+        return float(_joined([lane_line(net.getLane(via))]).length)
+
+    @cached_property
     def length_m(self) -> float:
         """Length of the link's line over the junction."""
         return float(_joined([self._inner]).length)

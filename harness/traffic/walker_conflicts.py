@@ -180,6 +180,7 @@ def _row(player: int, stream: int, crossing: _Crossing, *, yields: bool, before_
         "yields": yields,
         "first_come": False,
         "stop_m": crossing.own_m - before_m,
+        "wait_m": crossing.own_m - before_m,
         "right_m": -np.inf,
         "left_m": np.inf,
         "own_link": -1,

@@ -192,6 +192,7 @@ CROSSING: Mapping[str, Any] = {
     "crossing": True,
     "yields": True,
     "stop_m": LINE_M,
+    "wait_m": LINE_M,
     "right_m": -np.inf,
     "left_m": np.inf,
     "own_link": -1,
@@ -203,11 +204,11 @@ CROSSING: Mapping[str, Any] = {
 }
 
 
-def crossed(merge: OpenScene, yields: bool = True) -> World:
+def crossed(merge: OpenScene, yields: bool = True, wait_m: float = LINE_M) -> World:
     """The merge road, crossed at 100 m by a stream from the south with its stop line at y = -10."""
     y_m = np.arange(-120.0, 20.0, 4.0)
     samples = np.array([(100.0, y, 0.0, 1.0, 1.6, 2.0, y + 10.0) for y in y_m])
-    conflicts = Conflicts.of([{**CROSSING, "yields": yields}])
+    conflicts = Conflicts.of([{**CROSSING, "yields": yields, "wait_m": wait_m}])
     streams = Streams.of(samples, np.zeros(len(y_m), dtype=np.int64), conflicts, players=2)
     lines = StopLines.of([(0, LINE_M, Control.GIVE_WAY, -1)])
     return replace(merge.world, right_of_way=RightOfWay(conflicts, streams, lines, ()))
@@ -235,6 +236,23 @@ def test_permitted__waits_for_a_car_with_priority(
     q = at(moment, crossed(merge), front_m, others=[from_the_south(arrives_s)])
     assert q.meetings.other_s[0, 0, 2] == pytest.approx(arrives_s)
     assert q.permitted_mps[0, 0] == pytest.approx(permitted_mps)
+
+
+@pytest.mark.parametrize(
+    ("front_m", "permitted_mps", "due_mps"),
+    [
+        (85.0, 6.0, 6.0),  # sqrt(2 * 2 * 9): drive on past the line, and be late standing here
+        (91.2, np.sqrt(11.2), 0.0),  # within 3 m of the place it waits
+        (94.0, 0.0, 0.0),
+        (96.25, 3.0, 0.0),  # past the place: stop before the zone, sqrt(2 * 2 * 2.25)
+    ],
+)
+def test_permitted__a_car_that_turns_waits_inside_the_junction(
+    moment: Moment, merge: OpenScene, front_m: float, permitted_mps: float, due_mps: float
+) -> None:
+    q = at(moment, crossed(merge, wait_m=94.0), front_m, others=[from_the_south(1.0)])
+    assert q.rules.permitted_mps[0, 0] == pytest.approx(permitted_mps)
+    assert q.rules.due_mps[0, 0] == pytest.approx(due_mps)
 
 
 def test_posted__knows_signals_and_signs_and_no_other_cars(moment: Moment, merge: OpenScene, light: World) -> None:

@@ -383,6 +383,19 @@ def test_banner__stages_that_are_not_done_are_named_with_their_message(page):
     assert "not done" not in page.text
 
 
+def test_next_steps__a_person_that_did_not_learn_may_imitate_a_driver(page):
+    sentence, line = "speedy did not learn to drive here.", "imitation = true"
+    told = text_of(cannot_drive(campaign(personas=["speedy"]))).split("What to do next")[1]
+    assert sentence in told
+    assert line in told
+    assert line not in page.text
+    imitating = cannot_drive(campaign(personas=["speedy"]))
+    imitating["manifest"]["campaign"]["non_ego_training"] = {"imitation": True}
+    assert sentence not in text_of(imitating), "it has been tried"
+    on_foot = cannot_drive(campaign(personas=["speedy"]))
+    assert sentence not in text_of({**on_foot, "non_ego_drives": False}), "nobody on foot imitates"
+
+
 def test_banner__a_driver_that_varies_is_named(page):
     arguments = campaign()
     arguments["manifest"]["varying_drivers"] = {"dice.toml": "in decision 3 it decided otherwise"}

@@ -24,6 +24,7 @@ CROSSING: Mapping[str, Any] = {
     "yields": True,
     "first_come": False,
     "stop_m": 90.0,
+    "wait_m": 90.0,
     "right_m": -np.inf,
     "left_m": np.inf,
     "own_link": 0,

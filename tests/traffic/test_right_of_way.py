@@ -92,6 +92,27 @@ def test_zone__of_two_straight_streams_is_where_their_cars_need_room(crossings: 
     assert met["stop_m"] == pytest.approx(92.8)
 
 
+@pytest.mark.parametrize(
+    ("kind", "route", "stream", "inside"),
+    [
+        ("traffic_light", "sc cw", "nc cs", True),  # a left turn across oncoming traffic
+        ("priority", "wc cn", "ec cw", True),  # the same from the road with priority
+        ("priority", "sc cw", "nc cs", False),  # from the other road cars wait at the line, for the road with priority
+        ("traffic_light", "sc cn", "ec cw", False),
+    ],
+)
+def test_wait__is_where_sumo_divides_the_lane_inside_the_junction(
+    crossings: dict[str, Net], kind: str, route: str, stream: str, inside: bool
+) -> None:
+    net, met = crossings[kind], conflict(crossings[kind], route, stream)
+    assert met is not None
+    before, after = (net.getLane(f"{edge}_0") for edge in route.split())
+    inner_m = shapely.LineString(net.getLane(before.getConnection(after).getViaLaneID()).getShape()).length
+    assert met["wait_m"] == pytest.approx(92.8 + (inner_m if inside else 0.0), abs=0.01)
+    assert met["stop_m"] == pytest.approx(92.8)
+    assert met["wait_m"] < met["begin_m"]
+
+
 def test_zone__mirrored_with_left_hand_traffic(crossings: dict[str, Net]) -> None:
     met = conflict(crossings["lefthand"], "sc cn", "wc ce")  # eastbound traffic is on y = 1.6
     assert met is not None
