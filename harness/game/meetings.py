@@ -10,13 +10,14 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.right_of_way import CELL_M, Conflicts, Signal, Streams
+from harness.game.road import COMFORTABLE_MPS2
 
 STANDING_MPS = 0.1  # a body that is not faster does not arrive
 HORIZON_S = 5.0  # a zone that a player reaches later is not in its way yet: from 50 km/h it can stop in comfort
 _MOST_TURNED = float(np.cos(np.pi / 4.0))  # a body drives in a stream if its heading is within 45 degrees
-_BEGIN_M, _END_M, _STOP_M, _RIGHT_M, _LEFT_M, _FROM_M, _UNTIL_M, _ZONE_M, _LENGTH_M = (
+_BEGIN_M, _END_M, _STOP_M, _WAIT_M, _RIGHT_M, _LEFT_M, _FROM_M, _UNTIL_M, _ZONE_M, _LENGTH_M = (
     Conflicts._fields.index(f"{name}_m")
-    for name in ("begin", "end", "stop", "right", "left", "from", "until", "zone", "length")
+    for name in ("begin", "end", "stop", "wait", "right", "left", "from", "until", "zone", "length")
 )
 _YIELDS, _FIRST_COME, _OWN_LINK, _OTHER_LINK = (
     Conflicts._fields.index(name) for name in ("yields", "first_come", "own_link", "other_link")
@@ -38,7 +39,8 @@ class Meetings(NamedTuple):
     other_m: FloatArray
     own_s: FloatArray
     other_s: FloatArray
-    gap_s: FloatArray  # time between the two passages; 0 if both would be in the zone at the same time
+    gap_s: FloatArray  # time between the two passages; 0 if both would be in the zone at the same time; inf while the
+    # player moves up to its place inside the junction, before which it can stop in comfort
     must_yield: BoolArray  # the player, to the body
 
     @classmethod
@@ -110,8 +112,9 @@ def meetings(
                 own = _passage_s(own_m, own_end_m, speed_mps[g, p])
                 other = _passage_s(other_m, other_end_m, body_speed_mps[g, b])
                 other_along_m = conflicts[found, _ZONE_M] - other_m
+                gap_s = np.inf if _moves_up(found, own_m, speed_mps[g, p], conflicts) else _gap_s(own, other)
                 row[g, p, b] = found
-                for k, number in enumerate((own_m, other_m, own[0], other[0], _gap_s(own, other))):
+                for k, number in enumerate((own_m, other_m, own[0], other[0], gap_s)):
                     numbers[k, g, p, b] = number
                 must_yield[g, p, b] = _must_yield(
                     found, front_m, other_along_m, own[0], other[0], signals[g], conflicts
@@ -201,6 +204,12 @@ def _gap_s(own: tuple[float, float], other: tuple[float, float]) -> float:
     if own[0] == np.inf or other[0] == np.inf:
         return np.inf
     return max(other[0] - own[1], own[0] - other[1], 0.0)
+
+
+@compiled
+def _moves_up(c: int, own_m: float, speed_mps: float, conflicts: FloatArray) -> bool:
+    """Whether a player waits inside the junction in conflict `c`, and can stop in comfort before the zone."""
+    return conflicts[c, _WAIT_M] > conflicts[c, _STOP_M] and speed_mps**2 < 2.0 * COMFORTABLE_MPS2 * own_m
 
 
 @compiled

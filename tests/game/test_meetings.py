@@ -212,6 +212,17 @@ def test_gap__counts_zones_that_the_player_reaches_soon(moment: Moment, world: W
     assert far.gap_s[0].tolist() == [np.inf, np.inf]
 
 
+def test_gap__of_a_car_that_moves_up_inside_the_junction_counts_once_it_cannot_stop(
+    moment: Moment, merge: OpenScene, world: World
+) -> None:
+    # braking from 10 m/s at 2 m/s2 takes 25 m; the zone begins at 98.5 m
+    turning = with_conflicts(merge.world, {**CROSSING, "wait_m": 94.0})
+    for x_m, counts in ((98.5 - 25.1 - 2.3, False), (98.5 - 24.9 - 2.3, True)):
+        gap_s = moment(world, [ego(x_m), FAR], [northbound(-40.0)]).gap_s[0, 0]
+        assert gap_s < np.inf
+        assert moment(turning, [ego(x_m), FAR], [northbound(-40.0)]).gap_s[0, 0] == (gap_s if counts else np.inf)
+
+
 @pytest.mark.parametrize(
     ("meaning", "x_m", "y_m", "expected"),
     [
