@@ -31,8 +31,8 @@ quick: install ## the same campaign with a budget of minutes: every stage, fewer
 test: install ## run every test, in about 27 minutes on two cores; `make test ARGS="-k payoff"` runs some
 	$(PYTEST) $(ARGS)
 
-test-esmini: install ## run the tests that play exports in esmini: make test-esmini ESMINI=/path/to/bin/esmini
-	HARNESS_REQUIRE_ESMINI=1 ESMINI="$(ESMINI)" $(BIN)/pytest -n 0 -m esmini tests/export $(ARGS)
+test-esmini: install ## run the tests with esmini and its maps: make test-esmini ESMINI=/path/to/bin/esmini
+	HARNESS_REQUIRE_ESMINI=1 ESMINI="$(ESMINI)" $(BIN)/pytest -n 0 -m esmini tests/export tests/cli $(ARGS)
 
 test-fast: install ## run the tests of every room that take a moment, in about a minute: after each edit
 	$(PYTEST) -m "not slow" $(ARGS)

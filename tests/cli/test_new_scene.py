@@ -21,6 +21,7 @@ from harness.game.initial_state import draw_initial_state
 from harness.traffic.maps.candidates import Kind
 from harness.traffic.maps.open_map import OpenMap, open_map
 from harness.traffic.scene import OpenScene, open_scene
+from tests.support.esmini import require_esmini
 from tests.support.repository import REPOSITORY
 
 MAPS = REPOSITORY / "tests" / "data" / "maps"
@@ -142,6 +143,22 @@ def test_new__from_the_net_of_a_real_town(tmp_path: Path, new: Run) -> None:
     assert len(numbers_of(lines, "turn across")) == 40  # as many as are listed unless more are asked for
     campaign = open_campaign(tmp_path / "out" / "campaigns" / "adlershof.toml")
     assert campaign.scene.net_file.stat().st_size < REAL_TOWN.stat().st_size / 4  # the part near the players' routes
+
+
+@pytest.mark.esmini
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("straight_500m", "following"),
+        ("fabriksgatan", "crossing"),
+        ("e6mini", "following"),
+        ("multi_intersections", "turn across"),
+    ],
+)
+def test_new__from_the_maps_that_esmini_ships(tmp_path: Path, new: Run, name: str, kind: str) -> None:
+    map_file = require_esmini().parent.parent / "resources" / "xodr" / f"{name}.xodr"
+    assert numbers_of(new(name, "--from", map_file), kind)
+    open_campaign(tmp_path / "out" / "campaigns" / f"{name}.toml")
 
 
 def test_new__of_all_makes_a_scene_of_each_that_is_listed(tmp_path: Path, new: Run) -> None:
