@@ -110,7 +110,10 @@ class Retraining(Document):
     """Share of games without the non-ego, so that the ego does not forget what it has learned."""
     warm_start: bool = False
     """Start from the parameters of the naive ego, instead of random ones."""
-
+    imitation: bool = True
+    """Let the new policy of a retrained ego imitate the rule-based driver, as that of the naive ego does. Without it
+    the ego learns everything beside the person: it may find another way to drive, such as slowly past a person that
+    turns late, but it may not learn to drive a difficult road."""
     against: list[Name] = Field([], max_length=50)
     """Names of personas. One more ego, `robust`, is retrained against all of them, in equal shares of its games, and
     with a budget multiplied by their number. It is also assessed against the other personas of the campaign, which it

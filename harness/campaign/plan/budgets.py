@@ -6,18 +6,19 @@ from harness.campaign.plan.planned_drivers import Crowd, members_of, persona_of
 from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign
 from harness.config.training import Training
+from harness.evaluation.strategies import NaiveEgo
 from harness.game.state import EGO
 
 
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     """The settings of one training.
 
-    A person has no demonstrator, unless the campaign says so. A best response has a budget of its own. A training
+    A player that imitates nobody has no demonstration. A best response has a budget of its own. A training
     against several personas has the budget, and the segment length by which its learning curve is judged, times their
     number.
     """
     settings = campaign.training
-    if stage.learner != EGO and not campaign.non_ego_training.imitation:
+    if not _imitates(campaign, stage):
         settings = settings.model_copy(update={"demonstration_steps": 0})
     if stage.is_best_response:
         assert campaign.best_response is not None
@@ -27,3 +28,10 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
         return settings
     more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
     return settings.model_copy(update=more)
+
+
+def _imitates(campaign: Campaign, stage: TrainingStage) -> bool:
+    """Whether a new policy imitates the rule-based driver: that of round 0 does, others as the campaign says."""
+    if stage.learner != EGO:
+        return campaign.non_ego_training.imitation
+    return isinstance(stage.strategy, NaiveEgo) or campaign.retraining.imitation

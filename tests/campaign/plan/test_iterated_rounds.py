@@ -216,6 +216,17 @@ def test_settings__a_person_has_a_demonstrator_only_if_the_campaign_says_so(
     assert steps == {"naive": 38_400, "anna": 38_400 if imitation else 0}
 
 
+@pytest.mark.parametrize("imitation", [False, True])
+def test_settings__a_retrained_ego_has_a_demonstrator_unless_the_campaign_says_no(
+    imitation: bool, tmp_path: Path, anna: list[str]
+) -> None:
+    stages, _ = planned(tmp_path, personas=anna, retraining={"imitation": imitation}, rounds={"count": 4})
+    campaign = open_campaign(tmp_path / "tiny.toml").document
+    names = ("naive", "retrained_anna", "retrained_anna_round4")
+    steps = [training_settings(campaign, training(stages, name)).demonstration_steps for name in names]
+    assert steps == [38_400, *([38_400 if imitation else 0] * 2)]
+
+
 def test_plan__an_exchange_may_end_after_each_answer_of_the_ego(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 6}, best_response=RESPONSE)
     second = EquilibriumGate(
