@@ -207,7 +207,7 @@ class Campaign(Document):
         if self.policies is None:
             return self.model_dump(mode="json", exclude=unused)
         unused["naive_training"] = True
-        unused["retraining"] = {"alone_share", "warm_start"} if self.retraining.against else True
+        unused["retraining"] = {*Retraining.model_fields} - {"against"} if self.retraining.against else True
         if self.best_response is None:
             unused |= {"training": True, "non_ego_training": True}
         return self.model_dump(mode="json", exclude=unused)

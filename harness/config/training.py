@@ -101,6 +101,9 @@ class NonEgoTraining(Document):
     imitation: bool = False
     """Let the new policies of people imitate the rule-based driver as well (`training.demonstration_steps`). Some of
     its courtesy stays in what they learn afterwards."""
+    initial_deviation: float | None = Field(None, gt=0.0, le=2.0)
+    """Standard deviation of the actions of people's new policies; left out: that of `[training]`. People on foot
+    have no rail near them and learn to walk sooner with 0.5."""
 
 
 class Retraining(Document):
@@ -110,10 +113,10 @@ class Retraining(Document):
     """Share of games without the non-ego, so that the ego does not forget what it has learned."""
     warm_start: bool = False
     """Start from the parameters of the naive ego, instead of random ones."""
-    imitation: bool = True
-    """Let the new policy of a retrained ego imitate the rule-based driver, as that of the naive ego does. Without it
-    the ego learns everything beside the person: it may find another way to drive, such as slowly past a person that
-    turns late, but it may not learn to drive a difficult road."""
+    demonstrator_speed_share: float = Field(1.0, ge=0.3, le=1.0)
+    """Target speed of the rule-based driver that the new policy of a retrained ego imitates, as a share of the limit.
+    An ego that begins at the limit seldom learns to slow down early, because slowing down a little costs time and
+    avoids nothing; one that begins slowly learns to drive faster where that pays."""
     against: list[Name] = Field([], max_length=50)
     """Names of personas. One more ego, `robust`, is retrained against all of them, in equal shares of its games, and
     with a budget multiplied by their number. It is also assessed against the other personas of the campaign, which it

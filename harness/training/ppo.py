@@ -131,9 +131,15 @@ def _imitate(spec: TrainingSpec, model: PPO, environment: GamesVecEnv) -> None:
     """Let a policy without a past imitate the demonstrator."""
     settings = spec.settings
     if spec.initial is None:
-        steps, seed = min(settings.demonstration_steps, settings.steps // 5), seed_of(*spec.parts, "demonstration")
         try:
-            imitate(model, environment, steps=steps, deviation=settings.initial_deviation, seed=seed % 2**31)
+            imitate(
+                model,
+                environment,
+                steps=min(settings.demonstration_steps, settings.steps // 5),
+                speed_share=spec.demonstrator_speed_share,
+                deviation=settings.initial_deviation,
+                seed=seed_of(*spec.parts, "demonstration") % 2**31,
+            )
         except FloatingPointError as error:
             raise FloatingPointError(f"{error}, in a demonstration") from error
 

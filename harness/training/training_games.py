@@ -48,6 +48,8 @@ class TrainingSpec:
     places: tuple[LearningPlace, ...] = ()
     """With several people: each has an equal part of the games, and `opponent` is not used. Left out: the place of
     `learner`, beside `opponent`."""
+    demonstrator_speed_share: float = 1.0
+    """Target speed of the driver that a new policy imitates, as a share of the limit."""
     as_it_drives: bool = False
     """Train with all human factors of the persona, as in assessment: a best response is computed under the limits under
     which it is assessed."""

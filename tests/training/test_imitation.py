@@ -41,6 +41,17 @@ def test_imitation__a_new_policy_makes_the_turn(left_turn: OpenScene, tmp_path: 
     assert failures(left_turn, not_shown, demonstration_steps=0) > 0.6
 
 
+def test_imitation__of_a_slow_driver_gives_a_slow_policy(repository: Path, tmp_path: Path) -> None:
+    merge = naive_ego(open_scene(repository / "tests" / "data" / "merge"))
+    chosen = settings(steps=48_000, games=32, network=[64, 64], learning_rate=NO_LEARNING, demonstration_steps=9_600)
+    games = {}
+    for share in (0.5, 1.0):
+        (folder := tmp_path / str(share)).mkdir()
+        spec = replace(merge, settings=chosen, demonstrator_speed_share=share)
+        games[share] = sum(window.games for window in in_one_go(spec, folder).progress.curve)
+    assert games[0.5] < 0.75 * games[1.0]  # in the same number of steps, because each takes longer
+
+
 def first_policy(scene: OpenScene, folder: Path, learner: int, demonstration_steps: int) -> Policy:
     """The policy with which a training begins."""
     folder.mkdir()

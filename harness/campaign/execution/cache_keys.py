@@ -10,7 +10,7 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
-from harness.campaign.plan.budgets import training_settings
+from harness.campaign.plan.budgets import demonstrator_speed_share, training_settings
 from harness.campaign.plan.planned_drivers import (
     BestOf,
     Crowd,
@@ -58,6 +58,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     match stage:
         case TrainingStage():
             inputs["training"] = training_settings(document, stage).model_dump(mode="json")
+            if (share := demonstrator_speed_share(document, stage)) != 1.0:  # others keep the keys of earlier versions
+                inputs["demonstrator_speed_share"] = share
         case SearchStage():
             assert campaign.ego_driver is not None
             inputs["reconfiguration"] = document.reconfiguration.model_dump(mode="json")

@@ -13,13 +13,13 @@ from harness.game.state import EGO
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     """The settings of one training.
 
-    A player that imitates nobody has no demonstration. A best response has a budget of its own. A training
+    A person has no demonstrator, unless the campaign says so. A best response has a budget of its own. A training
     against several personas has the budget, and the segment length by which its learning curve is judged, times their
     number.
     """
     settings = campaign.training
-    if not _imitates(campaign, stage):
-        settings = settings.model_copy(update={"demonstration_steps": 0})
+    if stage.learner != EGO:
+        settings = settings.model_copy(update=_of_people(campaign))
     if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})
@@ -30,8 +30,14 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     return settings.model_copy(update=more)
 
 
-def _imitates(campaign: Campaign, stage: TrainingStage) -> bool:
-    """Whether a new policy imitates the rule-based driver: that of round 0 does, others as the campaign says."""
-    if stage.learner != EGO:
-        return campaign.non_ego_training.imitation
-    return isinstance(stage.strategy, NaiveEgo) or campaign.retraining.imitation
+def demonstrator_speed_share(campaign: Campaign, stage: TrainingStage) -> float:
+    """Target speed of the driver that a new policy imitates, as a share of the limit."""
+    retrained = stage.learner == EGO and not isinstance(stage.strategy, NaiveEgo)
+    return campaign.retraining.demonstrator_speed_share if retrained else 1.0
+
+
+def _of_people(campaign: Campaign) -> dict[str, object]:
+    """The settings in which the training of a person differs from that of an ego."""
+    own = campaign.non_ego_training
+    differing: dict[str, object] = {} if own.imitation else {"demonstration_steps": 0}
+    return differing if own.initial_deviation is None else differing | {"initial_deviation": own.initial_deviation}

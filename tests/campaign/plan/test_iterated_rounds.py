@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.plan.budgets import training_settings
+from harness.campaign.plan.budgets import demonstrator_speed_share, training_settings
 from harness.campaign.plan.paper_rounds import plan_paper_rounds
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import (
@@ -216,15 +216,21 @@ def test_settings__a_person_has_a_demonstrator_only_if_the_campaign_says_so(
     assert steps == {"naive": 38_400, "anna": 38_400 if imitation else 0}
 
 
-@pytest.mark.parametrize("imitation", [False, True])
-def test_settings__a_retrained_ego_has_a_demonstrator_unless_the_campaign_says_no(
-    imitation: bool, tmp_path: Path, anna: list[str]
-) -> None:
-    stages, _ = planned(tmp_path, personas=anna, retraining={"imitation": imitation}, rounds={"count": 4})
+def test_settings__people_may_begin_with_a_deviation_of_their_own(tmp_path: Path, anna: list[str]) -> None:
+    own = {"initial_deviation": 0.375}
+    stages, _ = planned(tmp_path, personas=anna, non_ego_training=own, training={"initial_deviation": 0.125})
     campaign = open_campaign(tmp_path / "tiny.toml").document
-    names = ("naive", "retrained_anna", "retrained_anna_round4")
-    steps = [training_settings(campaign, training(stages, name)).demonstration_steps for name in names]
-    assert steps == [38_400, *([38_400 if imitation else 0] * 2)]
+    begun = [training_settings(campaign, training(stages, name)).initial_deviation for name in ("naive", "anna")]
+    assert begun == [0.125, 0.375]
+
+
+def test_settings__only_retrained_egos_imitate_a_slow_driver(tmp_path: Path, anna: list[str]) -> None:
+    slow = {"demonstrator_speed_share": 0.5}
+    stages, _ = planned(tmp_path, personas=anna, retraining=slow, rounds={"count": 4}, best_response=RESPONSE)
+    campaign = open_campaign(tmp_path / "tiny.toml").document
+    names = ("naive", "anna", "retrained_anna", "retrained_anna_round4", "retrained_vs_anna_ego_response1")
+    shares = [demonstrator_speed_share(campaign, training(stages, name)) for name in names]
+    assert shares == [1.0, 1.0, 0.5, 0.5, 0.5]
 
 
 def test_plan__an_exchange_may_end_after_each_answer_of_the_ego(tmp_path: Path, anna: list[str]) -> None:
