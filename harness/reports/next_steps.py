@@ -14,7 +14,7 @@ from harness.reports.header import command_of
 from harness.reports.player_data import key
 from harness.reports.replays import most_severe
 from harness.reports.results import Results
-from harness.reports.wording import failures
+from harness.reports.wording import failures, played
 
 FINISH = "Some stages are not done. The same command continues; finished stages are skipped."
 LEARN_BY_EXAMPLE = (
@@ -22,6 +22,17 @@ LEARN_BY_EXAMPLE = (
     "the campaign, and run it again."
 )
 IMITATION = "[non_ego_training]\nimitation = true"
+EXPLORE_WIDELY = (
+    "{persona} did not learn to walk here. Let people begin with a wider deviation: add this to the campaign, and run "
+    "it again."
+)
+WIDER = "[non_ego_training]\ninitial_deviation = 0.5"
+BEGIN_SLOWLY = (
+    "Retraining left more than half of the failures against {persona}. Let the retrained ego imitate a slower driver "
+    "before its training: add this to the campaign, and run it again."
+)
+SLOWER = "[retraining]\ndemonstrator_speed_share = 0.5"
+FEW_FAILURES = 0.05
 WATCH_REMAINING = "See how the {made} ego still fails against {persona}: its worst game."
 WATCH_NAIVE = "See how {persona} makes the {naive} fail: its worst game."
 RETRAIN_AGAINST_SEVERAL = "Retrain one ego against several personas: add this to the campaign, and run it again."
@@ -52,6 +63,7 @@ def next_steps(
     steps = [
         *_finish(manifest, unfinished),
         *_learn(manifest, personas, found),
+        *_retrain(manifest, personas, found),
         *_watch(personas, found),
         *_widen(personas, found, checks),
     ]
@@ -64,13 +76,38 @@ def _finish(manifest: Mapping[str, Any], unfinished: int) -> Iterator[NextStep]:
 
 
 def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
-    """What helps people who did not learn to drive. Nobody on foot has a rule-based driver to imitate."""
-    imitates = manifest.get("campaign", {}).get("non_ego_training", {}).get("imitation")
+    """What helps people who did not learn to drive or to walk. Nobody on foot has a rule-based driver to imitate."""
+    training = manifest.get("campaign", {}).get("non_ego_training", {})
     stages = manifest.get("stages", {})
     unable = [name for name, each in stages.items() if each.get("stopped") == DID_NOT_LEARN]
     names = [persona for persona in personas if any(name.startswith(f"{persona}-seed") for name in unable)]
-    if names and found.non_ego_drives and not imitates:
-        yield NextStep(sentence=LEARN_BY_EXAMPLE.format(persona=" and ".join(names)), command=IMITATION)
+    persona = " and ".join(names)
+    if names and found.non_ego_drives and not training.get("imitation"):
+        yield NextStep(sentence=LEARN_BY_EXAMPLE.format(persona=persona), command=IMITATION)
+    if names and not found.non_ego_drives and training.get("initial_deviation") is None:
+        yield NextStep(sentence=EXPLORE_WIDELY.format(persona=persona), command=WIDER)
+
+
+def _retrain(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
+    """What helps a retrained ego that still fails about as often as the naive ego. Few failures are no reason."""
+    share = manifest.get("campaign", {}).get("retraining", {}).get("demonstrator_speed_share", 1.0)
+    if found.is_reconfigured or share < 1.0:
+        return
+    left = []
+    for persona in personas:
+        naive, retrained = (
+            _failure_rate(found, against_persona(ego, persona).name)
+            for ego in (NaiveEgo(), found.change.ego(against=persona))
+        )
+        left += [persona] if naive >= FEW_FAILURES and retrained > naive / 2 else []
+    if left:
+        yield NextStep(sentence=BEGIN_SLOWLY.format(persona=" and ".join(left)), command=SLOWER)
+
+
+def _failure_rate(found: Results, arm: str) -> float:
+    """The share of the arm's games that the ego fails, over all seeds; 0 where none was played."""
+    rows = found.of(arm).values()
+    return sum(map(failures, rows)) / max(sum(map(played, rows)), 1)
 
 
 def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:

@@ -392,8 +392,23 @@ def test_next_steps__a_person_that_did_not_learn_may_imitate_a_driver(page):
     imitating = cannot_drive(campaign(personas=["speedy"]))
     imitating["manifest"]["campaign"]["non_ego_training"] = {"imitation": True}
     assert sentence not in text_of(imitating), "it has been tried"
-    on_foot = cannot_drive(campaign(personas=["speedy"]))
-    assert sentence not in text_of({**on_foot, "non_ego_drives": False}), "nobody on foot imitates"
+    on_foot = text_of({**cannot_drive(campaign(personas=["speedy"])), "non_ego_drives": False})
+    assert sentence not in on_foot, "nobody on foot imitates"
+    assert "initial_deviation = 0.5" in on_foot.split("What to do next")[1]
+
+
+def test_next_steps__a_retrained_ego_that_still_fails_may_imitate_a_slower_driver(page):
+    line = "demonstrator_speed_share = 0.5"
+    assert line not in page.text, "retraining helped"
+    failing = {"naive": 0.3, "retrained": 0.25}
+    told = text_of(campaign(personas=["speedy"], failing=failing)).split("What to do next")[1]
+    assert "Retraining left more than half of the failures against speedy." in told
+    assert line in told
+    tried = campaign(personas=["speedy"], failing=failing)
+    tried["manifest"]["campaign"]["retraining"] = {"demonstrator_speed_share": 0.5}
+    assert line not in text_of(tried), "it has been tried"
+    rare = {"naive": 0.03, "retrained": 0.03}
+    assert line not in text_of(campaign(personas=["speedy"], failing=rare)), "there was little to learn"
 
 
 def test_banner__a_driver_that_varies_is_named(page):
