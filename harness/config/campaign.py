@@ -179,6 +179,23 @@ class Campaign(Document):
             raise Mistakes([("retraining.against", "an ego that does not learn can't be retrained", leave_out)])
         return self
 
+    @model_validator(mode="after")
+    def _new_policies_are_possible(self) -> Campaign:
+        training, deviation = self.training, self.non_ego_training.initial_deviation
+        if deviation is not None and deviation > training.max_deviation:
+            message = f"must not exceed training.max_deviation ({training.max_deviation:g}), but is {deviation:g}"
+            raise Mistakes(
+                [("non_ego_training.initial_deviation", message, "lower it, or raise training.max_deviation")]
+            )
+        key = "retraining.demonstrator_speed_share"
+        if self.retraining.demonstrator_speed_share < 1.0 and self.retraining.warm_start:
+            message = "with warm_start, a retrained ego begins as the naive ego and imitates nobody"
+            raise Mistakes([(key, message, "leave out one of these keys")])
+        if self.retraining.demonstrator_speed_share < 1.0 and not training.demonstration_steps:
+            message = "with training.demonstration_steps = 0, an ego imitates nobody"
+            raise Mistakes([(key, message, "leave out one of these keys")])
+        return self
+
     def _unused_tables(self) -> list[str]:
         """The training tables of the document that nothing uses in a campaign with `policies`."""
         given = [name for name in TRAINING_TABLES if name in self.model_fields_set]

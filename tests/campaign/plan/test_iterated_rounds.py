@@ -362,6 +362,21 @@ def test_matchups__a_response_has_the_pair_and_round_that_it_belongs_to(tmp_path
         ({"population": [{"name": "town", "shares": {"anna": 1.0}}]}, "population[0].shares", "at least 2"),
         ({"retraining": {"against": ["bret"]}}, "retraining.against", "'bret'"),
         ({"retraining": {"against": ["anna", "anna"]}}, "retraining.against", "twice"),
+        (
+            {"non_ego_training": {"initial_deviation": 0.75}, "training": {"max_deviation": 0.5}},
+            "non_ego_training.initial_deviation",
+            "must not exceed training.max_deviation (0.5)",
+        ),
+        (
+            {"retraining": {"demonstrator_speed_share": 0.5, "warm_start": True}},
+            "retraining.demonstrator_speed_share",
+            "begins as the naive ego",
+        ),
+        (
+            {"retraining": {"demonstrator_speed_share": 0.5}, "training": {"demonstration_steps": 0}},
+            "retraining.demonstrator_speed_share",
+            "imitates nobody",
+        ),
         ({"rounds": {"count": 4, "personas": ["bret"]}}, "rounds.personas", "'bret'"),
         ({"rounds": {"count": 1}}, "rounds.count", "greater than or equal to 2"),
         ({"rounds": {"count": 3, "stop_early": True}}, "rounds.stop_early", "best_response"),
