@@ -96,7 +96,9 @@ def card(persona: str, place: int, found: Results, worst: tuple[str, str] | None
         persona=persona,
         anchor=f"persona-{place}",
         verdicts=[
-            shown_verdict(question.format(doing=found.change.doing), found.verdicts(name, persona), figures)
+            shown_verdict(
+                question.format(person=found.person, doing=found.change.doing), found.verdicts(name, persona), figures
+            )
             for name, question in QUESTIONS.items()
         ],
         rates=[

@@ -23,8 +23,8 @@ LEARN_BY_EXAMPLE = (
 )
 IMITATION = "[non_ego_training]\nimitation = true"
 EXPLORE_WIDELY = (
-    "{persona} did not learn to walk here. Let people begin with a wider deviation: add this to the campaign, and run "
-    "it again."
+    "{persona} did not learn to reach its goal. Let people begin with a wider deviation: add this to the campaign, and "
+    "run it again."
 )
 WIDER = "[non_ego_training]\ninitial_deviation = 0.5"
 BEGIN_SLOWLY = (
@@ -76,7 +76,7 @@ def _finish(manifest: Mapping[str, Any], unfinished: int) -> Iterator[NextStep]:
 
 
 def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
-    """What helps people who did not learn to drive or to walk. Nobody on foot has a rule-based driver to imitate."""
+    """What helps people who did not learn to reach their goal. Nobody on foot has a rule-based driver to imitate."""
     training = manifest.get("campaign", {}).get("non_ego_training", {})
     stages = manifest.get("stages", {})
     unable = [name for name, each in stages.items() if each.get("stopped") == DID_NOT_LEARN]

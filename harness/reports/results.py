@@ -56,6 +56,11 @@ class Results:
     failures: pd.DataFrame
     """Rows of `causes`."""
 
+    @property
+    def person(self) -> str:
+        """What a persona is in sentences, after "this"."""
+        return "driver" if self.non_ego_drives else "person"
+
     def of(self, arm: str) -> dict[int, Row]:
         """The arm's rows by seed, where there are games that could be played."""
         rows = {seed: self.arms.get((arm, seed)) for seed in self.seeds}

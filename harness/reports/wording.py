@@ -19,7 +19,7 @@ Tone = Literal["harm", "mended", "open"]
 
 TONE_OF_YES: dict[str, Tone] = {"RQ1": "harm", "RQ2": "mended"}
 QUESTIONS = {
-    "RQ1": "Does this driver cause failures?",
+    "RQ1": "Does this {person} cause failures?",
     "RQ2": "Did {doing} fix it?",
 }
 NOT_ASKED, NOT_ANSWERED = "not asked", "not answered"

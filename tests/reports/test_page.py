@@ -395,6 +395,7 @@ def test_next_steps__a_person_that_did_not_learn_may_imitate_a_driver(page):
     on_foot = text_of({**cannot_drive(campaign(personas=["speedy"])), "non_ego_drives": False})
     assert sentence not in on_foot, "nobody on foot imitates"
     assert "initial_deviation = 0.5" in on_foot.split("What to do next")[1]
+    assert "Does this person cause failures?" in on_foot
 
 
 def test_next_steps__a_retrained_ego_that_still_fails_may_imitate_a_slower_driver(page):
