@@ -189,10 +189,10 @@ class Campaign(Document):
             )
         key = "retraining.demonstrator_speed_share"
         if self.retraining.demonstrator_speed_share < 1.0 and self.retraining.warm_start:
-            message = "with warm_start, a retrained ego begins as the naive ego and imitates nobody"
+            message = "with warm_start, a retrained ego begins as the naive ego and does not imitate a driver"
             raise Mistakes([(key, message, "leave out one of these keys")])
         if self.retraining.demonstrator_speed_share < 1.0 and not training.demonstration_steps:
-            message = "with training.demonstration_steps = 0, an ego imitates nobody"
+            message = "with training.demonstration_steps = 0, an ego does not imitate a driver"
             raise Mistakes([(key, message, "leave out one of these keys")])
         return self
 

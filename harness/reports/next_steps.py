@@ -76,7 +76,7 @@ def _finish(manifest: Mapping[str, Any], unfinished: int) -> Iterator[NextStep]:
 
 
 def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
-    """What helps people who did not learn to reach their goal. Nobody on foot has a rule-based driver to imitate."""
+    """What helps people who did not learn to reach their goal. People on foot have no rule-based driver to imitate."""
     training = manifest.get("campaign", {}).get("non_ego_training", {})
     stages = manifest.get("stages", {})
     unable = [name for name, each in stages.items() if each.get("stopped") == DID_NOT_LEARN]

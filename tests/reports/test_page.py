@@ -393,7 +393,7 @@ def test_next_steps__a_person_that_did_not_learn_may_imitate_a_driver(page):
     imitating["manifest"]["campaign"]["non_ego_training"] = {"imitation": True}
     assert sentence not in text_of(imitating), "it has been tried"
     on_foot = text_of({**cannot_drive(campaign(personas=["speedy"])), "non_ego_drives": False})
-    assert sentence not in on_foot, "nobody on foot imitates"
+    assert sentence not in on_foot, "there is no demonstrator on foot"
     assert "initial_deviation = 0.5" in on_foot.split("What to do next")[1]
     assert "Does this person cause failures?" in on_foot
 

@@ -375,7 +375,7 @@ def test_matchups__a_response_has_the_pair_and_round_that_it_belongs_to(tmp_path
         (
             {"retraining": {"demonstrator_speed_share": 0.5}, "training": {"demonstration_steps": 0}},
             "retraining.demonstrator_speed_share",
-            "imitates nobody",
+            "does not imitate a driver",
         ),
         ({"rounds": {"count": 4, "personas": ["bret"]}}, "rounds.personas", "'bret'"),
         ({"rounds": {"count": 1}}, "rounds.count", "greater than or equal to 2"),
