@@ -103,7 +103,7 @@ class NonEgoTraining(Document):
     its courtesy stays in what they learn afterwards."""
     initial_deviation: float | None = Field(None, gt=0.0, le=2.0)
     """Standard deviation of the actions of people's new policies; left out: that of `[training]`. People on foot
-    have no rail near them and learn to walk sooner with 0.5."""
+    learn to walk sooner with 0.5."""
 
 
 class Retraining(Document):

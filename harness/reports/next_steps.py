@@ -78,30 +78,38 @@ def _finish(manifest: Mapping[str, Any], unfinished: int) -> Iterator[NextStep]:
 def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
     """What helps people who did not learn to reach their goal. People on foot have no rule-based driver to imitate."""
     training = manifest.get("campaign", {}).get("non_ego_training", {})
-    stages = manifest.get("stages", {})
-    unable = [name for name, each in stages.items() if each.get("stopped") == DID_NOT_LEARN]
-    names = [persona for persona in personas if any(name.startswith(f"{persona}-seed") for name in unable)]
-    persona = " and ".join(names)
-    if names and found.non_ego_drives and not training.get("imitation"):
+    unable = [persona for persona in personas if _did_not_learn(manifest, persona)]
+    persona = " and ".join(unable)
+    if unable and found.non_ego_drives and not training.get("imitation"):
         yield NextStep(sentence=LEARN_BY_EXAMPLE.format(persona=persona), command=IMITATION)
-    if names and not found.non_ego_drives and training.get("initial_deviation") is None:
+    if unable and not found.non_ego_drives and training.get("initial_deviation") is None:
         yield NextStep(sentence=EXPLORE_WIDELY.format(persona=persona), command=WIDER)
 
 
 def _retrain(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
-    """What helps a retrained ego that still fails about as often as the naive ego. Few failures are no reason."""
-    share = manifest.get("campaign", {}).get("retraining", {}).get("demonstrator_speed_share", 1.0)
-    if found.is_reconfigured or share < 1.0:
+    """What helps a retrained ego that imitated a driver at the limit, and still fails more than half as often as the
+    naive ego. Few failures are no reason, and neither are those against a person that did not learn."""
+    campaign = manifest.get("campaign", {})
+    retraining, imitated = campaign.get("retraining", {}), campaign.get("training", {}).get("demonstration_steps", 1)
+    tried = retraining.get("demonstrator_speed_share", 1.0) < 1.0
+    if found.is_reconfigured or campaign.get("policies") or tried or retraining.get("warm_start") or not imitated:
         return
     left = []
     for persona in personas:
-        naive, retrained = (
-            _failure_rate(found, against_persona(ego, persona).name)
-            for ego in (NaiveEgo(), found.change.ego(against=persona))
-        )
-        left += [persona] if naive >= FEW_FAILURES and retrained > naive / 2 else []
+        egos = NaiveEgo(), found.change.ego(against=persona)
+        naive, retrained = (_failure_rate(found, against_persona(ego, persona).name) for ego in egos)
+        if naive >= FEW_FAILURES and retrained > naive / 2 and not _did_not_learn(manifest, persona):
+            left.append(persona)
     if left:
         yield NextStep(sentence=BEGIN_SLOWLY.format(persona=" and ".join(left)), command=SLOWER)
+
+
+def _did_not_learn(manifest: Mapping[str, Any], persona: str) -> bool:
+    """Whether the persona did not learn to reach its goal, in any training seed."""
+    return any(
+        name.startswith(f"{persona}-seed") and each.get("stopped") == DID_NOT_LEARN
+        for name, each in manifest.get("stages", {}).items()
+    )
 
 
 def _failure_rate(found: Results, arm: str) -> float:

@@ -408,6 +408,16 @@ def test_next_steps__a_retrained_ego_that_still_fails_may_imitate_a_slower_drive
     tried = campaign(personas=["speedy"], failing=failing)
     tried["manifest"]["campaign"]["retraining"] = {"demonstrator_speed_share": 0.5}
     assert line not in text_of(tried), "it has been tried"
+    for refused in (
+        {"policies": "policies"},
+        {"retraining": {"warm_start": True}},
+        {"training": {"demonstration_steps": 0}},
+    ):
+        other = campaign(personas=["speedy"], failing=failing)
+        other["manifest"]["campaign"] |= refused
+        assert line not in text_of(other), "the campaign would be refused"
+    unable = cannot_drive(campaign(personas=["speedy"], failing=failing))
+    assert line not in text_of(unable), "the person can't drive"
     rare = {"naive": 0.03, "retrained": 0.03}
     assert line not in text_of(campaign(personas=["speedy"], failing=rare)), "there was little to learn"
 
