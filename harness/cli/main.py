@@ -50,7 +50,7 @@ app = typer.Typer(
     help="""Test an automated vehicle against selfish human drivers in SUMO.
 
 A campaign trains a naive ego, trains a non-ego with a human persona against it, retrains the ego against the non-ego,
-and reports the differences with paired statistics:
+and reports the differences with paired statistics.
 
 `harness demo` plays such a campaign with trained policies; `harness new FOLDER` makes one of your own.
 """,
