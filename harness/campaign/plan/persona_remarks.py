@@ -53,9 +53,10 @@ def crash_cost(persona: Persona) -> float:
 
 
 def _of_lanes(persona: Persona, ends: bool) -> Iterator[str]:
+    if ends:
+        return
     for term in persona.human.fuzzy:
-        value = float(term.function(np.array([inf]))[0])
-        if term.quantity == "lane_end_m" and value != 0.0 and not ends:
+        if term.quantity == "lane_end_m" and (value := float(term.function(np.array([inf]))[0])) != 0.0:
             yield (
                 f"{term.name} asks how far the lane goes on, and no lane of its route ends: it is {value:g} per second "
                 "everywhere. Choose a persona that has something to decide in this scene"
