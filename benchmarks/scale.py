@@ -18,7 +18,7 @@ from benchmarks.games import REPOSITORY
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.config.campaign import Campaign
-from harness.game.state import EGO
+from harness.game.roles import EGO
 
 SCENES, SEEDS, ROUNDS = 12, 5, 4
 PERSONAS = ("careful", "cautious", "speedy", "tailgater", "late_merger", "distracted", "drowsy", "impaired")

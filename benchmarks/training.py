@@ -28,7 +28,7 @@ from harness.drivers.policy_file import write_policy
 from harness.environments.gymnasium_env import DrivingEnv
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.game.arrays import FloatArray
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.training.ppo import train
 from harness.training.training_games import TrainingSpec
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from harness.environments.gymnasium_vector import VectorDrivingEnv, make_vec
     from harness.environments.vector_env import ArenaVecEnv
     from harness.errors import HarnessError, SimulationError, UsageError
-    from harness.game.state import Outcome
+    from harness.game.outcome import Outcome
     from harness.library import Results, load, run
     from harness.traffic.scene import OpenScene, open_scene
 
@@ -70,7 +70,7 @@ _MODULES = {
     "environments.gymnasium_vector": ("VectorDrivingEnv", "make_vec"),
     "environments.vector_env": ("ArenaVecEnv",),
     "errors": ("HarnessError", "SimulationError", "UsageError"),
-    "game.state": ("Outcome",),
+    "game.outcome": ("Outcome",),
     "library": ("Results", "load", "run"),
     "traffic.scene": ("OpenScene", "open_scene"),
 }

@@ -193,6 +193,11 @@ def test_checking__loads_no_learner_and_no_statistics() -> None:
     assert loaded.isdisjoint(LEARNERS | {"pandas", "scipy.stats", "optuna"})
 
 
+def test_help__loads_no_numerics() -> None:
+    """Help and the completion of a shell answer at once."""
+    assert loaded_with("harness.cli.main").isdisjoint(LEARNERS | {"numpy", "numba", "pandas", "pydantic", "sumolib"})
+
+
 def test_resuming__loads_no_learner_and_no_statistics() -> None:
     """A campaign that is finished is looked through and left as it is; one that is not says so before it loads them."""
     loaded = loaded_with("harness.campaign.execution.run_campaign")

@@ -11,7 +11,7 @@ import pandas as pd
 from harness.evaluation.trace_quantities import drove_in, quantities_of
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities
-from harness.game.state import NON_EGO
+from harness.game.roles import NON_EGO
 from harness.game.world import World
 from harness.replay.vehicles import types_of_vehicles
 from harness.traffic.scene import OpenScene

@@ -24,7 +24,7 @@ from harness.evaluation.encounters import encounters_of
 from harness.evaluation.trace_file import read_traces
 from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
 from harness.game.arrays import FloatArray
-from harness.game.state import NON_EGO
+from harness.game.roles import NON_EGO
 from harness.traffic.scene import OpenScene, open_scene
 
 HEADER = ("run", "persona", "quantity", "measured", "games", "published", "within", "source")

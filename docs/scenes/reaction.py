@@ -20,7 +20,8 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT
-from harness.game.state import EGO, NON_EGO, Outcome
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO, NON_EGO
 from harness.game.world import World
 from harness.traffic.scene import open_scene
 

@@ -26,7 +26,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import Problem, UsageError, collect
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.shipped_documents import PACKAGE
 from harness.traffic.load_check import check_loads
 from harness.traffic.scene import OpenScene, open_scene

@@ -19,7 +19,7 @@ from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy_file import Policy, check_no_archive, persona_hash, policy_files, read_policy
 from harness.errors import Problem, UsageError, collect
-from harness.game.state import EGO, ROLES
+from harness.game.roles import EGO, ROLES
 from harness.game.world import World
 from harness.shipped_documents import find_document
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from harness.errors import plain
-from harness.game.state import roles_of
+from harness.game.roles import roles_of
 
 if TYPE_CHECKING:
     from harness.campaign.execution.pinned_games import Pinned

@@ -12,7 +12,7 @@ from harness.config.acceptance import Acceptance
 from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
 from harness.config.training import NaiveTraining, NonEgoTraining, Reconfiguration, Retraining, Training
-from harness.game.state import MOST_PEOPLE
+from harness.game.roles import MOST_PEOPLE
 
 LEARNED, SUMO = "learned", "sumo"  # drivers of an ego that have a name
 TRAINING_TABLES = ("training", "naive_training", "non_ego_training", "retraining")

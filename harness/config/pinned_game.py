@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from harness.config.campaign import DocumentPath, Seed
 from harness.config.toml_reading import Document
-from harness.game.state import MOST_PEOPLE
+from harness.game.roles import MOST_PEOPLE
 
 FORMAT = 1
 

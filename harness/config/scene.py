@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator,
 from harness.config.obstacle import Obstacle
 from harness.config.road_user import CYCLING, WALKER_RUN_MPS, Actuators, Kind
 from harness.config.toml_reading import TABLE, TABLES, Document, Interval, Mistakes
-from harness.game.state import MOST_PEOPLE, roles_of
+from harness.game.roles import MOST_PEOPLE, roles_of
 
 
 def _positive(interval: tuple[float, float]) -> tuple[float, float]:

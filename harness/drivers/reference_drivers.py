@@ -25,7 +25,7 @@ from harness.drivers.perception import perceive
 from harness.drivers.protocol import Driver
 from harness.drivers.rules import RulesDriver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.game.world import World
 
 PERSONS = ("careful_and_competent", "fuzzy", "rss")

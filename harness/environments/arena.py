@@ -36,9 +36,10 @@ from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
 from harness.game.observation import observe
 from harness.game.observation_layout import SIZE
+from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
 from harness.game.sanity_checks import check_observation, check_step, checked_decisions, slack_m
-from harness.game.state import Bodies, Outcome, State
+from harness.game.state import Bodies, State
 from harness.game.terminations import terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
@@ -150,8 +151,7 @@ class Arena(LiveSimulation):
         move(state, acceleration, steering, drove & self._on_wheels, world.actuators, world.step_s)
         if world.on_foot:
             walk(state, acceleration, steering, drove & world.walks, world.actuators, world.step_s)
-        reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
-        self.reading = reading
+        reading = self.reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         if reading.signals is not None:
             state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, self.world.step_s)
             state.signals = reading.signals

@@ -27,8 +27,9 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO
 from harness.game.sanity_checks import slack_m
-from harness.game.state import EGO, Outcome
 from harness.traffic.scene import OpenScene
 
 AFTERWARDS_S = 3.0

@@ -30,8 +30,9 @@ from harness.errors import SimulationError, UsageError
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO
 from harness.game.seeding import generator_of
-from harness.game.state import EGO, Outcome
 from harness.traffic.scene import OpenScene, open_scene
 
 _CHECKOUT = Path(__file__).resolve().parents[2]

@@ -19,7 +19,8 @@ from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE, Are
 from harness.errors import UsageError
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.observation import observe
-from harness.game.state import Outcome, State
+from harness.game.outcome import Outcome
+from harness.game.state import State
 from harness.traffic.scene import OpenScene
 
 _PARTS = "vector environment"

@@ -10,7 +10,7 @@ from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.seats import Seat
 from harness.errors import UsageError
-from harness.game.state import ROLES
+from harness.game.roles import ROLES
 from harness.game.world import World
 
 

@@ -21,7 +21,7 @@ from harness.game.geometry import Box, box_distance
 from harness.game.initial_state import InitialState
 from harness.game.quantities import Quantities
 from harness.game.road import MARGIN_M, SPACING_M, Routes
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import AtReset, Reading

@@ -35,7 +35,7 @@ def serve() -> None:
     from harness.drivers.car import car_of
     from harness.environments.conformance import difference_of
     from harness.errors import HarnessError
-    from harness.game.state import EGO
+    from harness.game.roles import EGO
     from harness.traffic.scene import open_scene
 
     answers = os.fdopen(os.dup(1), "w")

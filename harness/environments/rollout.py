@@ -24,8 +24,9 @@ from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_b
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, box_distance
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO, ROLES
 from harness.game.seeding import generator_of
-from harness.game.state import EGO, ROLES, Outcome
 from harness.traffic.scene import OpenScene
 
 

@@ -15,8 +15,10 @@ from harness.game.arrays import FloatArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation import observe
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO
 from harness.game.seeding import generator_of
-from harness.game.state import EGO, Bodies, Outcome
+from harness.game.state import Bodies
 from harness.traffic.scene import OpenScene
 
 if TYPE_CHECKING:

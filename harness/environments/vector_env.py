@@ -18,7 +18,7 @@ from harness.environments.live import LiveSimulation
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import StartDistribution
 from harness.game.observation_layout import SIZE
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 
 OBSERVATION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (SIZE,), np.float32)
 ACTION_SPACE = gymnasium.spaces.Box(-1.0, 1.0, (ACTIONS,), np.float32)

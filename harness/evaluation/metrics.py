@@ -12,7 +12,7 @@ import numpy as np
 
 from harness.evaluation.encounters import Encounter
 from harness.game.arrays import FloatArray
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """Games with several people: the columns of each person in `episodes.csv`, and values over all of them.
 
-A person's columns begin with its name (`game.state.roles_of`): `non_ego_outcome` with one person, `non_ego_1_outcome`,
+A person's columns begin with its name (`game.roles.roles_of`): `non_ego_outcome` with one person, `non_ego_1_outcome`,
 `non_ego_2_outcome` and so on with several.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.metrics import OF_NON_EGO, PlayerSeries
-from harness.game.state import MOST_PEOPLE, NON_EGO, ROLES, roles_of
+from harness.game.roles import MOST_PEOPLE, NON_EGO, ROLES, roles_of
 
 COLLIDED_WITH = "ego_collided_with"
 """The column of what the ego collided with, a person or `background`; only tables of several people have it."""

@@ -23,7 +23,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from harness.game.state import EGO, NON_EGO, ROLES
+from harness.game.roles import EGO, NON_EGO, ROLES
 
 PAPER_ROUNDS = 2
 """The rounds of the paper: strategies of later rounds carry their round in their name."""

@@ -8,7 +8,7 @@ import pandas as pd
 from harness.evaluation.people import judged_outcomes
 from harness.evaluation.severity.measures import CONTACT, RAIL, TIMEOUT, closeness
 from harness.evaluation.severity.thresholds import CONFLICT_TTC_S
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 
 FAILURES = (Outcome.COLLISION.word, Outcome.RAIL.word, Outcome.TIMEOUT.word)
 """The outcomes that are failures, from the worst on."""

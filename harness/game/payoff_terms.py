@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 
 GROUPS = ("safety", "operational", "human")
 FUZZY_QUANTITIES: Mapping[str, str] = {

@@ -27,7 +27,8 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.observation_layout import LAYOUT
 from harness.game.quantities import Quantities
-from harness.game.state import State, roles_of
+from harness.game.roles import roles_of
+from harness.game.state import State
 
 ROUNDING_M = 1e-3  # rounding of positions in network coordinates, which may be millions of metres
 LANE_CHANGE_M = 6.0  # width of a wide lane, plus the swing of a car's centre

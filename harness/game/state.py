@@ -3,46 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import IntEnum
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
+from harness.game.outcome import Outcome
 
-EGO, NON_EGO = 0, 1
-ROLES = ("ego", "non_ego")
-"""The two kinds of player."""
-MOST_PEOPLE = 4
-"""Non-egos of a game."""
 ALL_AROUND = -2.0
 """`State.sight_cosine` of a player that sees all around: below every cosine, whatever its rounding."""
-
-
-@cache
-def roles_of(players: int) -> tuple[str, ...]:
-    """The names of the players [P] of a game in every file: `ego` and `non_ego`; with several non-egos `ego`,
-    `non_ego_1`, `non_ego_2` and so on."""
-    return ROLES if players == len(ROLES) else ("ego", *(f"non_ego_{place}" for place in range(1, players)))
-
-
-class Outcome(IntEnum):
-    """How a player's game ended. `name.lower()` is the value in every file."""
-
-    RUNNING = 0
-    GOAL = 1
-    COLLISION = 2
-    RAIL = 3
-    TIMEOUT = 4
-    ERROR = 5
-
-    @property
-    def word(self) -> str:
-        """The outcome's value in files; empty while the game runs."""
-        return "" if self is Outcome.RUNNING else self.name.lower()
-
 
 _RUNNING = int(Outcome.RUNNING)  # comparing arrays with an enumeration member is slow in NumPy
 

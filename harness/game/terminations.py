@@ -6,7 +6,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 
 
 @compiled

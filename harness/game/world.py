@@ -11,8 +11,8 @@ from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import Actuators
 from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Road
+from harness.game.roles import roles_of
 from harness.game.sight import NOTHING_HIDES, Hiding
-from harness.game.state import roles_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ import pandas as pd
 
 from harness.evaluation.people import judged_outcomes
 from harness.evaluation.worst_first import FAILURES, worst_first
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 
 MOST_FAILURES_PER_ARM = 100  # and training seed: a replay folder contains a copy of the scene
 SAMPLE_PER_ARM = 2  # games without a failure, per arm and training seed, for comparison

@@ -9,7 +9,7 @@ import pandas as pd
 from markupsafe import Markup
 
 from harness.evaluation.strategies import NaiveEgo, Strategy, player_of
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.reports.figures import Curve, learning_figure
 from harness.reports.page_wording import curve_alternative, stop
 from harness.reports.run_tables import RunTables

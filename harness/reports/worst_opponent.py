@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from harness.evaluation.strategies import Arm, EgoStrategy, PersonaNonEgo
-from harness.game.state import NON_EGO
+from harness.game.roles import NON_EGO
 from harness.reports.differences import Row
 
 

@@ -12,7 +12,7 @@ from sumolib.net.edge import Edge
 
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
-from harness.game.state import ROLES
+from harness.game.roles import ROLES
 from harness.traffic import network
 from harness.traffic.route_file import Departure, RouteFile
 from harness.traffic.stops import stop_problems

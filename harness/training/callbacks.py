@@ -10,7 +10,7 @@ import torch
 from stable_baselines3.common.callbacks import BaseCallback
 
 from harness.environments.vector_env import Finished, GamesVecEnv
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 from harness.training.checkpoint import CurvePoint, Progress
 
 CURVE_WINDOW_STEPS = 16_384

@@ -14,8 +14,9 @@ from harness.drivers.protocol import Driver
 from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import draw_initial_state
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO, NON_EGO
 from harness.game.seeding import generator_of, seed_of
-from harness.game.state import EGO, NON_EGO, Outcome
 from harness.traffic.scene import OpenScene
 
 

@@ -27,8 +27,8 @@ from harness.drivers.mixture import Mixture
 from harness.drivers.protocol import Driver
 from harness.errors import SimulationError, StageFailed, is_of_memory
 from harness.files import write_atomically
+from harness.game.roles import EGO
 from harness.game.seeding import seed_of
-from harness.game.state import EGO
 from harness.traffic.scene import OpenScene
 from harness.training.paired_rollouts import PairedRollouts
 

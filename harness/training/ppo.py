@@ -21,8 +21,8 @@ from stable_baselines3.common.utils import set_random_seed
 from harness.drivers.policy_file import Policy
 from harness.environments.vector_env import GamesVecEnv
 from harness.game.observation_layout import OF_OTHERS
+from harness.game.outcome import Outcome
 from harness.game.seeding import seed_of
-from harness.game.state import Outcome
 from harness.training.callbacks import CurveRecorder, DeviationBound
 from harness.training.checkpoint import Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO

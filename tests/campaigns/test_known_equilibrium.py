@@ -44,7 +44,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.state import EGO, ROLES
+from harness.game.roles import EGO, ROLES
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.ppo import train
 from harness.training.training_games import TrainingSpec

@@ -35,7 +35,7 @@ from harness.evaluation.summary import summarise
 from harness.evaluation.tables import MANOEUVRE_COLUMNS, typed
 from harness.evaluation.trace_file import SCHEMA, TraceWriter
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 from harness.replay.selection import MOST_FAILURES_PER_ARM, choose_games, replay_name
 from harness.reports.manoeuvres import MOST_LISTED
 from harness.reports.page import PAGE_BYTES

@@ -20,7 +20,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from harness.training.ppo import train
 from harness.training.training_games import TrainingSpec

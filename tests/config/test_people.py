@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from harness.config.scene import Scene
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
-from harness.game.state import roles_of
+from harness.game.roles import roles_of
 
 SPAN = st.tuples(st.floats(0.0, 20.0), st.floats(20.0, 40.0)).map(list)
 

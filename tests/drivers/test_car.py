@@ -12,7 +12,7 @@ from harness.drivers.car import Car, car_of
 from harness.game.bicycle import requests
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 
 

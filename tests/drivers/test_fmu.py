@@ -19,7 +19,7 @@ from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.environments.rollout import Arm, assess
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.external_drivers import fmu_example
 from tests.support.tiny import CAREFUL

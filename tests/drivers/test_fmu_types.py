@@ -26,7 +26,7 @@ from harness.drivers.fmu_variables import INTEGERS
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.external_drivers import fmu_example
 from tests.support.tiny import CAREFUL

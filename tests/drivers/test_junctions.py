@@ -16,7 +16,8 @@ from harness.drivers.perception import perceive
 from harness.drivers.rules import RulesDriver
 from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray
-from harness.game.state import EGO, Outcome
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.observations import observation_of
 from tests.support.repository import REPOSITORY

@@ -21,7 +21,7 @@ from harness.drivers.process import ProcessDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import DriverError
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.processes import driver, is_running, started
 from tests.support.repository import REPOSITORY

@@ -19,7 +19,7 @@ from harness.drivers.reference_drivers import (
     reference_rules,
 )
 from harness.environments.arena import Arena, Seat
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.rollouts import Steady
 from tests.support.scenes import placed

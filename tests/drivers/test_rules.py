@@ -29,7 +29,8 @@ from harness.errors import UsageError
 from harness.game.bicycle import lateral_acceleration_mps2, move, requests
 from harness.game.observation_layout import LAYOUT
 from harness.game.road import AHEAD_M
-from harness.game.state import EGO, State
+from harness.game.roles import EGO
+from harness.game.state import State
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.observations import observation_of
 from tests.support.scenes import build_scene

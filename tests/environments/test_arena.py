@@ -17,8 +17,8 @@ from harness.environments.arena import Arena, Seat, Step
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.game.observation_layout import LAYOUT, SIZE
+from harness.game.outcome import Outcome
 from harness.game.payoff import Payoff
-from harness.game.state import Outcome
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.scenes import (

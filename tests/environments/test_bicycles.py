@@ -9,7 +9,7 @@ import pytest
 
 from harness.environments.arena import Arena, Seat
 from harness.game.observation_layout import LAYOUT
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed
 
 BICYCLE = """<vType id="bike" vClass="bicycle" maxSpeed="4" sigma="0" speedDev="0"/>

@@ -16,7 +16,7 @@ from harness.drivers.reference_drivers import PERSONS, REFERENCES
 from harness.environments.conflict_replay import AFTERWARDS_S, Collision, ConflictReplay, collision_of
 from harness.environments.recorded_courses import Course
 from harness.game.arrays import FloatArray
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.rollouts import Steady, arm, play, trace
 from tests.support.scenes import STRAIGHT, build_scene

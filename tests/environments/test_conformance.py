@@ -18,7 +18,7 @@ from harness.environments.conformance import check_conformance, difference_of
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation_layout import LAYOUT
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness

@@ -12,7 +12,7 @@ from harness.game.attention import HumanFactors
 from harness.game.geometry import Box, box_distance
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed
 

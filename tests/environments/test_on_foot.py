@@ -13,7 +13,8 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.game.state import NON_EGO, Outcome
+from harness.game.outcome import Outcome
+from harness.game.roles import NON_EGO
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 

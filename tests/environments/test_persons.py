@@ -9,7 +9,7 @@ import pytest
 
 from harness.environments.arena import Arena, Seat
 from harness.game.observation_layout import LAYOUT
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 from harness.replay.vehicles import types_of_vehicles
 from tests.support.rollouts import Steady, arm, play, trace
 from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed

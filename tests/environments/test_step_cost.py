@@ -29,8 +29,8 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution, draw_initial_state
+from harness.game.outcome import Outcome
 from harness.game.seeding import generator_of
-from harness.game.state import Outcome
 from harness.traffic import background_traffic
 from harness.traffic.scene import OpenScene, open_scene
 from harness.traffic.vehicle_reads import DIRECT

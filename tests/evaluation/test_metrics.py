@@ -10,7 +10,7 @@ import pytest
 from harness.evaluation import metrics
 from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
 from harness.evaluation.tables import EPISODE_COLUMNS
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 
 INF = np.inf
 

@@ -20,7 +20,7 @@ from harness.evaluation.strategies import (
     round_of,
     strategy_name,
 )
-from harness.game.state import EGO, NON_EGO
+from harness.game.roles import EGO, NON_EGO
 
 SPEEDY = PersonaNonEgo(persona="speedy")
 RETRAINED = RetrainedEgo(against="speedy")

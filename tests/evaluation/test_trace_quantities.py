@@ -6,7 +6,7 @@ import pytest
 from harness.campaign.results.recorded_games import recorded_games
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_quantities import drove_in, series_of
-from harness.game.state import ROLES
+from harness.game.roles import ROLES
 from harness.traffic.scene import open_scene
 from tests.support.tiny import learned_run, sumo_run
 from tests.support.traces import drawn

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 from harness.game.arrays import FloatArray
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT, OF_OTHERS, OTHERS, SIZE
+from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
 from harness.game.rails import Rails
 from harness.game.road import AHEAD_M, MARGIN_M, SPACING_M, Road, Route, Routes
-from harness.game.state import Outcome
 from harness.game.world import World
 from harness.traffic.scene import OpenScene
 

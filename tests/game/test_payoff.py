@@ -14,10 +14,10 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
+from harness.game.outcome import Outcome
 from harness.game.payoff import Payoff, Weighted
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.quantities import Quantities
-from harness.game.state import Outcome
 from harness.game.world import World
 from harness.traffic.scene import OpenScene
 

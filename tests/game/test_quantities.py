@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.game.outcome import Outcome
 from harness.game.quantities import REACH_M, Quantities
 from harness.game.rails import Rails
 from harness.game.road import MARGIN_M, SPACING_M, Road, Route, Routes
-from harness.game.state import Outcome
 from harness.game.world import World
 from harness.traffic.scene import OpenScene
 

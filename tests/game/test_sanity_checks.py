@@ -34,11 +34,13 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT
+from harness.game.outcome import Outcome
 from harness.game.payoff import Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS
 from harness.game.quantities import Quantities
+from harness.game.roles import EGO, NON_EGO, ROLES
 from harness.game.sanity_checks import ImpossibleNumber, check_observation, check_step, slack_m
-from harness.game.state import EGO, NON_EGO, ROLES, Bodies, Outcome, State
+from harness.game.state import Bodies, State
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.rollouts import Steady, arm, play, records, trace

@@ -7,7 +7,7 @@ from typing import Any
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from harness.training.ppo import Trained, train
 from harness.training.training_games import TrainingSpec

@@ -11,7 +11,7 @@ import pytest
 from harness.environments.arena import Arena, Seat
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT
-from harness.game.state import Outcome
+from harness.game.outcome import Outcome
 from harness.traffic.levels import on_players_level
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene

@@ -8,7 +8,7 @@ import pytest
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.right_of_way import Control
-from harness.game.state import EGO, NON_EGO
+from harness.game.roles import EGO, NON_EGO
 from harness.traffic.scene import open_scene
 from tests.support.repository import REPOSITORY
 

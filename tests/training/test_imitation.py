@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.drivers.policy_file import Policy
-from harness.game.state import NON_EGO
+from harness.game.roles import NON_EGO
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.imitation import returns_of
 from tests.support.tiny import settings

@@ -23,7 +23,7 @@ from harness.drivers.policy_file import read_policy
 from harness.drivers.protocol import Driver
 from harness.errors import StageFailed
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.paired_rollouts import PairedRollouts
 from harness.training.parameter_search import Search, Trial, best, propose, read_trials, run_search, write_trials

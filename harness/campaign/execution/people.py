@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from harness.campaign.plan.planned_drivers import Crowd, PlannedDriver, SumoDriven, persona_of
 from harness.campaign.plan.stages import TrainingStage
 from harness.drivers.mixture import Mixture, mixture_of
-from harness.game.state import EGO
+from harness.game.roles import EGO
 
 if TYPE_CHECKING:
     from harness.campaign.execution.player_factory import PlayerFactory

@@ -37,7 +37,7 @@ from harness.environments.rollout import Arm, assess
 from harness.errors import StageFailed
 from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_shares
 from harness.evaluation.tables import read_csv
-from harness.game.state import EGO, ROLES
+from harness.game.roles import EGO, ROLES
 from harness.traffic.scene import OpenScene
 
 _LEAST_SHARE = 1e-6  # members of a mixture with a smaller share are left out

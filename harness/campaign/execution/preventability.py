@@ -31,7 +31,7 @@ from harness.evaluation.reference_columns import REFERENCE_COLUMNS
 from harness.evaluation.tables import read_csv, typed, write_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.files import make_folder
-from harness.game.state import EGO
+from harness.game.roles import EGO
 
 _COLLISIONS_AT_ONCE = 100  # what the ego sees in each of their steps is kept in memory
 

@@ -23,7 +23,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.start_trials import StartTrials
 from harness.errors import Problem, UsageError, collect
 from harness.files import content_of
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene, open_scene
 
 _MOST_BYTES = 1_000_000_000

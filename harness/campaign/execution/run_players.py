@@ -34,7 +34,7 @@ from harness.drivers.protocol import Driver
 from harness.environments.rollout import Arm, parts_of
 from harness.errors import UsageError
 from harness.game.initial_state import draw_member
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene, open_scene
 
 

@@ -28,7 +28,7 @@ from harness.drivers.mixture import Player
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
 from harness.files import make_folder, write_atomically
-from harness.game.state import ROLES
+from harness.game.roles import ROLES
 from harness.traffic.scene import OpenScene, open_scene
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from harness.campaign.plan.planned_drivers import BestOf, Trained, TrainedBefore
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage, stage_id
 from harness.config.campaign import Campaign
 from harness.evaluation.strategies import Arm, BestResponse
-from harness.game.state import EGO, NON_EGO
+from harness.game.roles import EGO, NON_EGO
 
 
 def plan_best_responses(campaign: Campaign, pair: AssessmentStage) -> list[Stage]:

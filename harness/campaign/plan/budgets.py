@@ -7,7 +7,7 @@ from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign
 from harness.config.training import Training
 from harness.evaluation.strategies import NaiveEgo
-from harness.game.state import EGO
+from harness.game.roles import EGO
 
 
 def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:

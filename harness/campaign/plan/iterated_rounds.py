@@ -35,7 +35,7 @@ from harness.evaluation.strategies import (
     RetrainedEgo,
     strategy_name,
 )
-from harness.game.state import EGO, NON_EGO
+from harness.game.roles import EGO, NON_EGO
 
 
 @dataclass(frozen=True, kw_only=True)

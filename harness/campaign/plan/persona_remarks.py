@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.config.persona import Parametrised, Persona
 from harness.game.right_of_way import Control
-from harness.game.state import NON_EGO
+from harness.game.roles import NON_EGO
 from harness.game.world import World
 
 

@@ -19,7 +19,7 @@ from harness.evaluation.strategies import (
     round_of,
     strategy_name,
 )
-from harness.game.state import ROLES
+from harness.game.roles import ROLES
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,7 +25,7 @@ from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
-from harness.game.state import EGO, NON_EGO, ROLES
+from harness.game.roles import EGO, NON_EGO, ROLES
 from harness.reports.numbers import interval, number, percent
 from harness.reports.page_wording import stopped
 

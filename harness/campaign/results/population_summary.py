@@ -12,7 +12,7 @@ from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, Reconfig
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import POPULATION_COLUMNS, typed
 from harness.game.initial_state import draw_member
-from harness.game.state import NON_EGO
+from harness.game.roles import NON_EGO
 
 _SUMMARY_COLUMNS = [name for name in POPULATION_COLUMNS if name not in ("arm", "population", "seed", "persona")]
 

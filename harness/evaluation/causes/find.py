@@ -30,9 +30,10 @@ from harness.evaluation.severity.measures import Kind
 from harness.evaluation.trace_quantities import body_names, drove_in, obstacle_names, quantities_of
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, box_distance, time_to_contact
+from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
+from harness.game.roles import EGO
 from harness.game.route_coordinates import PATH_M
-from harness.game.state import EGO, Outcome
 from harness.game.world import World
 
 _HERE = int(np.flatnonzero(PATH_M == 0.0)[0])

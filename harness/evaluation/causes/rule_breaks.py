@@ -9,7 +9,7 @@ import pandas as pd
 from harness.evaluation.causes.thresholds import SINCE_S
 from harness.evaluation.manoeuvres import junction_rules as rules
 from harness.evaluation.manoeuvres.course import Course
-from harness.game.state import EGO
+from harness.game.roles import EGO
 from harness.game.world import World
 
 TURNS_ACROSS, WRONG_WAY = "turns across oncoming traffic", "drives among oncoming lanes"

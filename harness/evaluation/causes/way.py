@@ -9,7 +9,7 @@ import numpy as np
 from harness.evaluation.manoeuvres.thresholds import HALF_LANE_M
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.quantities import Quantities
-from harness.game.state import EGO
+from harness.game.roles import EGO
 
 
 @dataclass(frozen=True, kw_only=True)

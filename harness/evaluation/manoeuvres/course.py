@@ -14,8 +14,9 @@ from harness.evaluation.manoeuvres.thresholds import HALF_LANE_M, SAME_WITHIN_S
 from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities
+from harness.game.roles import EGO
 from harness.game.route_coordinates import PATH_M
-from harness.game.state import EGO, Bodies
+from harness.game.state import Bodies
 from harness.game.world import World
 
 _HERE = int(np.flatnonzero(PATH_M == 0.0)[0])

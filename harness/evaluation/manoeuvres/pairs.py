@@ -10,7 +10,7 @@ import pandas as pd
 
 from harness.evaluation.manoeuvres.naming import Manoeuvre, manoeuvres_in
 from harness.evaluation.manoeuvres.thresholds import AFTERMATH_S, ANSWER_WITHIN_S
-from harness.game.state import EGO, ROLES
+from harness.game.roles import EGO, ROLES
 
 NO_CAUSE, NO_REACTION = "nothing named", "no reaction"
 """Stand for no named manoeuvre of the non-ego and of the ego."""

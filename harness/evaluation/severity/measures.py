@@ -18,8 +18,9 @@ from harness.evaluation.trace_quantities import body_names, drove_in, obstacle_n
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
 from harness.game.geometry import Box, box_distance
+from harness.game.outcome import Outcome
 from harness.game.quantities import SIGHT_M, Quantities
-from harness.game.state import EGO, Outcome
+from harness.game.roles import EGO
 from harness.game.world import World
 
 CONTACT, RAIL, TIMEOUT = 300.0, 200.0, 100.0

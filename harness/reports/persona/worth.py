@@ -12,9 +12,9 @@ import numpy as np
 from harness.config.json_schema import unit_of
 from harness.config.persona import Persona
 from harness.game.arrays import FloatArray
+from harness.game.outcome import Outcome
 from harness.game.payoff import Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
-from harness.game.state import Outcome
 
 EXAMPLES: Mapping[str, tuple[str, str, float]] = {
     "collision": ("once", "outcome", float(Outcome.COLLISION)),

@@ -25,7 +25,7 @@ from harness.campaign.preflight import QUICK_RESPONSE_STEPS, open_campaign
 from harness.campaign.results.matchups import matchups_of
 from harness.drivers.policy_file import Policy, write_policy
 from harness.errors import UsageError
-from harness.game.state import EGO, NON_EGO
+from harness.game.roles import EGO, NON_EGO
 from tests.support.plans import planned
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY

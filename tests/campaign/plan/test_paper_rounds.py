@@ -12,7 +12,7 @@ from harness.campaign.plan.planned_drivers import SumoDriven, Trained, descripti
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.drivers.policy_file import write_policy
-from harness.game.state import EGO, NON_EGO
+from harness.game.roles import EGO, NON_EGO
 from tests.support.plans import planned
 from tests.support.policies import some_policy
 from tests.support.tiny import CAREFUL, SPEEDY, write_campaign, write_persona

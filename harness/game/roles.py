@@ -1,0 +1,18 @@
+"""The players of a game and their names."""
+
+from __future__ import annotations
+
+from functools import cache
+
+EGO, NON_EGO = 0, 1
+ROLES = ("ego", "non_ego")
+"""The two kinds of player."""
+MOST_PEOPLE = 4
+"""Non-egos of a game."""
+
+
+@cache
+def roles_of(players: int) -> tuple[str, ...]:
+    """The names of the players [P] of a game in every file: `ego` and `non_ego`; with several non-egos `ego`,
+    `non_ego_1`, `non_ego_2` and so on."""
+    return ROLES if players == len(ROLES) else ("ego", *(f"non_ego_{place}" for place in range(1, players)))
