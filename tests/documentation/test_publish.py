@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -102,6 +103,22 @@ def test_documents__every_block_is_of_a_command_that_exists() -> None:
     assert len(blocks) >= 8
     scripts = [command.split()[1] for command in blocks if not command.startswith("python -m ")]
     assert [name for name in scripts if not (REPOSITORY / name).is_file()] == []
+
+
+def test_documents__show_what_the_stored_tables_hold() -> None:
+    """Blocks of commands that read tables of docs/, which are in the repository; run folders are not, or in parts."""
+    shown = {
+        command: block
+        for page in publish.DOCUMENTS
+        for command, block in output_blocks.blocks_in(page.read_text("utf-8")).items()
+        if command.endswith(".csv") and "reports/" not in command
+    }
+    assert len(shown) >= 3
+    for command, block in shown.items():
+        printed = subprocess.run(
+            [sys.executable, *command.split()[1:]], cwd=REPOSITORY, capture_output=True, text=True, check=True
+        )
+        assert printed.stdout.strip() == block, command
 
 
 def test_cost__counts_trainings_steps_and_arms_of_the_plan() -> None:
