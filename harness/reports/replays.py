@@ -112,8 +112,9 @@ def _impact(game: Mapping[Any, Any]) -> str:
     speed = game.get("closing_speed_mps", math.nan)
     if speed != speed:
         return ""
-    delta_v = number(game["ego_delta_v_mps"], 1)
-    return f", {game['impact_side']} side at {number(speed, 1)}{NO_SPACE}m/s (delta-v {delta_v}{NO_SPACE}m/s)"
+    own, other = (f"{number(game[f'{who}_delta_v_mps'], 1)}{NO_SPACE}m/s" for who in ("ego", "other"))
+    of_other = f", of the other {other}" if other != own else ""
+    return f", {game['impact_side']} side at {number(speed, 1)}{NO_SPACE}m/s (delta-v {own}{of_other})"
 
 
 def _scene(name: str) -> str:

@@ -130,7 +130,13 @@ def with_walkers(routes: RouteFile, document: Scene, net: Net) -> RouteFile:
         )
         for name, way in walkers.items()
     }
-    kind = VehicleType(name=WALKER_TYPE, length_m=WALKER_LENGTH_M, width_m=WALKER_WIDTH_M, max_speed_mps=WALKER_RUN_MPS)
+    kind = VehicleType(
+        name=WALKER_TYPE,
+        length_m=WALKER_LENGTH_M,
+        width_m=WALKER_WIDTH_M,
+        max_speed_mps=WALKER_RUN_MPS,
+        vehicle_class="pedestrian",  # what it is; to SUMO it is a car
+    )
     return replace(
         routes,
         types={**routes.types, WALKER_TYPE: kind},

@@ -36,7 +36,7 @@ def is_vouched_for(run: Path, file: Path) -> bool:
     """Whether numbers are read from a file when the stages are done."""
     where = file.relative_to(run).parts
     if where[0] == ".stages":
-        tables = ("episodes.csv", "manoeuvres.csv", "training.csv", "severity-1.csv", "causes-1.csv")
+        tables = ("episodes.csv", "manoeuvres.csv", "training.csv", "severity-2.csv", "causes-2.csv")
         return file.name in ("done.json", *tables)
     return where[0] in ("policies", "traces", "scene") and file.name not in ANEW
 

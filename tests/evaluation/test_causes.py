@@ -118,6 +118,8 @@ def test_oncoming__in_the_ego_s_lane(merge: Any) -> None:
 def test_in_lane__ahead_and_behind(merge: Any) -> None:
     ahead = rows("non_ego", along(41.0, -4.8, 0.0, 2.0, STEPS))
     assert cause(merge, ego(), ahead).deed == "drives ahead of the ego"
+    on_foot = rows("non_ego", along(39.0, -4.8, 0.0, 1.0, STEPS), "foot")
+    assert cause(merge, ego(), on_foot).deed == "walks ahead of the ego"
     braking = [(41.0 + 0.2 * k, -4.8, 0.0, 2.0 if k < 10 else 1.0) for k in range(STEPS)]
     assert cause(merge, ego(), rows("non_ego", braking)).deed == "brakes ahead of the ego"
     standing = rows("non_ego", along(44.0, -4.8, 0.0, 0.0, STEPS))

@@ -13,6 +13,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.campaign.storage.trace_tables import kinds_of
 from harness.evaluation.columns import EPISODES
 from harness.evaluation.severity.columns import OF_SEVERITY
 from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
@@ -23,6 +24,8 @@ from harness.evaluation.worst_first import severities, worst_first
 from harness.game.geometry import Box
 from harness.game.sight import Hiding
 from harness.reports.columns_page import columns_page
+from harness.traffic.footway import WALKER_TYPE
+from harness.traffic.scene import open_scene
 from tests.support.repository import REPOSITORY
 from tests.support.traces import along, rows
 
@@ -67,6 +70,13 @@ def test_contact__a_pedestrian_decides_how_severe_it_is(merge: Any) -> None:
     cells = severity(merge, ego, rows("walker", along(24.5, -1.6, QUARTER, 0.0, 3), kind="foot"))
     assert cells["other_delta_v_mps"] == pytest.approx(9.554, abs=1e-3)
     assert cells["severity"] == pytest.approx(309.554, abs=1e-3)
+
+
+def test_contact__a_player_on_foot_weighs_a_person() -> None:
+    """Its vehicle type is the harness's own, and to SUMO a car."""
+    kinds = kinds_of(open_scene(REPOSITORY / "networks" / "zebra"))
+    assert mass_kg(kinds[WALKER_TYPE].vehicle_class) == 70.0
+    assert mass_kg(kinds["ego_car"].vehicle_class) == 1500.0
 
 
 def test_contact__an_obstacle_does_not_move(merge: Any) -> None:

@@ -18,7 +18,7 @@ from harness.evaluation.tables import SEVERITY_TABLE, read_csv, typed, write_csv
 from harness.evaluation.trace_file import read_traces
 from harness.traffic.scene import OpenScene
 
-SEVERITY, CAUSES = "severity-1.csv", "causes-1.csv"
+SEVERITY, CAUSES = "severity-2.csv", "causes-2.csv"
 """The number is raised when a definition changes: the tables of earlier ones are not used."""
 _GAME = ["arm", "seed", "episode"]
 
@@ -64,7 +64,7 @@ def _kept_or_made(folder: RunFolder, stage: str, name: str, make: Callable[[], p
 
 
 def _severity(folder: RunFolder, stage: str, scene: OpenScene) -> pd.DataFrame:
-    kinds = _kinds(scene)
+    kinds = kinds_of(scene)
     rows = [
         {"arm": game.arm, "seed": game.seed, "episode": game.episode, **severity_of(trace, scene.world, kinds)}
         for game, trace in _games(folder, stage)
@@ -73,7 +73,7 @@ def _severity(folder: RunFolder, stage: str, scene: OpenScene) -> pd.DataFrame:
 
 
 def _causes(folder: RunFolder, stage: str, scene: OpenScene) -> pd.DataFrame:
-    kinds = _kinds(scene)
+    kinds = kinds_of(scene)
     rows = []
     for game, trace in _games(folder, stage, failed=True):
         cause = cause_of(trace, scene.world, kinds)
@@ -96,8 +96,8 @@ def _games(folder: RunFolder, stage: str, failed: bool = False) -> Iterator[tupl
                 yield games[episode], trace
 
 
-def _kinds(scene: OpenScene) -> Mapping[str, Kind]:
-    """The scene's vehicle types."""
+def kinds_of(scene: OpenScene) -> Mapping[str, Kind]:
+    """What contacts and causes depend on, of each of the scene's vehicle types."""
     return {
         name: Kind(length_m=kind.length_m, width_m=kind.width_m, vehicle_class=kind.vehicle_class)
         for name, kind in scene.routes.types.items()

@@ -37,6 +37,8 @@ from harness.game.route_coordinates import PATH_M
 from harness.game.world import World
 
 _HERE = int(np.flatnonzero(PATH_M == 0.0)[0])
+_WALKS, _RIDES, _DRIVES = "walks", "rides", "drives"
+_MOVES = {"pedestrian": _WALKS, "wheelchair": _WALKS, "bicycle": _RIDES, "scooter": _RIDES}  # by class
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -213,11 +215,9 @@ def _deed(game: _Game, other: int, way: InWay) -> tuple[int, str]:
 
 def _enters(game: _Game, other: int, step: int, side: str) -> str:
     """How a body crosses the mark of the ego's lane."""
-    vehicle_class = game.kinds[other].vehicle_class
-    if vehicle_class in ("pedestrian", "wheelchair"):
-        return f"walks into the ego's lane from the {side}"
-    if vehicle_class == "bicycle":
-        return f"rides into the ego's lane from the {side}"
+    moves = _moves(game, other)
+    if moves != _DRIVES:
+        return f"{moves} into the ego's lane from the {side}"
     turned = game.q.bodies.heading_rad[step, other] - game.q.state.heading_rad[step, EGO]
     angle = abs((turned + math.pi) % (2.0 * math.pi) - math.pi)
     if angle > at.ONCOMING_RAD:
@@ -239,10 +239,18 @@ def _in_lane(game: _Game, other: int, way: InWay) -> str:
         return "hits the ego from behind"
     if q.bodies.speed_mps[last, other] < at.STANDS_MPS:
         return "stands in the ego's lane"
+    moves = _moves(game, other)
     since = max(last - game.steps(at.SINCE_S), 0)
     speeds = q.bodies.speed_mps[since : last + 1, other]
     braking = -np.diff(speeds) / game.step_s
-    return "brakes ahead of the ego" if len(braking) and braking.max() >= at.BRAKES_MPS2 else "drives ahead of the ego"
+    if moves != _WALKS and len(braking) and braking.max() >= at.BRAKES_MPS2:
+        moves = "brakes"
+    return f"{moves} ahead of the ego"
+
+
+def _moves(game: _Game, other: int) -> str:
+    """The verb for how a body of its class goes on."""
+    return _MOVES.get(game.kinds[other].vehicle_class, _DRIVES)
 
 
 def _danger(game: _Game, other: int) -> int:
