@@ -10,7 +10,7 @@ import pandas as pd
 
 from harness.evaluation.acceptance import worst_of_each
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.strategies import NaiveEgo, against_persona
+from harness.evaluation.strategies import NAIVE_ALONE
 from harness.evaluation.unplayed_games import reasons_of
 from harness.reports import page_wording
 from harness.reports.acceptance_wording import headline, line
@@ -154,8 +154,10 @@ def _cards(tables: RunTables, found: Results, embedded: Container[str]) -> dict[
 
 
 def _card(persona: str, place: int, found: Results, links: GameLinks) -> Card:
-    worst = worst_game(against_persona(NaiveEgo(), persona).name, links.episodes, links.embedded)
-    return card(persona, place, found, worst, links)
+    change = found.change if found.asked("RQ2", persona) else None
+    labels = page_wording.arm_labels(persona, change, found.naive)
+    against = {arm: label for label, _, arm in labels if arm != NAIVE_ALONE.name}
+    return card(persona, place, found, worst_game(against, links.episodes, links.embedded), links)
 
 
 def _player(tables: RunTables, embedded: Embedded) -> dict[str, Any]:

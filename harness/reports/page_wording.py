@@ -225,10 +225,11 @@ def search_alternative(title: str, summary: str) -> str:
 # --- games and arms ---
 
 
-def worst_game(episode: int, outcome: str, least_time_s: float, partner: str = "") -> str:
-    """A game in words: how it ended (`partner`: with what), and its least time to collision if there is one."""
+def worst_game(game: str, outcome: str, least_time_s: float, partner: str = "") -> str:
+    """A game in words: its name, how it ended (`partner`: with what), and its least time to collision if there is
+    one."""
     nearest = f", least time to collision {number(least_time_s, 1)} s" if 0 < least_time_s < math.inf else ""
-    return f"game {episode}: {OUTCOMES.get(outcome, outcome)}{partner}{nearest}"
+    return f"{game}: {OUTCOMES.get(outcome, outcome)}{partner}{nearest}"
 
 
 def glossary(arms: Sequence[str], records: Mapping[str, Arm], found: Results) -> list[tuple[str, str]]:

@@ -55,14 +55,17 @@ def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Containe
     ]
 
 
-def worst_game(arm: str, episodes: pd.DataFrame, embedded: Container[str]) -> tuple[str, str] | None:
-    """Key and description of the worst game of an arm, of those that the page can play; None where it can play none."""
-    games = worst_first(episodes[episodes["arm"] == arm]).to_dict("records")
+def worst_game(arms: Mapping[str, str], episodes: pd.DataFrame, embedded: Container[str]) -> tuple[str, str] | None:
+    """Key and description of the worst game of `arms`, which are labelled, of those games that the page can play; None
+    where it can play none."""
+    games = worst_first(episodes[episodes["arm"].isin(list(arms))]).to_dict("records")
     game = next((game for game in games if _key(game) in embedded), None)
     if game is None:
         return None
     (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
-    return _key(game), page_wording.worst_game(game["episode"], outcome, ttc, _with(game) + _impact(game))
+    seed = f", seed {game['seed']}" if episodes["seed"].nunique() > 1 else ""
+    name = f"{arms[game['arm']]}{seed}, game {game['episode']}"
+    return _key(game), page_wording.worst_game(name, outcome, ttc, _with(game) + _impact(game))
 
 
 def most_severe(episodes: pd.DataFrame) -> Mapping[Any, Any]:
