@@ -15,6 +15,8 @@ from harness.evaluation.strategies import NaiveEgo, RobustEgo, strategy_name
 
 _TAKEN = (strategy_name(NaiveEgo()), strategy_name(RobustEgo()), SUMO)
 """Names of egos that a driver of the cross-play can't have."""
+MOST_LETTERS = 40
+"""Of the name of a driver of the cross-play."""
 Wrong = Callable[[str, str, str], None]
 """Notes a problem: key, what is wrong, remedy."""
 
@@ -68,6 +70,9 @@ def _check_other_egos(document: Campaign, wrong: Wrong) -> None:
             wrong("crossplay.egos", f"{driver!r} is the campaign's ego, which always takes part", "leave it out")
         elif names.count(name) > 1:
             wrong("crossplay.egos", f"two drivers are called {name!r}", "rename a file, or leave one out")
+        elif len(name) > MOST_LETTERS:
+            message = f"{name[:MOST_LETTERS]!r}… is longer than {MOST_LETTERS} letters"
+            wrong("crossplay.egos", message, "rename its file or folder")
         elif driver != SUMO and name in _TAKEN:
             wrong("crossplay.egos", f"{driver!r} would be called {name!r}", "rename its file or folder")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 
@@ -83,5 +84,8 @@ def crossplay_drivers(campaign: Campaign) -> dict[str, PlannedMember]:
 
 
 def crossplay_name(written: str) -> str:
-    """The name of a driver in arms: that of its document or folder."""
-    return PurePath(written).stem if written.endswith(".toml") else PurePath(written).name
+    """The name of a driver in arms, which are names of files too: that of its document or folder, with "_" for all but
+    letters and digits. `naive_seed1` for `policies/merge/naive-seed1`."""
+    name = PurePath(written).stem if written.endswith(".toml") else PurePath(written).name
+    plain = re.sub("[^A-Za-z0-9]+", "_", name)
+    return plain if plain[:1].isalpha() else f"ego_{plain}"

@@ -21,6 +21,7 @@ from harness.campaign.plan.planned_drivers import (
     members_of,
 )
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage
+from harness.campaign.plan.strategy_drivers import crossplay_name
 from harness.campaign.preflight import QUICK_RESPONSE_STEPS, open_campaign
 from harness.campaign.results.matchups import matchups_of
 from harness.drivers.policy_file import Policy, write_policy
@@ -286,6 +287,28 @@ def test_plan__everyone_meets_everyone(tmp_path: Path, both: list[str]) -> None:
     }
     assert matchups.training_personas["robust"] == ["anna"]
     assert matchups.training_personas["retrained_bert_round4"] == ["bert"]
+
+
+@pytest.mark.parametrize(
+    ("written", "name"),
+    [
+        ("../policies/merge/naive-seed1", "naive_seed1"),
+        ("egos/my ego (2).toml", "my_ego_2_"),
+        ("egos/v1.2.toml", "v1_2"),
+        ("egos/2nd.toml", "ego_2nd"),
+        ("sumo", "sumo"),
+    ],
+)
+def test_crossplay__names_of_drivers_are_names_of_files_and_stages(written: str, name: str) -> None:
+    """A manifest with other names is refused as damaged."""
+    assert crossplay_name(written) == name
+
+
+def test_crossplay__a_driver_with_a_long_name_is_refused(tmp_path: Path, anna: list[str]) -> None:
+    driver = tmp_path / f"{'x' * 41}.toml"
+    driver.write_bytes((REPOSITORY / "egos/adas.toml").read_bytes())
+    with pytest.raises(UsageError, match="crossplay.egos: 'x{40}'… is longer than 40 letters"):
+        open_campaign(write_campaign(tmp_path, personas=anna, crossplay={"egos": [driver.name]}))
 
 
 @pytest.mark.parametrize(
