@@ -307,7 +307,7 @@ def test_crossplay__names_of_drivers_are_names_of_files_and_stages(written: str,
 def test_crossplay__a_driver_with_a_long_name_is_refused(tmp_path: Path, anna: list[str]) -> None:
     driver = tmp_path / f"{'x' * 41}.toml"
     driver.write_bytes((REPOSITORY / "egos/adas.toml").read_bytes())
-    with pytest.raises(UsageError, match="crossplay.egos: 'x{40}'… is longer than 40 letters"):
+    with pytest.raises(UsageError, match=r"crossplay\.egos: 'x{40}'… is longer than 40 letters"):
         open_campaign(write_campaign(tmp_path, personas=anna, crossplay={"egos": [driver.name]}))
 
 
