@@ -9,6 +9,7 @@ A campaign continues where it was interrupted, and a finished one is not run aga
 
 from __future__ import annotations
 
+import gzip
 import shutil
 import subprocess
 import sys
@@ -26,6 +27,7 @@ from harness.files import write_atomically
 
 ROOT = Path(__file__).parents[2]
 PUBLISHED = Path(__file__).with_name("published.toml")
+LONG_TABLES = ("episodes", "training")
 DOCUMENTS = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
 
 
@@ -33,6 +35,8 @@ class Step(Document):
     """One step: a campaign to run, a file or folder to copy, or a command."""
 
     campaign: str = ""
+    pack: bool = False
+    """Whether the long tables of the campaign's run folder are published, compressed."""
     copy_from: str = Field("", alias="copy")
     to: str = ""
     command: str = ""
@@ -45,6 +49,8 @@ class Step(Document):
             raise ValueError("a step has one of `campaign`, `copy` and `command`")
         if bool(self.copy_from) != bool(self.to):
             raise ValueError("`copy` and `to` belong together")
+        if self.pack and not self.campaign:
+            raise ValueError("`pack` belongs to a campaign")
         return self
 
     def __str__(self) -> str:
@@ -87,6 +93,8 @@ def carry_out(step: Step, root: Path) -> None:
     """Carry out one step in a checkout. Raises CalledProcessError or OSError if it fails."""
     if step.campaign:
         _run(f"harness campaign {step.campaign}", root, capture=False)
+        if step.pack:
+            pack(root / "reports" / Path(step.campaign).stem)
     elif step.command:
         _run(step.command, root, capture=False)
     else:
@@ -99,6 +107,13 @@ def carry_out(step: Step, root: Path) -> None:
             fresh.rename(target)
         else:
             write_atomically(target, source.read_bytes())
+
+
+def pack(run: Path) -> None:
+    """Compress the long tables of a run folder. Raises OSError if one is not there."""
+    for name in LONG_TABLES:
+        table = run / f"{name}.csv"
+        write_atomically(run / f"{name}.csv.gz", gzip.compress(table.read_bytes(), mtime=0))
 
 
 def write_outputs(document: Path, root: Path, chosen: list[str]) -> None:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import pandas as pd
 import pytest
 
 from tests.support.repository import REPOSITORY
@@ -84,9 +85,21 @@ def test_carry_out__a_copied_folder_replaces_the_one_before(tmp_path: Path) -> N
     assert [each.name for each in (tmp_path / "policies").iterdir()] == ["merge"]
 
 
-@pytest.mark.parametrize("keys", [{}, {"campaign": "a.toml", "command": "python b.py"}, {"copy": "a"}], ids=str)
+def test_carry_out__the_long_tables_of_a_packed_run_are_compressed(tmp_path: Path) -> None:
+    for name in publish.LONG_TABLES:
+        (tmp_path / f"{name}.csv").write_bytes(b"arm,seed\nnaive_alone,1\n")
+    publish.pack(tmp_path)
+    for name in publish.LONG_TABLES:
+        assert pd.read_csv(tmp_path / f"{name}.csv.gz").to_dict("list") == {"arm": ["naive_alone"], "seed": [1]}
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{"pack": True, "copy": "a", "to": "b"}, {}, {"campaign": "a.toml", "command": "python b.py"}, {"copy": "a"}],
+    ids=str,
+)
 def test_step__is_one_of_three(keys: dict[str, str]) -> None:
-    with pytest.raises(ValueError, match=r"a step has one of|belong together"):
+    with pytest.raises(ValueError, match=r"a step has one of|belong together|belongs to"):
         publish.Step.model_validate(keys)
 
 
