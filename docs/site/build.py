@@ -52,7 +52,7 @@ def write_source(folder: Path) -> None:
     pages = {name.relative_to(docs).as_posix(): name for name in sorted(docs.rglob("*.md"))}
     pages |= {site: ROOT / name for name, site in FROM_ROOT.items()}
     made = reference_pages.pages(docs / "schemas") | {"index.md": navigation.index()}
-    pictures = {file.relative_to(docs).as_posix() for ending in ("png", "svg") for file in docs.rglob(f"*.{ending}")}
+    pictures = {file.relative_to(docs).as_posix() for kind in ("png", "svg", "gif") for file in docs.rglob(f"*.{kind}")}
     for name in sorted(pictures):
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(docs / name, folder / name)

@@ -13,6 +13,8 @@ SECTIONS = {
     ),
     "How-to guides": (
         "installation",
+        "campaigns",
+        "commands",
         "egos",
         "egos-by-rules",
         "egos-by-networks",

@@ -1,4 +1,4 @@
-"""The pages of the documentation: every file and test that they name exists."""
+"""The pages of the documentation: every file, test, page, picture and heading that they name exists."""
 
 from __future__ import annotations
 
@@ -10,27 +10,14 @@ import pytest
 
 from tests.support.repository import REPOSITORY
 
-PAGES = sorted(
-    [*REPOSITORY.glob("*.md"), *(REPOSITORY / "docs").rglob("*.md"), *(REPOSITORY / ".github").rglob("*.md")]
-)
+PAGES = [REPOSITORY / folder / "README.md" for folder in ("", "reports", "policies")]
+PAGES += [REPOSITORY / name for name in ("CONTRIBUTING.md", "CHANGELOG.md")]
+PAGES += sorted([*(REPOSITORY / "docs").rglob("*.md"), *(REPOSITORY / ".github").rglob("*.md")])
 NAMED_FILE = re.compile(r"\b(?:tests|harness|benchmarks)/[\w/.-]*\w+\.(?:py|toml|json|jinja)\b")
 NAMED_TEST = re.compile(r"\b(tests/[\w/]+\.py)::(test_\w+)")
-HISTORY = {"CHANGELOG.md"}  # it names files as they were called at the time
-each_page = pytest.mark.parametrize(
-    "page",
-    [page for page in PAGES if page.name not in HISTORY],
-    ids=lambda page: page.relative_to(REPOSITORY).as_posix(),
-)
-
-
-def named_files(text: str) -> set[str]:
-    """The paths of the repository's Python code, tests and benchmarks in a text."""
-    return set(NAMED_FILE.findall(text))
-
-
-def named_tests(text: str) -> set[tuple[str, str]]:
-    """Files and functions of the tests in a text that are named as `file::function`."""
-    return set(NAMED_TEST.findall(text))
+CODE = re.compile(r"^ *```.*?^ *```|`[^`\n]+`", re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\]\((?![a-z]+:)([^)\s#]*)#?([^)\s]*)\)")
+each_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(REPOSITORY).as_posix())
 
 
 def functions_in(path: Path) -> set[str]:
@@ -39,24 +26,40 @@ def functions_in(path: Path) -> set[str]:
     return {node.name for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
 
 
+def anchors_of(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub and the site make them."""
+    headings = re.findall(r"^#+ (.*)", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading).strip().lower().replace(" ", "-") for heading in headings}
+
+
+def leads_nowhere(page: Path, target: str, anchor: str) -> bool:
+    """Whether a link of a page names no file, or a heading that its page does not have."""
+    there = page.parent / target if target else page
+    return not there.exists() or bool(anchor and anchor not in anchors_of(there))
+
+
 @each_page
 def test_page__every_named_file_exists(page: Path) -> None:
-    named = named_files(page.read_text(encoding="utf-8"))
+    named = set(NAMED_FILE.findall(page.read_text(encoding="utf-8")))
     assert [name for name in sorted(named) if not (REPOSITORY / name).is_file()] == []
 
 
 @each_page
 def test_page__every_named_test_exists(page: Path) -> None:
-    named = named_tests(page.read_text(encoding="utf-8"))
-    missing = [
-        f"{file}::{test}"
-        for file, test in sorted(named)
-        if not (REPOSITORY / file).is_file() or test not in functions_in(REPOSITORY / file)
-    ]
-    assert missing == []
+    named = set(NAMED_TEST.findall(page.read_text(encoding="utf-8")))
+    files = {file: functions_in(REPOSITORY / file) for file, _ in named if (REPOSITORY / file).is_file()}
+    assert [f"{file}::{test}" for file, test in sorted(named) if test not in files.get(file, ())] == []
 
 
-def test_page__names_are_found_in_text() -> None:
-    text = "`tests/game/test_payoff.py::test_terms` and (harness/game/payoff.py), `benchmarks/results.json`."
-    assert named_files(text) == {"tests/game/test_payoff.py", "harness/game/payoff.py", "benchmarks/results.json"}
-    assert named_tests(text) == {("tests/game/test_payoff.py", "test_terms")}
+@each_page
+def test_page__every_link_leads_to_a_file_and_a_heading(page: Path) -> None:
+    links = LINK.findall(CODE.sub("", page.read_text(encoding="utf-8")))
+    assert [link for link in links if leads_nowhere(page, *link)] == []
+
+
+def test_link__to_nothing_is_seen() -> None:
+    page = REPOSITORY / "docs" / "verdicts.md"
+    assert not leads_nowhere(page, "", "the-competence-gate")
+    assert not leads_nowhere(page, "game.md", "the-best-response-gap")
+    assert leads_nowhere(page, "game.md", "no-such-heading")
+    assert leads_nowhere(page, "no_such_page.md", "")

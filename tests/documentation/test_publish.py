@@ -105,7 +105,10 @@ def test_step__is_one_of_three(keys: dict[str, str]) -> None:
 
 def test_steps__name_campaigns_and_scripts_that_exist() -> None:
     steps = publish.read_document(publish.PUBLISHED, publish.Published).step
-    named = [each.campaign or each.command.split()[1] for each in steps if not each.copy_from]
+    commands = [each.command.split() for each in steps if each.command]
+    named = [each.campaign for each in steps if each.campaign] + [
+        file for program, file, *_ in commands if program == "python"
+    ]
     assert [name for name in named if not (REPOSITORY / name).is_file()] == []
     shipped = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "campaigns").glob("*.toml")}
     assert shipped <= set(named)
@@ -119,14 +122,14 @@ def test_documents__every_block_is_of_a_command_that_exists() -> None:
 
 
 def test_documents__show_what_the_stored_tables_hold() -> None:
-    """Blocks of commands that read tables of docs/, which are in the repository; run folders are not, or in parts."""
+    """Blocks of commands that read one file that is in the repository; run folders are not, or in parts."""
     shown = {
         command: block
         for page in publish.DOCUMENTS
         for command, block in output_blocks.blocks_in(page.read_text("utf-8")).items()
-        if command.endswith(".csv") and "reports/" not in command
+        if (REPOSITORY / command.split()[-1]).is_file() and " --out " not in command
     }
-    assert len(shown) >= 3
+    assert len(shown) >= 4
     for command, block in shown.items():
         printed = subprocess.run(
             [sys.executable, *command.split()[1:]], cwd=REPOSITORY, capture_output=True, text=True, check=True
