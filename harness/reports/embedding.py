@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from harness.reports.player_data import FloatArray, RecordedGame, SceneDrawing, Track, key
+from harness.reports.player_data import FloatArray, GameTracks, SceneDrawing, Track, key
 
 SCALES = {
     "x_m": 0.01,
@@ -44,14 +44,14 @@ class Embedded:
     def __init__(
         self,
         scene: SceneDrawing | None,
-        games: Iterable[RecordedGame],
+        games: Iterable[GameTracks],
         marks: Mapping[str, Sequence[Mapping[str, Any]]],
         budget_bytes: int,
         crowds: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ) -> None:
         """`games`, those to watch first at the front, are embedded until the budget is used up; `marks` are the
         manoeuvres to mark in each, by `key`; `crowds` are the personas of each crowd, in the order of its people."""
-        self.games: list[RecordedGame] = []
+        self.games: list[GameTracks] = []
         self._texts: list[str] = []
         size = 0
         for game in games if scene is not None else ():
@@ -79,7 +79,7 @@ class Embedded:
 
 
 def game_text(
-    game: RecordedGame,
+    game: GameTracks,
     marks: Mapping[str, Sequence[Mapping[str, Any]]],
     crowds: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> str:
@@ -117,7 +117,7 @@ def _points(line: FloatArray) -> list[list[float]]:
     return points
 
 
-def _game(game: RecordedGame, marks: Sequence[Mapping[str, Any]], crowd: Sequence[str] = ()) -> dict[str, Any]:
+def _game(game: GameTracks, marks: Sequence[Mapping[str, Any]], crowd: Sequence[str] = ()) -> dict[str, Any]:
     times = [player.time_to_collision_s for player in game.players if player.name == "ego"]
     measured = [float(values[np.isfinite(values)].min()) for values in times if np.isfinite(values).any()]
     return {
@@ -151,7 +151,7 @@ def _persona(player: Track, crowd: Sequence[str]) -> dict[str, str]:
     return {"persona": crowd[int(place) - 1]} if crowd and place.isdecimal() else {}
 
 
-def columns_of(game: RecordedGame) -> list[FloatArray]:
+def columns_of(game: GameTracks) -> list[FloatArray]:
     """A game's columns as whole numbers, track by track."""
     names = list(SCALES)
     tracks: list[tuple[Track, Sequence[str]]] = [(player, names) for player in game.players]

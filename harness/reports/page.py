@@ -27,7 +27,7 @@ from harness.reports.learning import learning
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
 from harness.reports.next_steps import next_steps
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, environment_of, libraries, script
-from harness.reports.player_data import RecordedGame, SceneDrawing, key
+from harness.reports.player_data import GameTracks, SceneDrawing, key
 from harness.reports.provenance import mixed_versions
 from harness.reports.replays import failures, keys, replay_list, worst_game
 from harness.reports.results import Results, results, unplayed
@@ -45,7 +45,7 @@ REPLAYS_SHOWN = 12
 """The rest of the replays is folded away."""
 
 
-def render_page(tables: RunTables, games: Iterable[RecordedGame] = (), scene: SceneDrawing | None = None) -> str:
+def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: SceneDrawing | None = None) -> str:
     """The report as HTML. Equal input gives equal text.
 
     `games`, those to watch first at the front, are embedded until the page is full (`PAGE_BYTES`); without a `scene`

@@ -54,7 +54,7 @@ class Touch:
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordedGame:
+class GameTracks:
     """One game, step 0 to step `steps`."""
 
     arm: str

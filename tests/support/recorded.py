@@ -11,7 +11,7 @@ import pandas as pd
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games
-from harness.reports.player_data import PlayerTrack, RecordedGame, SceneDrawing, Touch, Track
+from harness.reports.player_data import GameTracks, PlayerTrack, SceneDrawing, Touch, Track
 
 STEP_S, STEPS = 0.1, 80
 OUTLINE = np.array([[0, 0], [220, 0], [220, -3.2], [130, -3.2], [100, -6.4], [0, -6.4], [0, 0.0]])
@@ -23,7 +23,7 @@ SCENE = SceneDrawing(
 )
 
 
-def recorded(episodes: pd.DataFrame, background: int = 2) -> Iterator[RecordedGame]:
+def recorded(episodes: pd.DataFrame, background: int = 2) -> Iterator[GameTracks]:
     """A game for each played row of `episodes`, those to watch first at the front."""
     played = episodes[(episodes["error"] == "") & (episodes["ego_outcome"] != "error")]
     chosen = worst_first(choose_games(played))
@@ -33,7 +33,7 @@ def recorded(episodes: pd.DataFrame, background: int = 2) -> Iterator[RecordedGa
             yield recorded_game(row, background)
 
 
-def recorded_game(row: Any, background: int = 2) -> RecordedGame:
+def recorded_game(row: Any, background: int = 2) -> GameTracks:
     """One game with the outcome of its row and so many background vehicles."""
     outcome = row.ego_outcome or row.non_ego_outcome
     random = np.random.default_rng([row.seed, row.episode])
@@ -66,7 +66,7 @@ def recorded_game(row: Any, background: int = 2) -> RecordedGame:
         )
         for n in range(background)
     ]
-    return RecordedGame(
+    return GameTracks(
         arm=row.arm,
         persona=row.persona,
         seed=row.seed,

@@ -19,7 +19,7 @@ from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
 from harness.replay.contact import contacts
 from harness.replay.vehicles import types_of_vehicles
-from harness.reports.player_data import PlayerTrack, RecordedGame, SceneDrawing, Touch, Track
+from harness.reports.player_data import GameTracks, PlayerTrack, SceneDrawing, Touch, Track
 from harness.traffic import drawing
 from harness.traffic.network import read_net
 from harness.traffic.scene import OpenScene
@@ -29,7 +29,7 @@ TAKE_TURNS = 20  # games of an arm and seed in turn, so that a page without room
 
 def recorded_games(
     episodes: pd.DataFrame, arms: Mapping[str, Arm], traces: Callable[[str, int], Path], scene: OpenScene
-) -> Iterator[RecordedGame]:
+) -> Iterator[GameTracks]:
     """Every played game, those to watch first at the front. Each is read when the iterator reaches it.
 
     Games with a replay come first, worst first, in turns of `TAKE_TURNS` per arm and seed. Each is followed by the game
@@ -66,7 +66,7 @@ def _counterparts(arm: Arm | None) -> list[str]:
     return [each.name for each in counterparts(arm)] if arm is not None else []
 
 
-def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedGame:
+def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
     """One game's trace as tracks; `game` is its row of `episodes`."""
     types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
     sizes_m = {name: (kind.length_m, kind.width_m) for name, kind in types.items()}
@@ -90,7 +90,7 @@ def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> RecordedG
                     ended_step=int(ended["step"].iloc[0]) if len(ended) else None,
                 )
             )
-    return RecordedGame(
+    return GameTracks(
         arm=game.arm,
         persona=game.persona,
         seed=int(game.seed),
