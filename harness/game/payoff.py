@@ -107,15 +107,15 @@ def _term_values(
     for term in range(len(form)):
         scale = weight[term] * (step_s if per_second[term] else 1.0)
         for g in range(quantities.shape[1]):
-            value = scale * _unweighted(quantities[row[term], g], form[term], parameter[term])
+            value = scale * unweighted(quantities[row[term], g], form[term], parameter[term])
             values[term, g] = value
             values[-1, g] += value
     return values
 
 
 @compiled
-def _unweighted(value: float, form: int, parameter: float) -> float:
-    """The form of a term, applied to its quantity."""
+def unweighted(value: float, form: int, parameter: float) -> float:
+    """The form of a term, applied to its quantity: the term's value, per second or once, before weight and alpha."""
     if form == Form.BELOW:
         return np.minimum(value / parameter, 1.0) - 1.0
     if form == Form.OVER:

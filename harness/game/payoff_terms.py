@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from math import nan
 
 from harness.game.outcome import Outcome
 
@@ -55,10 +56,19 @@ class Term:
     """The name of the form's parameter, if a persona sets it: a limit in the quantity's unit."""
     outcome: Outcome = Outcome.RUNNING
     """The form's parameter, if it is an outcome."""
+    example: tuple[str, float] = ("", nan)
+    """Of a term without parameter: a moment in words and the quantity in it, from which profiles compute its worth."""
 
 
 def _outcome_term(*, group: str, meaning: str, form: Form, outcome: Outcome) -> Term:
-    return Term(group=group, meaning=meaning, quantity="state.outcome", form=form, outcome=outcome)
+    return Term(
+        group=group,
+        meaning=meaning,
+        quantity="state.outcome",
+        form=form,
+        outcome=outcome,
+        example=("once", float(outcome)),
+    )
 
 
 TERMS: Mapping[str, Term] = {
@@ -106,6 +116,7 @@ TERMS: Mapping[str, Term] = {
         quantity="speed_over_permitted",
         form=Form.OVER,
         per_second=True,
+        example=("at 10 % over", 0.1),
     ),
     "red_light": Term(
         group="safety",
@@ -127,6 +138,7 @@ TERMS: Mapping[str, Term] = {
         quantity="along.wrong_way",
         form=Form.LESS,
         per_second=True,
+        example=("on the wrong side", 1.0),
     ),
     "yield": Term(
         group="safety",
@@ -154,6 +166,7 @@ TERMS: Mapping[str, Term] = {
         meaning="way along the route, per 100 m",
         quantity="advanced_m",
         form=Form.PER_100,
+        example=("for 100 m", 100.0),
     ),
     "speed_under_limit": Term(
         group="operational",
@@ -161,6 +174,7 @@ TERMS: Mapping[str, Term] = {
         quantity="speed_over_permitted",
         form=Form.UNDER,
         per_second=True,
+        example=("at 10 % under", -0.1),
     ),
     "lane_offset": Term(
         group="operational",
@@ -168,6 +182,7 @@ TERMS: Mapping[str, Term] = {
         quantity="lane_offset_m",
         form=Form.LESS,
         per_second=True,
+        example=("at 1 m", 1.0),
     ),
     "acceleration": Term(
         group="operational",
@@ -175,6 +190,7 @@ TERMS: Mapping[str, Term] = {
         quantity="state.acceleration_mps2",
         form=Form.LESS_SQUARED,
         per_second=True,
+        example=("at 5 m/s²", 5.0),
     ),
     "lateral_acceleration": Term(
         group="operational",
@@ -182,6 +198,7 @@ TERMS: Mapping[str, Term] = {
         quantity="lateral_acceleration_mps2",
         form=Form.LESS_SQUARED,
         per_second=True,
+        example=("at 3 m/s²", 3.0),
     ),
     "on_carriageway": Term(
         group="safety",
@@ -189,6 +206,7 @@ TERMS: Mapping[str, Term] = {
         quantity="on_carriageway",
         form=Form.LESS,
         per_second=True,
+        example=("on the carriageway", 1.0),
     ),
     "waiting": Term(
         group="human",
@@ -196,6 +214,7 @@ TERMS: Mapping[str, Term] = {
         quantity="stands",
         form=Form.LESS,
         per_second=True,
+        example=("standing", 1.0),
     ),
     "time_pressure": Term(
         group="human",
@@ -203,5 +222,6 @@ TERMS: Mapping[str, Term] = {
         quantity="state.speed_mps",
         form=Form.ALWAYS,
         per_second=True,
+        example=("always", 0.0),
     ),
 }

@@ -2,48 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
 from harness.config.json_schema import unit_of
 from harness.config.persona import Persona
 from harness.game.arrays import FloatArray
-from harness.game.outcome import Outcome
-from harness.game.payoff import Payoff, Weighted
-from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
+from harness.game.payoff import unweighted
+from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS, Form
 
-EXAMPLES: Mapping[str, tuple[str, str, float]] = {
-    "collision": ("once", "outcome", float(Outcome.COLLISION)),
-    "rail": ("once", "outcome", float(Outcome.RAIL)),
-    "speed_over_limit": ("at 10 % over", "speed_over_permitted", 0.1),
-    "wrong_way": ("on the wrong side", "wrong_way", 1.0),
-    "goal": ("once", "outcome", float(Outcome.GOAL)),
-    "timeout": ("once", "outcome", float(Outcome.TIMEOUT)),
-    "progress": ("for 100 m", "advanced_m", 100.0),
-    "speed_under_limit": ("at 10 % under", "speed_over_permitted", -0.1),
-    "lane_offset": ("at 1 m", "lane_offset_m", 1.0),
-    "acceleration": ("at 5 m/s²", "acceleration_mps2", 5.0),
-    "lateral_acceleration": ("at 3 m/s²", "lateral_acceleration_mps2", 3.0),
-    "time_pressure": ("always", "advanced_m", 0.0),
-    "on_carriageway": ("on the carriageway", "on_carriageway", 1.0),
-    "waiting": ("standing", "stands", 1.0),
-}
-"""An example for each term without a limit: in words, with the quantity that is not as in a calm moment."""
-LIMITED: Mapping[str, str] = {
-    "clearance": "clearance_m",
-    "vehicle_clearance": "vehicle_clearance_m",
-    "time_gap": "time_gap_s",
-    "time_to_collision": "time_to_collision_s",
-    "yield": "entered_before_s",
-    "gap": "gap_s",
-}
-"""The quantity of each term that counts within a limit. In the example it is half of the limit."""
-FROM: Mapping[str, str] = {"red_light": "passed_red_s", "stop_sign": "passed_stop_sign_mps"}
-"""The quantity of each term that counts from a limit on. In the example it is at the limit."""
 POINTS = 401
 """How many evenly spaced inputs a function is evaluated at, besides the points of its sets."""
 
@@ -106,18 +74,13 @@ def term_examples(persona: Persona) -> list[TermExample]:
     found = []
     for each in payoff.terms:
         term = TERMS[each.name]
-        limit, moment, worth = "", "", np.nan
+        limit, (moment, value) = "", term.example
         if each.parameter is not None:
             unit, word = unit_of(term.parameter), term.parameter.split("_")[0]
             limit = f"{word} {each.parameter:g} {unit}"
-            at = each.parameter if each.name in FROM else each.parameter / 2
-            moment = f"at {at:g} {unit}"
-            worth = _in_a_second(payoff, each, {{**FROM, **LIMITED}[each.name]: at})
-        elif each.name in EXAMPLES:
-            moment, quantity, value = EXAMPLES[each.name]
-            worth = _in_a_second(payoff, each, {quantity: value})
-        if term.per_second and moment:
-            moment = f"per second {moment}"
+            value = each.parameter if term.form == Form.FROM else each.parameter / 2
+            moment = f"at {value:g} {unit}"
+        parameter = float(term.outcome if each.parameter is None else each.parameter)
         alpha = payoff.alpha[term.group]
         found.append(
             TermExample(
@@ -127,8 +90,8 @@ def term_examples(persona: Persona) -> list[TermExample]:
                 weight=each.weight,
                 meaning=term.meaning,
                 limit=limit,
-                moment=moment,
-                worth=worth,
+                moment=f"per second {moment}" if term.per_second else moment,
+                worth=alpha * each.weight * unweighted(value, int(term.form), parameter),
             )
         )
     return found
@@ -165,33 +128,3 @@ def payoff_functions(persona: Persona) -> list[PayoffFunction]:
 
 
 _BELOW_ZERO = ("speed_over_limit", "goal_m")  # quantities that can be negative
-
-
-def _in_a_second(payoff: Payoff, term: Weighted, quantities: Mapping[str, float]) -> float:
-    """The payoff of one term in a step of one second. All quantities but these are those of a calm moment."""
-
-    def array(name: str, calm: float) -> FloatArray:
-        return np.array([[quantities.get(name, calm)]])
-
-    far = {name: array(name, np.inf) for name in LIMITED.values()}
-    state: Any = SimpleNamespace(
-        step=np.array([0]),
-        x_m=np.zeros((1, 1)),
-        speed_mps=np.zeros((1, 1)),
-        outcome=array("outcome", float(Outcome.RUNNING)),
-        acceleration_mps2=array("acceleration_mps2", 0.0),
-    )
-    moment: Any = SimpleNamespace(
-        world=SimpleNamespace(step_s=1.0),
-        state=state,
-        advanced_m=array("advanced_m", 0.0),
-        speed_over_permitted=array("speed_over_permitted", 0.0),
-        along=SimpleNamespace(wrong_way=array("wrong_way", 0.0)),
-        rules=SimpleNamespace(**{name: array(name, -1.0) for name in FROM.values()}),
-        on_carriageway=array("on_carriageway", 0.0),
-        stands=array("stands", 0.0),
-        lane_offset_m=array("lane_offset_m", 0.0),
-        lateral_acceleration_mps2=array("lateral_acceleration_mps2", 0.0),
-        **far,
-    )
-    return float(Payoff(alpha=payoff.alpha, terms=(term,), fuzzy={}).evaluate(moment, 0)[term.name][0])
