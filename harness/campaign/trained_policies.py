@@ -109,8 +109,7 @@ def _problems_of(
         yield Problem(str(folder), "stage", message, "give the folder its policy's name")
     name = card.get("persona")
     persona = ego_persona if card.get("player") == ROLES[EGO] else personas.get(str(name))
-    learned_by = card.get("persona_sha256")  # policies of earlier versions have none
-    if persona is not None and learned_by is not None and learned_by != persona_hash(persona):
+    if persona is not None and card.get("persona_sha256") != persona_hash(persona):
         message = f"was learned by {name!r} with another payoff or limits than the campaign's {persona.name!r} has"
         yield Problem(str(folder), "persona_sha256", message, "train it again, or use the persona it was trained with")
 

@@ -40,8 +40,6 @@ class WithFiles(Document):
 
     keys_of_files: ClassVar[tuple[str, ...]] = ()
     """The keys that name one file each."""
-    later_keys: ClassVar[tuple[str, ...]] = ("files",)
-    """Keys that are not hashed at their default: documents without them keep the stages of earlier versions."""
 
     files: list[DocumentPath] = Field([], max_length=1000)
     """Further files that its decisions depend on, relative to this document's folder. When one of them changes, the
@@ -53,16 +51,10 @@ class WithFiles(Document):
         named = {key: getattr(self, key) for key in self.keys_of_files}
         return {key: file for key, file in named.items() if file is not None}
 
-    def hashed(self) -> dict[str, Any]:
-        """What is hashed of the document. Bounds of a search have no effect on decisions."""
-        later = {key for key in self.later_keys if getattr(self, key) == type(self).model_fields[key].get_default()}
-        return self.model_dump(mode="json", exclude={"tunable", *later})
-
 
 class Process(Adjustable, WithFiles):
     """A program in any language that answers observations with controls. The protocol is in docs/egos.md."""
 
-    later_keys: ClassVar[tuple[str, ...]] = ("parameters",)
     parameter_table: ClassVar[str] = "parameters"
 
     kind: Literal["process"]
@@ -128,7 +120,7 @@ class StableBaselines3(WithFiles):
     spaces."""
 
     keys_of_files: ClassVar[tuple[str, ...]] = ("file", "normalize")
-    later_keys: ClassVar[tuple[str, ...]] = ("files", "normalize", "actions")
+
     kind: Literal["stable_baselines3"]
     """The kind of driver, which determines the other keys."""
     file: DocumentPath

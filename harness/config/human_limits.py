@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from pydantic import Field, SerializerFunctionWrapHandler, field_validator, model_serializer, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from harness.config.toml_reading import Document, Interval
 from harness.game.attention import Attention, NoBlindSpotCheck
 from harness.game.human_limits import (
     ALL_NOTICED,
-    PERSISTENCE_S,
     ActuatorShares,
     LookedButFailedToSee,
     Reaction,
@@ -19,16 +16,6 @@ from harness.game.human_limits import (
 )
 
 LONGEST_DELAY_S = 5.0
-LATER = (
-    "looked_but_failed_to_see_share",
-    "noticed_within_m",
-    "range_m",
-    "opening_deg",
-    "distance_error",
-    "closing_error_per_s",
-    "error_correlation_time_s",
-)
-"""Keys of `Perception` that were added later."""
 
 
 class AttentionLapses(Document):
@@ -39,9 +26,9 @@ class AttentionLapses(Document):
     lapse_s: Interval
     """Range of the length of a lapse (uniform distribution). In a lapse the policy's actions are omitted: pedals and
     wheel are released."""
-    crown_steering_rad: float = Field(0.0, ge=0.0, le=0.1, serialization_alias="crown_rad")
+    crown_steering_rad: float = Field(0.0, ge=0.0, le=0.1)
     """Steering angle, to the right, that the crown of the road gives to a released wheel."""
-    bump_steering_sd_rad: float = Field(0.0, ge=0.0, le=0.1, serialization_alias="bumps_rad")
+    bump_steering_sd_rad: float = Field(0.0, ge=0.0, le=0.1)
     """Standard deviation, from lapse to lapse, of the steering angle that bumps and the car's own pull add to it."""
 
     @field_validator("lapse_s")
@@ -87,12 +74,12 @@ class Perception(Document):
     learning: they do not apply in the training of the person, because a car that is not seen and does no harm teaches
     nothing. How far and how exactly a person sees is a limit of the body, and applies in training as well."""
 
-    no_blind_spot_check_share: float = Field(0.0, ge=0.0, le=1.0, serialization_alias="overlooks_share")
+    no_blind_spot_check_share: float = Field(0.0, ge=0.0, le=1.0)
     """Share of the drives in which the person does not look into the mirrors and over the shoulder."""
-    unseen_behind_m: float = Field(0.0, ge=-20.0, le=100.0, serialization_alias="overlooked_up_to_m")
+    unseen_behind_m: float = Field(0.0, ge=-20.0, le=100.0)
     """In such a drive, a car is not seen if its centre is less than this far ahead of the centre of the person's own
     car."""
-    looked_but_failed_to_see_share: float = Field(0.0, ge=0.0, le=1.0, serialization_alias="misses_share")
+    looked_but_failed_to_see_share: float = Field(0.0, ge=0.0, le=1.0)
     """Share of the drives in which the person looks but fails to see: other cars are noticed only when they are
     near."""
     noticed_within_m: float | None = Field(None, gt=0.0, le=100.0)
@@ -107,8 +94,6 @@ class Perception(Document):
     10 %."""
     closing_error_per_s: float = Field(0.0, ge=0.0, le=1.0)
     """Error in the estimated closing speed of other cars: standard deviation, per distance. 0.01 is 0.3 m/s at 30 m."""
-    error_correlation_time_s: float = Field(PERSISTENCE_S, gt=0.0, le=3600.0, serialization_alias="error_s")
-    """How long such an error lasts (correlation time)."""
 
     @model_validator(mode="after")
     def _nothing_is_ignored(self) -> Perception:
@@ -118,19 +103,7 @@ class Perception(Document):
             raise ValueError(
                 "noticed_within_m has no effect without looked_but_failed_to_see_share: add the share of the drives"
             )
-        has_error = self.distance_error or self.closing_error_per_s
-        if "error_correlation_time_s" in self.model_fields_set and not has_error:
-            raise ValueError(
-                "error_correlation_time_s has no effect without distance_error or closing_error_per_s: add one of them"
-            )
         return self
-
-    @model_serializer(mode="wrap")
-    def _without_unused_later_keys(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out keys of later versions that have their default: stages of personas without them keep their keys."""
-        unused = {name for name in LATER if getattr(self, name) == Perception.model_fields[name].default}
-        aliases = {Perception.model_fields[name].serialization_alias for name in unused}
-        return {key: value for key, value in dump(self).items() if key not in unused | aliases}
 
     @property
     def no_blind_spot_check(self) -> NoBlindSpotCheck:
@@ -152,7 +125,6 @@ class Perception(Document):
             opening_rad=np.inf if self.opening_deg is None else np.deg2rad(self.opening_deg),
             distance_error=self.distance_error,
             closing_error_per_s=self.closing_error_per_s,
-            error_s=self.error_correlation_time_s,
         )
 
 

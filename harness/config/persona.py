@@ -3,18 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import (
-    Discriminator,
-    Field,
-    SerializerFunctionWrapHandler,
-    Tag,
-    field_validator,
-    model_serializer,
-    model_validator,
-)
+from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 
 from harness.config.human_limits import AttentionLapses, CarUse, Perception, ReactionTime
 from harness.config.scene import Name
@@ -204,15 +196,6 @@ class Persona(Document):
             elif not _has_limit(value, limit := TERMS[name].parameter):
                 remedy = f"{{ weight = ..., {limit} = ... }}" if limit else "a plain weight"
                 yield key, "has the wrong form", f"give {remedy}"
-
-    @model_serializer(mode="wrap")
-    def _without_unused_later_tables(self, dump: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave out tables of later versions that are not used: stages of personas without them keep their keys."""
-        document: dict[str, Any] = dump(self)
-        for table in ("reaction", "actuators"):
-            if document.get(table, 0) is None:
-                del document[table]
-        return document
 
     @property
     def payoff(self) -> Payoff:

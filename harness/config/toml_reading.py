@@ -6,7 +6,7 @@ import difflib
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
@@ -23,21 +23,11 @@ else:  # pragma: no cover
 
 
 class Document(BaseModel):
-    """A frozen record that knows all its keys: an unknown one is an error.
-
-    A key that has been renamed has its earlier name as `serialization_alias`. A TOML file with the earlier name is
-    refused, and the remedy is the present name. A record of a run may have either name.
-    """
+    """A frozen record that knows all its keys: an unknown one is an error."""
 
     model_config = ConfigDict(
         frozen=True, extra="forbid", strict=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
-
-    @classmethod
-    def renamed_keys(cls) -> dict[str, str]:
-        """The earlier names of keys, each with the present name."""
-        fields = cls.model_fields.items()
-        return {field.serialization_alias: name for name, field in fields if field.serialization_alias is not None}
 
     @classmethod
     def named_location(cls, location: list[Any]) -> list[Any]:
@@ -46,16 +36,12 @@ class Document(BaseModel):
 
     @classmethod
     def from_record(cls, record: object) -> Self:
-        """A document as a run folder records it; earlier names of keys are read as the present ones.
+        """A document from its JSON values, as a run folder records it. Raises pydantic's ValidationError."""
+        return cls.model_validate(record, strict=False)
 
-        Raises pydantic's ValidationError.
-        """
-        present = _with_present_keys(cls, record) if isinstance(record, Mapping) else record
-        return cls.model_validate(present, strict=False)
-
-    def identity(self) -> dict[str, Any]:
-        """The document as JSON values under the earlier names of its keys: hashes of it outlast a renaming."""
-        return self.model_dump(mode="json", by_alias=True)
+    def record(self) -> dict[str, Any]:
+        """The document as JSON values, every key with its value: what a run folder records, and what is hashed."""
+        return self.model_dump(mode="json")
 
 
 def _ordered(interval: tuple[float, float]) -> tuple[float, float]:
@@ -142,7 +128,10 @@ def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Proble
     key = ".".join(f"[{part}]" if isinstance(part, int) else str(part) for part in named).replace(".[", "[")
     cause = error.get("ctx", {}).get("error")
     if error["type"] == "extra_forbidden":
-        yield _unknown_key(path, key, str(location[-1]), _model_at(model, location[:-1]))
+        table = _model_at(model, location[:-1])
+        yield Problem(
+            str(path), key, "unknown key", nearest(str(location[-1]), table.model_fields if table is not None else ())
+        )
     elif error["type"] == "missing":
         yield Problem(str(path), key, "is missing", "add it")
     elif isinstance(cause, Mistakes):
@@ -164,13 +153,6 @@ def _lower(message: str) -> str:
     return message[0].lower() + message[1:]
 
 
-def _unknown_key(path: Path, key: str, name: str, model: type[BaseModel] | None) -> Problem:
-    present = model.renamed_keys().get(name) if model is not None and issubclass(model, Document) else None
-    if present is not None:
-        return Problem(str(path), key, "is the earlier name of a key", f"rename it to {present}")
-    return Problem(str(path), key, "unknown key", nearest(name, model.model_fields if model is not None else ()))
-
-
 def _model_at(model: type[BaseModel], location: list[Any]) -> type[BaseModel] | None:
     """The model of the table at a location; None where there is none."""
     table: Any = model
@@ -180,22 +162,6 @@ def _model_at(model: type[BaseModel], location: list[Any]) -> type[BaseModel] | 
         field = table.model_fields.get(part)
         table = _model_in(field.annotation) if field else table  # no field: a key of a table with free keys
     return table if hasattr(table, "model_fields") else None
-
-
-def _with_present_keys(model: type[BaseModel], table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table of a record with the present names of all keys, at every depth."""
-    renamed = model.renamed_keys() if issubclass(model, Document) else {}
-    result: dict[str, Any] = {}
-    for key, value in table.items():
-        name = renamed.get(key, key)
-        field = model.model_fields.get(name)
-        inner = _model_in(field.annotation) if field else None
-        if inner is not None and isinstance(value, dict):
-            value = _with_present_keys(inner, value)
-        elif inner is not None and isinstance(value, list):
-            value = [_with_present_keys(inner, each) if isinstance(each, dict) else each for each in value]
-        result[name if name not in table else key] = value
-    return result
 
 
 def _model_in(annotation: Any) -> Any:

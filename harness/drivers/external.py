@@ -97,12 +97,8 @@ class ExternalDriver:
         """Everything its decisions depend on. It is hashed into the keys of stages."""
         if self.document is None:
             return self.files[str(policy_files(self.place)[1])]
-        if isinstance(self.document, WithFiles):
-            document = self.document.hashed()
-        else:  # bounds of a search have no effect on decisions
-            document = self.document.model_dump(mode="json", exclude={"tunable"})
-        if isinstance(self.document, Process):  # the files are hashed, so their place has no effect
-            del document["folder"]
+        # Bounds of a search have no effect on decisions, nor has the place of a program: its files are hashed.
+        document = self.document.model_dump(mode="json", exclude={"tunable", "folder"})
         return {"document": document, "files": list(self.files.values()), "package": dict(self.package)}
 
     @property
@@ -112,7 +108,7 @@ class ExternalDriver:
             "driver": self.written,
             "kind": self.kind,
             "in_words": self.in_words,
-            "document": self.document.model_dump(mode="json") if self.document is not None else None,
+            "document": self.document.record() if self.document is not None else None,
             "files": {os.path.relpath(file, self.place): value for file, value in self.files.items()},
             "package": dict(self.package),
         }

@@ -75,7 +75,7 @@ def write_policy(policy: Policy, folder: Path) -> None:
 
 def persona_hash(persona: Persona) -> str:
     """SHA-256 of what a policy learns by: the persona's document without its name, description and sources."""
-    learned_by = {key: value for key, value in persona.identity().items() if key not in _NOT_LEARNED_BY}
+    learned_by = {key: value for key, value in persona.record().items() if key not in _NOT_LEARNED_BY}
     return hashlib.sha256(json.dumps(learned_by, sort_keys=True).encode()).hexdigest()
 
 

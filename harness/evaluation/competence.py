@@ -98,7 +98,7 @@ def broken_by(record: Mapping[str, Any]) -> str:
 
 
 def _at_least(games: pd.DataFrame, column: str, least: float) -> Any:
-    """Which games have at least this in a column; none, in runs of earlier versions without the column."""
+    """Which games have at least this in a column; none, if the table has no such column."""
     return games[column].fillna(0.0) >= least if column in games else False
 
 

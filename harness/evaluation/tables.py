@@ -60,7 +60,7 @@ several people, those of the non-ego occur for each of them (`people.columns_for
 EPISODE_COLUMNS = {name: dtype for name, dtype in PLAYED_COLUMNS.items() if name != "error"}
 EPISODE_COLUMNS |= {**SEVERITY_COLUMNS, "error": PLAYED_COLUMNS["error"]}
 """Columns of `episodes.csv`: those of the records, and what the traces tell besides. `columns.EPISODES` describes each
-of them. A file without the columns of severity is that of an earlier version."""
+of them."""
 
 SEVERITY_TABLE = {name: PLAYED_COLUMNS[name] for name in ("arm", "seed", "episode")} | dict(SEVERITY_COLUMNS)
 """Columns of a stage's table of severity."""
@@ -114,9 +114,6 @@ SUMMARY_COLUMNS = {
 }
 """Columns of `summary.csv`."""
 
-EARLIER_SUMMARY_COLUMNS = {name: dtype for name, dtype in SUMMARY_COLUMNS.items() if not name.startswith("near_miss")}
-"""Of a run of an earlier version, whose games have no near misses."""
-
 TRAINING_COLUMNS = {
     "stage": "object",
     "persona": "object",
@@ -168,7 +165,6 @@ TABLES = {
     "severity": SEVERITY_TABLE,
     "causes": CAUSE_COLUMNS,
     "summary": SUMMARY_COLUMNS,
-    "summary of an earlier version": EARLIER_SUMMARY_COLUMNS,
     "comparisons": COMPARISON_COLUMNS,
     "training": TRAINING_COLUMNS,
     "manoeuvres": MANOEUVRE_COLUMNS,

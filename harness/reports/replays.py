@@ -111,7 +111,7 @@ def _with(game: Mapping[Any, Any]) -> str:
 
 
 def _impact(game: Mapping[Any, Any]) -> str:
-    """How hard a contact of the ego was, and on which side; empty without one, and in a run of an earlier version."""
+    """How hard a contact of the ego was, and on which side; empty without one."""
     speed = game.get("closing_speed_mps", math.nan)
     if speed != speed:
         return ""

@@ -9,7 +9,7 @@ from harness.errors import UsageError
 from harness.reports.embedding import json_text
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE
 
-EARLIER = "is a page of an earlier version"
+NOT_SERVED = "is not a page that this version wrote"
 WRITE_ANEW = "harness report {run}"
 
 Entry = Sequence[Any]
@@ -19,10 +19,10 @@ Entry = Sequence[Any]
 def served_page(page: str, games: Sequence[Entry], run: str) -> str:
     """The page with a list of games that it may fetch from its own server as `games/KEY.json`.
 
-    Raises UsageError for a page of an earlier version; `run` is the folder that the message names.
+    Raises UsageError for a page that another version wrote; `run` is the folder that the message names.
     """
     empty = ELSEWHERE.format("[]")
     if CONTENT_POLICY not in page or empty not in page:
-        raise UsageError.of("report.html", run, EARLIER, WRITE_ANEW.format(run=run))
+        raise UsageError.of("report.html", run, NOT_SERVED, WRITE_ANEW.format(run=run))
     page = page.replace(CONTENT_POLICY, f"{CONTENT_POLICY}; connect-src 'self'", 1)
     return page.replace(empty, ELSEWHERE.format(json_text(games)), 1)

@@ -62,12 +62,11 @@ def test_policies__of_another_ego_persona_are_refused_one_by_one(tmp_path: Path,
     assert [Path(each.file).name for each in problems] == ["naive-seed1", "retrained_anna-seed1"]
 
 
-def test_policies__without_a_hash_are_read(tmp_path: Path, anna: Path) -> None:
-    """Policies of earlier versions have none."""
+def test_policies__without_a_hash_are_refused(tmp_path: Path, anna: Path) -> None:
     campaign = campaign_with_policies(tmp_path, anna)
-    write_persona(tmp_path, "anna", goal=2.5)
-    write_policy(Policy(some_policy().tensors, {"stage": "anna-seed1"}), tmp_path / "policies" / "anna-seed1")
-    assert open_campaign(campaign).policies is not None
+    card = {"stage": "anna-seed1", "player": "non_ego", "persona": "anna"}
+    write_policy(Policy(some_policy().tensors, card), tmp_path / "policies" / "anna-seed1")
+    assert [each.key for each in problems_of(campaign)] == ["persona_sha256"]
 
 
 def test_persona_hash__leaves_out_what_nothing_is_learned_by(anna: Path) -> None:

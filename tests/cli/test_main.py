@@ -18,7 +18,6 @@ from harness.campaign.preflight import open_campaign
 from harness.cli import main as cli
 from harness.cli import wording
 from harness.cli.main import INTERRUPTED, app
-from harness.config.persona import Persona
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import FAILURES
@@ -313,23 +312,6 @@ def test_report__needs_only_the_folder_even_after_a_move(tmp_path: Path, run_com
     assert (moved / "report.html").read_bytes() == (learned_run() / "report.html").read_bytes()
     replays = [{each.name for each in (run / "replays").iterdir()} for run in (moved, learned_run())]
     assert replays[0] == replays[1]
-
-
-def test_report__reads_a_run_folder_with_earlier_names_of_keys(
-    tmp_path: Path, run_command: Callable[..., Result]
-) -> None:
-    run = shutil.copytree(learned_run(), tmp_path / "run")
-    manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
-    documents = manifest["persona_documents"]
-    earlier = {name: Persona.from_record(document).identity() for name, document in documents.items()}
-    assert "overlooks_share" in earlier["speedy"]["perception"]
-    assert "overlooks_share" not in documents["speedy"]["perception"]
-    (run / "manifest.json").write_text(json.dumps({**manifest, "persona_documents": earlier}), encoding="utf-8")
-    card = Path("policies", "speedy-seed1", "README.md")
-    (run / card).unlink()
-    result = run_command("report", run)
-    assert result.code == 0, result.err
-    assert (run / card).read_bytes() == (learned_run() / card).read_bytes()
 
 
 @pytest.mark.parametrize(("bound", "code", "word"), [(1.0, 0, "PASS"), (0.0, NOT_ACCEPTED, "FAIL")])

@@ -9,7 +9,6 @@ import pytest
 from pydantic import ValidationError
 
 from harness.config.campaign import Campaign, resolve
-from harness.config.human_limits import AttentionLapses, Perception
 from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import Document, nearest, read_document
@@ -246,81 +245,21 @@ def test_document__is_frozen(write: Write) -> None:
         read_document(write(SCENE), Scene).ego.lane = "b"
 
 
-def test_persona__without_later_limits_is_dumped_without_them(write: Write) -> None:
-    """The keys of stages, and a manifest, contain this dump."""
-    plain = read_document(write(PERSONA), Persona).model_dump(mode="json")
-    assert {"reaction", "actuators"}.isdisjoint(plain)
-    assert plain["perception"] is None
-    perception = "[perception]\nno_blind_spot_check_share = 0.5\n"
-    written = read_document(write(PERSONA + perception), Persona).model_dump(mode="json")
-    assert written["perception"] == {"no_blind_spot_check_share": 0.5, "unseen_behind_m": 0.0}
-
-
 def test_persona__limits_survive_a_round_trip(write: Write) -> None:
     limits = (
-        "[perception]\nrange_m = 50.0\ndistance_error = 0.1\nerror_correlation_time_s = 5.0\n"
+        "[perception]\nrange_m = 50.0\ndistance_error = 0.1\n"
         "[reaction]\ndelay_s = [0.2, 0.3]\n[actuators]\nbraking_share = 0.5\n"
     )
     person = read_document(write(PERSONA + limits), Persona)
     written = person.model_dump(mode="json")
     assert Persona.model_validate(written, strict=False) == person
-    assert person.human_factors.sight == Sight(range_m=50.0, distance_error=0.1, error_s=5.0)
+    assert person.human_factors.sight == Sight(range_m=50.0, distance_error=0.1)
     assert person.human_factors.reaction == Reaction(delay_s=(0.2, 0.3))
     assert person.human_factors.actuator_shares == ActuatorShares(braking=0.5)
     assert (
         person.human_factors.looked_but_failed_to_see
         is read_document(write(PERSONA), Persona).human_factors.looked_but_failed_to_see
     )
-
-
-# --- renamed keys -----------------------------------------------------------------------------------------------------
-
-RENAMED = [(model, *names) for model in (AttentionLapses, Perception) for names in model.renamed_keys().items()]
-
-
-def test_renamed_keys__are_those_of_the_persona() -> None:
-    assert {earlier: present for _, earlier, present in RENAMED} == {
-        "crown_rad": "crown_steering_rad",
-        "bumps_rad": "bump_steering_sd_rad",
-        "overlooks_share": "no_blind_spot_check_share",
-        "overlooked_up_to_m": "unseen_behind_m",
-        "misses_share": "looked_but_failed_to_see_share",
-        "error_s": "error_correlation_time_s",
-    }
-
-
-@pytest.mark.parametrize(("model", "earlier", "present"), RENAMED)
-def test_renamed_key__is_refused_with_the_present_name(
-    write: Write, model: type[Document], earlier: str, present: str
-) -> None:
-    table = "perception" if model is Perception else "attention"
-    required = "" if model is Perception else "mean_attentive_s = 5.0\nlapse_s = [1.0, 2.0]\n"
-    key, message = only(write(f"{PERSONA}[{table}]\n{required}{earlier} = 0.05\n"), Persona)
-    assert key == f"{table}.{earlier}"
-    assert message == f"is the earlier name of a key (rename it to {present})"
-
-
-@pytest.mark.parametrize("name", ["distracted", "impaired", "late_merger"])
-def test_renamed_keys__records_with_either_name_are_read(repository: Path, name: str) -> None:
-    persona = read_document(repository / "personas" / f"{name}.toml", Persona)
-    identity, dump = persona.identity(), persona.model_dump(mode="json")
-    assert identity != dump
-    assert Persona.from_record(identity) == Persona.from_record(dump) == persona
-
-
-def test_identity__has_the_earlier_names(write: Write) -> None:
-    limits = (
-        "[attention]\nmean_attentive_s = 5.0\nlapse_s = [1.0, 2.0]\n"
-        "[perception]\nlooked_but_failed_to_see_share = 0.1\nnoticed_within_m = 8.0\n"
-    )
-    identity = read_document(write(PERSONA + limits), Persona).identity()
-    assert set(identity["attention"]) == {"mean_attentive_s", "lapse_s", "crown_rad", "bumps_rad"}
-    assert identity["perception"] == {
-        "overlooks_share": 0.0,
-        "overlooked_up_to_m": 0.0,
-        "misses_share": 0.1,
-        "noticed_within_m": 8.0,
-    }
 
 
 def test_from_record__refuses_what_is_no_persona() -> None:

@@ -144,22 +144,6 @@ def test_find__files_of_every_kind_are_relative_to_the_document_and_hashed(
     )
 
 
-@pytest.mark.parametrize(
-    ("text", "keys"),
-    [
-        ('kind = "fmu"\nfile = "mine.toml"', "deadline_s file inputs kind outputs start start_deadline_s"),
-        ('kind = "stable_baselines3"\nfile = "mine.toml"\nalgorithm = "PPO"', "algorithm file kind"),
-        ('kind = "python"\nentry_point = "steady"', "entry_point kind parameters"),
-    ],
-)
-def test_find__a_document_without_later_keys_keeps_its_identity(
-    text: str, keys: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    install(tmp_path / "site")
-    monkeypatch.syspath_prepend(tmp_path / "site")
-    assert sorted(find(document(tmp_path, text), tmp_path).identity["document"]) == keys.split()
-
-
 def test_find__a_parameter_that_is_the_path_of_a_file_is_hashed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -158,7 +158,6 @@ PERSONAS = [
             for line, said in {
                 "looked_but_failed_to_see_share = 0.5": ("perception", "noticed_within_m"),
                 "noticed_within_m = 5.0": ("perception", "looked_but_failed_to_see_share"),
-                "error_correlation_time_s = 5.0": ("perception", "distance_error"),
                 "range_m = 0.0": ("perception.range_m",),
                 "rnge_m = 5.0": ("perception.rnge_m", "'range_m'"),
                 "distance_error = -0.1": ("perception.distance_error",),

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import pickle
@@ -59,6 +60,18 @@ def lacking(*keys: str) -> Spoil:
         del document[keys[-1]]
 
     return manifest(change)
+
+
+def sealed(spoil: Spoil) -> Spoil:
+    """A scene whose hashes in the manifest fit it again: who changes a file on purpose can change those as well."""
+
+    def both(project: Path) -> None:
+        spoil(project)
+        files = [file for file in (project / "run/scene").iterdir() if file.is_file()]
+        hashes = {f"scene/{file.name}": hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+        holding("hashes", value=hashes)(project)
+
+    return both
 
 
 def renamed(stage: str) -> Spoil:
@@ -212,7 +225,7 @@ RUNS = [
         )
     ),
     *(
-        Bad(f"{command[0]}: the run's scene: {way}", spoil, words, command)
+        Bad(f"{command[0]}: the run's scene: {way}", sealed(spoil), words, command)
         for command in (REPORT, GAME)
         for way, spoil, words in (
             ("an entity", edit(NET, "<net ", '<!DOCTYPE n [<!ENTITY x SYSTEM "file:///etc/hostname">]><net '), ("merge.net.xml", "entities")),

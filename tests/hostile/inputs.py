@@ -288,9 +288,6 @@ def _build_run(folder: Path) -> None:
     run = shutil.copytree(sumo_run(), folder / "run", ignore=unread)
     for seal in run.glob(".stages/*/done.json"):
         seal.write_text(json.dumps({**json.loads(seal.read_text(encoding="utf-8")), "files": {}}), encoding="utf-8")
-    manifest = json.loads((run / "manifest.json").read_text(encoding="utf-8"))
-    del manifest["hashes"]
-    (run / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
     write_results(RunFolder(run), Console(quiet=True))  # its record of what the results were made from fits again
 
 

@@ -20,8 +20,8 @@ from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.results.kept_results import RunResult, kept_result
 from harness.campaign.storage.learned import Entries, did_not_learn, judged, recorded_goals
-from harness.campaign.storage.manifest import FINISHED
-from harness.campaign.storage.run_folder import FORMAT, RunFolder
+from harness.campaign.storage.manifest import FINISHED, FORMAT
+from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.run_log import LOGGER
 from harness.campaign.storage.versions import versions, versions_of_numbers
 from harness.errors import plain
@@ -116,9 +116,9 @@ class _ManifestKeeper:
             "quick": campaign.quick,
             "campaign": campaign.document.recorded(),
             "personas": [persona.name for persona in campaign.personas],
-            "ego_persona": campaign.ego_persona.model_dump(mode="json"),
+            "ego_persona": campaign.ego_persona.record(),
             "ego_driver": campaign.ego_driver.recorded if campaign.ego_driver is not None else None,
-            "persona_documents": {each.name: each.model_dump(mode="json") for each in campaign.personas},
+            "persona_documents": {each.name: each.record() for each in campaign.personas},
             "seeds": list(campaign.document.seeds),
             "hashes": dict(campaign.hashes),
             "versions": versions(),

@@ -62,16 +62,15 @@ class RunPlayers:
         self._folder, self._ego = folder, driver
         document = Campaign.model_validate(manifest["campaign"], strict=False)
         self._stages = plan(document, manifest["personas"], is_tuned(manifest))
-        records = manifest.get("persona_documents", {})
         self._context = RunContext(
             folder=folder.path,
             scene_folder=folder.scene,
             document=document,
             ego_persona=Persona.from_record(manifest["ego_persona"]),
-            personas={name: Persona.from_record(each) for name, each in records.items()},
+            personas={name: Persona.from_record(each) for name, each in manifest["persona_documents"].items()},
             ego_driver=driver,
             other_egos={},
-            policies=policies or policies_of_run(folder.path, document.policies, manifest.get("hashes", {})),
+            policies=policies or policies_of_run(folder.path, document.policies, manifest["hashes"]),
             keys={},
         )
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from harness.campaign.results.kept_results import RunResult
-from harness.campaign.storage.manifest import FINISHED
+from harness.campaign.storage.manifest import FINISHED, FORMAT
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.evaluation.acceptance import Check, Evidence, judge, worst_of_each
@@ -18,8 +18,6 @@ from harness.reports.acceptance_wording import TITLES, Line, line
 from harness.reports.numbers import NO_SPACE
 
 RESULT, JUNIT = "result.json", "junit.xml"
-RESULT_FORMAT = 1
-"""Version of the keys of result.json."""
 
 
 def checks_of(campaign: Campaign, personas: Sequence[str], evidence: Evidence) -> list[Check] | None:
@@ -44,11 +42,11 @@ def write_ci_files(
     folder: RunFolder, manifest: Mapping[str, Any], checks: Sequence[Check] | None, result: RunResult
 ) -> None:
     """Write `result.json` and `junit.xml`: the acceptance checks, and whether every stage was carried out."""
-    properties = {"harness": str(manifest.get("versions", {}).get("harness", "")), "campaign": manifest["name"]}
+    properties = {"harness": str(manifest["versions"].get("harness", "")), "campaign": manifest["name"]}
     cases = [*map(_acceptance_case, checks or ()), *_stage_cases(manifest)]
     junit.write_junit(folder.path / JUNIT, f"harness campaign {manifest['name']}", cases, properties)
     document = {
-        "format": RESULT_FORMAT,
+        "format": FORMAT,
         "campaign": manifest["name"],
         "quick": manifest["quick"],
         "accepted": result.accepted,
@@ -61,7 +59,7 @@ def write_ci_files(
         "failed_stages": list(result.failed_stages),
         "did_not_learn": list(result.did_not_learn),
         "error_games": result.error_games,
-        "versions": manifest.get("versions", {}),
+        "versions": manifest["versions"],
     }
     text = json.dumps(document, indent=1, ensure_ascii=False)
     write_atomically(folder.path / RESULT, (text + "\n").encode("utf-8", errors="backslashreplace"))

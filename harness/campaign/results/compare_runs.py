@@ -34,7 +34,7 @@ def compare_runs(before: Path, after: Path, page: Path) -> RunComparison:
     games = [read_csv(run / "episodes.csv") for run in (before, after)]
     scenes = [_scene(manifest) for manifest in manifests]
     same_scene = bool(scenes[0]) and scenes[0] == scenes[1]
-    significance = manifests[1]["campaign"].get("assessment", {}).get("significance", 0.01)
+    significance = manifests[1]["campaign"]["assessment"]["significance"]
     rows = compared_rows(differences_of(games[0], games[1], same_scene), significance)
     runs = [ComparedRun(name=str(run), manifest=each) for run, each in zip((before, after), manifests, strict=True)]
     text = render_comparison(runs[0], runs[1], rows, same_scene=same_scene, significance=significance)
@@ -44,9 +44,9 @@ def compare_runs(before: Path, after: Path, page: Path) -> RunComparison:
 
 def _scene(manifest: Mapping[str, Any]) -> dict[str, str]:
     """The hashes of the files of the run's scene."""
-    scene = posixpath.basename(posixpath.normpath(manifest["campaign"].get("scene", "")))
+    scene = posixpath.basename(posixpath.normpath(manifest["campaign"]["scene"]))
     return {
         posixpath.basename(name): digest
-        for name, digest in manifest.get("hashes", {}).items()
+        for name, digest in manifest["hashes"].items()
         if posixpath.basename(posixpath.dirname(name)) == scene
     }

@@ -72,7 +72,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
         intro=_intro(entry, policy["against"], is_ego),
         campaign=manifest["name"],
         version=versions["harness"],
-        quick=manifest.get("quick"),
+        quick=manifest["quick"],
         not_learned=stopped(entry) if entry["stopped"] == DID_NOT_LEARN else "",
         facts=list(_facts(entry, manifest, policy, persona)),
         persona=persona,
@@ -174,7 +174,7 @@ def _sight(perception: Perception) -> Iterator[tuple[str, str]]:
     if perception.distance_error or perception.closing_error_per_s:
         distances = f"distances by {percent(perception.distance_error)}"
         closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance per second"
-        yield "errors of perception", f"{distances}, {closing}, for {perception.error_correlation_time_s:g} s"
+        yield "errors of perception", f"{distances}, {closing}, for {perception.sight.error_s:g} s"
 
 
 def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:

@@ -26,12 +26,8 @@ class _PolicyCard(Document):
 
 
 def trained_policies(folder: RunFolder, manifest: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """The content of the policy.json of every policy that a run trained, by stage.
-
-    Empty for a run of an older version without cards. Raises UsageError where a file is damaged.
-    """
-    if "persona_documents" not in manifest:
-        return {}
+    """The content of the policy.json of every policy that a run trained, by stage. Raises UsageError where a file is
+    damaged."""
     return {
         stage: _policy_card(folder.policy(stage))
         for stage, entry in manifest["stages"].items()

@@ -1,26 +1,37 @@
-"""The manifest of a run folder: the parts that other modules rely on, checked like any file from outside."""
+"""The manifest of a run folder, checked like any file from outside: every part that other modules rely on."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError, model_validator
 
+from harness.campaign.plan.stages import stage_id
 from harness.config.campaign import Campaign, CampaignName, Seed
 from harness.config.persona import Persona
 from harness.config.scene import Name
 from harness.config.toml_reading import Document
+from harness.errors import UsageError
+
+FORMAT = 1
+"""Of run folders. It is raised when a file of a run folder gets another form, or the same inputs give other numbers: a
+run folder of another format is neither read nor continued."""
+RUN_AGAIN = "run the campaign again into another folder, with --out"
 
 Count = Annotated[int, Field(ge=0, le=10**15)]
 Text = Annotated[str, Field(max_length=10_000)]
 _MOST_LISTED = 3
+_STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
 FINISHED = ("done", "settled")
 """Statuses of a finished stage; `settled`: an approximate equilibrium left nothing to do."""
 
 
 class _Record(Document):
-    model_config = ConfigDict(extra="ignore")  # a later version of the same format may have more keys
+    model_config = ConfigDict(extra="ignore")  # a stage may note more
 
 
 class StageEntry(_Record):
@@ -54,61 +65,57 @@ class StageEntry(_Record):
     """Of a training: the least share of these games for its player to have learned."""
 
 
+class _Format(_Record):
+    format: int
+
+
 class Manifest(_Record):
     """The content of a manifest."""
 
     format: int
     name: CampaignName
-    file: Text = ""
-    """The name of the campaign's file; empty in runs of earlier versions."""
-    quick: bool = False
-    campaign: dict[str, Any]
+    file: Text
+    """The name of the campaign's file."""
+    quick: bool
+    campaign: Campaign
     personas: list[Name]
     seeds: list[Seed] = Field(min_length=1)
-    hashes: dict[Text, Text] = Field(default_factory=dict)
-    versions: dict[Text, Text] = Field(default_factory=dict)
+    hashes: dict[Text, Text]
+    versions: dict[Text, Text]
     stages: dict[Text, StageEntry]
-    ego_persona: dict[str, Any] | None = None
-    persona_documents: dict[Name, dict[str, Any]] = Field(default_factory=dict)
+    ego_persona: Persona
+    persona_documents: dict[Name, Persona]
+
+    @model_validator(mode="after")
+    def _is_consistent(self) -> Manifest:
+        """The names of stages become names of files; reports and model cards rely on the rest."""
+        problems = [] if "harness" in self.versions else ["versions.harness: is missing"]
+        people = {"", *self.persona_documents, *self.campaign.mixed_people}
+        for name, entry in self.stages.items():
+            if name != stage_id(entry.name, entry.seed) or not _STAGE.fullmatch(name):
+                problems.append(f"{name!r} is no stage")
+            if entry.persona not in people:
+                problems.append(f"stages.{name}.persona: there is no document of persona {entry.persona!r}")
+            if entry.kind == "training" and entry.status == "done":
+                unsaid = [key for key in ("steps", "budget_steps", "stopped") if getattr(entry, key) is None]
+                problems += [f"stages.{name}.{key}: is missing" for key in unsaid]
+        if problems:
+            raise ValueError("; ".join(problems))
+        return self
 
 
-def check_manifest(content: bytes, known_format: int) -> Manifest:
-    """A manifest's text as a record. Raises ValueError saying which keys are wrong, and how."""
+def read_manifest(file: Path, content: bytes) -> dict[str, Any]:
+    """The content of a manifest. Raises UsageError if it is damaged, or has another format than `FORMAT`."""
     try:
-        manifest = Manifest.model_validate_json(content)
-    except ValidationError as error:
-        raise ValueError(_words(error)) from None
-    if manifest.format != known_format:
-        raise ValueError(f"format: it is {manifest.format}, not {known_format}")
-    return manifest
-
-
-def problems_for_report(manifest: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    """Key and problem of each part that only reports and model cards rely on."""
-    try:
-        Campaign.model_validate(manifest["campaign"], strict=False)
-    except ValidationError as error:
-        yield "campaign", _words(error)
-    if "persona_documents" not in manifest:
-        return  # runs of earlier versions have no model cards
-    documents = {"ego_persona": manifest.get("ego_persona")}
-    documents |= {f"persona_documents.{name}": each for name, each in manifest["persona_documents"].items()}
-    for key, document in documents.items():
-        try:
-            Persona.from_record(document)
-        except ValidationError as error:
-            yield key, _words(error)
-    if "harness" not in manifest.get("versions", {}):
-        yield "versions.harness", "is missing"
-    written = manifest["campaign"]
-    populations = {each.get("name") for each in (*written.get("population", ()), *written.get("crowd", ()))}
-    for name, entry in manifest["stages"].items():
-        if entry.get("persona", "") not in {"", *manifest["persona_documents"], *populations}:
-            yield f"stages.{name}.persona", f"there is no document of persona {entry['persona']!r}"
-        if entry["kind"] == "training" and entry["status"] == "done":
-            for key in ("steps", "budget_steps", "stopped"):
-                if entry.get(key) is None:
-                    yield f"stages.{name}.{key}", "is missing"
+        found = _Format.model_validate_json(content).format
+        if found != FORMAT:
+            message = f"the run folder has format {found}, this version of the harness reads format {FORMAT}"
+            raise UsageError.of(file, "format", message, RUN_AGAIN)
+        Manifest.model_validate_json(content)
+        return dict(json.loads(content))
+    except (ValueError, RecursionError) as error:
+        words = _words(error) if isinstance(error, ValidationError) else str(error)
+        raise UsageError.of(file, "", f"is damaged: {words}", RUN_AGAIN) from None
 
 
 def is_tuned(manifest: Mapping[str, Any]) -> bool:

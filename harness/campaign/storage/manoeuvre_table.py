@@ -28,7 +28,7 @@ def name_manoeuvres(episodes: pd.DataFrame, traces: Path, scene: OpenScene) -> p
 
 
 def manoeuvres_of(folder: RunFolder, stage: str, scene: OpenScene) -> pd.DataFrame:
-    """The manoeuvres of an arm. They are named now if an earlier version carried out the stage without naming them."""
+    """The manoeuvres of an arm. They are named now if the table is not there."""
     file = folder.work(stage) / MANOEUVRES
     if file.is_file():
         return read_csv(file)

@@ -22,7 +22,6 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -30,15 +29,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.plan.stages import stage_id
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.locks import InUse, only_one, wait_for_workers
-from harness.campaign.storage.manifest import StageEntry, check_manifest, problems_for_report
+from harness.campaign.storage.manifest import RUN_AGAIN, StageEntry, read_manifest
 from harness.campaign.storage.run_log import LOG, run_log
 from harness.errors import Problem, UsageError
 from harness.files import content_of, drop_scratch, leads_out, make_folder, write_atomically
 
-FORMAT = 1
 MANIFEST = "manifest.json"
 JUDGED = "reference_drivers.csv"
 """The table that the judgement of an arm's failures makes."""
@@ -46,16 +43,6 @@ _PATIENCE_S = 10.0  # the time that workers of a killed command may take to end
 _MOST_MANIFEST_BYTES = 50_000_000
 _MOST_SCENE_BYTES = 1_000_000_000
 _ANY_STAGE = {"kind": "training", "name": "", "seed": 0, "status": "done"}
-_STAGE = re.compile(r"[A-Za-z][A-Za-z0-9_]*-seed\d+")
-
-
-def _check(content: bytes) -> dict[str, Any]:
-    """A manifest that is one of ours, as far as others rely on it; names in it become names of files."""
-    manifest = check_manifest(content, FORMAT)
-    for name, entry in manifest.stages.items():
-        if name != stage_id(entry.name, entry.seed) or not _STAGE.fullmatch(name):
-            raise ValueError(f"{name!r} is no stage")
-    return dict(json.loads(content))
 
 
 def _has_only_locks(folder: Path) -> bool:
@@ -169,16 +156,14 @@ class RunFolder:
     def manifest(self) -> dict[str, Any]:
         """The manifest. Raises UsageError if the folder has none that can be read."""
         try:
-            manifest = _check(content_of(self.manifest_file, _MOST_MANIFEST_BYTES))
+            content = content_of(self.manifest_file, _MOST_MANIFEST_BYTES)
         except (FileNotFoundError, NotADirectoryError):
             raise UsageError.of(
                 self.path, "", f"is not a run folder: it has no {MANIFEST}", "name the folder a campaign wrote"
             ) from None
-        except (OSError, ValueError, RecursionError) as error:
-            text = error.strerror if isinstance(error, OSError) else error
-            raise UsageError.of(
-                self.manifest_file, "", f"is damaged: {text}", "run the campaign again into another folder, with --out"
-            ) from None
+        except OSError as error:
+            raise UsageError.of(self.manifest_file, "", f"is damaged: {error.strerror}", RUN_AGAIN) from None
+        manifest = read_manifest(self.manifest_file, content)
         self._check_links()
         return manifest
 
@@ -193,7 +178,7 @@ class RunFolder:
 
     def check_whole(self, manifest: Mapping[str, Any]) -> None:
         """Raises UsageError where files of the stages are missing, as in a folder that was published without them, or
-        are not what the stages wrote, or where the manifest describes no possible campaign."""
+        are not what the stages wrote."""
         done = [name for name, entry in manifest["stages"].items() if entry["status"] == "done"]
         if done and not any(self.work(name).is_dir() for name in done):
             raise UsageError.of(
@@ -202,23 +187,16 @@ class RunFolder:
                 "holds a report and its tables, but not the files that they are made from",
                 f"read its report.html, or play the games: run campaign {manifest['name']!r} again",
             )
-        remedy = "run the campaign again"
-        found = [
-            Problem(str(self.manifest_file), key, f"is damaged: {message}", remedy)
-            for key, message in problems_for_report(manifest)
-        ]
-        damaged = [file for name in done for file in self._damaged(name, manifest["stages"][name])]
-        if isinstance(hashes := manifest.get("hashes"), dict):
-            damaged += [file for file in sorted(self.scene.glob("*")) if not _is_one_of(file, hashes)]
-        found += [Problem(str(file), "", "is missing, or is not what the campaign wrote", remedy) for file in damaged]
-        if found:
-            raise UsageError(found)
+        damaged = [file for name in done for file in self._damaged(name)]
+        damaged += [file for file in sorted(self.scene.glob("*")) if not _is_one_of(file, manifest["hashes"])]
+        if damaged:
+            message, remedy = "is missing, or is not what the campaign wrote", "run the campaign again"
+            raise UsageError(Problem(str(file), "", message, remedy) for file in damaged)
 
-    def _damaged(self, stage: str, entry: Mapping[str, Any]) -> list[Path]:
+    def _damaged(self, stage: str) -> list[Path]:
+        """The files of a finished stage that are not what it wrote."""
         record = self.done(stage)
-        if record is None:  # manifests without versions are older than the checksums of stages with errors
-            return [self.work(stage) / "done.json"] if "versions" in entry else []
-        return mismatches(record, self.path)
+        return [self.work(stage) / "done.json"] if record is None else mismatches(record, self.path)
 
     def write_manifest(self, manifest: Mapping[str, Any]) -> None:
         """Replace the manifest."""
@@ -244,7 +222,7 @@ class RunFolder:
             wrong = ""
             if manifest["name"] != campaign:
                 wrong = f"belongs to campaign {manifest['name']!r}, not {campaign!r}"
-            elif bool(manifest.get("quick")) != quick:
+            elif manifest["quick"] != quick:
                 kinds = ("a full run, which a quick one", "a quick run, which a full one")
                 wrong = f"holds {kinds[not quick]} would overwrite"
             if wrong:

@@ -12,7 +12,6 @@ _PACKAGES = (
     *("eclipse-sumo", "libsumo", "sumolib", "numpy", "scipy", "numba", "pandas", "torch"),
     *("stable-baselines3", "gymnasium", "pyarrow", "safetensors"),
 )
-NUMBERS_FORMAT = 3  # raised when the same inputs give other numbers, so that finished stages are carried out again
 _OF_NUMBERS = ("python", "platform", "harness", "libsumo", "numpy", "numba", "torch", "stable-baselines3")
 
 
@@ -26,4 +25,4 @@ def versions() -> dict[str, str]:
 
 def versions_of_numbers() -> dict[str, str]:
     """The versions that a stage's numbers depend on: with others the numbers may differ."""
-    return {name: versions()[name] for name in _OF_NUMBERS} | {"numbers": str(NUMBERS_FORMAT)}
+    return {name: versions()[name] for name in _OF_NUMBERS}

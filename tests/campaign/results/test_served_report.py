@@ -63,7 +63,7 @@ def test_serve__another_site_that_names_this_machine_gets_nothing(address: str) 
     assert refused.value.code == 404
 
 
-def test_serve__a_page_of_an_earlier_version_is_refused_with_the_remedy() -> None:
+def test_serve__a_page_of_another_version_is_refused_with_the_remedy() -> None:
     with pytest.raises(UsageError, match="harness report reports/mine"):
         served_page("<html></html>", [], "reports/mine")
 

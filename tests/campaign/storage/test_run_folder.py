@@ -9,16 +9,26 @@ from typing import Any
 
 import pytest
 
+from harness.campaign.storage.manifest import FORMAT
 from harness.campaign.storage.run_folder import RunFolder
+from harness.config.persona import Persona
+from harness.config.toml_reading import read_document
 from harness.errors import UsageError
 
+PERSONA = read_document("personas/careful.toml", Persona).record()
 MANIFEST: dict[str, Any] = {
-    "format": 1,
+    "format": FORMAT,
     "name": "tiny",
-    "campaign": {"name": "tiny"},
+    "file": "tiny.toml",
+    "quick": False,
+    "campaign": {"name": "tiny", "scene": "merge", "personas": ["speedy"]},
     "personas": ["speedy"],
+    "ego_persona": PERSONA,
+    "persona_documents": {"speedy": PERSONA},
     "seeds": [1],
-    "stages": {"naive-seed1": {"kind": "training", "name": "naive", "persona": "", "seed": 1, "status": "done"}},
+    "hashes": {},
+    "versions": {"harness": "1"},
+    "stages": {"naive-seed1": {"kind": "training", "name": "naive", "persona": "", "seed": 1, "status": "pending"}},
 }
 
 
@@ -100,7 +110,7 @@ DAMAGED = {
     "a number": "7",
     "nothing": "{}",
     "deeply nested": "[" * 100_000,
-    "of a later format": changed(format=2),
+    "without a format": changed(format=None),
     "without a name": changed(name=None),
     "without a campaign": changed(campaign=None),
     "without seeds": changed(seeds=[]),
@@ -112,6 +122,11 @@ DAMAGED = {
     "with a stage of no kind": stage(kind="dance"),
     "with a stage of no status": stage(status=None),
     "with a stage that is a number": changed(stages={"naive-seed1": 1}),
+    "with a stage of an unknown persona": stage(persona="nobody"),
+    "with a training that does not say how it stopped": stage(status="done"),
+    "without the version of the harness": changed(versions={}),
+    "with a campaign of an unknown key": changed(campaign={**MANIFEST["campaign"], "colour": 1}),
+    "with a persona of nothing": changed(persona_documents={"speedy": {}}),
 }
 
 
@@ -123,6 +138,16 @@ def test_manifest__a_damaged_one_is_named(name: str, folder: RunFolder) -> None:
     assert "damaged" in problem
     assert problem_of(lambda: folder.claim("tiny")) == problem
     assert folder.manifest_file.read_text() == DAMAGED[name]
+
+
+def test_manifest__of_another_format_is_refused_in_one_line(folder: RunFolder) -> None:
+    folder.manifest_file.write_text(changed(format=FORMAT + 1, campaign=None))
+    problem = problem_of(folder.manifest)
+    assert "\n" not in problem
+    assert (
+        f"format: the run folder has format {FORMAT + 1}, this version of the harness reads format {FORMAT}" in problem
+    )
+    assert "run the campaign again into another folder, with --out" in problem
 
 
 def test_manifest__of_no_run_folder(tmp_path: Path) -> None:
