@@ -29,10 +29,13 @@ def compiled(function: _Function) -> _Function:
     """Compile a function on its first call.
 
     Processes that compile the same version of a package do so in turns, so that each finds the machine code of the
-    others on disk. If no folder is writable, every process compiles for itself.
+    others on disk. If no folder is writable, every process compiles for itself. With NUMBA_DISABLE_JIT=1 in the
+    environment, nothing is compiled: for short programs, debuggers and coverage.
     """
-    _functions.add(function)
     config: Any = numba.config
+    if config.DISABLE_JIT:
+        return function
+    _functions.add(function)
     default = config.CACHE_DIR
     config.CACHE_DIR = default or _folder(Path(function.__code__.co_filename).parent)
     options: dict[str, Any] = {"error_model": "numpy"}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import shutil
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -15,7 +14,6 @@ import pandas as pd
 import pytest
 
 from harness.config.campaign import Campaign
-from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.evaluation.trace_file import SCHEMA, TraceWriter
 from harness.traffic.scene import OpenScene
@@ -194,16 +192,9 @@ def test_main__prints_markdown_and_writes_the_same_as_csv(run: Path, capsys: pyt
 # --- the personas -----------------------------------------------------------------------------------------------------
 
 
-def shipped() -> Sequence[Persona]:
-    return [read_document(file, Persona) for file in sorted((REPOSITORY / "personas").glob("*.toml"))]
-
-
 def test_characteristics__every_persona_of_the_campaign_has_one() -> None:
     campaign = read_document(REPOSITORY / "campaigns" / "merge-personas.toml", Campaign)
     names = {Path(file).stem for file in campaign.personas}
     assert names == set(table.CHARACTERISTICS)
-    assert {each.name for each in shipped()} - names == {
-        *("impatient", "red_light_runner"),  # people of junctions
-        *("jaywalker", "phone_walker", "older_walker", "red_light_cyclist", "e_scooter"),
-    }
+    assert names <= {each.stem for each in (REPOSITORY / "personas").glob("*.toml")}
     assert campaign.training == read_document(REPOSITORY / "campaigns" / "merge.toml", Campaign).training

@@ -86,7 +86,8 @@ def test_profile__has_a_moment_for_every_term() -> None:
         terms[term.group][name] = {"weight": 2.0, term.parameter: 1.0} if term.parameter else 2.0
     found = invented(**{group: {"weight": 0.5, "terms": each} for group, each in terms.items()})
     worth = {each.name: (each.worth, each.moment) for each in found.terms}
-    assert worth == {  # alpha 0.5, weight 2: the term's own value
+    assert not any(np.isnan(value) for value, _ in worth.values()), "a term without parameter has an example"
+    by_hand = {  # alpha 0.5, weight 2: the term's own value
         "collision": (-1.0, "once"),
         "rail": (-1.0, "once"),
         "clearance": (-0.5, "per second at 0.5 m"),
@@ -110,6 +111,7 @@ def test_profile__has_a_moment_for_every_term() -> None:
         "lateral_acceleration": (pytest.approx(-0.09), "per second at 3 m/s²"),
         "time_pressure": (-1.0, "per second always"),
     }
+    assert {name: worth[name] for name in by_hand} == by_hand
 
 
 def test_function__is_that_of_the_game() -> None:
