@@ -16,9 +16,9 @@ from markupsafe import Markup
 from harness.evaluation.tables import typed
 from harness.reports.numbers import MISSING, number, p_number, trimmed
 
-PACKED_FROM = 1_000
-"""A table with more rows is packed: columns of exact texts as JSON, deflated, in base64. `tables.js` reads them."""
-_CELL_BYTES = 60
+PACKED = ("episodes", "training", "reconfiguration")
+"""The tables with thousands of rows are packed: columns of exact texts as JSON, deflated, in base64. `tables.js` reads
+them."""
 UNITS = (("_mps2", "m/s²"), ("_mps", "m/s"), ("_m", "m"), ("_s", "s"))
 RATES = (
     *("failure_rate", "non_ego_goal_rate", "ego_failure_rate", "naive_failure_rate", "solution_failure_rate"),
@@ -78,17 +78,12 @@ class Table:
     """Its number of rows."""
     packed: Markup | None = None
 
-    @property
-    def bytes(self) -> int:
-        """About its size on the page."""
-        return len(self.packed or "") + len(self.rows) * len(self.headings) * _CELL_BYTES
-
 
 def table(name: str, caption: str, frame: pd.DataFrame) -> Table:
     """The frame, one of `harness.evaluation.tables.TABLES`, as cells; `name` is the CSV file's without its suffix."""
     frame = typed(frame)
     headings = [heading(str(column), frame[column].dtype == object, _kind(frame[column])) for column in frame.columns]
-    if len(frame) > PACKED_FROM and not {"metric", *P_VALUES} & set(frame.columns):
+    if name in PACKED:
         packed = pack([[exact(value) for value in frame[column].tolist()] for column in frame.columns])
         return Table(name=name, caption=caption, headings=headings, rows=(), length=len(frame), packed=packed)
     metrics = frame["metric"].tolist() if "metric" in frame.columns else [""] * len(frame)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -36,9 +36,7 @@ MOST_DOTS = 300
 """The most games of an arm that are drawn one by one; of more, only the middle half and the median are drawn."""
 MOST_LINES = 300
 """The most pairs that are drawn; of more, this many are chosen, evenly over the episodes."""
-DOT_BYTES = 150
-"""About the size of a dot with its link on the page."""
-_FAILED_ALPHA, _WELL_ALPHA = 0.95, 0.45
+_DOT_PT, _FAILED_ALPHA, _WELL_ALPHA = 2.4, 0.95, 0.45
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,8 +117,10 @@ def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str, made
         for axes, every in zip(figure.subplots(1, len(quantities), squeeze=False)[0], quantities, strict=True):
             pairs = _drawn(every)
             both = np.isfinite(pairs.before) & np.isfinite(pairs.after)
-            ends = np.stack((pairs.before, pairs.after))
-            axes.plot([0, 1], ends[:, both], color=INK, linewidth=0.7, alpha=0.22)
+            ends = [
+                np.stack((np.full(both.sum(), x), y[both]), 1) for x, y in ((0.0, pairs.before), (1.0, pairs.after))
+            ]
+            _segments(axes, *ends, color=INK, linewidth=0.7, alpha=0.22)
             before = (pairs.before, pairs.before_failed, "persona", pairs.before_links)
             after = (pairs.after, pairs.after_failed, "retrained", pairs.after_links)
             for place, (values, failed, series, links) in enumerate((before, after)):
@@ -181,16 +181,30 @@ def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> 
 def _games(
     axes: Axes, x: FloatArray, values: FloatArray, failed: NDArray[np.bool_], series: str, links: Sequence[str]
 ) -> None:
-    """Games as dots, failed ones as crosses; each leads to its game."""
-    measured = np.isfinite(values)
-    well = (measured & ~failed, "o", 2.4, _WELL_ALPHA)
+    """Games as dots, failed ones as crosses; each leads to its game, if it has an address."""
+    measured, linked = np.isfinite(values), np.array(links, dtype=bool)
+    unlinked, colour = measured & ~failed & ~linked, SERIES[series]
+    dots = np.stack((x, values), 1)[unlinked]
+    _segments(axes, dots, dots, color=colour, linewidth=_DOT_PT, alpha=_WELL_ALPHA, zorder=3)
+    well = (measured & ~failed & linked, "o", _DOT_PT, _WELL_ALPHA)
     for chosen, marker, size, alpha in (well, (measured & failed, "x", 4.2, _FAILED_ALPHA)):
         if chosen.any():
             axes.scatter(
-                x[chosen], values[chosen], size**2, color=SERIES[series], marker=marker, alpha=alpha,
+                x[chosen], values[chosen], size**2, color=colour, marker=marker, alpha=alpha,
                 linewidths=1.1 if marker == "x" else 0, zorder=3,
                 urls=[links[place] or None for place in np.flatnonzero(chosen).tolist()],
             )  # fmt: skip
+
+
+def _segments(axes: Axes, starts: FloatArray, ends: FloatArray, **style: Any) -> None:
+    """Lines from `starts` [N, 2] to `ends` [N, 2] as one path, which takes few bytes; of no length they are dots."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    path = Path(np.stack((starts, ends), 1).reshape(-1, 2), [Path.MOVETO, Path.LINETO] * len(starts))
+    path.should_simplify = False  # simplified, dots would go
+    axes.add_patch(PathPatch(path, fill=False, capstyle="round", **style))
+    axes.autoscale_view()
 
 
 def _beside(games: int) -> FloatArray:

@@ -1,8 +1,8 @@
 """The recorded games in the page: small numbers, packed, as many games as fit.
 
-A game's columns are whole numbers of centimetres, milliradians and so on (`SCALES`), each number but a column's first
-is the difference to the previous one. Their bytes are arranged in four planes (all lowest bytes, all second ones, ...),
-of which all but the first are mostly zeros, deflated, and written in base64. `recorded.js` reads them.
+A game's columns are whole numbers of centimetres, milliradians and so on (`COLUMNS`). Of smooth columns the second
+differences are written, of the others the first, as variable-length integers (zigzag, 7 bits a byte, low bits first),
+deflated, in base64. `recorded.js` reads them.
 """
 
 from __future__ import annotations
@@ -10,27 +10,40 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
+from numpy.typing import NDArray
 
 from harness.reports.player_data import FloatArray, GameTracks, SceneDrawing, Track, key
 
-SCALES = {
-    "x_m": 0.01,
-    "y_m": 0.01,
-    "heading_rad": 0.001,
-    "speed_mps": 0.01,
-    "acceleration_mps2": 0.01,
-    "steering_rad": 0.001,
-    "lapsed": 1.0,
-    "leader_gap_m": 0.01,
-    "time_to_collision_s": 0.01,
+IntArray = NDArray[np.int64]
+
+
+class PackedColumn(NamedTuple):
+    """How a column of a track is packed."""
+
+    unit: float
+    """Values are rounded to multiples of it."""
+    differences: int
+    """1: of neighbours, 2: of their differences."""
+
+
+COLUMNS = {
+    "x_m": PackedColumn(0.02, 2),
+    "y_m": PackedColumn(0.02, 2),
+    "heading_rad": PackedColumn(0.002, 2),
+    "speed_mps": PackedColumn(0.02, 1),
+    "acceleration_mps2": PackedColumn(0.05, 1),
+    "steering_rad": PackedColumn(0.002, 1),
+    "lapsed": PackedColumn(1.0, 1),
+    "leader_gap_m": PackedColumn(0.1, 1),
+    "time_to_collision_s": PackedColumn(0.1, 1),
 }
-"""The unit of each column of a player; background vehicles have the first `BACKGROUND_COLUMNS` of them."""
+"""The columns of a player; background vehicles have the first `BACKGROUND_COLUMNS` of them."""
 BACKGROUND_COLUMNS = 4
 NOTHING = -1
 """Stands for a missing gap or time."""
@@ -73,9 +86,9 @@ class Embedded:
 
     def document(self) -> Markup:
         """The games and the road as JSON that is safe inside a script element."""
-        scales = json_text(list(SCALES.values()))
-        columns = f'"scales":{scales},"backgroundColumns":{BACKGROUND_COLUMNS},"scene":{json_text(_scene(self._scene))}'
-        return Markup("{" + columns + ',"games":[' + ",\n".join(self._texts) + "]}")
+        columns = json_text(list(COLUMNS.values()))
+        head = f'"columns":{columns},"backgroundColumns":{BACKGROUND_COLUMNS},"scene":{json_text(_scene(self._scene))}'
+        return Markup("{" + head + ',"games":[' + ",\n".join(self._texts) + "]}")
 
 
 def game_text(
@@ -151,23 +164,32 @@ def _persona(player: Track, crowd: Sequence[str]) -> dict[str, str]:
     return {"persona": crowd[int(place) - 1]} if crowd and place.isdecimal() else {}
 
 
-def columns_of(game: GameTracks) -> list[FloatArray]:
-    """A game's columns as whole numbers, track by track."""
-    names = list(SCALES)
+def columns_of(game: GameTracks) -> Iterator[tuple[IntArray, int]]:
+    """A game's columns as whole numbers, track by track, each with the number of its differences."""
+    names = list(COLUMNS)
     tracks: list[tuple[Track, Sequence[str]]] = [(player, names) for player in game.players]
     tracks += [(vehicle, names[:BACKGROUND_COLUMNS]) for vehicle in game.background]
-    return [_whole(getattr(track, name), SCALES[name]) for track, columns in tracks for name in columns]
+    for track, columns in tracks:
+        for name in columns:
+            unit, differences = COLUMNS[name]
+            yield _whole(getattr(track, name), unit), differences
 
 
-def _whole(values: Any, scale: float) -> FloatArray:
+def _whole(values: Any, unit: float) -> IntArray:
     numbers = np.asarray(values, dtype=float)
     present = np.isfinite(numbers) & (np.abs(numbers) < LONGEST)
-    return np.where(present, np.rint(np.where(present, numbers, 0.0) / scale), NOTHING)
+    return np.where(present, np.rint(np.where(present, numbers, 0.0) / unit), NOTHING).astype(np.int64)
 
 
-def pack(columns: Sequence[FloatArray]) -> str:
-    """Columns of whole numbers as text."""
-    differences = [np.diff(column, prepend=0.0) for column in columns]
-    numbers = np.concatenate([np.zeros(0), *differences]).astype("<i4")
-    planes = numbers.view(np.uint8).reshape(-1, 4).T
-    return base64.b64encode(zlib.compress(planes.tobytes(), 9)).decode("ascii")
+def pack(columns: Iterable[tuple[IntArray, int]]) -> str:
+    """Columns of whole numbers, each with the number of its differences, as text."""
+    numbers: list[IntArray] = [np.zeros(0, np.int64)]
+    for column, differences in columns:
+        for _ in range(differences):
+            column = np.diff(column, prepend=0)
+        numbers.append(column)
+    signed = np.concatenate(numbers)
+    rest = ((signed << 1) ^ (signed >> 63))[:, None] >> np.arange(0, 42, 7)  # [numbers, bytes]: what each byte begins
+    digits = (rest & 127) | np.where(rest >> 7 > 0, 128, 0)
+    needed = (rest > 0) | (np.arange(rest.shape[1]) == 0)
+    return base64.b64encode(zlib.compress(digits[needed].astype(np.uint8).tobytes(), 9)).decode("ascii")

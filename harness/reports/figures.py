@@ -51,8 +51,6 @@ _STYLE = {
 }
 GAME = "#game="
 """The beginning of the address of a recorded game of the page."""
-MOST_STOPS = 12
-"""The links of a figure with more are left out when the page is walked through with the tab key: tables have them."""
 _LINES = ("-", "--", ":", "-.")
 
 
@@ -226,10 +224,13 @@ def _link(artists: Iterable[Artist], address: str) -> None:
         artist.set_url(address or None)
 
 
-_SHORTER = re.compile(
-    r'(<a [^>]*>)\s*<g clip-path="[^"]*">\s*(<use [^>]*x="[\d.]+?\.\d)\d*(" y="[^>]*>)\s*</g>\s*</a>\s*'
-)
-"""The link of one dot of thousands, with its blanks and the clipping that changes nothing within the axes."""
+_DOT = re.compile(r'(<a [^>]*>)\s*<g clip-path="[^"]*">\s*(<use [^>]*>)\s*</g>\s*</a>\s*')
+"""The link of a dot, with its blanks and the clipping that changes nothing within the axes."""
+_STYLED = re.compile(r'<use xlink:href="#(C[^"]+)"[^>]* style="([^"]*)"')
+_PLACES = re.compile(r' (?:d|x|y|transform)="[^"]*"')
+_DIGITS = re.compile(r"(\.\d\d)\d+")
+_POINT = re.compile(r"M (\S+ \S+) L \1(?=\s)")
+"""A line of no length, which is drawn as a dot."""
 
 
 def svg(figure: Figure, name: str, alternative: str) -> Markup:
@@ -240,14 +241,16 @@ def svg(figure: Figure, name: str, alternative: str) -> Markup:
     size = re.search(r'viewBox="[^"]*"', drawn)
     assert size is not None  # matplotlib always writes one
     drawn = re.sub(r"<(metadata|style)\b.*?</\1>", "", drawn[drawn.index(">", size.end()) + 1 :], flags=re.DOTALL)
-    links = drawn.count(f'xlink:href="{GAME}')
-    skipped = 'tabindex="-1" ' if links > MOST_STOPS else ""
-    drawn = drawn.replace(f'xlink:href="{GAME}', f'{skipped}href="{GAME}')
-    drawn = _SHORTER.sub(r"\1\2\3</a>", drawn)
+    drawn = _DOT.sub(r"\1\2</a>", drawn.replace(f'xlink:href="{GAME}', f'href="{GAME}'))
+    for marker, style in dict(_STYLED.findall(drawn)).items():  # all dots of a collection have the style of one
+        drawn = re.sub(f'(<use xlink:href="#{marker}"[^>]*?) style="[^"]*"', r"\1", drawn)
+        drawn = drawn.replace(f'<path id="{marker}"', f'<path id="{marker}" style="{style}"')
+    drawn = _PLACES.sub(lambda attribute: _DIGITS.sub(r"\1", attribute[0]).replace(" \n", " "), drawn)
+    drawn = _POINT.sub(r"M\1h0", drawn)
     drawn = drawn.replace('xlink:href="#', f'href="#{name}-').replace("url(#", f"url(#{name}-")
     drawn = drawn.replace(' id="', f' id="{name}-')
     drawn = re.sub(r"font(?:-size)?: ([\d.]+px)(?:;? [^;\"]*'DejaVu Sans'[^;\"]*)", r"font-size: \1", drawn)
     for stand_in, colour in _PAGE_COLOURS.items():
         drawn = drawn.replace(stand_in, colour)
-    role = "group" if links else "img"  # what is inside an image can't be a link
+    role = "group" if GAME in drawn else "img"  # what is inside an image can't be a link
     return Markup('<svg {} role="{}" aria-label="{}">').format(Markup(size[0]), role, alternative) + Markup(drawn)

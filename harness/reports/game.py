@@ -27,8 +27,6 @@ from harness.reports.heatmaps import MatrixView, views
 from harness.reports.numbers import MISSING, interval, number, p_number, percent, signed
 from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, as_sentence
 
-_REST_BYTES = 50_000
-
 
 @dataclass(frozen=True, kw_only=True)
 class Gap:
@@ -77,12 +75,6 @@ class GameSection:
     """Of each seed and game, its solutions in sentences."""
     new_personas: Sequence[NewPersona]
     tables: dict[str, Table]
-
-    @property
-    def bytes(self) -> int:
-        """About its size on the page."""
-        tables = sum(table.bytes for table in self.tables.values())
-        return tables + sum(len(each.figure) for view in self.views for each in view.maps) + _REST_BYTES
 
 
 def game_section(findings: GameFindings | None, episodes: pd.DataFrame | None = None) -> GameSection | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable
 from dataclasses import replace
 from typing import Any
 
@@ -15,8 +15,8 @@ from harness.evaluation.unplayed_games import reasons_of
 from harness.reports import page_wording
 from harness.reports.acceptance_wording import headline, line
 from harness.reports.cards import Card, card
-from harness.reports.data_table import Table, table
-from harness.reports.distributions import DOT_BYTES, MOST_DOTS
+from harness.reports.data_table import table
+from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
 from harness.reports.first_answers import first_answers
 from harness.reports.game import GameSection, game_section
@@ -29,34 +29,30 @@ from harness.reports.next_steps import next_steps
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, environment_of, libraries, script
 from harness.reports.player_data import GameTracks, SceneDrawing, key
 from harness.reports.provenance import mixed_versions
-from harness.reports.replays import failures, keys, replay_list, worst_game
+from harness.reports.replays import replay_list, worst_game
 from harness.reports.results import Results, results, unplayed
 from harness.reports.run_tables import RunTables
 from harness.reports.search import searches
 from harness.reports.stage_table import stage_rows, unfinished
 
-MOST_ROWS = 50_000
+MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
-GAMES_BYTES = 8_000_000
-PAGE_BYTES = 10_000_000
-"""The largest page: recorded games get what the rest leaves of it, and at most GAMES_BYTES."""
-_REST_BYTES = 1_500_000
+GAMES_BYTES = 600_000
+"""Room for recorded games. `harness serve` shows all."""
 REPLAYS_SHOWN = 12
-"""The rest of the replays is folded away."""
+"""`harness replay RUN --list` lists all."""
 
 
 def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: SceneDrawing | None = None) -> str:
     """The report as HTML. Equal input gives equal text.
 
-    `games`, those to watch first at the front, are embedded until the page is full (`PAGE_BYTES`); without a `scene`
-    none is. Raises ValueError when a frame of `tables` does not have a table's columns.
+    `games`, those to watch first at the front, are embedded as far as they fit (`GAMES_BYTES`); without a `scene` none
+    is. Raises ValueError when a frame of `tables` does not have a table's columns.
     """
     tables = tables.with_types()
     found, section = results(tables), game_section(tables.game, tables.episodes)
     listed = tables.episodes if len(tables.episodes) <= MOST_ROWS else tables.episodes[:0]
-    shown = _shown_tables(tables, listed)
-    room = _room_for_games(_dots_bytes(tables), shown.values(), section)
-    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), room, found.crowds)
+    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), GAMES_BYTES, found.crowds)
     environment = environment_of("reports")
     page = environment.get_template("report.html.jinja").render(
         **_header(tables, found),
@@ -66,7 +62,7 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Scen
         **_player(tables, embedded),
         **_manoeuvres(tables),
         **_learning(tables),
-        **_tables(tables, shown, listed),
+        **_tables(tables, listed),
         **_replays(tables, embedded.keys),
         **_method(tables, found),
         game=_linked(section, embedded.keys),
@@ -81,18 +77,6 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Scen
 def _linked(section: GameSection | None, embedded: Container[str]) -> GameSection | None:
     """The section with links to embedded games alone."""
     return section and replace(section, views=[only_links_to(embedded, view) for view in section.views])
-
-
-def _room_for_games(dots_bytes: int, shown: Iterable[Table], section: GameSection | None) -> int:
-    """Bytes that a page with these figures, tables and this section leaves for recorded games."""
-    taken = _REST_BYTES + dots_bytes + sum(each.bytes for each in shown) + (section.bytes if section else 0)
-    return max(min(GAMES_BYTES, PAGE_BYTES - taken), 0)
-
-
-def _dots_bytes(tables: RunTables) -> int:
-    """About the size of the games in the figures: of each persona four arms with four quantities, and the pairs."""
-    games = int(tables.episodes.groupby("arm").size().max()) if len(tables.episodes) else 0
-    return len(tables.personas) * (4 * 4 + 4) * DOT_BYTES * min(games, MOST_DOTS)
 
 
 def _header(tables: RunTables, found: Results) -> dict[str, Any]:
@@ -185,7 +169,7 @@ def _learning(tables: RunTables) -> dict[str, Any]:
     }
 
 
-def _shown_tables(tables: RunTables, listed: pd.DataFrame) -> dict[str, Table]:
+def _tables(tables: RunTables, listed: pd.DataFrame) -> dict[str, Any]:
     """The tables as cells; `listed` are the games that the page lists."""
     frames = {
         "comparisons": tables.comparisons,
@@ -195,13 +179,8 @@ def _shown_tables(tables: RunTables, listed: pd.DataFrame) -> dict[str, Table]:
     }
     if len(tables.reconfiguration):
         frames["reconfiguration"] = tables.reconfiguration
-    return {name: table(name, page_wording.CAPTIONS[name], frame) for name, frame in frames.items()}
-
-
-def _tables(tables: RunTables, shown: Mapping[str, Table], listed: pd.DataFrame) -> dict[str, Any]:
     return {
-        "tables": shown,
-        "keys": keys(listed),
+        "tables": {name: table(name, page_wording.CAPTIONS[name], frame) for name, frame in frames.items()},
         "games": len(tables.episodes),
         "most_rows": MOST_ROWS,
         "stages": stage_rows(tables.stages),
@@ -210,9 +189,8 @@ def _tables(tables: RunTables, shown: Mapping[str, Table], listed: pd.DataFrame)
 
 def _replays(tables: RunTables, embedded: Container[str]) -> dict[str, Any]:
     return {
-        "replays": replay_list(tables.replays, tables.episodes, embedded),
-        "replays_shown": REPLAYS_SHOWN,
-        "unlisted": failures(tables.episodes) - failures(tables.episodes, tables.replays),
+        "replays": replay_list(tables.replays, tables.episodes, embedded)[:REPLAYS_SHOWN],
+        "unlisted": max(len(tables.replays) - REPLAYS_SHOWN, 0),
     }
 
 

@@ -39,7 +39,7 @@ function opened(game) {
     let at = 0;
     const columns = (track, names) => {
       for (const [place, name] of names.entries()) {
-        track[name] = column(numbers.subarray(at, at + track.count), recorded.scales[place], OFTEN_MISSING.has(name));
+        track[name] = column(numbers.subarray(at, at + track.count), ...recorded.columns[place], OFTEN_MISSING.has(name));
         at += track.count;
       }
     };
@@ -60,26 +60,30 @@ async function inflated(text) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-/** Base64 of deflated byte planes, as 32 bit numbers. */
+/** Base64 of deflated variable-length integers (zigzag, 7 bits a byte, low bits first), as numbers. */
 async function inflate(text) {
-  const planes = await inflated(text);
-  const count = planes.length / 4;
-  const numbers = new Int32Array(count);
-  for (let n = 0; n < count; n++) {
-    numbers[n] = planes[n] | planes[n + count] << 8 | planes[n + 2 * count] << 16 | planes[n + 3 * count] << 24;
+  const bytes = await inflated(text);
+  const numbers = new Int32Array(bytes.length);
+  let count = 0, number = 0, shift = 0;
+  for (const byte of bytes) {
+    number |= (byte & 127) << shift;
+    shift += 7;
+    if (byte < 128) {
+      numbers[count++] = (number >>> 1) ^ -(number & 1);
+      number = shift = 0;
+    }
   }
-  return numbers;
+  return numbers.subarray(0, count);
 }
 
-/** The values of differences of whole numbers; a missing value is NaN. */
-function column(differences, scale, mayMiss) {
-  const values = new Float64Array(differences.length);
-  let whole = 0;
-  for (let n = 0; n < differences.length; n++) {
-    whole += differences[n];
-    values[n] = mayMiss && whole < 0 ? NaN : whole * scale;
+/** The values of a column from the differences of its whole numbers; a missing value is NaN. */
+function column(differences, unit, times, mayMiss) {
+  let whole = Array.from(differences);
+  for (let time = 0; time < times; time++) {
+    let sum = 0;
+    whole = whole.map(difference => (sum += difference));
   }
-  return values;
+  return Float64Array.from(whole, value => (mayMiss && value < 0 ? NaN : value * unit));
 }
 
 /** The pose of a road user at a time, interpolated between the steps; null when it is absent. */

@@ -10,8 +10,8 @@ from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.people import COLLIDED_WITH, judged, judged_outcomes
-from harness.evaluation.worst_first import FAILURES, worst_first
+from harness.evaluation.people import COLLIDED_WITH, judged
+from harness.evaluation.worst_first import worst_first
 from harness.reports import page_wording
 from harness.reports.numbers import MISSING, NO_SPACE, number
 from harness.reports.player_data import key
@@ -29,14 +29,6 @@ class Replay:
     scene: str
     watch: str
     """Key of the game if the page can play it, else empty."""
-
-
-def failures(episodes: pd.DataFrame, among: Sequence[str] | None = None) -> int:
-    """How many games the judged player failed; only those with a replay named in `among`, if it is given."""
-    failed = episodes[judged_outcomes(episodes).isin(FAILURES)]
-    if among is None:
-        return len(failed)
-    return len({_name(game) for game in failed[["arm", "seed", "episode"]].to_dict("records")} & set(among))
 
 
 def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[Replay]:
@@ -71,11 +63,6 @@ def worst_game(arms: Mapping[str, str], episodes: pd.DataFrame, embedded: Contai
 def most_severe(episodes: pd.DataFrame) -> Mapping[Any, Any]:
     """The worst of these games, of which there is at least one."""
     return worst_first(episodes).head(1).to_dict("records")[0]
-
-
-def keys(episodes: pd.DataFrame) -> list[str]:
-    """The key of each game."""
-    return [_key(game) for game in episodes[["arm", "seed", "episode"]].to_dict("records")]
 
 
 def _name(game: Mapping[Any, Any]) -> str:

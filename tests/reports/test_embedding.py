@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.reports.embedding import NOTHING, SCALES, Embedded, columns_of, pack
+from harness.reports.embedding import COLUMNS, NOTHING, Embedded, columns_of, pack
 from harness.reports.player_data import key
 from tests.support.pages import campaign
 from tests.support.recorded import SCENE, recorded
@@ -19,43 +19,37 @@ def games():
     return list(recorded(campaign(personas=["speedy"])["episodes"]))
 
 
-def unpacked(text):
-    """What recorded.js makes of a packed game, before it is cut into columns."""
-    planes = np.frombuffer(zlib.decompress(base64.b64decode(text)), dtype=np.uint8).reshape(4, -1)
-    return np.ascontiguousarray(planes.T).view("<i4").ravel()
-
-
 def read(embedded):
     return json.loads(embedded.document())
 
 
-def test_packing__can_be_unpacked():
-    columns = [np.array([5.0, -3.0, 100_000.0]), np.zeros(0), np.array([-2_000_000.0, -1.0])]
-    numbers = unpacked(pack(columns))
-    assert np.cumsum(numbers[:3]).tolist() == columns[0].tolist()
-    assert np.cumsum(numbers[3:]).tolist() == columns[2].tolist()
+def test_packing__of_differences_in_variable_length():
+    """Second differences of 0, 1, 2, 10 are 0, 1, 0, 7; zigzag doubles them. 100,000 takes three bytes."""
+    packed = pack([(np.array([0, 1, 2, 10]), 2), (np.array([-3, 99_997]), 1)])
+    written = zlib.decompress(base64.b64decode(packed))
+    assert list(written) == [0, 2, 0, 14, 5, *(200_000 & 127 | 128, 200_000 >> 7 & 127 | 128, 200_000 >> 14)]
 
 
 def test_columns__are_the_trace_to_half_a_unit(games):
     game = games[0]
-    columns = columns_of(game)
+    columns = [column for column, _ in columns_of(game)]
     ego = game.players[0]
-    for column, (name, scale) in zip(columns, SCALES.items(), strict=False):
+    for column, (name, (unit, _)) in zip(columns, COLUMNS.items(), strict=False):
         values = np.asarray(getattr(ego, name), dtype=float)
         measured = np.isfinite(values)
-        assert np.abs(column[measured] * scale - values[measured]).max() <= 0.5 * scale + 1e-9
+        assert np.abs(column[measured] * unit - values[measured]).max() <= 0.5 * unit + 1e-9
         assert (column[~measured] == NOTHING).all()
-    assert len(columns) == len(SCALES) * len(game.players) + 4 * len(game.background)
+    assert len(columns) == len(COLUMNS) * len(game.players) + 4 * len(game.background)
 
 
 def test_embedded__as_many_as_fit_and_the_first_ones(games):
     whole = Embedded(SCENE, games, {}, 10_000_000)
     assert whole.keys == {key(game.arm, game.seed, game.episode) for game in games}
-    part = Embedded(SCENE, games, {}, 40_000)
+    part = Embedded(SCENE, games, {}, 20_000)
     assert 0 < len(part.games) < len(games)
     assert part.games == games[: len(part.games)]
     road = len(Embedded(SCENE, [], {}, 0).document())
-    assert len(part.document()) - road < 40_000 + 2 * len(part.games)
+    assert len(part.document()) - road < 20_000 + 2 * len(part.games)
 
 
 def test_embedded__games_are_read_only_until_the_page_is_full(games):
@@ -66,7 +60,7 @@ def test_embedded__games_are_read_only_until_the_page_is_full(games):
             asked.append(game)
             yield game
 
-    part = Embedded(SCENE, one_by_one(), {}, 40_000)
+    part = Embedded(SCENE, one_by_one(), {}, 20_000)
     assert len(asked) == len(part.games) + 1
 
 

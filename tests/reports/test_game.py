@@ -128,11 +128,6 @@ def test_heat_map__has_a_personas_strategies_side_by_side(found):
     assert names == ["speedy", "speedy_round2", "distracted", "sumo"]
 
 
-def test_section__takes_its_share_of_the_page(found, html):
-    without = page_of(None, seeds=(1, 2))
-    assert len(html) - len(without) == pytest.approx(game_section(found).bytes, rel=0.35)
-
-
 # --- where there is nothing ---
 
 
