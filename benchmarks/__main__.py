@@ -102,17 +102,12 @@ def scale(
     file: Annotated[
         Path, typer.Argument(metavar="[FILE]", help="Stored results.", show_default="benchmarks/results.json")
     ] = RESULTS,
-    write_page: Annotated[bool, typer.Option("--write", help="Replace the tables in docs/scaling.md instead.")] = False,
 ) -> None:
     """Print what a study of many campaigns would take on 2, 64 and 1,024 cores, by the times of stored results."""
     from benchmarks import scale
 
     try:
-        results = read(file)
-        if write_page:
-            scale.write_page(results)
-        else:
-            print(scale.scale_text(results))
+        print(scale.scale_text(read(file)))
     except (OSError, ValueError, KeyError) as error:
         typer.echo(f"{file}: can't be read as results with a campaign: {error!r}", err=True)
         raise typer.Exit(USERS_MISTAKE) from None

@@ -9,12 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from pathlib import Path
 from statistics import mean
 from typing import Any
 
 from benchmarks.campaign import TimedStage, makespan_s
-from benchmarks.games import REPOSITORY
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.config.campaign import Campaign
@@ -23,8 +21,6 @@ from harness.game.roles import EGO
 SCENES, SEEDS, ROUNDS = 12, 5, 4
 PERSONAS = ("careful", "cautious", "speedy", "tailgater", "late_merger", "distracted", "drowsy", "impaired")
 CORES = (2, 64, 1024)
-PAGE = REPOSITORY / "docs" / "scaling.md"
-BEGIN, END = "<!-- output of: python -m benchmarks scale -->\n\n", "\n\n<!-- end of output -->"
 _KINDS = {
     "naive": "training of the naive ego",
     "non_ego": "training of a non-ego",
@@ -179,12 +175,3 @@ def _hours(seconds: float) -> str:
 
 def _share(share: float) -> str:
     return f"{share:.0%}"
-
-
-def write_page(results: Mapping[str, Any], page: Path = PAGE) -> None:
-    """Replace the tables in the page. Raises ValueError where it has no place for them."""
-    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not end:
-        raise ValueError(f"{page} has no lines {BEGIN.strip()!r} and {END.strip()!r}")
-    page.write_text(before + BEGIN + scale_text(results) + END + after, encoding="utf-8")

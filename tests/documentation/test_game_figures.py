@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
 from pathlib import Path
-from types import ModuleType
 
 import pandas as pd
 import pytest
 
 from tests.support.repository import REPOSITORY
+from tests.support.scripts import script
 
 FOLDER = REPOSITORY / "docs" / "game"
 PUBLISHED = REPOSITORY / "reports" / "merge-arms-race"
 
-
-def script() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("figures", FOLDER / "figures.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-figures = script()
+figures = script("game/figures.py")
 
 
 def test_gaps__a_row_has_the_payoffs_the_gap_and_the_failures_of_the_ego() -> None:
@@ -60,23 +49,6 @@ def test_failures__a_cell_is_the_mean_over_seeds_and_a_dash_without_games() -> N
         "| `naive` | 30% | 0% |",
         "| `robust` | 10% | – |",
     ]
-
-
-def test_generalisation__a_row_compares_with_the_naive_ego() -> None:
-    row = {
-        "ego": "robust",
-        "met": "anna + bert",
-        "non_ego": "cleo",
-        "failure_rate": 0.05,
-        "failure_rate_low": 0.0215,
-        "failure_rate_high": 0.1118,
-        "naive_failure_rate": 0.2,
-        "share_of_naive": 0.25,
-        "p_holm": float("nan"),
-    }
-    assert figures.generalisation_table(pd.DataFrame([row])).splitlines()[-1] == (
-        "| `robust` | anna + bert | `cleo` | 5% (2.1% to 11.2%) | 20% | 0.25 | – |"
-    )
 
 
 @pytest.mark.parametrize(

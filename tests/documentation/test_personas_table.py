@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import shutil
-import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -18,26 +15,11 @@ from harness.config.toml_reading import read_document
 from harness.evaluation.trace_file import SCHEMA, TraceWriter
 from harness.traffic.scene import OpenScene
 from tests.support.repository import REPOSITORY
+from tests.support.scripts import script
 
 LANE_0_M, LANE_1_M = -4.8, -1.6  # lane 0 ends at x = 100, lane 1 goes on; cars are 4.6 m long
 
-
-def script() -> ModuleType:
-    folder = REPOSITORY / "docs" / "personas"
-    spec = importlib.util.spec_from_file_location("personas_table", folder / "table.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["personas_table"] = module  # dataclasses look their module up
-    sys.path.insert(0, str(folder))  # as for a script: the folder has the module `measures`
-    try:
-        spec.loader.exec_module(module)
-    finally:
-        sys.path.remove(str(folder))
-    return module
-
-
-table = script()
+table = script("personas/table.py")
 
 
 def trace(*rows: dict[str, Any], ego_x_m: float | None = None) -> pd.DataFrame:

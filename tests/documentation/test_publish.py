@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
+import contextlib
+import runpy
 import shutil
-import subprocess
 import sys
 from pathlib import Path
-from types import ModuleType
 
 import pandas as pd
 import pytest
 
 from tests.support.repository import REPOSITORY
+from tests.support.scripts import script
 
-FOLDER = REPOSITORY / "docs" / "publish"
 PAGE = """# A page
 
 <!-- output of: python table.py reports/one -->
@@ -29,16 +28,7 @@ In between.
 <!-- end of output -->
 """
 
-
-def script(name: str) -> ModuleType:
-    sys.path.insert(0, str(FOLDER))
-    try:
-        return importlib.import_module(name)
-    finally:
-        sys.path.remove(str(FOLDER))
-
-
-publish, output_blocks = script("publish"), script("output_blocks")
+publish, output_blocks, cost = (script(f"publish/{name}.py") for name in ("publish", "output_blocks", "cost"))
 
 
 def test_blocks__are_found_by_their_command() -> None:
@@ -121,25 +111,28 @@ def test_documents__every_block_is_of_a_command_that_exists() -> None:
     assert [name for name in scripts if not (REPOSITORY / name).is_file()] == []
 
 
-def test_documents__show_what_the_stored_tables_hold() -> None:
+def test_documents__show_what_the_stored_tables_hold(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Blocks of commands that read one file that is in the repository; run folders are not, or in parts."""
+    monkeypatch.chdir(REPOSITORY)
+    blocks = {k: v for page in publish.DOCUMENTS for k, v in output_blocks.blocks_in(page.read_text("utf-8")).items()}
     shown = {
-        command: block
-        for page in publish.DOCUMENTS
-        for command, block in output_blocks.blocks_in(page.read_text("utf-8")).items()
-        if (REPOSITORY / command.split()[-1]).is_file() and " --out " not in command
+        k: v
+        for k, v in blocks.items()
+        if k.endswith((".csv", ".json")) and "--out" not in k and Path(k.split()[-1]).is_file()
     }
     assert len(shown) >= 4
     for command, block in shown.items():
-        printed = subprocess.run(
-            [sys.executable, *command.split()[1:]], cwd=REPOSITORY, capture_output=True, text=True, check=True
-        )
-        assert printed.stdout.strip() == block, command
+        monkeypatch.setattr(sys, "argv", command.split()[1:])
+        with contextlib.suppress(SystemExit):
+            runpy.run_path(sys.argv[0], run_name="__main__")
+        assert capsys.readouterr().out.strip() == block, command
 
 
 def test_cost__counts_trainings_steps_and_arms_of_the_plan() -> None:
     merge = REPOSITORY / "campaigns" / "merge.toml"
-    header, _, row, total = script("cost").cost_table([merge], REPOSITORY).splitlines()
+    header, _, row, total = cost.cost_table([merge], REPOSITORY).splitlines()
     cells = dict(zip(header.split("|"), row.split("|"), strict=True))
     assert [cells[f" {name} "].strip() for name in ("trainings", "steps", "arms")] == ["5", "15.0 M", "10"]
     hours = float(cells[" core-hours "])
@@ -155,8 +148,8 @@ def test_cost__of_a_campaign_whose_policies_an_earlier_step_makes(tmp_path: Path
     shutil.copyfile(REPOSITORY / "campaigns" / "merge-demo.toml", demo)
     (tmp_path / "benchmarks").mkdir()
     shutil.copyfile(REPOSITORY / "benchmarks" / "results.json", tmp_path / "benchmarks" / "results.json")
-    not_made_yet = script("cost").cost_table([demo], tmp_path).splitlines()
+    not_made_yet = cost.cost_table([demo], tmp_path).splitlines()
     cells = not_made_yet[2].split("|")
     assert [cells[1].strip(), cells[4].strip()] == ["campaigns/merge-demo.toml", "10"]
     (tmp_path / "policies" / "merge").mkdir(parents=True)  # empty: as those of an older version, left unread
-    assert script("cost").cost_table([demo], tmp_path).splitlines() == not_made_yet
+    assert cost.cost_table([demo], tmp_path).splitlines() == not_made_yet

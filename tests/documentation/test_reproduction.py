@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-import sys
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pandas as pd
@@ -17,23 +14,12 @@ from harness.config.campaign import Campaign
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from tests.support.repository import REPOSITORY
+from tests.support.scripts import script
 
 FOLDER = REPOSITORY / "docs" / "reproduction"
 PAGE = REPOSITORY / "docs" / "reproduction.md"
 
-
-def script(name: str) -> ModuleType:
-    """A script of the folder, as a module."""
-    spec = importlib.util.spec_from_file_location(name, FOLDER / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses look their module up
-    spec.loader.exec_module(module)
-    return module
-
-
-findings, sweep = script("findings"), script("sweep")
+findings, sweep = script("reproduction/findings.py"), script("reproduction/sweep.py")
 
 # --- findings ---------------------------------------------------------------------------------------------------------
 

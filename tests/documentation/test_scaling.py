@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from benchmarks import results, scale
 from benchmarks.campaign import TimedStage
+from tests.support.repository import REPOSITORY
+from tests.support.scripts import script
 
 
 def stage(name: str, *needs: str, seconds: float) -> TimedStage:
@@ -46,22 +46,7 @@ def test_study__wall_time(fork: scale.Study, cores: int, in_turn_s: float, at_on
 
 
 def test_page__shows_the_output_for_the_stored_results() -> None:
-    """After a measurement: `python -m benchmarks scale --write`."""
-    shown = scale.PAGE.read_text(encoding="utf-8").partition(scale.BEGIN)[2].partition(scale.END)[0]
-    assert shown == scale.scale_text(results.read(results.RESULTS))
-
-
-def test_write_page__replaces_the_tables_and_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    page = tmp_path / "page.md"
-    page.write_text(f"before\n{scale.BEGIN}old{scale.END}\nafter\n", encoding="utf-8")
-    for text in ("first", "second"):
-        monkeypatch.setattr(scale, "scale_text", lambda results, text=text: text)
-        scale.write_page({}, page)
-        assert page.read_text(encoding="utf-8") == f"before\n{scale.BEGIN}{text}{scale.END}\nafter\n"
-
-
-def test_write_page__refuses_a_page_without_a_place_for_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(scale, "scale_text", lambda results: "text")
-    (tmp_path / "page.md").write_text("nothing\n", encoding="utf-8")
-    with pytest.raises(ValueError, match="has no lines"):
-        scale.write_page({}, tmp_path / "page.md")
+    """After a measurement: `python docs/publish/publish.py --documents --only "benchmarks scale"`."""
+    page = (REPOSITORY / "docs" / "scaling.md").read_text(encoding="utf-8")
+    shown = script("publish/output_blocks.py").blocks_in(page)["python -m benchmarks scale"]
+    assert shown == scale.scale_text(results.read(results.RESULTS)).strip()

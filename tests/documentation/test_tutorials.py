@@ -49,7 +49,3 @@ def test_tutorial__its_commands_exist(page: Path) -> None:
         assert not getattr(command, "commands", {}), line
         known = {name for each in command.params for name in each.opts}
         assert {word for word in words if word.startswith("-")} <= known, line
-
-
-def test_tutorials__there_are_six() -> None:
-    assert len(TUTORIALS) == 6
