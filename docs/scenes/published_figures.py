@@ -129,7 +129,7 @@ def rows_of(run: Path) -> Iterator[dict[str, Any]]:
         files = [run / "traces" / f"naive_vs_{persona}-seed{seed}.parquet" for seed in manifest["seeds"]]
         games = pd.DataFrame([game for file in files for game in games_of(file, scene)])
         for figure in FIGURES.get(persona, ()):
-            if figure is GAP and scene.document.players[NON_EGO].marked_crossing:
+            if figure is GAP and scene.stripes:
                 continue
             values = games[figure.measure].to_numpy(dtype=float)
             values = values[np.isfinite(values)]

@@ -25,7 +25,7 @@ USUAL_SIZE_M = {
 }
 """Length and width by kind: of vehicles, SUMO's for its classes (passenger, delivery, truck, bus)."""
 HIDING = ("van", "truck", "bus", "wall", "building")
-"""Kinds that hide what is behind them unless `hides` says otherwise."""
+"""Kinds that are higher than eyes, and hide what is behind them."""
 _FARTHEST_M = 1e7
 
 
@@ -57,7 +57,8 @@ class Obstacle(Document):
     """A body that stands in one place for a whole game. Cars that touch it have collided."""
 
     kind: Kind
-    """What it is. A `closed_lane` is as wide as its lane; a `building` has an `outline` and stands off the road."""
+    """What it is. A `closed_lane` is as wide as its lane; a `building` has an `outline` and stands off the road. Vans,
+    trucks, buses, walls and buildings hide what is behind them."""
     lane: str | None = None
     """The lane it stands on or beside, with `position_m`."""
     position_m: NumberOrRange | None = None
@@ -78,9 +79,6 @@ class Obstacle(Document):
     """Its width; left out: that of its kind."""
     outline: list[Corner] | None = Field(None, min_length=2, max_length=100)
     """Of a building: its corners [x, y] in the net's coordinates, in order. Two corners are a wall."""
-    hides: bool | None = None
-    """Whether it is higher than eyes, and hides what is behind it; left out: vans, trucks, buses, walls and buildings
-    do."""
 
     @model_validator(mode="after")
     def _one_place(self) -> Obstacle:
@@ -118,14 +116,13 @@ class Obstacle(Document):
             raise ValueError("a building needs its outline; a wall on the road is a wall")
         surplus = [*placed, *(name for name in ("length_m", "width_m") if getattr(self, name) is not None)]
         surplus += sorted({"offset_m", "turned_deg"} & self.model_fields_set)
-        if surplus or self.hides is False:
-            name = surplus[0] if surplus else "hides"
-            raise ValueError(f"a building is where its outline is, and hides: leave out {name}")
+        if surplus:
+            raise ValueError(f"a building is where its outline is: leave out {surplus[0]}")
 
     @property
     def is_hiding(self) -> bool:
         """Whether it hides what is behind it."""
-        return self.kind in HIDING if self.hides is None else self.hides
+        return self.kind in HIDING
 
     @property
     def turned_rad(self) -> tuple[float, float]:

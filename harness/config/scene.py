@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, field_validator, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from harness.config.obstacle import Obstacle
 from harness.config.road_user import CYCLING, WALKER_RUN_MPS, Actuators, Kind
@@ -42,11 +42,8 @@ class Player(Document):
     vehicle: str = ""
     """The id of the vehicle in the route file. It gives the route and the vehicle type. A pedestrian has none."""
     way: Annotated[tuple[Point, ...], Field(min_length=2, max_length=200)] | None = None
-    """The way of a pedestrian: points [x, y] in the net's coordinates, from its start to its goal. It may leave it."""
-    marked_crossing: bool = False
-    """Whether a pedestrian's way crosses the road on a marked crossing, where vehicles must yield."""
-    pavements: bool = False
-    """Whether a bicycle or an e-scooter may ride on pavements: lanes for pedestrians belong to its drivable area."""
+    """The way of a pedestrian: points [x, y] in the net's coordinates, from its start to its goal. It may leave it.
+    Where it follows a crossing of the net, vehicles must yield; elsewhere the pedestrian must."""
     lane: str | None = None
     """The lane of the start, with `position_m` or `beside_ego_m`."""
     position_m: Interval | None = None
@@ -66,8 +63,6 @@ class Player(Document):
 
     @model_validator(mode="after")
     def _is_one_kind(self) -> Player:
-        if self.pavements and self.kind not in CYCLING:
-            raise ValueError('pavements is for kind = "bicycle" and "e_scooter": leave it out')
         if self.on_foot:
             if self.way is None:
                 raise ValueError("a pedestrian needs a way: points [x, y] from its start to its goal")
@@ -77,9 +72,8 @@ class Player(Document):
             if self.speed_mps[1] > WALKER_RUN_MPS:
                 raise ValueError(f"a pedestrian's speed_mps is up to {WALKER_RUN_MPS:g}")
             return self
-        for name in ("way", "marked_crossing"):
-            if getattr(self, name):
-                raise ValueError(f'{name} is a pedestrian\'s: give kind = "pedestrian", or leave it out')
+        if self.way is not None:
+            raise ValueError('way is a pedestrian\'s: give kind = "pedestrian", or leave it out')
         if not self.vehicle:
             raise ValueError("give the vehicle: the id of one in the route file")
         return self
@@ -140,16 +134,6 @@ class Varies(Document):
     """Range of the coefficient of friction, instead of the scene's `friction`."""
     speed_limit_share: Annotated[Interval, AfterValidator(_positive)] | None = None
     """Range of a factor on all speed limits of the net."""
-    signal_place: Interval = (0.0, 1.0)
-    """Range of the place in the cycles of the traffic lights at which a game starts, from 0 to 1. [0.0, 0.0] starts
-    every game with the first phase."""
-
-    @field_validator("signal_place")
-    @classmethod
-    def _within_the_cycle(cls, place: tuple[float, float]) -> tuple[float, float]:
-        if place[0] < 0.0 or place[1] > 1.0:
-            raise ValueError("signal_place is a part of the cycle: keep it from 0 to 1")
-        return place
 
 
 class Scene(Document):
@@ -169,8 +153,6 @@ class Scene(Document):
     """Longest duration of a game. A player that has not reached its goal by then has failed."""
     friction: float = Field(0.8, gt=0.0, le=1.5)
     """Coefficient of friction between tyre and road, as a share of g."""
-    lane_change_duration_s: float = Field(2.0, ge=0.0, le=10.0)
-    """Duration of a lane change of background traffic."""
     traffic_begin_s: float = Field(0.0, ge=0.0, le=1e7)
     """Time of the route file at which its traffic begins, as SUMO's option --begin."""
     warm_up_s: float = Field(0.0, ge=0.0, le=3600.0)

@@ -64,13 +64,8 @@ class InitialState:
     member: tuple[int, ...]  # index of the driver that each player has in this game
     friction: float
     limit_share: float
-    signal_range: tuple[float, float]
+    signal_place: float  # in the cycles of traffic lights at which the game starts, from 0 to 1
     parts: tuple[str | int, ...]  # parts of the seeds
-
-    @property
-    def signal_place(self) -> float:
-        """The place in the cycles of traffic lights at which the game starts, from 0 to 1."""
-        return between(self.signal_range, float(generator_of(*self.parts, "signals").random()))
 
     @property
     def noise(self) -> FloatArray:
@@ -89,7 +84,6 @@ class Conditions:
 
     friction: tuple[float, float]
     limit_share: tuple[float, float] = (1.0, 1.0)
-    signal_place: tuple[float, float] = (0.0, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,7 +169,7 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
         member=tuple(member),
         friction=_varied(start_distribution.conditions.friction, "friction", *parts),
         limit_share=_varied(start_distribution.conditions.limit_share, "speed limit", *parts),
-        signal_range=start_distribution.conditions.signal_place,
+        signal_place=float(generator_of(*parts, "signals").random()),
         parts=parts,
     )
 

@@ -248,7 +248,7 @@ class Quantities:
         distance_m = road.rails.distance_m(self._cars, REACH_M)
         if road.walkers_rails is None:
             return distance_m
-        return np.where(self.world.leaves_carriageway, road.walkers_rails.distance_m(self._cars, REACH_M), distance_m)
+        return np.where(self.world.walks, road.walkers_rails.distance_m(self._cars, REACH_M), distance_m)
 
     @cached_property
     def clearance_m(self) -> FloatArray:

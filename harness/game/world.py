@@ -28,8 +28,6 @@ class World:
     right_of_way: RightOfWay = NO_JUNCTIONS
     on_foot: tuple[bool, ...] = ()
     """Which players walk; empty if none does."""
-    on_pavements: tuple[bool, ...] = ()
-    """Which players may ride on pavements; empty if none may."""
     hiding: Hiding = NOTHING_HIDES
 
     @cached_property
@@ -41,11 +39,6 @@ class World:
     def walks(self) -> BoolArray:
         """[P] players on foot."""
         return np.array(self.on_foot or [False] * len(self.length_m), dtype=bool)
-
-    @cached_property
-    def leaves_carriageway(self) -> BoolArray:
-        """[P] players whose area includes pavements."""
-        return self.walks | np.array(self.on_pavements or [False] * len(self.length_m), dtype=bool)
 
     def on_carriageway(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
         """[G, P] 1 for players on foot at points [G, P] of the carriageway, else 0."""

@@ -1,4 +1,4 @@
-"""A player on foot: its way, the surface on which it walks, and its body in SUMO. Cyclists on pavements share it.
+"""A player on foot: its way, the surface on which it walks, and its body in SUMO.
 
 In SUMO a walker is a small vehicle with the shape of a pedestrian: persons that are placed end SUMO 1.28 in nets with
 crossings, and SUMO's cars do not see them beside crossings.
@@ -6,7 +6,6 @@ crossings, and SUMO's cars do not see them beside crossings.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -26,11 +25,12 @@ from harness.game.arrays import FloatArray
 from harness.game.raster import CELL_M, Raster
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic import surface
-from harness.traffic.network import car_lanes, lane_line, rail_lines
+from harness.traffic.network import car_lanes, lane_line
 from harness.traffic.player import OpenPlayer
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_table import extended, road_edges, sampled
 from harness.traffic.stream import USERS
+from harness.traffic.zebra import follows_crossing
 
 WALKER_TYPE = "harness_pedestrian"
 WALKER_ATTRIBUTES = {
@@ -49,22 +49,20 @@ _ROOM_M = 0.5 * (WALKER_LENGTH_M**2 + WALKER_WIDTH_M**2) ** 0.5  # a walker's ce
 
 @dataclass(frozen=True, kw_only=True)
 class Ground:
-    """Where players on foot walk, and cyclists on pavements ride."""
+    """Where players on foot walk."""
 
     surface: BaseGeometry
     """Carriageway, pavements, walking areas and crossings."""
     carriageway: BaseGeometry
     """The part of it that cars can drive on."""
-    near_m: FloatArray | None
-    """[4] bounds of the surroundings of the ways: least x and y, greatest x and y; None without players on foot."""
+    near_m: FloatArray
+    """[4] bounds of the surroundings of the ways: least x and y, greatest x and y."""
     rail_lines: tuple[FloatArray, ...]
-    """The edges of the surface as polylines [n, 2]. With cyclists they are open where roads leave the scene."""
+    """The edges of the surface as polylines [n, 2]."""
 
     @cached_property
-    def raster(self) -> Raster | None:
+    def raster(self) -> Raster:
         """The carriageway's cells around the ways."""
-        if self.near_m is None:
-            return None
         low, high = self.near_m[:2] - CELL_M, self.near_m[2:] + CELL_M
         counts = np.ceil((high - low) / CELL_M).astype(int)
         x_m, y_m = (low[k] + CELL_M * (np.arange(counts[k]) + 0.5) for k in range(2))
@@ -72,19 +70,21 @@ class Ground:
         return Raster(origin_m=low, cells=cells)
 
 
-def ground(net: Net, carriageway: BaseGeometry, ways: Sequence[FloatArray], ridden: Sequence[Edge] = ()) -> Ground:
-    """The ground around ways [n, 2] and around the routes of cyclists over edges; `carriageway` is the net's drivable
+def opened_ground(document: Scene, net: Net, carriageway: BaseGeometry) -> Ground | None:
+    """The ground around the ways of a scene's players on foot; None without any. `carriageway` is the net's drivable
     area."""
-    lines = [shapely.LineString(way) for way in ways]
-    routes = [shapely.LineString(lane_line(lane)) for edge in ridden for lane in edge.getLanes()]
-    around = shapely.union_all([*lines, *routes]).buffer(MARGIN_M)
-    parts = [each for each in _pavements(net) if each.intersects(around)]
+    ways = [np.array(player.way, dtype=float) for player in document.players if player.way is not None]
+    lines = [shapely.LineString(way) for way in ways if np.ptp(way, axis=0).any()]
+    if not lines:
+        return None
+    around = shapely.union_all(lines)
+    parts = [each for each in _pavements(net) if each.intersects(around.buffer(MARGIN_M))]
     area = surface.without_slits(surface.joined([carriageway, *parts]))
     return Ground(
         surface=area,
         carriageway=carriageway,
-        near_m=np.array(shapely.union_all(lines).buffer(_STRAYS_M).bounds) if lines else None,
-        rail_lines=tuple(rail_lines(net, area, ridden) if ridden else _outlines(area)),
+        near_m=np.array(around.buffer(_STRAYS_M).bounds),
+        rail_lines=tuple(_outlines(area)),
     )
 
 
@@ -174,10 +174,10 @@ def open_walker(
     if shapely.intersects(ground.carriageway, shapely.Point(way[-1])):
         message = f"ends on the carriageway, at [{way[-1][0]:.1f}, {way[-1][1]:.1f}]"
         raise problem(message, "end it on a pavement")
-    junction = _junction_crossed(net, line, marked=document.player(role).marked_crossing)
+    junction = _junction_crossed(net, line, marked=follows_crossing(net, line))
     if junction is not None:
         message = f"crosses the road inside junction {junction!r}, where priority and signals on foot are not known"
-        remedy = "let it cross the lanes before or behind the junction, or mark a crossing that has no signals"
+        remedy = "let it cross the lanes before or behind the junction, or on a crossing of the net without signals"
         raise problem(message, remedy)
     vehicle = routes.vehicles[document.vehicles[document.roles.index(role)]]
     return OpenPlayer(
@@ -228,12 +228,3 @@ def way_table(way: FloatArray, area: BaseGeometry) -> Route:
         length_m=line.length,
         goal_m=line.length,
     )
-
-
-def opened_ground(document: Scene, net: Net, carriageway: BaseGeometry, own: Sequence[Edge]) -> Ground | None:
-    """The ground of a scene's players on foot, and of its cyclists on pavements; None without any. `own` are the edges
-    of the players' routes."""
-    ways = [np.array(player.way, dtype=float) for player in document.players if player.way is not None]
-    usable = [way for way in ways if np.ptp(way, axis=0).any()]
-    ridden = own if any(player.pavements for player in document.players) else ()
-    return ground(net, carriageway, usable, ridden) if usable or ridden else None

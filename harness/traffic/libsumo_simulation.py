@@ -38,7 +38,7 @@ from harness.traffic.simulation import NO_SIGNALS, AtReset, Reading
 from harness.traffic.speed_limits import SpeedLimits
 from harness.traffic.standing_vehicles import TYPE_XML, StandingVehicles
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
-from harness.traffic.warm_up import clear_of_players
+from harness.traffic.warm_up import LANE_CHANGE_S, clear_of_players
 
 # Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
 # exactly, on the road or off it. Its bit 1 limits the search to lanes of the car's route.
@@ -105,7 +105,7 @@ class LibsumoSimulation:
         document = scene.document
         # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take
         # time only if SUMO drives a vehicle.
-        duration_s = 0.0 if self._players_only else document.lane_change_duration_s
+        duration_s = 0.0 if self._players_only else LANE_CHANGE_S
         lateral = ["--lanechange.duration", str(duration_s)]
         if self._needs_sublanes():
             lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO accepts one of the two options

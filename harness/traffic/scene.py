@@ -8,6 +8,7 @@ from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
+import shapely
 from sumolib.net import Net
 from sumolib.net.edge import Edge
 
@@ -40,7 +41,7 @@ from harness.traffic.start_overlaps import check_starts, start_warnings
 from harness.traffic.start_ranges import start_range
 from harness.traffic.trips import with_routes
 from harness.traffic.users_lanes import lanes_for
-from harness.traffic.walker_conflicts import ways_of, with_walkers_conflicts
+from harness.traffic.walker_conflicts import Way, ways_of, with_walkers_conflicts
 from harness.traffic.warm_up import Snapshot, snapshots
 from harness.traffic.zebra import stripes
 
@@ -177,14 +178,12 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     own = _edges_of_players(document, net, routes)
     collect(problems, lambda: check_one_level(document_file, own))
     area = network.drivable_area(net, own)
-    ground = opened_ground(document, net, area, own)
-    paved = area if ground is None else ground.surface
-    areas = [paved if player.pavements else area for player in document.players]
-    open_one = partial(open_player, file=document_file, document=document, net=net, routes=routes)
+    ground = opened_ground(document, net, area)
+    open_one = partial(open_player, file=document_file, document=document, net=net, routes=routes, area=area)
     on_foot = partial(open_walker, file=document_file, document=document, net=net, routes=routes, ground=ground)
     opened = [
-        collect(problems, partial(on_foot, role) if player.on_foot else partial(open_one, role, area=ridden))
-        for role, player, ridden in zip(document.roles, document.players, areas, strict=True)
+        collect(problems, partial(on_foot if player.on_foot else open_one, role))
+        for role, player in zip(document.roles, document.players, strict=True)
     ]
     vehicles = set(document.vehicles)
     collect(problems, lambda: check_departures(vehicles, net, routes, document.traffic_window_s, document.roles))
@@ -204,7 +203,8 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     background = _background_edges(vehicles, net, routes)
     lines = network.rail_lines(net, area, own)
     types = [player.vehicle_type for player in players]
-    walking, riding = zip(*((player.on_foot, player.pavements) for player in document.players), strict=True)
+    walking = tuple(player.on_foot for player in document.players)
+    walks = ways_of(document, net)
     world = World(
         road=Road(
             network.rails(lines, REACH_M + 10.0),
@@ -217,14 +217,10 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
         width_m=np.array([each.width_m for each in types]),
         step_s=document.step_length_s,
         time_limit_s=document.time_limit_s,
-        right_of_way=_right_of_way(document, net, players),
+        right_of_way=_right_of_way(document, walks, net, players),
         on_foot=walking if any(walking) else (),
-        on_pavements=riding if any(riding) else (),
         hiding=hiding_in(obstacles, routes, document),
     )
-    if "signal_place" in document.varies.model_fields_set and not world.right_of_way.signal_links:
-        message, remedy = "no player's route passes a traffic light", "leave it out, or choose other routes"
-        raise UsageError.of(document_file, "varies.signal_place", message, remedy)
     scene = OpenScene(
         folder=folder,
         document=document,
@@ -236,7 +232,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
         edges=tuple(player.edges for player in players),
         rail_lines=tuple(lines),
         junctions=network.junctions_near(net, [*own, *background]),
-        stripes=tuple(stripes([np.array(each.way) for each in document.players if each.marked_crossing], area)),
+        stripes=tuple(stripes([shapely.get_coordinates(way.line) for way in walks if way.marked], area)),
         roads_m=heights_of_players_roads(net, own),
     )
     factors, present = [HumanFactors()] * len(places), [1.0] * len(places)
@@ -245,8 +241,7 @@ def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
     return scene
 
 
-def _right_of_way(document: Scene, net: Net, players: Sequence[OpenPlayer]) -> RightOfWay:
-    ways = ways_of(document)
+def _right_of_way(document: Scene, ways: Sequence[Way], net: Net, players: Sequence[OpenPlayer]) -> RightOfWay:
     walkers = {way.player for way in ways}
     routes = [[] if k in walkers else [net.getEdge(name) for name in player.edges] for k, player in enumerate(players)]
     lanes_of = [lanes_for(player.kind) for player in document.players]
@@ -266,7 +261,6 @@ def _conditions(document: Scene) -> Conditions:
     return Conditions(
         friction=varies.friction or (document.friction, document.friction),
         limit_share=varies.speed_limit_share or (1.0, 1.0),
-        signal_place=varies.signal_place,
     )
 
 

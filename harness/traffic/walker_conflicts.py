@@ -23,6 +23,7 @@ from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic.network import lane_line
 from harness.traffic.route_table import line_over_junction
 from harness.traffic.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
+from harness.traffic.zebra import follows_crossing
 
 WALKERS_STREAM_M = 3.0
 """Width of a way: a walker that is farther beside it is not in its stream."""
@@ -39,6 +40,7 @@ class Way:
     player: int
     line: shapely.LineString
     marked: bool
+    """Whether it follows a crossing of the net."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,12 +63,12 @@ class _Crossed:
     width_m: float
 
 
-def ways_of(document: Scene) -> list[Way]:
+def ways_of(document: Scene, net: Net) -> list[Way]:
     """The ways of a scene's players on foot."""
     return [
-        Way(player=k, line=shapely.LineString(player.way), marked=player.marked_crossing)
+        Way(player=k, line=line, marked=follows_crossing(net, line))
         for k, player in enumerate(document.players)
-        if player.way is not None
+        if player.way is not None and (line := shapely.LineString(player.way))
     ]
 
 

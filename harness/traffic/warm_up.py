@@ -42,6 +42,8 @@ SNAPSHOTS = 20
 CLEAR_M, CLEAR_S, CLEAR_AROUND_M = 10.0, 2.0, 2.0
 """Room at a player's start: no vehicle on its lane nearer than the first or than the way that the one behind drives in
 the second, and none nearer than the third anywhere."""
+LANE_CHANGE_S = 2.0
+"""Duration of a lane change of background traffic."""
 _LANE_M = 3.0
 _ENDING = ".warm"  # of a vehicle's name: a flow numbers its later vehicles anew
 _PATIENCE_S = 300.0
@@ -114,7 +116,7 @@ def _options(document: Scene) -> tuple[str, ...]:
     end_s = round(document.warm_up_s / step_s) * step_s
     return (
         *("--step-length", str(step_s), "--collision.action", "none", "--time-to-teleport", "-1"),
-        *("--lanechange.duration", str(document.lane_change_duration_s), "--end", f"{end_s + step_s:.3f}"),
+        *("--lanechange.duration", str(LANE_CHANGE_S), "--end", f"{end_s + step_s:.3f}"),
         *("--save-state.times", f"{end_s:.3f}", "--save-state.files", "state.xml", "--save-state.precision", "6"),
         *("--fcd-output", "motion.xml", "--device.fcd.begin", f"{end_s - step_s:.3f}", "--precision", "6"),
         *("--no-step-log", "--no-warnings", "--xml-validation", "never"),

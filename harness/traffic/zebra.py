@@ -1,4 +1,4 @@
-"""The stripes of marked crossings, for drawings."""
+"""Marked crossings: whether a way follows one of the net, where vehicles must yield, and its stripes, for drawings."""
 
 from __future__ import annotations
 
@@ -7,11 +7,27 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
+from sumolib.net import Net
 
 from harness.game.arrays import FloatArray
+from harness.traffic.network import lane_line
 
 _STRIPE_M, _LONG_M = 0.5, 4.0  # along the way, and across it
 _LEAST_M = 1.0  # of the carriageway on a way
+
+
+_FOLLOWED_SHARE = 0.5  # of the length of a crossing
+
+
+def follows_crossing(net: Net, way: shapely.LineString) -> bool:
+    """Whether a way crosses a road on a crossing of the net: it keeps to the crossing for most of its length."""
+    for edge in net.getEdges(withInternal=True):
+        if edge.getFunction() == "crossing":
+            line = shapely.LineString(lane_line(edge.getLane(0)))
+            area = line.buffer(0.5 * edge.getLane(0).getWidth(), cap_style="flat")
+            if way.intersection(area).length > _FOLLOWED_SHARE * line.length:
+                return True
+    return False
 
 
 def stripes(ways: Sequence[FloatArray], carriageway: BaseGeometry) -> Iterator[FloatArray]:

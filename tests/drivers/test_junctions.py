@@ -121,7 +121,7 @@ def played(lights: OpenScene) -> Iterator[dict[str, FloatArray]]:
     driver = RulesDriver(document, car_of(lights.world, EGO))
     arena = Arena(lights, len(PLACES), [Seat(driver), Seat(None)], seed=1)
     starts = {
-        game: replace(drawn(lights, "alone", game, present=(1.0, 0.0)), signal_range=(place, place))
+        game: replace(drawn(lights, "alone", game, present=(1.0, 0.0)), signal_place=place)
         for game, place in enumerate(PLACES.tolist())
     }
     names = ("passed_red_s", "speed_mps", "permitted_mps", "front_m")

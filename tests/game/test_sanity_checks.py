@@ -43,7 +43,7 @@ from harness.game.sanity_checks import ImpossibleNumber, check_observation, chec
 from harness.game.state import Bodies, State
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene, open_scene
-from tests.support.rollouts import Steady, arm, play, records, trace
+from tests.support.rollouts import Steady, arm, play, records
 from tests.support.scenes import build_scene, drawn
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign
 from tests.support.trainings import in_one_go, naive_ego
@@ -282,21 +282,6 @@ def test_motion__of_a_background_vehicle_that_is_not_finite_is_an_error_row(
     assert game.record["error"].endswith(
         f"a background vehicle has no finite position, heading or speed in step {STEP}"
     )
-
-
-@pytest.mark.parametrize("duration_s", [0.0, 0.1, 2.0])
-def test_motion__a_lane_change_of_any_duration_is_valid(duration_s: float, tmp_path: Path) -> None:
-    folder = Path(shutil.copytree(MERGE, tmp_path / "merge"))
-    document = (folder / "scene.toml").read_text()
-    assert "lane_change_duration_s = 2.0" in document
-    (folder / "scene.toml").write_text(
-        document.replace("lane_change_duration_s = 2.0", f"lane_change_duration_s = {duration_s}")
-    )
-    games = play(arm(open_scene(folder), SumoDriver(), SumoDriver()), 6)
-    assert not any(game.record["error"] for game in games)
-    frames = [frame[frame["player"] == "non_ego"] for frame in map(trace, games)]
-    furthest = max(float(np.abs(np.diff(frame["y_m"])).max()) for frame in frames)
-    assert (furthest > 3.0) == (duration_s <= 0.1)  # a lane's width in one step, for short durations
 
 
 # --- observations -----------------------------------------------------------------------------------------------------

@@ -11,9 +11,7 @@ import pytest
 
 from harness.config.road_user import WALKING_MPS
 from harness.errors import UsageError
-from harness.game.geometry import Box
 from harness.game.right_of_way import Control
-from harness.game.state import State
 from harness.traffic.network import read_net
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
@@ -79,62 +77,15 @@ def test_conflicts__are_where_the_way_crosses_the_lanes(crossing: OpenScene) -> 
 def test_conflicts__at_a_marked_crossing_the_vehicle_yields() -> None:
     tables = open_scene(NETWORKS / "zebra").world.right_of_way
     assert tables.conflicts.yields.tolist() == [True, False, False]
-    assert tables.stop_lines.player.tolist() == [0]
-    assert tables.stop_lines.control.tolist() == [Control.GIVE_WAY]
-    assert tables.stop_lines.station_m[0] == pytest.approx(tables.conflicts.begin_m[0] - 1.0)
+    assert set(tables.stop_lines.player) == {0}
+    assert set(tables.stop_lines.control) == {Control.GIVE_WAY}
+    assert tables.stop_lines.station_m[-1] == pytest.approx(tables.conflicts.begin_m[0] - 1.0)
 
 
-RIDER = """<vType id="bike" vClass="bicycle"/>
-<vehicle id="rider" type="bike" depart="0"><route edges="eastbound"/></vehicle></routes>"""
-RIDES = """kind = "bicycle"
-vehicle = "rider"
-goal = { edge = "eastbound", position_m = 230.0 }
-pavements = true
-"""
-
-
-def rider(folder: Path, *edits: tuple[str, str, str]) -> Path:
-    """The scene of the street between pavements, with a cyclist on it in place of the walker."""
-    on_foot = f"""kind = "pedestrian"\n{WAY}     # along the pavement, then across the road\n"""
-    return changed(
-        folder, "crossing", ("crossing.rou.xml", "</routes>", RIDER), ("scene.toml", on_foot, RIDES),
-        ("scene.toml", "arrival_after_ego_s = [-2.0, 2.0]", "route_m = [90.0, 100.0]"),
-        ("scene.toml", "speed_mps = [1.0, 1.4]", "speed_mps = [4.0, 5.0]"), *edits,
-    )  # fmt: skip
-
-
-def test_pavements__belong_to_the_area_of_a_cyclist_whose_scene_says_so(tmp_path: Path) -> None:
-    world = open_scene(rider(tmp_path)).world
-    routes = world.road.routes
-    ego, cyclist = routes.rows(np.array([[100.0, 100.0]]))[0]
-    assert routes.y_m[[ego, cyclist]] == pytest.approx([-1.75, -1.75])  # both ways are the middle of the lane
-    # the road is 3.5 m wide on either side of y = 0, each pavement 5 m
-    assert (routes.left_edge_m[ego], routes.right_edge_m[ego]) == pytest.approx((5.25, -1.75), abs=0.05)
-    assert (routes.left_edge_m[cyclist], routes.right_edge_m[cyclist]) == pytest.approx((10.25, -6.75), abs=0.05)
-    # boxes of 1 m x 0.5 m: the first is on the pavement, the second 0.1 m over its outer edge at y = -8.5
-    state = State.empty(2, 2)
-    state.x_m[:], state.y_m[:] = 150.0, [[0.0, -6.0], [0.0, -8.35]]
-    box = Box(state.x_m, state.y_m, state.heading_rad, np.array([4.6, 1.0]), np.array([1.8, 0.5]))
-    assert world.leaves_carriageway.tolist() == [False, True]
-    assert world.road.walkers_rails is not None
-    assert world.road.walkers_rails.distance_m(box, 20.0)[:, 1] == pytest.approx([8.5 - 6.25, 0.0])
-
-
-def test_pavements__are_walls_for_a_cyclist_whose_scene_does_not_say_so(tmp_path: Path) -> None:
-    routes = open_scene(rider(tmp_path, ("scene.toml", "pavements = true\n", ""))).world.road.routes
-    cyclist = routes.rows(np.array([[100.0, 100.0]]))[0, 1]
-    assert (routes.left_edge_m[cyclist], routes.right_edge_m[cyclist]) == pytest.approx((5.25, -1.75), abs=0.05)
-
-
-def test_pavements__are_for_cyclists_only(tmp_path: Path) -> None:
-    assert "pavements is for kind" in problem(rider(tmp_path, ("scene.toml", 'kind = "bicycle"', 'kind = "car"')))
-
-
-@pytest.mark.parametrize("marked", ["", "marked_crossing = true\n"])
-def test_way__that_crosses_the_road_inside_a_junction_with_signals_is_refused(tmp_path: Path, marked: str) -> None:
-    walks = f"""kind = "pedestrian"
+def test_way__that_crosses_the_road_inside_a_junction_with_signals_is_refused(tmp_path: Path) -> None:
+    walks = """kind = "pedestrian"
 way = [[100.0, 95.6], [145.0, 95.6]]                   # along the path beside the road, over the side road
-{marked}"""
+"""
     goal = """speed_mps = [4.0, 5.5]
 goal = { edge = "east_out", position_m = 40.0 }"""
     folder = changed(
@@ -183,10 +134,7 @@ def street(tmp_path: Path, build_net: Callable[..., Path]) -> Path:
     return folder
 
 
-def test_way__over_a_crossing_inside_a_junction_is_refused_unless_it_is_marked(street: Path) -> None:
-    assert "crosses the road inside junction 'm'" in problem(street)
-    scene = street / "scene.toml"
-    scene.write_text(scene.read_text() + "marked_crossing = true\n")
+def test_way__inside_a_junction_is_refused_unless_it_follows_a_crossing(street: Path) -> None:
     tables = open_scene(street).world.right_of_way
     of_walker = tables.conflicts.player == 1
     lanes = [tables.stream_lanes[stream] for stream in tables.conflicts.stream]
@@ -195,6 +143,9 @@ def test_way__over_a_crossing_inside_a_junction_is_refused_unless_it_is_marked(s
     assert (tables.conflicts.zone_m[of_walker] >= 0.0).all()  # behind the stop lines
     (before_m,) = tables.conflicts.begin_m[~of_walker] - tables.stop_lines.station_m[-1]
     assert before_m == pytest.approx(1.0)
+    net = street / "test.net.xml"
+    net.write_text(net.read_text().replace('function="crossing"', 'function="walkingarea"'))
+    assert "crosses the road inside junction 'm'" in problem(street)
 
 
 def test_bicycle__rides_on_its_own_lane_and_the_turning_car_yields() -> None:

@@ -56,7 +56,7 @@ def opened(scene: OpenScene) -> Iterator[Open]:
 
 def starting(scene: OpenScene, place: float) -> InitialState:
     """A game that starts at a place in the cycles."""
-    return replace(drawn(scene, "lights"), signal_range=(place, place))
+    return replace(drawn(scene, "lights"), signal_place=place)
 
 
 def seconds(*times_s: float) -> list[float]:
