@@ -1,16 +1,13 @@
 """A co-simulation harness on Eclipse SUMO that tests an automated vehicle against selfish human drivers.
 
 This module exports the public names of the library. Each is imported at its first use: `import harness` stays fast.
-When `harness` and Gymnasium are both imported, Gymnasium knows `harness/Ego-v0` and `harness/NonEgo-v0`.
+`gymnasium.make("harness:harness/Ego-v0")` imports it, which registers the environments: see `harness.environments`.
 """
 
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import sys
-from importlib.machinery import ModuleSpec
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from harness.version import __version__ as __version__
@@ -87,47 +84,5 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-# --- Gymnasium --------------------------------------------------------------------------------------------------------
-
-
-def _register() -> None:
-    from gymnasium.envs.registration import register, registry
-
-    for name, player in (("harness/Ego-v0", "ego"), ("harness/NonEgo-v0", "non_ego")):
-        if name not in registry:
-            register(
-                name,
-                entry_point="harness.environments.gymnasium_env:DrivingEnv",
-                vector_entry_point="harness.environments.gymnasium_vector:VectorDrivingEnv",
-                kwargs={"player": player},
-            )
-
-
-class _GymnasiumFinder:
-    """Registers the environments if Gymnasium is imported later. Importing Gymnasium here would take 0.1 s."""
-
-    searching = False
-
-    def find_spec(self, name: str, path: object = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        if name != "gymnasium" or self.searching:
-            return None
-        self.searching = True
-        try:
-            spec = importlib.util.find_spec(name)
-        finally:
-            self.searching = False
-        if spec is not None and spec.loader is not None:
-            execute = spec.loader.exec_module
-
-            def execute_and_register(module: ModuleType) -> None:
-                execute(module)
-                _register()
-
-            spec.loader.exec_module = execute_and_register  # type: ignore[method-assign]
-        return spec
-
-
-if "gymnasium" in sys.modules:
-    _register()
-else:
-    sys.meta_path.insert(0, _GymnasiumFinder())
+if "gymnasium" in sys.modules:  # importing Gymnasium takes 0.15 s
+    importlib.import_module("harness.environments")

@@ -29,7 +29,7 @@ _PICTURES_PER_S = 10  # the steps of the shipped scenes; an environment has thos
 
 
 class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
-    """One player's game on a scene with SUMO traffic. Also `gymnasium.make("harness/Ego-v0")`, `"harness/NonEgo-v0"`.
+    """One player's game on a scene with SUMO traffic. Also `gymnasium.make("harness:harness/Ego-v0")`, or `NonEgo-v0`.
 
     Observation: Box(-1, 1, (98,), float32), in the player's frame; `harness.game.observation_layout` names its entries.
     An entry x is divided by its scale and clipped to [-1, 1], or compressed:

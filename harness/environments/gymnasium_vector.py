@@ -28,7 +28,7 @@ _SEEDS = 2**31 - 1
 
 
 class VectorDrivingEnv(LiveSimulation, gymnasium.vector.VectorEnv[Any, Any, Any]):
-    """G games of `DrivingEnv` in one SUMO simulation. Also `gymnasium.make_vec("harness/Ego-v0", num_envs=64)`.
+    """G games of `DrivingEnv` in one SUMO simulation. Also `gymnasium.make_vec("harness:harness/Ego-v0", num_envs=64)`.
 
     Observation, action, reward and end of each game: as in `DrivingEnv`. A game that ends is reset in the same step
     (`AutoresetMode.SAME_STEP`): its last observation and info are in `final_obs` and `final_info`.

@@ -100,12 +100,9 @@ def test_gymnasium__passes_its_checker(opened: Open, name: str, other: str | Non
 @pytest.mark.parametrize(
     "program",
     [
-        "import gymnasium, harness; gymnasium.make('harness/Ego-v0')",
-        "import harness, gymnasium; gymnasium.make('harness/NonEgo-v0').close()",
         "import gymnasium; gymnasium.make('harness:harness/Ego-v0')",
-        "import harness, importlib.util; importlib.util.find_spec('gymnasium')\n"
-        "import gymnasium; gymnasium.make('harness:harness/Ego-v0')",
-        "import importlib, gymnasium, harness; importlib.reload(harness); gymnasium.make('harness/Ego-v0')",
+        "import gymnasium, harness; gymnasium.make('harness/NonEgo-v0').close()",
+        "import harness, gymnasium; gymnasium.make('harness.environments:harness/Ego-v0')",
     ],
 )
 def test_gymnasium__knows_the_environments_in_any_order_of_imports(program: str, tmp_path: Path) -> None:
