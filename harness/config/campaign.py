@@ -83,9 +83,7 @@ class BestResponse(Document):
     """Budget of each training of a best response."""
     starts: int = Field(2, ge=1, le=20)
     """Trainings of each best response. The first starts from the player's own policy, the others from random
-    parameters."""
-    choice_episodes: int = Field(100, ge=2, le=100_000)
-    """Games that select the best of these trainings; none of them is a game of the assessment."""
+    parameters. The best one is selected by as many games as an arm has, none of which is a game of the assessment."""
     arms: list[Annotated[str, Field(min_length=1, max_length=200)]] = Field([], max_length=200)
     """Names of further arms to measure."""
 
@@ -177,23 +175,6 @@ class Campaign(Document):
             raise Mistakes([("rounds.count", "the ego does not learn, so there are no further rounds", leave_out)])
         if not learns and self.retraining.against:
             raise Mistakes([("retraining.against", "an ego that does not learn can't be retrained", leave_out)])
-        return self
-
-    @model_validator(mode="after")
-    def _new_policies_are_possible(self) -> Campaign:
-        training, deviation = self.training, self.non_ego_training.initial_deviation
-        if deviation is not None and deviation > training.max_deviation:
-            message = f"must not exceed training.max_deviation ({training.max_deviation:g}), but is {deviation:g}"
-            raise Mistakes(
-                [("non_ego_training.initial_deviation", message, "lower it, or raise training.max_deviation")]
-            )
-        key = "retraining.demonstrator_speed_share"
-        if self.retraining.demonstrator_speed_share < 1.0 and self.retraining.warm_start:
-            message = "with warm_start, a retrained ego begins as the naive ego and does not imitate a driver"
-            raise Mistakes([(key, message, "leave out one of these keys")])
-        if self.retraining.demonstrator_speed_share < 1.0 and not training.demonstration_steps:
-            message = "with training.demonstration_steps = 0, an ego does not imitate a driver"
-            raise Mistakes([(key, message, "leave out one of these keys")])
         return self
 
     def _unused_tables(self) -> list[str]:

@@ -9,6 +9,10 @@ from pydantic import Field, model_validator
 from harness.config.scene import Name
 from harness.config.toml_reading import Document
 
+ATTENTIVE_SHARE = 0.5
+"""Share of the budget of a person's training, at its start, without lapses of attention: people learn to drive before
+they text."""
+
 
 class Training(Document):
     """Training of the players with PPO. The defaults are those of table 1 of the paper."""
@@ -41,7 +45,8 @@ class Training(Document):
     payoffs of these games. 0: the policy begins with random parameters, as those of people do."""
     initial_deviation: float = Field(0.25, gt=0.0, le=2.0)
     """Standard deviation of the actions of a new policy. With a wide deviation nearly all games end at the rail at
-    first, and the player learns to stand still, or to crash early, before it learns to drive."""
+    first, and the player learns to stand still, or to crash early, before it learns to drive. People on foot, who
+    learn to walk sooner with more, begin with `max_deviation`."""
     max_deviation: float = Field(0.5, gt=0.0, le=2.0)
     """Upper bound of that standard deviation. Without it, the entropy term raises the standard deviation without limit
     once little is left to learn."""
@@ -54,10 +59,6 @@ class Training(Document):
     payoff_scale: float = Field(0.1, gt=0.0, le=1000.0)
     """Factor of the payoffs that PPO receives; tables show the payoffs without it. The gradients of actor and critic
     are clipped together: with large payoffs, the errors of the critic would leave little of the step to the actor."""
-    along_route_share: float = Field(0.7, ge=0.0, le=1.0)
-    """Share of the games without another player that start anywhere along the route, at any legal speed: a learner that
-    fails early sees the rest of its route too. Games with another player, and all games of an assessment, start as the
-    scene says: players that start apart seldom meet."""
     segment_steps: int = Field(131_072, ge=1_024, le=100_000_000)
     """A checkpoint is written, and the learning curve evaluated, each time after this many steps."""
     learner: Literal["compiled", "stable_baselines3"] = "compiled"
@@ -94,16 +95,9 @@ class NonEgoTraining(Document):
 
     alone_share: float = Field(0.7, ge=0.0, le=1.0)
     """Share of games without the ego: people mostly learn to drive on roads with no car beside them."""
-    attentive_share: float = Field(0.5, ge=0.0, le=1.0)
-    """Share of the budget, at its start, without lapses of attention: people learn to drive before they text."""
-    warm_start: bool = False
-    """Start from the parameters of the naive ego, which can drive on the empty road, instead of random ones."""
     imitation: bool = False
     """Let the new policies of people imitate the rule-based driver as well (`training.demonstration_steps`). Some of
     its courtesy stays in what they learn afterwards."""
-    initial_deviation: float | None = Field(None, gt=0.0, le=2.0)
-    """Standard deviation of the actions of people's new policies; left out: that of `[training]`. People on foot
-    learn to walk sooner with 0.5."""
 
 
 class Retraining(Document):
@@ -113,10 +107,6 @@ class Retraining(Document):
     """Share of games without the non-ego, so that the ego does not forget what it has learned."""
     warm_start: bool = False
     """Start from the parameters of the naive ego, instead of random ones."""
-    demonstrator_speed_share: float = Field(1.0, ge=0.3, le=1.0)
-    """Target speed of the rule-based driver that the new policy of a retrained ego imitates, as a share of the limit.
-    An ego that begins at the limit seldom learns to slow down early, because slowing down a little costs time and
-    avoids nothing; one that begins slowly learns to drive faster where that pays."""
     against: list[Name] = Field([], max_length=50)
     """Names of personas. One more ego, `robust`, is retrained against all of them, in equal shares of its games, and
     with a budget multiplied by their number. It is also assessed against the other personas of the campaign, which it

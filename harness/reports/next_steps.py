@@ -22,17 +22,6 @@ LEARN_BY_EXAMPLE = (
     "the campaign, and run it again."
 )
 IMITATION = "[non_ego_training]\nimitation = true"
-EXPLORE_WIDELY = (
-    "{persona} did not learn to reach its goal. Let people begin with a wider deviation: add this to the campaign, and "
-    "run it again."
-)
-WIDER = "[non_ego_training]\ninitial_deviation = 0.5"
-BEGIN_SLOWLY = (
-    "Retraining left more than half of the failures against {persona}. Let the retrained ego imitate a slower driver "
-    "before its training: add this to the campaign, and run it again."
-)
-SLOWER = "[retraining]\ndemonstrator_speed_share = 0.5"
-FEW_FAILURES = 0.05
 WATCH_REMAINING = "See how the {made} ego still fails against {persona}: its worst game."
 WATCH_NAIVE = "See how {persona} makes the {naive} fail: its worst game."
 RETRAIN_AGAINST_SEVERAL = "Retrain one ego against several personas: add this to the campaign, and run it again."
@@ -63,7 +52,6 @@ def next_steps(
     steps = [
         *_finish(manifest, unfinished),
         *_learn(manifest, personas, found),
-        *_retrain(manifest, personas, found),
         *_watch(personas, found),
         *_widen(personas, found, checks),
     ]
@@ -79,29 +67,8 @@ def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: Results)
     """What helps people who did not learn to reach their goal. People on foot have no rule-based driver to imitate."""
     training = manifest.get("campaign", {}).get("non_ego_training", {})
     unable = [persona for persona in personas if _did_not_learn(manifest, persona)]
-    persona = " and ".join(unable)
     if unable and found.non_ego_drives and not training.get("imitation"):
-        yield NextStep(sentence=LEARN_BY_EXAMPLE.format(persona=persona), command=IMITATION)
-    if unable and not found.non_ego_drives and training.get("initial_deviation") is None:
-        yield NextStep(sentence=EXPLORE_WIDELY.format(persona=persona), command=WIDER)
-
-
-def _retrain(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
-    """What helps a retrained ego that imitated a driver at the limit, and still fails more than half as often as the
-    naive ego. Few failures are no reason, and neither are those against a person that did not learn."""
-    campaign = manifest.get("campaign", {})
-    retraining, imitated = campaign.get("retraining", {}), campaign.get("training", {}).get("demonstration_steps", 1)
-    tried = retraining.get("demonstrator_speed_share", 1.0) < 1.0
-    if found.is_reconfigured or campaign.get("policies") or tried or retraining.get("warm_start") or not imitated:
-        return
-    left = []
-    for persona in personas:
-        egos = NaiveEgo(), found.change.ego(against=persona)
-        naive, retrained = (_failure_rate(found, against_persona(ego, persona).name) for ego in egos)
-        if naive >= FEW_FAILURES and retrained > naive / 2 and not _did_not_learn(manifest, persona):
-            left.append(persona)
-    if left:
-        yield NextStep(sentence=BEGIN_SLOWLY.format(persona=" and ".join(left)), command=SLOWER)
+        yield NextStep(sentence=LEARN_BY_EXAMPLE.format(persona=" and ".join(unable)), command=IMITATION)
 
 
 def _did_not_learn(manifest: Mapping[str, Any], persona: str) -> bool:

@@ -34,12 +34,9 @@ class _Demonstrations:
     returns: FloatArray  # [T, G], NaN in games that had not ended
 
 
-def imitate(
-    model: PPO, environment: GamesVecEnv, *, steps: int, speed_share: float, deviation: float, seed: int
-) -> None:
+def imitate(model: PPO, environment: GamesVecEnv, *, steps: int, deviation: float, seed: int) -> None:
     """Fit a new model's actor to the demonstrator's actions, and its critic to the payoffs, in `steps` steps over all
-    games. The demonstrator's target speed is `speed_share` of the limit, from 0.3 to 1.5. The noise added to an action
-    has the standard deviation `deviation`, which is that of the new policy.
+    games. The noise added to an action has the standard deviation `deviation`, which is that of the new policy.
 
     A learner on foot keeps to no lane and has no demonstrator: its model is left as it is.
     Raises SimulationError if SUMO fails, FloatingPointError if a number of a game is impossible.
@@ -53,20 +50,19 @@ def imitate(
         return
     noise = np.random.default_rng(seed)
     shown = [
-        _demonstrate(place, _demonstrator(speed_share), rounds, discount=model.gamma, deviation=deviation, noise=noise)
+        _demonstrate(place, _DEMONSTRATOR, rounds, discount=model.gamma, deviation=deviation, noise=noise)
         for place in driven
     ]
     _fit(model, shown, torch.Generator().manual_seed(seed))
 
 
-def _demonstrator(speed_share: float) -> Rules:
-    return Rules(
-        kind="rules",
-        name="demonstrator",
-        description="Cruises and keeps its lane, with so little inertia that its actions follow from what it sees.",
-        cruise=Cruise(speed_share=speed_share, max_jerk_mps3=50.0),
-        lane_keeping=LaneKeeping(max_lateral_jerk_mps3=20.0),
-    )
+_DEMONSTRATOR = Rules(
+    kind="rules",
+    name="demonstrator",
+    description="Cruises and keeps its lane, with so little inertia that its actions follow from what it sees.",
+    cruise=Cruise(max_jerk_mps3=50.0),
+    lane_keeping=LaneKeeping(max_lateral_jerk_mps3=20.0),
+)
 
 
 def _demonstrate(

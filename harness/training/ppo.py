@@ -115,16 +115,22 @@ def _learner(spec: TrainingSpec, environment: GamesVecEnv, tensorboard: Path | N
         ent_coef=settings.entropy_coefficient,
         policy_kwargs={
             "net_arch": list(settings.network),
-            "log_std_init": float(np.log(settings.initial_deviation)),
+            "log_std_init": float(np.log(_initial_deviation(spec))),
         },
         device="cpu",
     )
     model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else configure(None, []))
     if spec.initial is not None:
-        put_policy(model, spec.initial, settings.initial_deviation)
+        put_policy(model, spec.initial, _initial_deviation(spec))
     else:
         _zero_other_weights(model)
     return model
+
+
+def _initial_deviation(spec: TrainingSpec) -> float:
+    """The standard deviation of a new policy's actions. On foot, with more of it a learner learns to walk sooner."""
+    walks = spec.scene.world.walks[spec.learner]
+    return spec.settings.max_deviation if walks else spec.settings.initial_deviation
 
 
 def _imitate(spec: TrainingSpec, model: PPO, environment: GamesVecEnv) -> None:
@@ -136,8 +142,7 @@ def _imitate(spec: TrainingSpec, model: PPO, environment: GamesVecEnv) -> None:
                 model,
                 environment,
                 steps=min(settings.demonstration_steps, settings.steps // 5),
-                speed_share=spec.demonstrator_speed_share,
-                deviation=settings.initial_deviation,
+                deviation=_initial_deviation(spec),
                 seed=seed_of(*spec.parts, "demonstration") % 2**31,
             )
         except FloatingPointError as error:

@@ -16,6 +16,11 @@ from harness.game.initial_state import StartDistribution
 from harness.game.seeding import seed_of
 from harness.traffic.scene import OpenScene
 
+ALONG_ROUTE_SHARE = 0.7
+"""Share of the games without another player that start anywhere along the route, at any legal speed: a learner that
+fails early sees the rest of its route too. Games with another player, and all games of an assessment, start as the
+scene says: players that start apart seldom meet."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LearningPlace:
@@ -48,8 +53,6 @@ class TrainingSpec:
     places: tuple[LearningPlace, ...] = ()
     """With several people: each has an equal part of the games, and `opponent` is not used. Left out: the place of
     `learner`, beside `opponent`."""
-    demonstrator_speed_share: float = 1.0
-    """Target speed of the driver that a new policy imitates, as a share of the limit."""
     as_it_drives: bool = False
     """Train with all human factors of the persona, as in assessment: a best response is computed under the limits under
     which it is assessed."""
@@ -117,7 +120,7 @@ def _start_distribution(spec: TrainingSpec, place: LearningPlace, steps: int) ->
     human_factors[place.learner], shares[place.learner] = [own_factors], [1.0]
     if steps < attentive_steps(spec):
         human_factors = [[replace(each, attention=None) for each in of_player] for of_player in human_factors]
-    starts = spec.scene.start_distribution(human_factors, present, shares, spec.settings.along_route_share)
+    starts = spec.scene.start_distribution(human_factors, present, shares, ALONG_ROUTE_SHARE)
     return replace(starts, meet_in_place=True)
 
 

@@ -18,7 +18,7 @@ from tests.support.tiny import DISTRACTED, SPEEDY, TRAINING, finished, harness
 
 pytestmark = pytest.mark.slow
 
-RESPONSE = {"steps": 1024, "starts": 2, "choice_episodes": 3}
+RESPONSE = {"steps": 1024, "starts": 2}
 TABLES = ("episodes.csv", "gaps.csv", "crossplay.csv", "equilibria.csv", "generalisation.csv", "populations.csv")
 
 

@@ -250,7 +250,7 @@ def matrix(folder: Path, scene: OpenScene) -> Matrix:
         policies=str(folder / "policies"),
         training=TRAINING,
         rounds={"count": 3, "stop_early": False},
-        best_response={"steps": TRAINING["steps"], "starts": 2, "choice_episodes": 4, "arms": list(MEASURED)},
+        best_response={"steps": TRAINING["steps"], "starts": 2, "arms": list(MEASURED)},
         crossplay={},
         assessment={"episodes": 20},
     )

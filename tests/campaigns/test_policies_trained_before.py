@@ -278,7 +278,7 @@ REFUSED: dict[str, tuple[Callable[[Path], dict[str, Any]], str, str, list[str]]]
         ["would be ignored"],
     ),
     "training of non-egos, which would be ignored": (
-        lambda policies: {"non_ego_training": {"warm_start": True}},
+        lambda policies: {"non_ego_training": {"alone_share": 0.5}},
         "played.toml",
         "non_ego_training",
         ["would be ignored"],

@@ -124,7 +124,7 @@ def test_number__an_integer_is_accepted_as_a_float(write: Write) -> None:
         # unknown keys, at every depth
         (Campaign, CAMPAIGN + "sede = [1]", "sede", "unknown key (did you mean 'seeds'?)"),
         (Campaign, CAMPAIGN + "[trainin]", "trainin", "unknown key (did you mean 'training'?)"),
-        (Campaign, CAMPAIGN + "[training]\nlr = 1", "training.lr", "unknown key (valid: along_route_share, buffer, "),
+        (Campaign, CAMPAIGN + "[training]\nlr = 1", "training.lr", "unknown key (valid: buffer, clip, "),
         (Scene, SCENE + "[ego.actuators]\nwheelbse_m = 2", "ego.actuators.wheelbse_m", "(did you mean 'wheelbase_m'?)"),
         (Persona, PERSONA + FUZZY + "wieght = 1", "human.fuzzy[0].wieght", "unknown key (did you mean 'weight'?)"),
         (

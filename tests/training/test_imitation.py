@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.config.training import Training
 from harness.drivers.policy_file import Policy
 from harness.game.roles import NON_EGO
 from harness.traffic.scene import OpenScene, open_scene
@@ -41,21 +42,12 @@ def test_imitation__a_new_policy_makes_the_turn(left_turn: OpenScene, tmp_path: 
     assert failures(left_turn, not_shown, demonstration_steps=0) > 0.6
 
 
-def test_imitation__of_a_slow_driver_gives_a_slow_policy(repository: Path, tmp_path: Path) -> None:
-    merge = naive_ego(open_scene(repository / "tests" / "data" / "merge"))
-    chosen = settings(steps=48_000, games=32, network=[64, 64], learning_rate=NO_LEARNING, demonstration_steps=9_600)
-    games = {}
-    for share in (0.5, 1.0):
-        (folder := tmp_path / str(share)).mkdir()
-        spec = replace(merge, settings=chosen, demonstrator_speed_share=share)
-        games[share] = sum(window.games for window in in_one_go(spec, folder).progress.curve)
-    assert games[0.5] < 0.75 * games[1.0]  # in the same number of steps, because each takes longer
-
-
 def first_policy(scene: OpenScene, folder: Path, learner: int, demonstration_steps: int) -> Policy:
     """The policy with which a training begins."""
     folder.mkdir()
-    chosen = settings(steps=1024, learning_rate=NO_LEARNING, demonstration_steps=demonstration_steps)
+    chosen = settings(
+        steps=1024, learning_rate=NO_LEARNING, demonstration_steps=demonstration_steps, final_deviation=0.5
+    )
     spec = naive_ego(scene)
     return in_one_go(replace(spec, learner=learner, settings=chosen), folder).policy
 
@@ -68,6 +60,7 @@ def test_imitation__a_learner_on_foot_has_no_demonstrator(repository: Path, tmp_
     )
     for name, tensor in shown.items():
         np.testing.assert_array_equal(tensor, not_shown[name])
+    assert np.exp(shown["log_deviation"]) == pytest.approx([Training().max_deviation] * 2)
 
 
 def test_returns__are_the_discounted_payoffs_until_the_end_of_the_game() -> None:

@@ -56,8 +56,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
     drivers = [each for driver in stage.drivers for each in members_of(driver)]
     if crossplay := sorted({each.name for each in drivers if isinstance(each, External) and each.name}):
         inputs["others"] = {name: campaign.other_egos[name].identity for name in crossplay}
-    if any(isinstance(each, BestOf) for each in stage.drivers) and document.best_response is not None:
-        inputs["choice_episodes"] = document.best_response.choice_episodes
+    if any(isinstance(each, BestOf) for each in stage.drivers):
+        inputs["choice_episodes"] = document.assessment.episodes
     if stage.gates:
         inputs["significance"] = document.assessment.significance
         inputs["competence"] = document.competence.record()

@@ -92,10 +92,9 @@ class PlayerFactory:
         """
         planned = stage.drivers[learner]
         assert isinstance(planned, BestOf)
-        assert self.context.document.best_response is not None
         other = self.player(stage.drivers[1 - learner])
-        first = self.context.document.assessment.episodes
-        games = range(first, first + self.context.document.best_response.choice_episodes)
+        episodes = self.context.document.assessment.episodes
+        games = range(episodes, 2 * episodes)
         candidates = [self._driver(each) for each in planned.members]
         mean_payoffs = []
         for candidate in candidates:

@@ -18,7 +18,7 @@ from harness.campaign.execution.crash_retries import FIRST, Attempt, OnProgress,
 from harness.campaign.execution.equilibrium_stop import equilibrium_before
 from harness.campaign.execution.people import learning_places, people_of
 from harness.campaign.execution.run_context import RunContext
-from harness.campaign.plan.budgets import demonstrator_speed_share, training_settings
+from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.planned_drivers import BestOf, SumoDriven, description, persona_of
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, SearchStage, Stage, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
@@ -132,7 +132,6 @@ def _train(stage: TrainingStage, run: StageRun) -> Made:
         attentive_share=stage.attentive_share,
         initial=read_policy(run.players.policy_folder(stage.initial)) if stage.initial is not None else None,
         settings=settings,
-        demonstrator_speed_share=demonstrator_speed_share(context.document, stage),
         parts=("training", stage.seed, stage.name),
         as_it_drives=stage.is_best_response,
     )

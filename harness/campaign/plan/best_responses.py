@@ -13,6 +13,7 @@ from harness.campaign.plan.competence import alone_bounds
 from harness.campaign.plan.planned_drivers import BestOf, Trained, TrainedBefore, persona_of
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage, stage_id
 from harness.config.campaign import Campaign
+from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.strategies import Arm, BestResponse
 from harness.game.roles import EGO, NON_EGO
 
@@ -53,7 +54,7 @@ def _plan_response(campaign: Campaign, pair: AssessmentStage, learner: int) -> l
                 opponent=other,
                 initial=initial,
                 alone_share=0.0,
-                attentive_share=campaign.non_ego_training.attentive_share if from_nothing else 0.0,
+                attentive_share=ATTENTIVE_SHARE if from_nothing else 0.0,
                 gates=pair.gates,
             )
         )

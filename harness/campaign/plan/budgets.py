@@ -6,7 +6,6 @@ from harness.campaign.plan.planned_drivers import Crowd, members_of, persona_of
 from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign
 from harness.config.training import Training
-from harness.evaluation.strategies import NaiveEgo
 from harness.game.roles import EGO
 
 
@@ -18,8 +17,8 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     number.
     """
     settings = campaign.training
-    if stage.learner != EGO:
-        settings = settings.model_copy(update=_of_people(campaign))
+    if stage.learner != EGO and not campaign.non_ego_training.imitation:
+        settings = settings.model_copy(update={"demonstration_steps": 0})
     if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})
@@ -28,16 +27,3 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
         return settings
     more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
     return settings.model_copy(update=more)
-
-
-def demonstrator_speed_share(campaign: Campaign, stage: TrainingStage) -> float:
-    """Target speed of the driver that a new policy imitates, as a share of the limit."""
-    retrained = stage.learner == EGO and not isinstance(stage.strategy, NaiveEgo)
-    return campaign.retraining.demonstrator_speed_share if retrained else 1.0
-
-
-def _of_people(campaign: Campaign) -> dict[str, object]:
-    """The settings in which the training of a person differs from that of an ego."""
-    own = campaign.non_ego_training
-    differing: dict[str, object] = {} if own.imitation else {"demonstration_steps": 0}
-    return differing if own.initial_deviation is None else differing | {"initial_deviation": own.initial_deviation}

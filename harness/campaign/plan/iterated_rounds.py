@@ -22,9 +22,10 @@ from dataclasses import dataclass
 
 from harness.campaign.plan.best_responses import gate_of, plan_best_responses
 from harness.campaign.plan.planned_drivers import EquilibriumMixture, Mixture, PlannedDriver, PlannedMember
-from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage, stage_id
-from harness.campaign.plan.strategy_drivers import driver_of, ego_learns, learned_driver
+from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage
+from harness.campaign.plan.strategy_drivers import driver_of, ego_learns, warm_start
 from harness.config.campaign import Campaign
+from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.strategies import (
     PAPER_ROUNDS,
     Arm,
@@ -33,7 +34,6 @@ from harness.evaluation.strategies import (
     PersonaNonEgo,
     ReconfiguredEgo,
     RetrainedEgo,
-    strategy_name,
 )
 from harness.game.roles import EGO, NON_EGO
 
@@ -135,9 +135,9 @@ def _plan_round(
         persona=persona,
         strategy=latest.strategy,
         opponent=opponent,
-        initial=learned_driver(campaign, stage_id(strategy_name(NaiveEgo()), seed)) if settings.warm_start else None,
+        initial=warm_start(campaign, seed) if learner == EGO else None,
         alone_share=settings.alone_share,
-        attentive_share=campaign.non_ego_training.attentive_share if learner == NON_EGO else 0.0,
+        attentive_share=ATTENTIVE_SHARE if learner == NON_EGO else 0.0,
         gates=latest.gates,
     )
     if learner == EGO:

@@ -20,15 +20,16 @@ from collections.abc import Sequence
 
 from harness.campaign.plan.competence import alone_bounds
 from harness.campaign.plan.planned_drivers import PlannedDriver
-from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage, stage_id
+from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
 from harness.campaign.plan.strategy_drivers import (
     driver_of,
     ego_learns,
-    learned_driver,
     mixed_people,
     population_driver,
+    warm_start,
 )
 from harness.config.campaign import Campaign
+from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.research_questions import Question, ResearchQuestion
 from harness.evaluation.strategies import (
     Arm,
@@ -39,7 +40,6 @@ from harness.evaluation.strategies import (
     RetrainedEgo,
     RobustEgo,
     SumoNonEgo,
-    strategy_name,
 )
 
 
@@ -105,16 +105,14 @@ def _naive_training(campaign: Campaign, seed: int) -> TrainingStage:
 
 
 def _persona_training(campaign: Campaign, persona: str, naive: PlannedDriver, seed: int) -> TrainingStage:
-    settings = campaign.non_ego_training
-    warm = ego_learns(campaign) and settings.warm_start
     return TrainingStage(
         seed=seed,
         persona=persona,
         strategy=PersonaNonEgo(persona=persona),
         opponent=naive,
-        initial=learned_driver(campaign, stage_id(strategy_name(NaiveEgo()), seed)) if warm else None,
-        alone_share=settings.alone_share,
-        attentive_share=settings.attentive_share,
+        initial=None,
+        alone_share=campaign.non_ego_training.alone_share,
+        attentive_share=ATTENTIVE_SHARE,
     )
 
 
@@ -127,7 +125,7 @@ def _retraining(
         persona=persona,
         strategy=strategy,
         opponent=opponent,
-        initial=learned_driver(campaign, stage_id(strategy_name(NaiveEgo()), seed)) if settings.warm_start else None,
+        initial=warm_start(campaign, seed),
         alone_share=settings.alone_share,
     )
 

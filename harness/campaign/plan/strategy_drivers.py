@@ -89,3 +89,10 @@ def crossplay_name(written: str) -> str:
     name = PurePath(written).stem if written.endswith(".toml") else PurePath(written).name
     plain = re.sub("[^A-Za-z0-9]+", "_", name)
     return plain if plain[:1].isalpha() else f"ego_{plain}"
+
+
+def warm_start(campaign: Campaign, seed: int) -> Trained | TrainedBefore | None:
+    """The naive ego, from whose parameters a retraining starts if the campaign says so; None: from random ones."""
+    if not campaign.retraining.warm_start:
+        return None
+    return learned_driver(campaign, stage_id(strategy_name(NaiveEgo()), seed))

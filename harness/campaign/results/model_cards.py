@@ -21,6 +21,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
 from harness.config.human_limits import Perception
 from harness.config.persona import Parametrised, Persona
+from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
@@ -134,7 +135,7 @@ def _facts(
         lapse = "–".join(f"{each:g}" for each in persona.attention.lapse_s)
         yield "attention", f"lapses for {lapse} s after {persona.attention.mean_attentive_s:g} s on average"
         if policy["player"] == ROLES[NON_EGO]:
-            yield "no lapses in", f"the first {percent(campaign.non_ego_training.attentive_share)} of the budget"
+            yield "no lapses in", f"the first {percent(ATTENTIVE_SHARE)} of the budget"
     if persona.perception is not None:
         share, up_to_m = percent(persona.perception.no_blind_spot_check_share), persona.perception.unseen_behind_m
         if persona.perception.no_blind_spot_check_share:

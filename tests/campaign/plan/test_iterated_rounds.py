@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.plan.budgets import demonstrator_speed_share, training_settings
+from harness.campaign.plan.budgets import training_settings
 from harness.campaign.plan.paper_rounds import plan_paper_rounds
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import (
@@ -32,7 +32,7 @@ from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, write_campaign, write_persona
 
-RESPONSE: dict[str, Any] = {"steps": 2048, "starts": 2, "choice_episodes": 4}
+RESPONSE: dict[str, Any] = {"steps": 2048, "starts": 2}
 
 
 @pytest.fixture
@@ -217,23 +217,6 @@ def test_settings__a_person_has_a_demonstrator_only_if_the_campaign_says_so(
     assert steps == {"naive": 38_400, "anna": 38_400 if imitation else 0}
 
 
-def test_settings__people_may_begin_with_a_deviation_of_their_own(tmp_path: Path, anna: list[str]) -> None:
-    own = {"initial_deviation": 0.375}
-    stages, _ = planned(tmp_path, personas=anna, non_ego_training=own, training={"initial_deviation": 0.125})
-    campaign = open_campaign(tmp_path / "tiny.toml").document
-    begun = [training_settings(campaign, training(stages, name)).initial_deviation for name in ("naive", "anna")]
-    assert begun == [0.125, 0.375]
-
-
-def test_settings__only_retrained_egos_imitate_a_slow_driver(tmp_path: Path, anna: list[str]) -> None:
-    slow = {"demonstrator_speed_share": 0.5}
-    stages, _ = planned(tmp_path, personas=anna, retraining=slow, rounds={"count": 4}, best_response=RESPONSE)
-    campaign = open_campaign(tmp_path / "tiny.toml").document
-    names = ("naive", "anna", "retrained_anna", "retrained_anna_round4", "retrained_vs_anna_ego_response1")
-    shares = [demonstrator_speed_share(campaign, training(stages, name)) for name in names]
-    assert shares == [1.0, 1.0, 0.5, 0.5, 0.5]
-
-
 def test_plan__an_exchange_may_end_after_each_answer_of_the_ego(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 6}, best_response=RESPONSE)
     second = EquilibriumGate(
@@ -385,21 +368,6 @@ def test_matchups__a_response_has_the_pair_and_round_that_it_belongs_to(tmp_path
         ({"population": [{"name": "town", "shares": {"anna": 1.0}}]}, "population[0].shares", "at least 2"),
         ({"retraining": {"against": ["bret"]}}, "retraining.against", "'bret'"),
         ({"retraining": {"against": ["anna", "anna"]}}, "retraining.against", "twice"),
-        (
-            {"non_ego_training": {"initial_deviation": 0.75}, "training": {"max_deviation": 0.5}},
-            "non_ego_training.initial_deviation",
-            "must not exceed training.max_deviation (0.5)",
-        ),
-        (
-            {"retraining": {"demonstrator_speed_share": 0.5, "warm_start": True}},
-            "retraining.demonstrator_speed_share",
-            "begins as the naive ego",
-        ),
-        (
-            {"retraining": {"demonstrator_speed_share": 0.5}, "training": {"demonstration_steps": 0}},
-            "retraining.demonstrator_speed_share",
-            "does not imitate a driver",
-        ),
         ({"rounds": {"count": 4, "personas": ["bret"]}}, "rounds.personas", "'bret'"),
         ({"rounds": {"count": 1}}, "rounds.count", "greater than or equal to 2"),
         ({"rounds": {"count": 3, "stop_early": True}}, "rounds.stop_early", "best_response"),

@@ -55,7 +55,7 @@ def test_plan__pairings_of_a_learned_ego(tmp_path: Path, personas: list[str]) ->
 
 def test_plan__trainings_of_a_learned_ego(tmp_path: Path, personas: list[str]) -> None:
     shares = {
-        "non_ego_training": {"alone_share": 0.125, "warm_start": True},
+        "non_ego_training": {"alone_share": 0.125},
         "retraining": {"alone_share": 0.5, "warm_start": True},
     }
     stages, _ = planned(tmp_path, personas=personas[:1], **shares)
@@ -64,7 +64,7 @@ def test_plan__trainings_of_a_learned_ego(tmp_path: Path, personas: list[str]) -
     assert isinstance(anna, TrainingStage)
     assert isinstance(retrained, TrainingStage)
     assert (naive.learner, naive.opponent, naive.initial, naive.alone_share) == (EGO, None, None, 1.0)
-    assert (anna.learner, anna.initial, anna.alone_share) == (NON_EGO, Trained(stage="naive-seed1"), 0.125)
+    assert (anna.learner, anna.initial, anna.alone_share) == (NON_EGO, None, 0.125)
     assert anna.opponent == Trained(stage="naive-seed1")
     assert (retrained.learner, retrained.initial, retrained.alone_share) == (EGO, Trained(stage="naive-seed1"), 0.5)
     assert retrained.opponent == Trained(stage="anna-seed1", persona="anna")
@@ -83,8 +83,7 @@ def test_plan__the_naive_ego_may_train_beside_sumos_driver(tmp_path: Path, perso
 def test_plan__without_a_warm_start_everyone_begins_from_nothing_but_still_needs_the_opponent(
     tmp_path: Path, personas: list[str]
 ) -> None:
-    cold = {"warm_start": False}
-    stages, _ = planned(tmp_path, personas=personas[:1], non_ego_training=cold, retraining=cold)
+    stages, _ = planned(tmp_path, personas=personas[:1])
     anna, retrained = stages["anna-seed1"], stages["retrained_anna-seed1"]
     assert isinstance(anna, TrainingStage)
     assert isinstance(retrained, TrainingStage)
