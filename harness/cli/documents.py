@@ -84,13 +84,13 @@ def show_persona(
 
     from harness.config.persona import Persona
     from harness.config.toml_reading import read_document
+    from harness.reports.persona.persona_terminal import show
     from harness.reports.persona.profile import persona_profile
-    from harness.reports.persona.terminal import show
 
     file = document_at(file, "personas")
     profile = persona_profile(read_document(file, Persona))
     if html is not None:
-        from harness.reports.persona.page import write_profile
+        from harness.reports.persona.persona_page import write_profile
 
         write_profile(profile, html)
     if isinstance(sys.stdout, io.TextIOWrapper):

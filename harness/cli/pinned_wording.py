@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from harness.campaign.execution.pinned_games import Pinned
     from harness.campaign.execution.regression import PlayedAgain
     from harness.config.pinned_game import PinnedGame
-    from harness.reports.junit import Check
+    from harness.reports.junit import JUnitCase
 
 NO_FAILURES = "Nothing to pin: the ego fails in no game."
 NAMES_NO_FAILURE = ("names no game", "name ARM and EPISODE, or pin all kinds of failures with --all")
@@ -53,14 +53,13 @@ def regression_result(played: Sequence[PlayedAgain]) -> str:
     return f"{passed} of {len(played)} pinned games pass."
 
 
-def check_of(played: PlayedAgain) -> Check:
+def check_of(played: PlayedAgain) -> JUnitCase:
     """The game as a check of a JUnit file."""
-    from harness.reports.junit import Check
 
     game = played.game
     failure = "" if played.passed or played.error else f"the ego fails: {played.outcome}"
     details = f"arm {game.arm}, seed {game.seed}, game {game.episode}; {game.found_with} failed by {game.outcome}"
-    return Check(
+    return JUnitCase(
         name=played.name,
         group=f"regression.{game.arm}",
         failure=failure,

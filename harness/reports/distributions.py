@@ -15,7 +15,7 @@ from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports.figures import INK, SERIES, figure_of, svg
 from harness.reports.game_links import NO_LINKS, GameLinks
 from harness.reports.player_data import FloatArray
-from harness.reports.treatment import RETRAINED, Change
+from harness.reports.verdict_wording import RETRAINED, Change
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

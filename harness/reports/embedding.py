@@ -8,7 +8,6 @@ deflated, in base64. `recorded.js` reads them.
 from __future__ import annotations
 
 import base64
-import json
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
@@ -18,6 +17,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from harness.reports.page_template import json_text
 from harness.reports.player_data import FloatArray, GameTracks, SceneDrawing, Track, key
 
 IntArray = NDArray[np.int64]
@@ -98,12 +98,6 @@ def game_text(
 ) -> str:
     """One game as JSON, with its manoeuvres out of `marks` and the personas of its crowd, if it has one."""
     return json_text(_game(game, marks.get(key(game.arm, game.seed, game.episode), ()), crowds.get(game.persona, ())))
-
-
-def json_text(value: Any) -> str:
-    """JSON that cannot end a script element and contains no markup."""
-    text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
-    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
 
 
 def _scene(scene: SceneDrawing | None) -> dict[str, Any] | None:

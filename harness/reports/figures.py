@@ -16,14 +16,15 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
+from harness.evaluation.competence import DID_NOT_LEARN
 from harness.reports.numbers import short, steps_text
-from harness.reports.page_wording import NOT_PLAYED, stopped_at
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+NOT_PLAYED = "not played"
 INK, GRID = "#010101", "#010102"
 SERIES = {"alone": "#010111", "sumo": "#010112", "persona": "#010113", "retrained": "#010114"}
 _PAGE_COLOURS = {INK: "currentColor", GRID: "var(--grid)"} | {
@@ -148,7 +149,7 @@ def learning_figure(curves: Sequence[Curve], series: str, name: str, alternative
             payoff.legend(frameon=False, fontsize=8)
         elif curves[0].stopped_at is not None:
             payoff.annotate(
-                stopped_at(curves[0].stopped_at, curves[0].stopped), (curves[0].stopped_at, 1), (0, 3),
+                _end(curves[0]), (curves[0].stopped_at, 1), (0, 3),
                 xycoords=("data", "axes fraction"), textcoords="offset points", ha="right", fontsize=9,
             )  # fmt: skip
         payoff.set_ylabel("mean payoff")
@@ -162,6 +163,12 @@ def learning_figure(curves: Sequence[Curve], series: str, name: str, alternative
         failure.locator_params(axis="x", nbins=5)
         failure.set_xlabel("training steps")
         return svg(figure, name, alternative)
+
+
+def _end(curve: Curve) -> str:
+    """Where a curve ends. No text that a run folder brings is drawn."""
+    reasons = {"converged": "stopped early", "budget": "budget used", DID_NOT_LEARN: DID_NOT_LEARN}
+    return f"{reasons.get(curve.stopped, 'stopped')}: {steps_text(curve.stopped_at or 0.0)}"
 
 
 @contextmanager

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from harness.evaluation.strategies import EgoStrategy, NaiveEgo, against_persona
 from harness.reports.next_steps import NextStep
-from harness.reports.results import Results
+from harness.reports.run_findings import RunFindings
 
 WHY = "Why does it fail?"
 PREVENTABLE = "Could it have been prevented?"
@@ -38,7 +38,7 @@ class FirstAnswer:
     """The key of the game that it is about, empty for none."""
 
 
-def first_answers(personas: Sequence[str], found: Results, steps: Sequence[NextStep]) -> list[FirstAnswer]:
+def first_answers(personas: Sequence[str], found: RunFindings, steps: Sequence[NextStep]) -> list[FirstAnswer]:
     """The questions after "did it pass?", in order; empty before a game against a persona was played."""
     lines = [line for persona in personas for line in _why(persona, found)]
     if not lines:
@@ -53,14 +53,14 @@ def first_answers(personas: Sequence[str], found: Results, steps: Sequence[NextS
     return answers
 
 
-def _egos(persona: str, found: Results) -> Iterator[tuple[str, str, EgoStrategy]]:
+def _egos(persona: str, found: RunFindings) -> Iterator[tuple[str, str, EgoStrategy]]:
     """The egos that a persona's card shows: the question about each, its word, and the strategy."""
     yield "RQ1", found.naive, NaiveEgo()
     if found.asked("RQ2", persona):
         yield "RQ2", f"{found.change.made} ego", found.change.ego(against=persona)
 
 
-def _why(persona: str, found: Results) -> Iterator[str]:
+def _why(persona: str, found: RunFindings) -> Iterator[str]:
     """One line for each ego that fails against a persona: how often, and its most frequent cause."""
     failing, egos = 0, 0
     for question, word, ego in _egos(persona, found):
@@ -80,7 +80,7 @@ def _why(persona: str, found: Results) -> Iterator[str]:
         yield NO_FAILURE.format(persona=persona)
 
 
-def _prevented(personas: Sequence[str], found: Results) -> list[str]:
+def _prevented(personas: Sequence[str], found: RunFindings) -> list[str]:
     lines: list[str] = []
     all_avoided, all_failures = 0, 0
     for persona in personas:

@@ -12,37 +12,17 @@ from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.research_questions import Verdict
 from harness.evaluation.tables import typed
 from harness.reports.data_table import Table, table
-from harness.reports.differences import Row
+from harness.reports.game_links import NO_LINKS, GameLinks
 from harness.reports.game_wording import (
     CAPTIONS,
-    NONE_FOUND,
     equilibrium_sentences,
     fewer_failures,
     gap_verdicts,
-    last_pairs,
     other_pairs,
-    pair_name,
 )
 from harness.reports.heatmaps import MatrixView, views
-from harness.reports.numbers import MISSING, interval, number, p_number, percent, signed
-from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, as_sentence
-
-
-@dataclass(frozen=True, kw_only=True)
-class Gap:
-    """One best response of a last pair, as a row of the small table."""
-
-    seed: int
-    pair: str
-    player: str
-    payoff: str
-    best: str
-    gap: str
-    share: str
-    p_holm: str
-    failures: str
-    failures_best: str
-    verdict: str
+from harness.reports.numbers import MISSING, interval, percent
+from harness.reports.verdict_wording import NOT_ANSWERED, Answer, Conclusion, as_sentence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,7 +49,6 @@ class GameSection:
     verdicts: Sequence[tuple[str, Conclusion]]
     others: Sequence[tuple[str, str, Answer]]
     """Persona, name and answer of each pair that is not of the last round."""
-    gaps: Sequence[Gap]
     views: Sequence[MatrixView]
     solutions: Sequence[tuple[int, str, Sequence[str]]]
     """Of each seed and game, its solutions in sentences."""
@@ -77,8 +56,8 @@ class GameSection:
     tables: dict[str, Table]
 
 
-def game_section(findings: GameFindings | None, episodes: pd.DataFrame | None = None) -> GameSection | None:
-    """The section of a run's findings; None where it has none. `episodes` are the games that cells link to."""
+def game_section(findings: GameFindings | None, links: GameLinks = NO_LINKS) -> GameSection | None:
+    """The section of a run's findings; None where it has none. `links` are the games that cells lead to."""
     if findings is None:
         return None
     frames = {name: typed(getattr(findings, name)) for name in CAPTIONS}
@@ -87,41 +66,11 @@ def game_section(findings: GameFindings | None, episodes: pd.DataFrame | None = 
         cautions=[(seed, as_sentence(reason)) for seed, reason in findings.cautions],
         verdicts=gap_verdicts(gaps),
         others=other_pairs(gaps),
-        gaps=[_gap(row) for name in dict.fromkeys(gaps["persona"]) for row in _last(gaps[gaps["persona"] == name])],
-        views=views(frames["crossplay"], episodes),
+        views=views(frames["crossplay"], links),
         solutions=equilibrium_sentences(frames["equilibria"]),
         new_personas=_new_personas(frames["generalisation"]),
         tables={name: table(name, CAPTIONS[name], frame) for name, frame in frames.items()},
     )
-
-
-def _last(gaps: pd.DataFrame) -> list[Row]:
-    return [row for rows in last_pairs(gaps) for row in rows]
-
-
-def _gap(row: Row) -> Gap:
-    gap = number(row["gap"], 2)
-    if math.isfinite(row["ci_low"]):
-        gap += f" ({signed(row['ci_low'], 2)} to {signed(row['ci_high'], 2)})"
-    return Gap(
-        seed=row["seed"],
-        pair=pair_name(row),
-        player="ego" if row["role"] == "ego" else str(row["persona"]),
-        payoff=number(row["payoff"], 2),
-        best=number(row["payoff_best_response"], 2),
-        gap=gap,
-        share=NONE_FOUND if row["gap"] <= 0 and not row["reason"] else percent(row["gap_share"]),
-        p_holm=p_number(row["p_holm"]),
-        failures=_rate(row, "ego_failure_rate"),
-        failures_best=_rate(row, "ego_failure_rate_best_response"),
-        verdict=str(row["verdict"]),
-    )
-
-
-def _rate(row: Row, name: str) -> str:
-    if not math.isfinite(row[name]):
-        return MISSING
-    return f"{percent(row[name])} ({interval(row[f'{name}_low'], row[f'{name}_high'])})"
 
 
 def _new_personas(generalisation: pd.DataFrame) -> list[NewPersona]:

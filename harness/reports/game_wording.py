@@ -15,7 +15,7 @@ from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, Ga
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
 from harness.reports.differences import Row
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, signed, trimmed
-from harness.reports.wording import NOT_ANSWERED, Answer, Conclusion, Tone, as_sentence, left_out
+from harness.reports.verdict_wording import NOT_ANSWERED, Answer, Conclusion, Tone, as_sentence, left_out
 
 QUESTION = "Equilibrium"
 NO, NEAR, OPEN = "no", "not refuted", "not decided"
@@ -43,7 +43,6 @@ _HEAT_CAPTIONS = {
         "Darker: earns more than other strategies of the same persona; payoffs of two personas are not comparable."
     ),
 }
-NONE_FOUND = "none found"
 NOT_VERIFIED = "No equilibrium could be verified with the accuracy of the numbers."
 NO_GAME = "No ego was measured against all of these: there is no game to solve."
 

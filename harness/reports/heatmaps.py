@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,9 +14,9 @@ from markupsafe import Markup
 from harness.evaluation.game_theory.crossplay import Matrices, matrices
 from harness.evaluation.worst_first import worst_first
 from harness.reports.figures import GAME, INK, SERIES, figure_of, svg
+from harness.reports.game_links import NO_LINKS, GameLinks
 from harness.reports.game_wording import HEAT_TITLES, heat_caption
 from harness.reports.numbers import MISSING, number, trimmed
-from harness.reports.player_data import key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +27,6 @@ Floats = npt.NDArray[np.float64]
 OPENS_A_GAME = "A cell opens the worst of its games."
 PALEST, DARKEST = 0.04, 0.5
 """Opacity of the least and the greatest value: text on them is legible on a dark and on a light page."""
-_LINK = re.compile(rf'<a [^>]*href="{GAME}(?P<game>[^"]*)"[^>]*>(?P<cell>.*?)</a>', re.DOTALL)
 COLUMN_IN, ROW_IN, LETTER_IN = 0.8, 0.46, 0.085
 
 
@@ -71,13 +69,10 @@ QUANTITIES = (
 )
 
 
-def views(crossplay: pd.DataFrame, episodes: pd.DataFrame | None = None) -> list[MatrixView]:
-    """The heat maps of `crossplay`: of its seed, or of the mean over its seeds first and then of each.
-
-    A cell links to the worst of its games in `episodes`, whether or not the page contains it: `only_links_to` takes out
-    the other links.
-    """
-    worst = _worst_games(episodes)
+def views(crossplay: pd.DataFrame, links: GameLinks = NO_LINKS) -> list[MatrixView]:
+    """The heat maps of `crossplay`: of its seed, or of the mean over its seeds first and then of each. A cell leads to
+    the worst of its games."""
+    worst = _worst_games(links)
     seeds = list(dict.fromkeys(crossplay["seed"]))
     shown = [(f"seed {seed}", crossplay[crossplay["seed"] == seed]) for seed in seeds]
     if len(seeds) > 1:
@@ -88,26 +83,13 @@ def views(crossplay: pd.DataFrame, episodes: pd.DataFrame | None = None) -> list
     ]
 
 
-def only_links_to(embedded: Container[str], view: MatrixView) -> MatrixView:
-    """The view with links to these games alone, and a caption that says that there are links."""
-
-    def kept(link: re.Match[str]) -> str:
-        return link[0] if link["game"] in embedded else link["cell"]
-
-    def linked(drawn: HeatMap) -> HeatMap:
-        figure = Markup(_LINK.sub(kept, drawn.figure))
-        caption = f"{drawn.caption} {OPENS_A_GAME}" if GAME in figure else drawn.caption
-        return replace(drawn, figure=figure, caption=caption)
-
-    return replace(view, maps=[linked(each) for each in view.maps])
-
-
-def _worst_games(episodes: pd.DataFrame | None) -> dict[tuple[str, int | None], str]:
-    """The key of the worst game of each arm and seed, and under the seed None of each arm."""
+def _worst_games(links: GameLinks) -> dict[tuple[str, int | None], str]:
+    """The address of the worst game of each arm and seed, and under the seed None of each arm."""
     worst: dict[tuple[str, int | None], str] = {}
-    for game in () if episodes is None else worst_first(episodes).itertuples():
+    games = worst_first(links.episodes) if links.embedded else links.episodes[:0]
+    for game, address in zip(games.itertuples(), links.of(games), strict=True):
         for seed in (int(game.seed), None):
-            worst.setdefault((game.arm, seed), key(game.arm, int(game.seed), int(game.episode)))
+            worst.setdefault((game.arm, seed), address)
     return worst
 
 
@@ -153,6 +135,7 @@ def _map(
         is_mean=label.startswith("mean"),
         unpaid=quantity.name == "non_ego_payoff" and "" in table.personas,
     )
+    caption = f"{caption} {OPENS_A_GAME}" if GAME in element else caption
     return HeatMap(title=title, caption=caption, figure=element, width_in=round(width_in, 2))
 
 
@@ -193,8 +176,7 @@ def _draw_cells(
                 color=SERIES[quantity.series], alpha=PALEST + (DARKEST - PALEST) * shades[row, column],
             )  # fmt: skip
             cell = cells[ego, non_ego]
-            game = worst.get((cell["arm"], cell.get("seed")), "")
-            bar.set_url(f"{GAME}{game}" if game else None)
+            bar.set_url(worst.get((cell["arm"], cell.get("seed"))) or None)
             axes.text(column + 0.5, row + 0.46, _text(quantity, values[row, column]), ha="center", color=INK)
             axes.text(column + 0.5, row + 0.82, _span(quantity, cell), ha="center", fontsize=8, color=INK)
 

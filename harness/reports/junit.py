@@ -14,7 +14,7 @@ from harness.files import write_atomically
 
 
 @dataclass(frozen=True, kw_only=True)
-class Check:
+class JUnitCase:
     """One check and its outcome. At most one of `failure`, `error` and `skipped` is given; without any it passed."""
 
     name: str
@@ -32,7 +32,7 @@ class Check:
 
 
 def write_junit(
-    file: Path, suite: str, checks: Sequence[Check], properties: Mapping[str, str] = MappingProxyType({})
+    file: Path, suite: str, checks: Sequence[JUnitCase], properties: Mapping[str, str] = MappingProxyType({})
 ) -> None:
     """Write a suite of checks. `properties` are facts of the whole suite, such as versions. Raises OSError."""
     report, tests = JUnitXml(plain(suite)), TestSuite(plain(suite))
@@ -45,7 +45,7 @@ def write_junit(
     write_atomically(file, report.tostring())
 
 
-def _case(check: Check) -> TestCase:
+def _case(check: JUnitCase) -> TestCase:
     case = TestCase(plain(check.name), plain(check.group), check.seconds)
     kinds = ((Failure, check.failure), (Error, check.error), (Skipped, check.skipped))
     case.result = [kind(plain(message)) for kind, message in kinds if message]

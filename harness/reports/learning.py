@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 from markupsafe import Markup
 
+from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, Strategy, player_of
 from harness.game.roles import EGO
 from harness.reports.figures import Curve, learning_figure
-from harness.reports.page_wording import curve_alternative, stop
+from harness.reports.numbers import MISSING, percent
 from harness.reports.run_tables import RunTables
 
 
@@ -50,10 +52,22 @@ def _stage(stage: str, place: int, tables: RunTables, rows: pd.DataFrame) -> Lea
             )
         )
         if entry.get("steps") is not None:
-            stops.append(stop(entry, int(seed), several))
-    alternative = curve_alternative(stage, {curve.seed: curve.payoffs[-1] for curve in curves})
+            text = f"{entry['steps']:,} steps ({stopped(entry)})"
+            stops.append(f"seed {seed}: {text}" if several else text)
+    ends = "; ".join(f"seed {curve.seed} ends at mean payoff {curve.payoffs[-1]:.3g}" for curve in curves)
+    alternative = f"Learning curve of {stage}: mean payoff and failure rate over training steps; {ends}"
     figure = learning_figure(curves, _series(tables.strategies.get(stage)), f"curve{place}", alternative)
     return Learning(stage=stage, figure=figure, stops=stops)
+
+
+def stopped(stage: Mapping[str, Any]) -> str:
+    """Why a training stopped."""
+    reason = stage.get("stopped")
+    text = {"converged": "early: converged", "budget": "budget used", None: MISSING}.get(reason, str(reason))
+    if reason == DID_NOT_LEARN and stage.get("played"):
+        asked = f"at least {percent(stage['goal_share_asked'])}"
+        text += f": goal in {stage['goals']} of {stage['played']} games alone, {asked} asked"
+    return text
 
 
 def _series(strategy: Strategy | None) -> str:

@@ -8,10 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.errors import UsageError
-from harness.files import write_atomically
 from harness.game.arrays import FloatArray
-from harness.reports.page_template import environment_of
+from harness.reports.page_template import environment_of, write_page
 
 _MARGIN_M = 15.0
 
@@ -56,9 +54,4 @@ class Drawing:
 
 def write_net_page(drawing: Drawing, file: Path) -> None:
     """Write the page. Raises UsageError when the file's name or folder is wrong."""
-    if file.suffix.lower() not in (".html", ".htm"):
-        raise UsageError.of("--html", str(file), "is not the name of a page", "it must end with .html")
-    if not file.absolute().parent.is_dir():
-        raise UsageError.of("--html", str(file), f"there is no folder {file.parent}", "create it, or name another file")
-    page = environment_of("reports").get_template("net.html.jinja").render(drawing=drawing)
-    write_atomically(file, page.encode())
+    write_page(file, environment_of("reports").get_template("net.html.jinja").render(drawing=drawing))

@@ -11,10 +11,11 @@ from harness.evaluation.acceptance import Check
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, against_persona
 from harness.reports.header import command_of
+from harness.reports.listed_replays import most_severe
 from harness.reports.player_data import key
-from harness.reports.replays import most_severe
-from harness.reports.results import Results
-from harness.reports.wording import failures, played
+from harness.reports.run_findings import RunFindings
+from harness.reports.run_tables import RunTables
+from harness.reports.verdict_wording import failures, played
 
 FINISH = "Some stages are not done. The same command continues; finished stages are skipped."
 LEARN_BY_EXAMPLE = (
@@ -41,16 +42,12 @@ class NextStep:
     """The key of the game to watch (`player_data.key`); empty: the step is about no game."""
 
 
-def next_steps(
-    manifest: Mapping[str, Any],
-    personas: Sequence[str],
-    found: Results,
-    checks: Sequence[Check] | None,
-    unfinished: int,
-) -> list[NextStep]:
+def next_steps(tables: RunTables, found: RunFindings) -> list[NextStep]:
     """The first few steps that this run suggests, the most urgent first."""
+    manifest, personas, checks = tables.manifest, tables.personas, tables.acceptance
+    finish = NextStep(sentence=FINISH, command=command_of(manifest))
     steps = [
-        *_finish(manifest, unfinished),
+        *([finish] if tables.unfinished else []),
         *_learn(manifest, personas, found),
         *_watch(personas, found),
         *_widen(personas, found, checks),
@@ -58,12 +55,7 @@ def next_steps(
     return steps[:MOST_STEPS]
 
 
-def _finish(manifest: Mapping[str, Any], unfinished: int) -> Iterator[NextStep]:
-    if unfinished:
-        yield NextStep(sentence=FINISH, command=command_of(manifest))
-
-
-def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: Results) -> Iterator[NextStep]:
+def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: RunFindings) -> Iterator[NextStep]:
     """What helps people who did not learn to reach their goal. People on foot have no rule-based driver to imitate."""
     training = manifest.get("campaign", {}).get("non_ego_training", {})
     unable = [persona for persona in personas if _did_not_learn(manifest, persona)]
@@ -79,13 +71,13 @@ def _did_not_learn(manifest: Mapping[str, Any], persona: str) -> bool:
     )
 
 
-def _failure_rate(found: Results, arm: str) -> float:
+def _failure_rate(found: RunFindings, arm: str) -> float:
     """The share of the arm's games that the ego fails, over all seeds; 0 where none was played."""
     rows = found.of(arm).values()
     return sum(map(failures, rows)) / max(sum(map(played, rows)), 1)
 
 
-def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:
+def _watch(personas: Sequence[str], found: RunFindings) -> Iterator[NextStep]:
     """The worst game of the persona against which the last ego fails most; else, of the naive ego's."""
     for made, sentence in ((found.change.made, WATCH_REMAINING), ("naive", WATCH_NAIVE)):
         arms = []
@@ -106,7 +98,7 @@ def _watch(personas: Sequence[str], found: Results) -> Iterator[NextStep]:
             return
 
 
-def _widen(personas: Sequence[str], found: Results, checks: Sequence[Check] | None) -> Iterator[NextStep]:
+def _widen(personas: Sequence[str], found: RunFindings, checks: Sequence[Check] | None) -> Iterator[NextStep]:
     if checks is None:
         yield NextStep(sentence=SET_BOUNDS, command="[acceptance]\nfailure_rate = 0.1")
     elif all(check.passed for check in checks):

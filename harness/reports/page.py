@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
-from dataclasses import replace
+from collections.abc import Container, Iterable, Mapping
 from typing import Any
 
 import pandas as pd
@@ -12,33 +11,43 @@ from harness.evaluation.acceptance import worst_of_each
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NAIVE_ALONE
 from harness.evaluation.unplayed_games import reasons_of
-from harness.reports import page_wording
 from harness.reports.acceptance_wording import headline, line
-from harness.reports.cards import Card, card
+from harness.reports.arm_glossary import glossary
+from harness.reports.cards import CAUTION, Card, arm_labels, card
 from harness.reports.data_table import table
+from harness.reports.differences import effect
 from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
 from harness.reports.first_answers import first_answers
-from harness.reports.game import GameSection, game_section
+from harness.reports.game import game_section
 from harness.reports.game_links import GameLinks
 from harness.reports.header import command_of, facts, made_by
-from harness.reports.heatmaps import only_links_to
-from harness.reports.learning import learning
+from harness.reports.learning import learning, stopped
+from harness.reports.listed_replays import replay_list, worst_game
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
 from harness.reports.next_steps import next_steps
+from harness.reports.numbers import percent
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, environment_of, libraries, script
 from harness.reports.player_data import GameTracks, SceneDrawing, key
 from harness.reports.provenance import mixed_versions
-from harness.reports.replays import replay_list, worst_game
-from harness.reports.results import Results, results, unplayed
+from harness.reports.run_findings import RunFindings, results, unplayed
 from harness.reports.run_tables import RunTables
-from harness.reports.search import searches
-from harness.reports.stage_table import stage_rows, unfinished
+from harness.reports.searches import searches
 
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""
 GAMES_BYTES = 600_000
 """Room for recorded games. `harness serve` shows all."""
+QUICK = "Quick run: fewer training steps than table 1; not for conclusions."
+CAPTIONS = {
+    "comparisons": "Every test of the campaign.",
+    "summary": "A row per arm and training seed.",
+    "training": "A row per window of a learning curve.",
+    "episodes": "A row per game.",
+    "reconfiguration": "A row per trial and parameter of a search.",
+}
+"""Of the tables that are shown as the CSV files have them."""
+METRICS = {"failure": "failures", "mean_speed": "average speed"}
 REPLAYS_SHOWN = 12
 """`harness replay RUN --list` lists all."""
 
@@ -50,22 +59,23 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Scen
     is. Raises ValueError when a frame of `tables` does not have a table's columns.
     """
     tables = tables.with_types()
-    found, section = results(tables), game_section(tables.game, tables.episodes)
+    found = results(tables)
     listed = tables.episodes if len(tables.episodes) <= MOST_ROWS else tables.episodes[:0]
     embedded = Embedded(scene, games, marks_of(tables.manoeuvres), GAMES_BYTES, found.crowds)
+    links = GameLinks(embedded=embedded.keys, episodes=tables.episodes)
     environment = environment_of("reports")
     page = environment.get_template("report.html.jinja").render(
         **_header(tables, found),
         **_troubles(tables),
         **_acceptance(tables, found),
-        **_cards(tables, found, embedded.keys),
+        **_cards(tables, found, links),
         **_player(tables, embedded),
         **_manoeuvres(tables),
         **_learning(tables),
         **_tables(tables, listed),
         **_replays(tables, embedded.keys),
         **_method(tables, found),
-        game=_linked(section, embedded.keys),
+        game=game_section(tables.game, links),
         content_policy=CONTENT_POLICY,
         elsewhere=ELSEWHERE.format("[]"),
         libraries=libraries(environment),
@@ -74,19 +84,14 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Scen
     return page.strip() + "\n"
 
 
-def _linked(section: GameSection | None, embedded: Container[str]) -> GameSection | None:
-    """The section with links to embedded games alone."""
-    return section and replace(section, views=[only_links_to(embedded, view) for view in section.views])
-
-
-def _header(tables: RunTables, found: Results) -> dict[str, Any]:
+def _header(tables: RunTables, found: RunFindings) -> dict[str, Any]:
     manifest = tables.manifest
     return {
         "command": command_of(manifest),
         "made_by": made_by(manifest),
         "name": manifest.get("name", "campaign"),
         "facts": facts(manifest, found.seeds, len(tables.personas)),
-        "quick": page_wording.QUICK if manifest.get("quick") else "",
+        "quick": QUICK if manifest.get("quick") else "",
         "trained_before": manifest.get("campaign", {}).get("policies") or "",
         "several_seeds": len(found.seeds) > 1,
         "change": found.change,
@@ -97,11 +102,9 @@ def _troubles(tables: RunTables) -> dict[str, Any]:
     """The banners: unfinished stages, mixed versions, games that could not be played."""
     errored = tables.episodes[unplayed(tables.episodes)]
     return {
-        "unfinished": unfinished(tables.stages),
+        "unfinished": tables.unfinished,
         "not_learned": [
-            (name, page_wording.stopped(each))
-            for name, each in tables.stages.items()
-            if each.get("stopped") == DID_NOT_LEARN
+            (name, stopped(each)) for name, each in tables.stages.items() if each.get("stopped") == DID_NOT_LEARN
         ],
         "mixed": mixed_versions(tables.stages),
         "errored": errored.groupby(["arm", "seed"], sort=False).size().items(),
@@ -112,12 +115,11 @@ def _troubles(tables: RunTables) -> dict[str, Any]:
     }
 
 
-def _acceptance(tables: RunTables, found: Results) -> dict[str, Any]:
+def _acceptance(tables: RunTables, found: RunFindings) -> dict[str, Any]:
     """The verdict on the bounds of the campaign, and what to do next."""
     checks = tables.acceptance
     lines = [line(check, len(found.seeds)) for check in worst_of_each(checks or ())]
-    left = len(unfinished(tables.stages))
-    steps = next_steps(tables.manifest, tables.personas, found, checks, left)
+    steps = next_steps(tables, found)
     return {
         "acceptance": None if checks is None else (all(each.passed for each in lines), headline(checks), lines),
         "answers": first_answers(tables.personas, found, steps),
@@ -125,23 +127,24 @@ def _acceptance(tables: RunTables, found: Results) -> dict[str, Any]:
     }
 
 
-def _cards(tables: RunTables, found: Results, embedded: Container[str]) -> dict[str, Any]:
+def _cards(tables: RunTables, found: RunFindings, links: GameLinks) -> dict[str, Any]:
     """The verdicts, and the figures and tests below them."""
     games_of_arm = tables.episodes.groupby("arm").size().max()
-    links = GameLinks(embedded=embedded, episodes=tables.episodes)
     return {
         "cards": [_card(persona, place, found, links) for place, persona in enumerate(tables.personas, 1)],
         "most_dots": MOST_DOTS if games_of_arm > MOST_DOTS else 0,
-        "caution": page_wording.CAUTION,
+        "caution": CAUTION,
+        "metrics": METRICS,
+        "effect": effect,
         "tests": int(tables.comparisons["p_value"].notna().sum()),
     }
 
 
-def _card(persona: str, place: int, found: Results, links: GameLinks) -> Card:
+def _card(persona: str, place: int, found: RunFindings, links: GameLinks) -> Card:
     change = found.change if found.asked("RQ2", persona) else None
-    labels = page_wording.arm_labels(persona, change, found.naive)
+    labels = arm_labels(persona, change, found.naive)
     against = {arm: label for label, _, arm in labels if arm != NAIVE_ALONE.name}
-    return card(persona, place, found, worst_game(against, links.episodes, links.embedded), links)
+    return card(persona, place, found, worst=worst_game(against, links.episodes, links.embedded), links=links)
 
 
 def _player(tables: RunTables, embedded: Embedded) -> dict[str, Any]:
@@ -180,10 +183,11 @@ def _tables(tables: RunTables, listed: pd.DataFrame) -> dict[str, Any]:
     if len(tables.reconfiguration):
         frames["reconfiguration"] = tables.reconfiguration
     return {
-        "tables": {name: table(name, page_wording.CAPTIONS[name], frame) for name, frame in frames.items()},
+        "tables": {name: table(name, CAPTIONS[name], frame) for name, frame in frames.items()},
         "games": len(tables.episodes),
         "most_rows": MOST_ROWS,
-        "stages": stage_rows(tables.stages),
+        "stages": tables.stages,
+        "stopped": stopped,
     }
 
 
@@ -194,11 +198,23 @@ def _replays(tables: RunTables, embedded: Container[str]) -> dict[str, Any]:
     }
 
 
-def _method(tables: RunTables, found: Results) -> dict[str, Any]:
+def _method(tables: RunTables, found: RunFindings) -> dict[str, Any]:
     return {
         "significance": found.significance,
-        "asked_alone": page_wording.asked_alone(tables.manifest),
+        "asked_alone": _asked_alone(tables.manifest),
         "rules": sorted({stage["rule"] for stage in tables.stages.values() if stage.get("rule")}),
-        "glossary": page_wording.glossary(list(dict.fromkeys(tables.summary["arm"])), tables.arms, found),
+        "glossary": glossary(list(dict.fromkeys(tables.summary["arm"])), tables.arms, found),
         "versions": tables.manifest.get("versions", {}),
     }
+
+
+def _asked_alone(manifest: Mapping[str, Any]) -> str:
+    """What the campaign asks of players alone; empty if nothing."""
+    asked = manifest.get("campaign", {}).get("competence", {})
+    names = {"ego_goal_share": "an ego", "non_ego_goal_share": "a non-ego"}
+    bounds = [f"{percent(asked[key])} of {player}" for key, player in names.items() if asked.get(key)]
+    if not bounds:
+        return ""
+    return (
+        f"A question is answered only if its players reach their goals alone in a share of games: {', '.join(bounds)}."
+    )

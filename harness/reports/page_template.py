@@ -2,8 +2,17 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
 from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
+
+from harness.errors import UsageError
+from harness.files import write_atomically
+from harness.reports.numbers import duration, number, p_number, percent, short
 
 CONTENT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data: blob:"
 """What the page may load: nothing but itself."""
@@ -22,14 +31,19 @@ LIBRARIES = ("vendor/uPlot.iife.min.js", "vendor/dataTables.min.js")
 
 
 def environment_of(*folders: str) -> Environment:
-    """The template environment of folders of the package `harness`; the first that has a template provides it."""
-    return Environment(
+    """The template environment of folders of the package `harness`; the first that has a template provides it.
+
+    Templates write numbers with the functions of `harness.reports.numbers`, which are filters.
+    """
+    environment = Environment(
         loader=ChoiceLoader([PackageLoader("harness", folder) for folder in folders]),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters |= {each.__name__: each for each in (number, short, percent, p_number, duration)}
+    return environment
 
 
 def script(environment: Environment) -> Markup:
@@ -45,3 +59,31 @@ def libraries(environment: Environment) -> Markup:
 def _source(environment: Environment, name: str) -> str:
     assert environment.loader is not None
     return environment.loader.get_source(environment, name)[0].rstrip()
+
+
+def served_page(page: str, games: Sequence[Sequence[Any]], run: str) -> str:
+    """The page as a server sends it: with a list of the games that it may fetch from there as `games/KEY.json`.
+
+    `games` have arm, persona, seed, episode, outcome and least time to collision (s, None: none). Raises UsageError for
+    another page; `run` is the folder that the message names.
+    """
+    empty = ELSEWHERE.format("[]")
+    if CONTENT_POLICY not in page or empty not in page:
+        raise UsageError.of("report.html", run, "is not a report of this harness", f"harness report {run}")
+    page = page.replace(CONTENT_POLICY, f"{CONTENT_POLICY}; connect-src 'self'", 1)
+    return page.replace(empty, ELSEWHERE.format(json_text(games)), 1)
+
+
+def json_text(value: Any) -> str:
+    """JSON that cannot end a script element and contains no markup."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=True, allow_nan=False)
+    return text.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e")
+
+
+def write_page(file: Path, page: str) -> None:
+    """Write a page that a command was asked for. Raises UsageError when the file's name or folder is wrong."""
+    if file.suffix.lower() not in (".html", ".htm"):
+        raise UsageError.of("--html", str(file), "is not the name of a page", "it must end with .html")
+    if not file.absolute().parent.is_dir():
+        raise UsageError.of("--html", str(file), f"there is no folder {file.parent}", "create it, or name another file")
+    write_atomically(file, page.encode())

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from harness.reports.page_wording import MIXED_VERSIONS, UNKNOWN_VERSION, made_with
-
 if TYPE_CHECKING:
     from rich.console import Console
+
+MIXED_VERSIONS = "This run mixes versions: its results may differ from those of a single version."
+UNKNOWN_VERSION = "of no known version"
 
 
 def mixed_versions(stages: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Sentences for a run whose finished stages were not all made with the same versions; none for any other run.
 
-    `stages` are those of the manifest. The versions of a stage are unknown in runs of before they were recorded.
+    `stages` are those of the manifest.
     """
     recorded = {name: _versions(stage) for name, stage in stages.items() if stage.get("status") == "done"}
     known = {name: versions for name, versions in recorded.items() if versions}
@@ -38,7 +39,7 @@ def mixed_versions(stages: Mapping[str, Mapping[str, Any]]) -> list[str]:
         group = ", ".join(f"{program} {text[program]}" for program in mixed if program in text)
         if group:
             groups.setdefault(group, []).append(name)
-    return [MIXED_VERSIONS, *(made_with(group, names) for group, names in groups.items())]
+    return [MIXED_VERSIONS, *(f"  by {group}: {', '.join(names)}" for group, names in groups.items())]
 
 
 def warn(sentences: Sequence[str], console: Console) -> None:

@@ -13,6 +13,9 @@ from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.strategies import Arm, Strategy
 from harness.evaluation.tables import TABLES, typed
 
+FINISHED = ("done", "settled")
+"""Statuses of a stage that is complete."""
+
 
 def _empty(name: str) -> Callable[[], pd.DataFrame]:
     return lambda: pd.DataFrame(columns=list(TABLES[name]))
@@ -71,6 +74,11 @@ class RunTables:
         """The stages of the manifest, by id."""
         stages: Mapping[str, Mapping[str, Any]] = self.manifest.get("stages", {})
         return stages
+
+    @property
+    def unfinished(self) -> Mapping[str, Mapping[str, Any]]:
+        """The stages that are not complete."""
+        return {name: stage for name, stage in self.stages.items() if stage.get("status") not in FINISHED}
 
     @property
     def personas(self) -> list[str]:

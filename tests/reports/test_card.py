@@ -7,12 +7,18 @@ import pytest
 
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, RetrainedEgo, against_persona
 from harness.evaluation.summary import summarise
-from harness.reports.key_figures import NEAR_MISSES, PRICE, WORST_KNOWN_OPPONENT, key_figures
+from harness.reports.key_figures import (
+    NEAR_MISSES,
+    PARTLY,
+    PRICE,
+    WORST_KNOWN_OPPONENT,
+    card_verdict,
+    key_figures,
+    portrait,
+)
 from harness.reports.numbers import NO_SPACE
-from harness.reports.portrait import portrait
-from harness.reports.results import results
+from harness.reports.run_findings import results
 from harness.reports.run_tables import RunTables
-from harness.reports.shown_verdict import PARTLY, shown_verdict
 from tests.support.game_tables import arm, table
 from tests.support.pages import campaign
 
@@ -55,7 +61,7 @@ def test_near_misses__of_an_ego_without_failures_are_on_its_card():
 @pytest.mark.parametrize(("share", "label", "tone"), [(0.95, PARTLY, "open"), (0.0, "Yes", "mended")])
 def test_verdict__an_ego_that_comes_too_close_is_mended_only_in_part(share, label, tone):
     run = found(campaign(personas=["speedy"]), {"retrained_vs_speedy": share})
-    shown = shown_verdict("Did retraining fix it?", run.verdicts("RQ2", "speedy"), key_figures("speedy", run))
+    shown = card_verdict("Did retraining fix it?", run.verdicts("RQ2", "speedy"), key_figures("speedy", run))
     assert (shown.label, shown.tone, bool(shown.caution)) == (label, tone, label == PARTLY)
 
 

@@ -7,13 +7,13 @@ from xml.etree import ElementTree
 
 import pytest
 
-from harness.reports.junit import Check, write_junit
+from harness.reports.junit import JUnitCase, write_junit
 
 CHECKS = [
-    Check(name="failure rate", group="merge.speedy", seconds=1.5, details="at most 0.2\nfound 0.1"),
-    Check(name="near misses", group="merge.speedy", failure="12 of 100, more than 5"),
-    Check(name="speed", group="merge.speedy", error="no game was played"),
-    Check(name="gap", group="merge.speedy", skipped="not measured"),
+    JUnitCase(name="failure rate", group="merge.speedy", seconds=1.5, details="at most 0.2\nfound 0.1"),
+    JUnitCase(name="near misses", group="merge.speedy", failure="12 of 100, more than 5"),
+    JUnitCase(name="speed", group="merge.speedy", error="no game was played"),
+    JUnitCase(name="gap", group="merge.speedy", skipped="not measured"),
 ]
 
 
@@ -52,7 +52,7 @@ def test_write_junit__has_facts_of_the_whole_suite(suite: ElementTree.Element) -
 
 
 def test_write_junit__characters_that_xml_forbids_are_escaped(tmp_path: Path) -> None:
-    write_junit(tmp_path / "junit.xml", "a\x00b", [Check(name="<&\x1b", group="x", failure="\ud800")])
+    write_junit(tmp_path / "junit.xml", "a\x00b", [JUnitCase(name="<&\x1b", group="x", failure="\ud800")])
     root = ElementTree.parse(tmp_path / "junit.xml").getroot()
     case = next(root.iter("testcase"))
     assert case.get("name") == "<&\\x1b"

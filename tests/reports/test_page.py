@@ -12,11 +12,11 @@ from harness.evaluation.tables import write_csv
 from harness.evaluation.worst_first import worst_first
 from harness.replay.selection import choose_games, replay_name
 from harness.reports import page as page_module
+from harness.reports.cards import AS_MANY_FAILURES, FAILS_ALONE
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, speed_sentence, too_few
 from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
-from harness.reports.page import REPLAYS_SHOWN
-from harness.reports.page_wording import FAILS_ALONE, QUICK, as_many_failures
-from harness.reports.wording import (
+from harness.reports.page import QUICK, REPLAYS_SHOWN
+from harness.reports.verdict_wording import (
     NO_DIFFERENCE,
     NO_ROUND_2,
     NO_SEED_ANSWERS,
@@ -220,7 +220,7 @@ def test_words__several_seeds_are_counted_and_shown_each():
 
 
 def test_words__as_many_failures_against_an_ordinary_driver_are_stated(page):
-    sentence = as_many_failures("speedy", seeds=[1], several=False)
+    sentence = AS_MANY_FAILURES.format(persona="speedy", seeds="")
     assert sentence not in page.text
     assert sentence in text_of(campaign(personas=["speedy"], failing={"sumo": 0.4}))
 

@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from harness.reports.page_wording import MIXED_VERSIONS
-from harness.reports.provenance import mixed_versions
+from harness.reports.provenance import MIXED_VERSIONS, mixed_versions
 from tests.support.tiny import harness, sumo_run
 
 NEW, OLD = {"python": "3.11.7", "numpy": "2.2.6"}, {"python": "3.11.7", "numpy": "2.1.0"}

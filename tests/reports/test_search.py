@@ -12,12 +12,11 @@ import pandas as pd
 
 from harness.evaluation.strategies import ReconfiguredEgo, against_persona
 from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed
+from harness.reports.cards import STILL_DRIVES
 from harness.reports.header import rounds
-from harness.reports.page_wording import changed_ego_alone
 from harness.reports.provenance import mixed_versions
-from harness.reports.search import searches
-from harness.reports.treatment import RECONFIGURED
-from harness.reports.wording import QUESTIONS
+from harness.reports.searches import searches
+from harness.reports.verdict_wording import QUESTIONS, RECONFIGURED
 from tests.support.pages import campaign, rendered
 
 PAYOFFS = (2.0, 1.5, math.nan, 4.25, 4.25)
@@ -73,7 +72,7 @@ def test_page__shows_naive_against_reconfigured_as_it_does_naive_against_retrain
     assert f"{QUESTIONS['RQ2'].format(doing=RECONFIGURED.doing)} Yes RQ2: yes" in page
     assert "Reconfiguration reduces the ego's failures against the speedy driver from 18 of 60 games to 2 of 60" in page
     assert "reconfigured ego, against speedy" in page
-    assert changed_ego_alone("reconfigured") in page
+    assert STILL_DRIVES.format(made="reconfigured") in page
     assert "played by the naive and by the reconfigured ego" in page
     assert "drives faster after reconfiguration" in page
     assert "the ego tuned against speedy, against the same speedy" in page

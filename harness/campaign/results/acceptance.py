@@ -78,20 +78,19 @@ def _record(check: Check) -> dict[str, Any]:
     }
 
 
-def _acceptance_case(check: Check) -> junit.Check:
+def _acceptance_case(check: Check) -> junit.JUnitCase:
     name, words = f"{TITLES[check.bound]}: {check.arm}, seed {check.seed}", line(check).sentence.replace(NO_SPACE, " ")
     group = f"acceptance.{check.persona}.{check.bound}"
-    return junit.Check(name=name, group=group, failure="" if check.passed else words, details=words)
+    return junit.JUnitCase(name=name, group=group, failure="" if check.passed else words, details=words)
 
 
-def _stage_cases(manifest: Mapping[str, Any]) -> list[junit.Check]:
+def _stage_cases(manifest: Mapping[str, Any]) -> list[junit.JUnitCase]:
     cases = []
     for name, entry in manifest["stages"].items():
         finished = entry["status"] in FINISHED
         error = "" if finished else entry.get("message") or "it is not finished"
         if finished and entry.get("errors"):
             error = f"{entry['errors']} of {entry['episodes']} games could not be played"
-        cases.append(
-            junit.Check(name=name, group=f"stages.{entry['kind']}", error=error, seconds=entry.get("seconds") or 0.0)
-        )
+        group, seconds = f"stages.{entry['kind']}", entry.get("seconds") or 0.0
+        cases.append(junit.JUnitCase(name=name, group=group, error=error, seconds=seconds))
     return cases

@@ -13,7 +13,7 @@ from harness.errors import UsageError
 from harness.evaluation.run_comparison import differences_of
 from harness.evaluation.tables import read_csv
 from harness.files import write_atomically
-from harness.reports.run_comparison import ComparedRow, ComparedRun, compared_rows, headline, render_comparison
+from harness.reports.comparison_page import ComparedRow, compared_rows, headline, render_comparison
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,8 +36,8 @@ def compare_runs(before: Path, after: Path, page: Path) -> RunComparison:
     same_scene = bool(scenes[0]) and scenes[0] == scenes[1]
     significance = manifests[1]["campaign"]["assessment"]["significance"]
     rows = compared_rows(differences_of(games[0], games[1], same_scene), significance)
-    runs = [ComparedRun(name=str(run), manifest=each) for run, each in zip((before, after), manifests, strict=True)]
-    text = render_comparison(runs[0], runs[1], rows, same_scene=same_scene, significance=significance)
+    runs = list(zip((str(before), str(after)), manifests, strict=True))
+    text = render_comparison(runs, rows, same_scene=same_scene, significance=significance)
     write_atomically(page, text.encode())
     return RunComparison(headline=headline(rows), rows=rows, page=page)
 

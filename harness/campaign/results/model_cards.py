@@ -27,8 +27,8 @@ from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.roles import EGO, NON_EGO, ROLES
+from harness.reports.learning import stopped
 from harness.reports.numbers import interval, number, percent
-from harness.reports.page_wording import stopped
 
 CARD = "README.md"
 _PROGRAMS = ("python", "eclipse-sumo", "torch", "stable-baselines3", "numpy")

@@ -58,10 +58,9 @@ from harness.replay import choose_games, names_in_pictures, replay_name, write_r
 from harness.reports.game_wording import gap_verdicts
 from harness.reports.page import render_page
 from harness.reports.provenance import mixed_versions, warn
-from harness.reports.results import results
+from harness.reports.run_findings import results
 from harness.reports.run_tables import RunTables
-from harness.reports.treatment import ARMS
-from harness.reports.wording import Conclusion
+from harness.reports.verdict_wording import ARMS, Conclusion
 from harness.traffic.scene import OpenScene, open_scene
 
 WRITING_REPLAYS = "writing replays"

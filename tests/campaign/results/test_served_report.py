@@ -14,8 +14,7 @@ import pytest
 from harness.campaign.results.served_report import ServedReport, server_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
-from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE
-from harness.reports.served import served_page
+from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, served_page
 from tests.support.tiny import sumo_run
 
 

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from harness.evaluation.research_questions import INCOMPETENT, Verdict
+from harness.evaluation.strategies import NAIVE_ALONE, NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, Row, speed_sentence, statistics, too_few
 from harness.reports.numbers import p_text
-from harness.reports.treatment import ARMS, RETRAINED, Change
 
 Tone = Literal["harm", "mended", "open"]
 """harm: RQ1 is yes in any seed; mended: RQ2 is yes in all seeds; open: everything else."""
@@ -38,6 +38,32 @@ NOT_COMPARED = "Not compared."
 FAILURES_NOT_COMPARED = "The failures were not compared."
 BEFORE_HOLM_ONLY = "significantly {direction} without correction, but not after Holm's correction"
 NO_DIFFERENCE = "In each of the {pairs} pairs both games have the same result, so there is nothing to test."
+
+
+class Change(NamedTuple):
+    """What round 2 makes of the ego."""
+
+    made: str
+    """The ego of round 2 in sentences."""
+    doing: str
+    """What round 2 does, in sentences."""
+    ego: type[RetrainedEgo] | type[ReconfiguredEgo]
+    """The ego of round 2 as a strategy."""
+    naive: str = "naive ego"
+    """The ego before round 2 in sentences, after "the": an ego that the campaign did not train has its own name."""
+
+
+RETRAINED = Change("retrained", "retraining", RetrainedEgo)
+RECONFIGURED = Change("reconfigured", "reconfiguration", ReconfiguredEgo)
+
+ARMS = {
+    "RQ1": lambda persona, change: (NAIVE_ALONE.name, against_persona(NaiveEgo(), persona).name),
+    "RQ2": lambda persona, change: (
+        against_persona(NaiveEgo(), persona).name,
+        against_persona(change.ego(against=persona), persona).name,
+    ),
+}
+"""Baseline and treatment of each question, by the persona and by what round 2 does."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,15 +13,14 @@ from harness.evaluation.causes.sentences import cause_lines
 from harness.evaluation.people import people_in
 from harness.evaluation.preventability import Preventability, preventability_of
 from harness.evaluation.strategies import Arm, ReconfiguredEgo
-from harness.reports import wording
+from harness.reports import verdict_wording
 from harness.reports.differences import Row
 from harness.reports.run_tables import RunTables
-from harness.reports.treatment import ARMS, RECONFIGURED, RETRAINED, Change
-from harness.reports.wording import Conclusion, played
+from harness.reports.verdict_wording import ARMS, RECONFIGURED, RETRAINED, Change, Conclusion, played
 
 
 @dataclass(frozen=True, kw_only=True)
-class Results:
+class RunFindings:
     """The tables as the cards look them up."""
 
     arms: Mapping[tuple[str, int], Row]
@@ -79,7 +78,7 @@ class Results:
 
     def verdicts(self, question: str, persona: str) -> Conclusion:
         """The answer to a question about a persona, in words."""
-        return wording.verdicts(
+        return verdict_wording.verdicts(
             question,
             persona,
             seeds=self.asked(question, persona),
@@ -109,11 +108,11 @@ class Results:
         return [row for row in self.comparisons if (row["question"], row["persona"]) == (question, persona)]
 
 
-def results(tables: RunTables) -> Results:
+def results(tables: RunTables) -> RunFindings:
     """The frames of a run, looked up by arm and seed."""
     manifest, summary, comparisons = tables.manifest, tables.summary, tables.comparisons
     good = tables.episodes[~unplayed(tables.episodes)]
-    return Results(
+    return RunFindings(
         arms={(row["arm"], row["seed"]): row for row in summary.to_dict("records")},
         comparisons=comparisons.to_dict("records"),
         speeds={key: games.dropna() for key, games in good.groupby(["arm", "seed"])["ego_mean_speed_mps"]},

@@ -12,16 +12,17 @@ import pandas as pd
 
 from harness.evaluation.people import COLLIDED_WITH, judged
 from harness.evaluation.worst_first import worst_first
-from harness.reports import page_wording
-from harness.reports.numbers import MISSING, NO_SPACE, number
+from harness.reports.numbers import NO_SPACE, number
 from harness.reports.player_data import key
+
+OUTCOMES = {"rail": "contact with the rail", "timeout": "out of time", "goal": "goal reached"}
+"""Outcomes in words, where the name is not clear."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replay:
+class ListedReplay:
     """A recorded game and how to watch it."""
 
-    name: str
     game: str
     outcome: str
     min_ttc: str
@@ -31,20 +32,14 @@ class Replay:
     """Key of the game if the page can play it, else empty."""
 
 
-def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[Replay]:
+def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[ListedReplay]:
     """The replays, worst first.
 
     `embedded` are the keys of the games that the page can play.
     """
-    games = {_name(game): game for game in worst_first(episodes).to_dict("records")}
-    several_seeds = episodes["seed"].nunique() > 1
-    wanted = set(names)
-    shown = [_replay(name, game, several_seeds, embedded) for name, game in games.items() if name in wanted]
-    unknown = sorted(set(names) - set(games))
-    return shown + [
-        Replay(name=name, game=name, outcome=MISSING, min_ttc=MISSING, command="", scene=_scene(name), watch="")
-        for name in unknown
-    ]
+    several_seeds, wanted = episodes["seed"].nunique() > 1, set(names)
+    games = [game for game in worst_first(episodes).to_dict("records") if _name(game) in wanted]
+    return [_replay(_name(game), game, several_seeds, embedded) for game in games]
 
 
 def worst_game(arms: Mapping[str, str], episodes: pd.DataFrame, embedded: Container[str]) -> tuple[str, str] | None:
@@ -57,7 +52,8 @@ def worst_game(arms: Mapping[str, str], episodes: pd.DataFrame, embedded: Contai
     (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
     seed = f", seed {game['seed']}" if episodes["seed"].nunique() > 1 else ""
     name = f"{arms[game['arm']]}{seed}, game {game['episode']}"
-    return _key(game), page_wording.worst_game(name, outcome, ttc, _with(game) + _impact(game))
+    nearest = f", least time to collision {number(ttc, 1)} s" if 0 < ttc < math.inf else ""
+    return _key(game), f"{name}: {OUTCOMES.get(outcome, outcome)}{_with(game)}{_impact(game)}{nearest}"
 
 
 def most_severe(episodes: pd.DataFrame) -> Mapping[Any, Any]:
@@ -73,16 +69,15 @@ def _key(game: Mapping[Any, Any]) -> str:
     return key(game["arm"], game["seed"], game["episode"])
 
 
-def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: Container[str]) -> Replay:
+def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: Container[str]) -> ListedReplay:
     arm, seed, episode = game["arm"], game["seed"], game["episode"]
     who, outcome = judged(game)
-    return Replay(
-        name=name,
+    return ListedReplay(
         game=f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
         outcome=f"{_in_words(who)}: {outcome}{_with(game)}{_impact(game)}",
         min_ttc=number(game["ego_min_ttc_s"], 2),
         command=f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
-        scene=_scene(name),
+        scene=f"sumo-gui -c {shlex.quote(f'replays/{name}/scene.sumocfg')}",
         watch=_key(game) if _key(game) in embedded else "",
     )
 
@@ -105,7 +100,3 @@ def _impact(game: Mapping[Any, Any]) -> str:
     own, other = (f"{number(game[f'{who}_delta_v_mps'], 1)}{NO_SPACE}m/s" for who in ("ego", "other"))
     of_other = f", of the other {other}" if other != own else ""
     return f", {game['impact_side']} side at {number(speed, 1)}{NO_SPACE}m/s (delta-v {own}{of_other})"
-
-
-def _scene(name: str) -> str:
-    return f"sumo-gui -c {shlex.quote(f'replays/{name}/scene.sumocfg')}"

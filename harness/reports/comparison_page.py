@@ -21,16 +21,6 @@ DIFFERENT_SCENES = "The scenes differ, so games have different starts: there are
 
 
 @dataclass(frozen=True, kw_only=True)
-class Statistics:
-    """The test behind a difference."""
-
-    interval: str
-    p_value: str
-    p_holm: str
-    pairs: int
-
-
-@dataclass(frozen=True, kw_only=True)
 class ComparedRow:
     """One difference in words."""
 
@@ -43,31 +33,11 @@ class ComparedRow:
     tone: str
     sentence: str
     difference: str
-    statistics: Statistics | None
-    """None without pairs."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComparedRun:
-    """One of the two runs."""
-
-    name: str
-    manifest: Mapping[str, Any]
-
-    @property
-    def facts(self) -> list[tuple[str, str]]:
-        """What was run, as label and value."""
-        return facts(self.manifest, (), len(self.manifest.get("personas", ())))
-
-    @property
-    def command(self) -> str:
-        """The command that makes the run."""
-        return command_of(self.manifest)
-
-    @property
-    def made_by(self) -> list[str]:
-        """The version of the harness and the date, where they are known."""
-        return made_by(self.manifest)
+    interval: str
+    p_value: str
+    p_holm: str
+    pairs: int
+    """0 without a test."""
 
 
 def compared_rows(differences: Sequence[Difference], significance: float) -> list[ComparedRow]:
@@ -86,15 +56,17 @@ def headline(rows: Sequence[ComparedRow]) -> str:
 
 
 def render_comparison(
-    before: ComparedRun, after: ComparedRun, rows: Sequence[ComparedRow], *, same_scene: bool, significance: float
+    runs: Sequence[tuple[str, Mapping[str, Any]]], rows: Sequence[ComparedRow], *, same_scene: bool, significance: float
 ) -> str:
-    """The page as HTML. Equal input gives equal text."""
+    """The page as HTML. `runs` are name and manifest of both runs. Equal input gives equal text."""
     return (
         environment_of("reports")
         .get_template("compare.html.jinja")
         .render(
-            before=before,
-            after=after,
+            runs=[
+                (name, command_of(each), made_by(each), facts(each, (), len(each.get("personas", ()))))
+                for name, each in runs
+            ],
             rows=rows,
             headline=headline(rows),
             remark="" if same_scene else DIFFERENT_SCENES,
@@ -117,7 +89,12 @@ def _row(found: Difference, significance: float) -> ComparedRow:
         tone=TONES.get(verdict, "open"),
         sentence=f"{sentence}: {CHANCE if verdict == NOT_SHOWN else verdict}",
         difference=_with_unit(found, found.mean) if found.pairs else "",
-        statistics=_statistics(found) if found.pairs else None,
+        interval=" to ".join(_with_unit(found, end) for end in (found.low, found.high))
+        if math.isfinite(found.low)
+        else MISSING,
+        p_value=p_number(found.p_value),
+        p_holm=p_number(found.p_holm),
+        pairs=found.pairs,
     )
 
 
@@ -152,13 +129,3 @@ def _with_interval(found: Difference, side: Side) -> str:
 
 def _with_unit(found: Difference, value: float) -> str:
     return f"{signed(value * 100.0, 1)} points" if found.is_rate else f"{signed(value, 3)}{NO_SPACE}m/s"
-
-
-def _statistics(found: Difference) -> Statistics:
-    ends = [_with_unit(found, end) for end in (found.low, found.high)]
-    return Statistics(
-        interval=" to ".join(ends) if math.isfinite(found.low) else MISSING,
-        p_value=p_number(found.p_value),
-        p_holm=p_number(found.p_holm),
-        pairs=found.pairs,
-    )

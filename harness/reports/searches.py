@@ -2,42 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import pandas as pd
 from markupsafe import Markup
 
+from harness.reports.differences import Row
 from harness.reports.figures import INK, SERIES, figure_of, svg
-from harness.reports.numbers import short
-from harness.reports.page_wording import search_alternative, search_summary
+from harness.reports.numbers import number, short, trimmed
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter:
-    """One parameter of the ego: its given value, its found value, and the bounds of the search."""
-
-    name: str
-    given: str
-    found: str
-    low: str
-    high: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Search:
+class SearchSection:
     """One search, in words and numbers."""
 
     stage: str
     """With its seed when there are several."""
     figure: Markup
     summary: str
-    parameters: Sequence[Parameter]
+    parameters: Sequence[Mapping[Hashable, Any]]
+    """Name (`parameter`), given `value`, `value_found`, and the bounds `low` and `high` of the search."""
     document: str
     """The path of the driver that it found, from the run folder."""
 
 
-def searches(reconfiguration: pd.DataFrame) -> list[Search]:
+def searches(reconfiguration: pd.DataFrame) -> list[SearchSection]:
     """Each search of `reconfiguration`, the table, in order of first appearance."""
     several = reconfiguration["seed"].nunique() > 1
     return [
@@ -46,33 +37,34 @@ def searches(reconfiguration: pd.DataFrame) -> list[Search]:
     ]
 
 
-def _search(stage_id: str, title: str, rows: pd.DataFrame, place: int) -> Search:
+def _search(stage_id: str, title: str, rows: pd.DataFrame, place: int) -> SearchSection:
     trials = rows.drop_duplicates("trial").sort_values("trial")
     given, chosen = rows[rows["trial"] == 0], rows[rows["chosen"]]
-    summary = search_summary(
-        trials=len(trials),
-        first=given.iloc[0],
-        best=chosen.iloc[0],
-        unplayed=int(trials["mean_payoff"].isna().sum()),
-        errors=trials.loc[trials["error"] != "", "error"].unique()[:3],
-    )
+    summary = _summary(trials, given.iloc[0], chosen.iloc[0])
     both = given.merge(chosen[["parameter", "value"]], on="parameter", suffixes=("", "_found"))
-    return Search(
+    return SearchSection(
         stage=title,
-        figure=_figure(trials, f"search{place}", search_alternative(title, summary)),
+        figure=_figure(
+            trials, f"search{place}", f"Mean payoff of each trial of {title}, and the best so far. {summary}"
+        ),
         summary=summary,
-        parameters=[
-            Parameter(
-                name=row.parameter,
-                given=short(row.value),
-                found=short(row.value_found),
-                low=short(row.low),
-                high=short(row.high),
-            )
-            for row in both.itertuples()
-        ],
+        parameters=both.to_dict("records"),
         document=f"policies/{stage_id}/driver.toml",
     )
+
+
+def _summary(trials: pd.DataFrame, first: Row, best: Row) -> str:
+    """What a search found, of its first and its best trial."""
+    text = f"{len(trials)} trials; the best is trial {best['trial']}: {_trial(best)}. As given: {_trial(first)}."
+    if best["trial"] == first["trial"]:
+        text = f"{len(trials)} trials, none better than the ego as given: {_trial(first)}."
+    unplayed = int(trials["mean_payoff"].isna().sum())
+    errors = "; ".join(trials.loc[trials["error"] != "", "error"].unique()[:3])
+    return text + (f" {unplayed} could not be played: {errors}" if unplayed else "")
+
+
+def _trial(trial: Row) -> str:
+    return f"mean payoff {number(trial['mean_payoff'], 2)}, failures in {trimmed(trial['failure_rate'] * 100, 1)} %"
 
 
 def _figure(trials: pd.DataFrame, name: str, alternative: str) -> Markup:

@@ -1,18 +1,68 @@
-"""A profile's figures, in the style of the report's."""
+"""A persona's profile as one HTML file: opens offline, loads nothing."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from markupsafe import Markup
 
 from harness.reports.figures import GRID, INK, SERIES, figure_of, svg
+from harness.reports.page_template import environment_of, write_page
 from harness.reports.persona.drives import DRIVE_S, SampleDrive
-from harness.reports.persona.profile import NO_CHECK_MARK, number
+from harness.reports.persona.profile import (
+    ATTENDS,
+    DECIDES,
+    FORMULA,
+    NO_CHECK_MARK,
+    WANTS,
+    PersonaProfile,
+    attends,
+    body,
+    decides,
+    function_in_words,
+    lapses_of,
+    number,
+    sees,
+    wants,
+)
 from harness.reports.persona.worth import PayoffFunction
 
 _COLOURS = [SERIES[name] for name in ("alone", "persona", "retrained", "sumo")]
 _LINES = ("-", "--", ":", "-.")
+
+
+def write_profile(profile: PersonaProfile, file: Path) -> None:
+    """Write the page. Raises UsageError when the file's name or folder is wrong."""
+    write_page(file, render_profile(profile))
+
+
+def render_profile(profile: PersonaProfile) -> str:
+    """The page as text. Equal portraits give equal pages."""
+    functions = []
+    for k, each in enumerate(profile.functions, 1):
+        words = function_in_words(each)
+        functions.append((each, words, function_figure(each, f"function{k}", f"{each.name}: {words}")))
+    lapses = None
+    if profile.persona.human_factors.attention is not None:
+        lapses = drives_figure(profile.drives, "drives", lapses_of(profile))
+    page = (
+        environment_of("reports/persona", "reports")
+        .get_template("profile.html.jinja")
+        .render(
+            persona=profile.persona,
+            headings={"wants": WANTS, "attends": ATTENDS, "decides": DECIDES},
+            formula=FORMULA,
+            terms=profile.terms,
+            wants=list(wants(profile)),
+            functions=functions,
+            attends=[*attends(profile), *sees(profile), *body(profile)],
+            drives_figure=lapses,
+            decides=decides(profile),
+            number=number,
+        )
+    )
+    return page.strip() + "\n"
 
 
 def function_figure(function: PayoffFunction, name: str, alternative: str) -> Markup:

@@ -1,0 +1,62 @@
+"""Each arm of a campaign in words: who drives with whom."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from harness.evaluation.strategies import (
+    Arm,
+    EgoStrategy,
+    NaiveEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    SumoNonEgo,
+    strategy_name,
+)
+from harness.reports.run_findings import RunFindings
+
+
+def glossary(arms: Sequence[str], records: Mapping[str, Arm], found: RunFindings) -> list[tuple[str, str]]:
+    """Each arm that is planned, and what it pairs."""
+    return [(name, _in_words(records[name], found)) for name in arms if name in records]
+
+
+def _in_words(arm: Arm, found: RunFindings) -> str:
+    """What an arm pairs."""
+    several = "s" if found.people > 1 else ""
+    if arm.best_response_of is not None:
+        player = ("the ego", "the non-ego")[arm.best_response_of]
+        return f"{arm.pair.name}, {player} replaced by its best response"
+    match arm:
+        case Arm(ego=None, non_ego=non_ego) if non_ego is not None:
+            name = strategy_name(non_ego)
+            return f"{f'one {name} driver at a time' if several else f'the non-ego {name}'} without the ego"
+        case Arm(ego=NaiveEgo(), non_ego=None):
+            return f"the {found.naive} on the road without the non-ego{several}"
+        case Arm(ego=ego, non_ego=None) if ego is not None:
+            return f"{_ego_in_words(ego, found.naive)}, without the non-ego{several}"
+        case Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()):
+            if several:
+                return f"the {found.naive} with ordinary law-abiding SUMO drivers in the non-egos' places"
+            return f"the {found.naive} with an ordinary law-abiding SUMO driver in the non-ego's place"
+        case Arm(ego=RetrainedEgo(against=against) | ReconfiguredEgo(against=against) as ego, non_ego=non_ego) if (
+            non_ego is not None and against == strategy_name(non_ego)
+        ):
+            same = found.who(against).removeprefix("the ") or against
+            return f"{_ego_in_words(ego, found.naive)}, against the same {same}"
+        case Arm(ego=ego, non_ego=non_ego) if ego is not None and non_ego is not None:
+            name = strategy_name(non_ego)
+            return f"{_ego_in_words(ego, found.naive)} against {found.who(name) or f'the non-ego {name}'}"
+    raise ValueError("an arm has at least one player")
+
+
+def _ego_in_words(ego: EgoStrategy, naive: str) -> str:
+    match ego:
+        case NaiveEgo():
+            return f"the {naive}"
+        case ReconfiguredEgo(against=against):
+            return f"the ego tuned against {against}"
+        case RetrainedEgo(against=against, round=2):
+            return f"the ego retrained against {against}"
+        case _:
+            return f"the ego {strategy_name(ego)}"
