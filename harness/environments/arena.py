@@ -21,14 +21,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NoReturn
 
 import numpy as np
 
-from harness.environments.live import LiveSimulation
 from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat as Seat
 from harness.environments.seats import with_walkers
-from harness.environments.sumo_players import read_sumo_players
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import release_controls
 from harness.game.bicycle import move, requests
@@ -43,10 +42,22 @@ from harness.game.state import Bodies, State
 from harness.game.terminations import terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
-from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
 from harness.traffic.simulation import Reading, Simulation, with_game
+from harness.traffic.subprocess_simulation import open_simulation
+
+
+class LiveSimulation:
+    """An environment that holds a running SUMO simulation, which is neither pickled nor copied."""
+
+    def __reduce_ex__(self, protocol: Any) -> NoReturn:
+        """Raises TypeError: `pickle`, `copy` and `cloudpickle` ask for this."""
+        raise TypeError(
+            f"{type(self).__name__} holds a running SUMO simulation and can't be pickled or copied: pass on a function "
+            "that makes it, such as lambda: gymnasium.make('harness:harness/Ego-v0'), and call that where it is needed"
+        )
+
 
 _RUNNING, _GOAL = int(Outcome.RUNNING), int(Outcome.GOAL)  # comparing arrays with members of an enumeration is slower
 
@@ -298,3 +309,19 @@ class Arena(LiveSimulation):
     def _bodies(self, state: State, games: IntArray | slice = slice(None)) -> Bodies:
         """The players and the bodies near them in `games`; `state` is that of the same games."""
         return self.nearby.of(state, self.reading, games)
+
+
+def read_sumo_players(state: State, reading: Reading, drove: BoolArray, taken_over: BoolArray, step_s: float) -> None:
+    """Write the motion of the players that SUMO drives to `state`, in place.
+
+    `drove` [G, P] marks the players that still drive, `taken_over` [P] those that the harness drives.
+    """
+    if reading.players is None:
+        return
+    for player in np.flatnonzero(~taken_over):
+        games = np.flatnonzero(drove[:, player])
+        x, y, heading, speed = reading.players[games, player].T
+        gained = np.where(state.step[games] > 0, speed - state.speed_mps[games, player], 0.0)
+        state.acceleration_mps2[games, player] = gained / step_s
+        state.x_m[games, player], state.y_m[games, player] = x, y
+        state.heading_rad[games, player], state.speed_mps[games, player] = heading, speed

@@ -1,7 +1,7 @@
 """A Gymnasium environment for one player, and a PettingZoo environment for all.
 
 Each environment has its own arena with one game. A process may contain any number of environments: the first runs SUMO
-in the process itself, each further one in a process of its own (`harness.traffic.open_simulation`).
+in the process itself, each further one in a process of its own (`harness.traffic.subprocess_simulation`).
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv
 
 from harness.drivers.policy_file import ACTIONS
-from harness.environments.arena import Seat
-from harness.environments.live import LiveSimulation
+from harness.environments.arena import LiveSimulation, Seat
 from harness.environments.reset_options import named_game
 from harness.environments.seating import PERSONA, SCENE, Place, opened_scene, read_persona, seating_of
 from harness.environments.single_game import RENDER_MODES, Info, SingleGame

@@ -10,9 +10,8 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
 from harness.drivers.policy_file import ACTIONS
-from harness.environments.arena import Arena
+from harness.environments.arena import Arena, LiveSimulation
 from harness.environments.auto_reset import AutoReset
-from harness.environments.live import LiveSimulation
 from harness.environments.seating import PERSONA, SCENE, Place, Seating, seating_of
 from harness.environments.single_game import checked_actions
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE, ArenaVecEnv

@@ -10,8 +10,8 @@ from pathlib import Path
 import pandas as pd
 
 from harness.game.obstacles import NO_OBSTACLES, Obstacle, Obstacles
-from harness.traffic.class_sizes import CAR_SIZE_M, SIZES_M
-from harness.traffic.footway import WALKER_ATTRIBUTES, WALKER_TYPE
+from harness.traffic.route_file import CAR_SIZE_M, SIZES_M
+from harness.traffic.walker_vehicle import WALKER_ATTRIBUTES, WALKER_TYPE
 from harness.traffic.xml_file import parse_xml
 
 PLAYER_COLOURS = {

@@ -1,47 +1,30 @@
-"""A player on foot: its way, the surface on which it walks, and its body in SUMO.
-
-In SUMO a walker is a small vehicle with the shape of a pedestrian: persons that are placed end SUMO 1.28 in nets with
-crossings, and SUMO's cars do not see them beside crossings.
-"""
+"""A player on foot: its way, and the surface on which it walks."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, partial
-from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 import shapely
 from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
-from sumolib.net.edge import Edge
 from sumolib.net.node import Node
 
-from harness.config.road_user import WALKER_LENGTH_M, WALKER_RUN_MPS, WALKER_WIDTH_M, WALKING_MPS
+from harness.config.road_user import WALKER_LENGTH_M, WALKER_WIDTH_M, WALKING_MPS
 from harness.config.scene import Scene
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.raster import CELL_M, Raster
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic import surface
-from harness.traffic.network import car_lanes, lane_line
+from harness.traffic.network import lane_line
 from harness.traffic.player import OpenPlayer
-from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_table import extended, road_edges, sampled
+from harness.traffic.scene_files import SceneFiles
 from harness.traffic.stream import USERS
 from harness.traffic.zebra import follows_crossing
 
-WALKER_TYPE = "harness_pedestrian"
-WALKER_ATTRIBUTES = {
-    "id": WALKER_TYPE,
-    "length": f"{WALKER_LENGTH_M:g}",
-    "width": f"{WALKER_WIDTH_M:g}",
-    "maxSpeed": f"{WALKER_RUN_MPS:g}",
-    "minGap": "0.25",
-    "guiShape": "pedestrian",
-}
-"""The SUMO `<vType>` of a walker. Its class is a car's: the edges of its route need not allow pedestrians."""
 _LEAST_M, _MOST_M = 2.0, 150.0  # of a way
 _STRAYS_M = 30.0  # beside a way, within which the carriageway is known
 _ROOM_M = 0.5 * (WALKER_LENGTH_M**2 + WALKER_WIDTH_M**2) ** 0.5  # a walker's centre keeps from the surface's edge
@@ -107,59 +90,11 @@ def _pavements(net: Net) -> list[BaseGeometry]:
     return shapes
 
 
-def with_walkers(routes: RouteFile, document: Scene, net: Net) -> RouteFile:
-    """The route file with a vehicle for each pedestrian among the players, on the road that is nearest to its way."""
-    walkers = {
-        name: np.array(player.way)
-        for name, player in zip(document.vehicles, document.players, strict=True)
-        if player.way is not None
-    }
-    if not walkers:
-        return routes
-    types = ElementTree.fromstring(routes.types_xml)
-    ElementTree.SubElement(types, "vType", WALKER_ATTRIBUTES)
-    vehicles = {
-        name: Departure(
-            name=name,
-            vehicle_type=WALKER_TYPE,
-            edges=(_nearest_road(net, way).getID(),),
-            depart_s=0.0,
-            lane="best",
-            position="base",
-            speed="0",
-        )
-        for name, way in walkers.items()
-    }
-    kind = VehicleType(
-        name=WALKER_TYPE,
-        length_m=WALKER_LENGTH_M,
-        width_m=WALKER_WIDTH_M,
-        max_speed_mps=WALKER_RUN_MPS,
-        vehicle_class="pedestrian",  # what it is; to SUMO it is a car
-    )
-    return replace(
-        routes,
-        types={**routes.types, WALKER_TYPE: kind},
-        vehicles={**routes.vehicles, **vehicles},
-        types_xml=ElementTree.tostring(types, encoding="unicode"),
-    )
-
-
-def _nearest_road(net: Net, way: FloatArray) -> Edge:
-    roads = [edge for edge in net.getEdges(withInternal=False) if car_lanes(edge)]
-    line = shapely.LineString(way)
-    return min(roads, key=lambda edge: shapely.distance(line, shapely.LineString(lane_line(car_lanes(edge)[0]))))
-
-
-def open_walker(
-    role: str, *, file: Path, document: Scene, net: Net, routes: RouteFile, ground: Ground | None
-) -> OpenPlayer:
-    """The player of a name of a scene document, which was read from `file`, on foot.
-
-    Raises UsageError with every problem found.
-    """
+def open_walker(role: str, files: SceneFiles, ground: Ground | None) -> OpenPlayer:
+    """The player of a name (`Scene.roles`) who is on foot. Raises UsageError with every problem found."""
+    document, net, routes = files.document, files.net, files.routes
     way = np.array(document.player(role).way, dtype=float)
-    problem = partial(UsageError.of, file, f"{role}.way")
+    problem = partial(UsageError.of, files.file, f"{role}.way")
     length_m = float(np.hypot(*np.diff(way, axis=0).T).sum())
     if not _LEAST_M <= length_m <= _MOST_M:
         message = f"is {length_m:.1f} m long, {_LEAST_M:g} to {_MOST_M:g} m are possible"

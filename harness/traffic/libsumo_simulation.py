@@ -33,9 +33,8 @@ from harness.traffic.insertion import Insertion
 from harness.traffic.obstacles import clear_of_obstacles
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.signals import Signals
+from harness.traffic.signals import Signals, SpeedLimits
 from harness.traffic.simulation import NO_SIGNALS, AtReset, Reading
-from harness.traffic.speed_limits import SpeedLimits
 from harness.traffic.standing_vehicles import TYPE_XML, StandingVehicles
 from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.traffic.warm_up import LANE_CHANGE_S, clear_of_players

@@ -15,7 +15,7 @@ import numpy as np
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.traffic.schema import kinds, problems_in
+from harness.traffic.schema import PARAM, Kind, problems_in
 from harness.traffic.xml_file import number_of, parse_xml
 
 _REMEDY = "build it with netconvert or netedit"
@@ -25,6 +25,25 @@ _WIDEST_M = 100_000.0
 _MOST_CELLS, _CELL_M = 4e6, 20.0  # of the grid of rails
 _MOST_LANES = 63
 _MOST_LINKS = 10_000  # of a traffic light
+_CHILDREN = {
+    "net": "location type edge tlLogic junction connection prohibition roundabout taz",
+    "type": "restriction meso laneType",
+    "taz": "tazSource tazSink",
+    "edge": "lane stopOffset",
+    "lane": "neigh stopOffset",
+    "tlLogic": "phase condition assignment function",
+    "junction": "request",
+    "connection": "conflict",
+}
+_LEAVES = {child for children in _CHILDREN.values() for child in children.split()} - _CHILDREN.keys()
+_KINDS = {
+    "param": PARAM,
+    **dict.fromkeys(_LEAVES, Kind(None, {"param": "param"})),
+    **{
+        tag: Kind(None, {child: child for child in (*children.split(), "param")}) for tag, children in _CHILDREN.items()
+    },
+}
+"""The elements of a net that SUMO and the harness read, by the element around them."""
 
 
 def check_net(path: Path) -> None:
@@ -32,7 +51,7 @@ def check_net(path: Path) -> None:
     root = parse_xml(path)
     if root.tag != "net":
         raise UsageError.of(path, str(root.tag), "is not a SUMO net: its root is not net", _REMEDY)
-    unknown = list(problems_in(path, root, kinds("net_file.xsd"), "netType"))
+    unknown = list(problems_in(path, root, _KINDS, "net"))
     if unknown:
         raise UsageError(unknown)
     faults = chain(_number_faults(root), _reference_faults(root), _signal_faults(root))

@@ -20,39 +20,36 @@ from harness.config.scene import Scene
 from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
 from harness.game.geometry import Box, box_distance
-from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.neighbours import NOTICED_M
 from harness.game.obstacles import AtPoint, Obstacle, Obstacles, OnLane
 from harness.game.road import Route
 from harness.game.sight import TALL_WIDTH_M, Hiding
-from harness.game.world import World
 from harness.traffic import network
 from harness.traffic.departures import background_departures
 from harness.traffic.route_file import Departure, Motion, RouteFile, VehicleType
+from harness.traffic.scene_files import SceneFiles
 from harness.traffic.warm_up import CLEAR_M, CLEAR_S
 
-_DRAWS = 200
 _BENT_M = 0.5  # a closed lane is straight: its lane may leave the middle of the box by this much
 _SHARES = (0.0, 0.5, 1.0)
 
 
-def open_obstacles(
-    *, file: Path, document: Scene, net: Net, area: BaseGeometry, routes: RouteFile, ways: Sequence[Route]
-) -> Obstacles:
-    """The obstacles of a scene document, which was read from `file`. Raises UsageError with every problem found.
+def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route]) -> Obstacles:
+    """The obstacles of a scene. Raises UsageError with every problem found.
 
     `area` is the net's drivable area, `ways` are the players' routes.
     """
+    file, routes = files.file, files.routes
     problems: list[Problem] = []
     lines = shapely.union_all([shapely.LineString(np.stack((way.x_m, way.y_m), axis=1)) for way in ways])
     found: list[Obstacle] = []
     outlines: list[FloatArray] = []
-    for number, each in enumerate(document.obstacle, start=1):
+    for number, each in enumerate(files.document.obstacle, start=1):
         name = f"obstacle_{number}"
         if each.outline is not None:
             outlines.append(np.array(each.outline, dtype=float))
             collect(problems, partial(_check_building, file, name, outlines[-1], area, lines))
-        elif (obstacle := collect(problems, partial(_obstacle, file, name, each, net))) is not None:
+        elif (obstacle := collect(problems, partial(_obstacle, file, name, each, files.net))) is not None:
             found.append(obstacle)
             collect(problems, partial(_check_is_near, file, name, reach_of(obstacle), lines))
     taken = {each.name for each in found} & {*routes.vehicles, *(flow.departure.name for flow in routes.flows)}
@@ -63,28 +60,9 @@ def open_obstacles(
     return Obstacles(each=tuple(found), outlines=tuple(outlines))
 
 
-def check_clear_starts(file: Path, starts: StartDistribution, world: World) -> None:
-    """Raise UsageError if an obstacle touches a player in one of many drawn starts of the scene document `file`."""
-    obstacles = starts.obstacles
-    if not obstacles.each:
-        return
-    found: dict[tuple[int, int], int] = {}
-    for draw in range(_DRAWS):
-        parts = ("start check", draw)
-        start, boxes = draw_initial_state(starts, *parts), _boxes_of(obstacles.boxes(*parts))
-        players = _boxes_of(Box(start.x_m, start.y_m, start.heading_rad, world.length_m, world.width_m))
-        for player, obstacle in product(range(len(players)), range(len(boxes))):
-            if box_distance(players[player], boxes[obstacle]) <= 0.0:
-                found[player, obstacle] = found.get((player, obstacle), 0) + 1
-    if found:
-        (player, obstacle), count = max(found.items(), key=lambda each: each[1])
-        message = f"stands on the start of {world.roles[player]} in {count} of {_DRAWS} drawn starts"
-        raise UsageError.of(file, obstacles.each[obstacle].name, message, "move it, or the start")
-
-
 def clear_of_obstacles(departures: Iterable[Departure], obstacles: Box) -> list[Departure]:
     """The departures without vehicles of a warm-up that are on an obstacle, or would have to brake hard before it."""
-    boxes = _boxes_of(obstacles)
+    boxes = boxes_of(obstacles)
     return [
         each
         for each in departures
@@ -100,7 +78,8 @@ def _way(motion: Motion) -> Box:
     return Box(float(x_m), float(y_m), motion.heading_rad, motion.length_m + room_m, motion.width_m)
 
 
-def _boxes_of(boxes: Box) -> list[Box]:
+def boxes_of(boxes: Box) -> list[Box]:
+    """The boxes of a box with arrays [N], one by one."""
     return [Box(*each) for each in np.array(boxes, dtype=float).T.tolist()]
 
 

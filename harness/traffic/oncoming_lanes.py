@@ -1,13 +1,34 @@
-"""Where the lanes of a route's own direction end and oncoming lanes begin."""
+"""The lanes of an edge that a kind of road user travels on, and the marks between own and oncoming lanes."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeAlias
 
 import numpy as np
 import shapely
 from sumolib.net import Net
+from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
 
+from harness.config.road_user import CYCLING, Kind
 from harness.game.arrays import BoolArray, FloatArray
 from harness.traffic.network import car_lanes, lane_line
+
+LanesOf: TypeAlias = Callable[[Edge], list[Lane]]
+
+
+def lanes_for(kind: Kind) -> LanesOf:
+    """The lanes of an edge for a kind, in SUMO's order."""
+    return bicycle_lanes if kind in CYCLING else car_lanes
+
+
+def bicycle_lanes(edge: Edge) -> list[Lane]:
+    """The edge's lanes for bicycles alone; without any, the rightmost lane that admits them: it may be a pavement."""
+    admit = [lane for lane in edge.getLanes() if lane.allows("bicycle")]
+    alone = [lane for lane in admit if not lane.allows("passenger") and not lane.allows("pedestrian")]
+    return alone or admit[:1]
+
 
 _BESIDE_M = 1.0  # a lane that is this far beyond the own lanes is next to them
 _OPPOSITE = -0.7  # cosine of the angle between two directions

@@ -18,9 +18,10 @@ from harness.errors import Problem, UsageError, collect
 from harness.game.road import Route
 from harness.traffic import network
 from harness.traffic.departures import edges_of
+from harness.traffic.oncoming_lanes import bicycle_lanes, lanes_for
 from harness.traffic.route_file import Departure, RouteFile, VehicleType
 from harness.traffic.route_table import route_table
-from harness.traffic.users_lanes import bicycle_lanes, lanes_for
+from harness.traffic.scene_files import SceneFiles
 
 _LONGEST_ROUTE_M = 50_000.0
 _CYCLING_CLASSES = ("bicycle", "scooter")
@@ -35,13 +36,12 @@ class OpenPlayer:
     vehicle_type: VehicleType
 
 
-def open_player(
-    role: str, *, file: Path, document: Scene, net: Net, area: BaseGeometry, routes: RouteFile
-) -> OpenPlayer:
-    """The player of a name (`Scene.roles`) of a scene document, which was read from `file`.
+def open_player(role: str, files: SceneFiles, area: BaseGeometry) -> OpenPlayer:
+    """The player of a name (`Scene.roles`) who is not on foot. Raises UsageError with every problem found.
 
-    `area` is the net's drivable area. Raises UsageError with every problem found.
+    `area` is the net's drivable area.
     """
+    file, document, net, routes = files.file, files.document, files.net, files.routes
     player: Player = document.player(role)
     problems: list[Problem] = []
     lane = player.lane and collect(problems, lambda: network.find_lane(net, file, f"{role}.lane", str(player.lane)))

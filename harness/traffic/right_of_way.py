@@ -17,9 +17,9 @@ from sumolib.net.lane import Lane
 from harness.game.arrays import FloatArray
 from harness.game.right_of_way import Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.traffic.network import car_lanes, lane_line
+from harness.traffic.oncoming_lanes import LanesOf
 from harness.traffic.route_table import JunctionOnRoute, junctions_on_route
 from harness.traffic.stream import Feeders, Stream, carries_traffic, samples_of
-from harness.traffic.users_lanes import LanesOf
 
 _MERGING_M = 10.0  # length of the zone of a stream that joins the route
 _LEAST_AREA_M2 = 0.5

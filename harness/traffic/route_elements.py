@@ -10,11 +10,18 @@ from xml.etree import ElementTree
 
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
-from harness.traffic.class_sizes import CAR_SIZE_M, DESIRED_SPEEDS_MPS, SIZES_M
 from harness.traffic.flows import LEAST_PERIOD_S
-from harness.traffic.route_file import DEFAULT_TYPE, Mix, RouteChoice, VehicleType
+from harness.traffic.route_file import (
+    CAR_SIZE_M,
+    DEFAULT_TYPE,
+    DESIRED_SPEEDS_MPS,
+    SIZES_M,
+    Mix,
+    RouteChoice,
+    VehicleType,
+)
 from harness.traffic.stops import Stop, StopPlace, stop_in
-from harness.traffic.xml_attributes import number_in, required
+from harness.traffic.xml_file import number_in, required
 
 _MOST_EDGES = 10_000
 # the range of each number: above the first value, up to the second

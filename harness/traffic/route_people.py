@@ -15,12 +15,10 @@ from xml.etree import ElementTree
 
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError
-from harness.traffic.class_sizes import DESIRED_SPEEDS_MPS, SIZES_M
 from harness.traffic.route_elements import Types, ranged
-from harness.traffic.route_file import Departure, VehicleType
+from harness.traffic.route_file import DESIRED_SPEEDS_MPS, SIZES_M, Departure, VehicleType
 from harness.traffic.schema import Kind
-from harness.traffic.xml_attributes import number_in, required, seconds_in
-from harness.traffic.xml_file import number_of
+from harness.traffic.xml_file import number_in, number_of, required, seconds_in
 
 PEOPLE = ("person", "personFlow")
 PERSONS_RATES = ("number", "period", "personsPerHour", "perHour", "probability")

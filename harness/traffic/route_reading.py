@@ -19,8 +19,7 @@ from harness.traffic.route_file import DEFAULT_TYPE, Departure, Flow, RouteChoic
 from harness.traffic.route_people import DEFAULT_PERSONS_TYPE, PEOPLE, PERSONS_TYPE, person_in
 from harness.traffic.route_schema import FLOW_RATES, VEHICLES, check_content
 from harness.traffic.stops import stop_in
-from harness.traffic.xml_attributes import number_in, required, seconds_in
-from harness.traffic.xml_file import number_of, parse_xml
+from harness.traffic.xml_file import number_in, number_of, parse_xml, required, seconds_in
 
 _RANDOM_PERIOD = re.compile(r"exp\((.+)\)")
 _LATERAL = ("left", "right", "center", "random")

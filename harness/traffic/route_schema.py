@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 from harness.errors import Problem, UsageError
 from harness.traffic.route_people import PEOPLE, kinds_of_people, without_other_stages
-from harness.traffic.schema import Kind, kinds, problems_in
+from harness.traffic.schema import PARAM, Kind, problems_in
 from harness.traffic.stops import STOP_ATTRIBUTES
 
 ROOTS = ("routes", "additional", "flows", "trips")
@@ -126,9 +126,7 @@ def _invalid_names(path: Path, root: ElementTree.Element) -> Iterator[Problem]:
 
 @cache
 def _supported_kinds() -> Mapping[str, Kind]:
-    """The part of SUMO's schema that the harness uses or passes on to SUMO, without attributes that name files."""
-    types = kinds("routes_file.xsd")
-    mix = types["vTypeDistributionType"]
+    """What the harness reads, and vehicle types, whose attributes SUMO checks."""
     departs = ("type", "departLane", "departPos", "departSpeed", "departPosLat", "departEdge")
     arrives = ("arrivalLane", "arrivalPos", "arrivalSpeed", "arrivalEdge", "speedFactor", *_NO_EFFECT["vehicle"])
     vehicle, between = dict.fromkeys((*departs, *arrives), False), dict.fromkeys(("from", "to", "via"), False)
@@ -139,10 +137,9 @@ def _supported_kinds() -> Mapping[str, Kind]:
     unused = ("arrival", "routeLength")
     top = (*VEHICLES, *PEOPLE, "vType", "vTypeDistribution", "route", "routeDistribution", "interval", "busStop")
     return {
-        **types,
         "root": Kind(children={name: name for name in top}),
-        "vType": types["vTypeType"],
-        "vTypeDistribution": Kind({"id": True, "vTypes": False, "probabilities": False}, mix.children),
+        "vType": Kind(None, {"param": "param"}),
+        "vTypeDistribution": Kind({"id": True, "vTypes": False, "probabilities": False}, {"vType": "vType"}),
         "route": Kind({"id": True, "edges": True, **route}, {"stop": "stop", "param": "param"}),
         "route within": Kind({"id": False, "edges": True, **route}, {"stop": "stop", "param": "param"}),
         "route listed": Kind(
@@ -168,6 +165,6 @@ def _supported_kinds() -> Mapping[str, Kind]:
             {"param": "param", "access": "access"},
         ),
         "access": Kind(dict.fromkeys(("lane", "pos", "length", "friendlyPos"), False)),
-        "param": types["paramType"],
+        "param": PARAM,
         **kinds_of_people(),
     }

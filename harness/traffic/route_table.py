@@ -20,9 +20,8 @@ from sumolib.net.lane import Lane
 from harness.game.arrays import FloatArray
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic.network import car_lanes, lane_line
-from harness.traffic.oncoming_lanes import own_side
+from harness.traffic.oncoming_lanes import LanesOf, own_side
 from harness.traffic.surface import curve_between
-from harness.traffic.users_lanes import LanesOf
 
 _FAR_SIDE_M = 50.0
 _ON_POINT_M = 0.1

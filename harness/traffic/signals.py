@@ -1,4 +1,5 @@
-"""The traffic lights of a simulation: their states, and the time in their programmes at which a game starts."""
+"""What varies on the roads of a simulation: the states of its traffic lights, the place in their cycles at which a game
+starts, and the speed limits."""
 
 from __future__ import annotations
 
@@ -95,3 +96,20 @@ class Signals:
                     break
                 since_s[link] += phases[phase].duration
         return since_s
+
+
+class SpeedLimits:
+    """The limits of all lanes in the tiles with these prefixes; they are read from SUMO before the first game."""
+
+    def __init__(self, prefixes: Sequence[str]) -> None:
+        self._lanes: list[list[tuple[str, float]]] = [[] for _ in prefixes]
+        tiles = {prefix: tile for tile, prefix in enumerate(prefixes)}
+        for lane in libsumo.lane.getIDList():
+            inner = lane.removeprefix(":")
+            prefix = inner[: inner.find("_") + 1] if len(prefixes) > 1 else ""
+            self._lanes[tiles[prefix]].append((lane, libsumo.lane.getMaxSpeed(lane)))
+
+    def reset(self, game: int, share: float) -> None:
+        """Multiply the net's limits in a game's tile by a factor."""
+        for lane, limit_mps in self._lanes[game]:
+            libsumo.lane.setMaxSpeed(lane, limit_mps * share)

@@ -1,18 +1,20 @@
-"""Whether the players of a scene can all start: their start ranges leave room for their cars beside one another."""
+"""Whether the players of a scene can all start: beside one another, and beside the obstacles."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, product
 from pathlib import Path
 
 import shapely
 from shapely.affinity import rotate
 
 from harness.errors import UsageError
+from harness.game.geometry import Box, box_distance
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.world import World
+from harness.traffic.obstacles import boxes_of
 
 _DRAWS = 200
 
@@ -28,6 +30,25 @@ def check_starts(file: Path, starts: StartDistribution, world: World) -> None:
     names = world.roles
     message = f"{names[first]} and {names[second]} overlap in {count} of {_DRAWS} drawn starts, and no draw is free"
     raise UsageError.of(file, names[second], message, "give it another lane, or a wider range on a longer one")
+
+
+def check_clear_starts(file: Path, starts: StartDistribution, world: World) -> None:
+    """Raise UsageError if an obstacle touches a player in one of many drawn starts of the scene document `file`."""
+    obstacles = starts.obstacles
+    if not obstacles.each:
+        return
+    found: dict[tuple[int, int], int] = {}
+    for draw in range(_DRAWS):
+        parts = ("start check", draw)
+        start, boxes = draw_initial_state(starts, *parts), boxes_of(obstacles.boxes(*parts))
+        players = boxes_of(Box(start.x_m, start.y_m, start.heading_rad, world.length_m, world.width_m))
+        for player, obstacle in product(range(len(players)), range(len(boxes))):
+            if box_distance(players[player], boxes[obstacle]) <= 0.0:
+                found[player, obstacle] = found.get((player, obstacle), 0) + 1
+    if found:
+        (player, obstacle), count = max(found.items(), key=lambda each: each[1])
+        message = f"stands on the start of {world.roles[player]} in {count} of {_DRAWS} drawn starts"
+        raise UsageError.of(file, obstacles.each[obstacle].name, message, "move it, or the start")
 
 
 def start_warnings(starts: StartDistribution, world: World) -> list[str]:

@@ -2,79 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from pathlib import Path
-
 import numpy as np
-from sumolib.net import Net
 from sumolib.net.lane import Lane
 
-from harness.config.scene import Player, Scene
 from harness.errors import UsageError
-from harness.game.arrays import FloatArray
-from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.game.road import SPACING_M, Route
 from harness.game.start_range import ArrivesAfterEgo, BesideEgo, OnLine, StartRange
 from harness.traffic import network
-
-_MEETS_M = 1.6  # routes whose lines are closer than half a lane meet
-
-
-@dataclass(frozen=True, kw_only=True)
-class Meeting:
-    """The first place along the ego's route where another player's route meets it, in metres along both."""
-
-    ego_m: float
-    other_m: float
+from harness.traffic.meeting import meeting, route_points
+from harness.traffic.scene_files import SceneFiles
 
 
-def meeting(ego: Route, other: Route) -> Meeting | None:
-    """The first place where the routes, up to their goals, meet; None if they do not."""
-    ego_points, other_points = (_points(route)[: round(route.goal_m / SPACING_M) + 1] for route in (ego, other))
-    return meeting_of_lines(ego_points, other_points)
-
-
-def meeting_of_lines(ego_points: FloatArray, other_points: FloatArray) -> Meeting | None:
-    """The first place where two lines, of points [n, 2] every `SPACING_M`, meet; None if they do not."""
-    from scipy.spatial import KDTree  # loads SciPy's sparse matrices: only for commands that open a scene
-
-    distances, rows = KDTree(other_points).query(ego_points)
-    near = np.flatnonzero(distances < _MEETS_M)
-    if not len(near):
-        return None
-    first = near[0]
-    last = first + int(np.argmin(np.append(distances[first:] < _MEETS_M, False)))
-    closest = first + int(np.flatnonzero(distances[first:last] <= distances[first:last].min() + 0.1)[0])
-    return Meeting(ego_m=float(closest * SPACING_M), other_m=float(rows[closest] * SPACING_M))
-
-
-def start_range(role: str, *, file: Path, document: Scene, net: Net, route: Route, ego_route: Route) -> StartRange:
+def start_range(role: str, *, files: SceneFiles, route: Route, ego_route: Route) -> StartRange:
     """The range of a player's start. `route` begins at the edge of its start. Raises UsageError if it is impossible."""
-    player: Player = document.player(role)
+    file, player = files.file, files.document.player(role)
     if player.lane is not None:
-        lane = network.find_lane(net, file, f"{role}.lane", player.lane)
-        return _on_lane(role, file=file, document=document, net=net, lane=lane, route=route)
-    line = _points(route)[: int(route.length_m / SPACING_M) + 1]
+        return _on_lane(role, files, network.find_lane(files.net, file, f"{role}.lane", player.lane), route)
+    line = route_points(route)[: int(route.length_m / SPACING_M) + 1]
     if player.route_m is not None:
         low, high = player.route_m
         if low < 0.0 or high >= route.goal_m:
             message = f"reaches from {low:g} to {high:g} m, and the goal is at {route.goal_m:.1f} m of the route"
             raise UsageError.of(file, f"{role}.route_m", message, f"keep it from 0 to below {route.goal_m:.1f} m")
         return StartRange(line=line, place=OnLine(player.route_m), speed_mps=player.speed_mps)
-    place = _arrival(role, file=file, document=document, route=route, ego_route=ego_route)
+    place = _arrival(role, files, route, ego_route)
     return StartRange(line=line, place=place, speed_mps=player.speed_mps)
 
 
-def _points(route: Route) -> FloatArray:
-    """[n, 2] the line of a route, every `SPACING_M` from its station 0."""
-    first = round(MARGIN_M / SPACING_M)
-    return np.stack((route.x_m[first:-first], route.y_m[first:-first]), axis=1)
-
-
-def _on_lane(role: str, *, file: Path, document: Scene, net: Net, lane: Lane, route: Route) -> StartRange:
-    player: Player = document.player(role)
+def _on_lane(role: str, files: SceneFiles, lane: Lane, route: Route) -> StartRange:
+    file, player = files.file, files.document.player(role)
     place: OnLine | BesideEgo
     if player.beside_ego_m is not None:
-        reach, name = _beside_ego(role, file=file, document=document, lane=lane, net=net), "beside_ego_m"
+        reach, name = _beside_ego(role, files, lane), "beside_ego_m"
         place = BesideEgo(player.beside_ego_m)
     else:
         assert player.position_m is not None, "a start on a lane has one of the two"
@@ -93,12 +52,13 @@ def _on_lane(role: str, *, file: Path, document: Scene, net: Net, lane: Lane, ro
     return StartRange(line=line, place=place, speed_mps=player.speed_mps, scale=scale)
 
 
-def _beside_ego(role: str, *, file: Path, document: Scene, lane: Lane, net: Net) -> tuple[float, float]:
+def _beside_ego(role: str, files: SceneFiles, lane: Lane) -> tuple[float, float]:
     """The range of positions along its lane of a player that starts beside the ego."""
+    file, document = files.file, files.document
     ego_m, ego_lane_name = document.ego.position_m, document.ego.lane
     assert ego_m is not None, "the document says that the ego has a position"
     assert ego_lane_name is not None, "a position is along a lane"
-    ego_lane = network.find_lane(net, file, "ego.lane", ego_lane_name)
+    ego_lane = network.find_lane(files.net, file, "ego.lane", ego_lane_name)
     if ego_lane.getEdge() is not lane.getEdge():
         message = "needs both to start on the same edge"
         raise UsageError.of(file, f"{role}.beside_ego_m", message, "give position_m instead")
@@ -107,10 +67,10 @@ def _beside_ego(role: str, *, file: Path, document: Scene, lane: Lane, net: Net)
     return ego_m[0] + beside_ego_m[0], ego_m[1] + beside_ego_m[1]
 
 
-def _arrival(role: str, *, file: Path, document: Scene, route: Route, ego_route: Route) -> ArrivesAfterEgo:
+def _arrival(role: str, files: SceneFiles, route: Route, ego_route: Route) -> ArrivesAfterEgo:
     """The start of a player that is timed by its arrival at the place where its route meets the ego's."""
-    player: Player = document.player(role)
-    key, ego = f"{role}.arrival_after_ego_s", document.ego
+    file, player, ego = files.file, files.document.player(role), files.document.ego
+    key = f"{role}.arrival_after_ego_s"
     ego_m = ego.position_m or ego.route_m
     assert player.arrival_after_ego_s is not None, "the start is of this kind"
     assert ego_m is not None, "the document says that the ego has a position"

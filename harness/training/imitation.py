@@ -18,8 +18,7 @@ from stable_baselines3 import PPO
 from harness.config.rule_driver import Cruise, LaneKeeping, Rules
 from harness.drivers.car import car_of
 from harness.drivers.rules import RulesDriver
-from harness.environments.joined_vec_env import JoinedVecEnv
-from harness.environments.vector_env import ArenaVecEnv, GamesVecEnv
+from harness.environments.vector_env import ArenaVecEnv, GamesVecEnv, JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
 
 _EPOCHS, _MINIBATCH, _LEARNING_RATE = 30, 512, 1e-3

@@ -9,8 +9,7 @@ from harness.config.training import Training
 from harness.drivers.mixture import Mixture, Player, mixture_of
 from harness.drivers.policy_file import Policy
 from harness.environments.arena import Arena, Seat
-from harness.environments.joined_vec_env import JoinedVecEnv
-from harness.environments.vector_env import ArenaVecEnv, GamesVecEnv
+from harness.environments.vector_env import ArenaVecEnv, GamesVecEnv, JoinedVecEnv
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import StartDistribution
 from harness.game.seeding import seed_of

@@ -15,9 +15,8 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.environments.joined_vec_env import JoinedVecEnv
 from harness.environments.rollout import Arm, Game
-from harness.environments.vector_env import ArenaVecEnv
+from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.evaluation.people import COLLIDED_WITH, columns_for
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 from harness.game.arrays import FloatArray, IntArray

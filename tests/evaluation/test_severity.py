@@ -24,8 +24,8 @@ from harness.evaluation.worst_first import severities, worst_first
 from harness.game.geometry import Box
 from harness.game.sight import Hiding
 from harness.reports.columns_page import columns_page
-from harness.traffic.footway import WALKER_TYPE
 from harness.traffic.scene import open_scene
+from harness.traffic.walker_vehicle import WALKER_TYPE
 from tests.support.repository import REPOSITORY
 from tests.support.traces import along, rows
 

@@ -25,9 +25,8 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
-from harness.environments.arena import Arena, Seat
+from harness.environments.arena import Arena, Seat, read_sumo_players
 from harness.environments.gymnasium_env import DrivingEnv
-from harness.environments.sumo_players import read_sumo_players
 from harness.errors import StageFailed, UsageError
 from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
 from harness.game.arrays import FloatArray, IntArray

@@ -18,8 +18,8 @@ from harness.errors import UsageError
 from harness.game.initial_state import InitialState
 from harness.game.start_range import ArrivesAfterEgo, OnLine, StartRange
 from harness.traffic import network
+from harness.traffic.meeting import meeting
 from harness.traffic.scene import OpenScene, open_scene
-from harness.traffic.start_ranges import meeting
 from tests.support.roads import arc, straight
 from tests.support.scenes import CARS, CROSSING_EDGES, CROSSING_NODES, build_scene, drawn
 

@@ -21,10 +21,9 @@ from harness.environments.arena import Arena, Seat
 from harness.errors import SimulationError
 from harness.traffic import subprocess_simulation
 from harness.traffic.libsumo_simulation import LibsumoSimulation
-from harness.traffic.open_simulation import open_simulation
 from harness.traffic.route_file import Departure
 from harness.traffic.scene import OpenScene
-from harness.traffic.subprocess_simulation import SubprocessSimulation
+from harness.traffic.subprocess_simulation import SubprocessSimulation, open_simulation
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import LEFT_Y, ZIPPER, ZIPPER_EDGES, ZIPPER_NODES, build_scene, drawn, placed
 
@@ -183,7 +182,7 @@ SCRIPT = """
 import os, pathlib, signal, sys
 sys.path.insert(0, {repository!r})
 from harness import open_scene
-from harness.traffic.open_simulation import open_simulation
+from harness.traffic.subprocess_simulation import open_simulation
 scene = open_scene(pathlib.Path("straight"))
 both = [open_simulation(scene, 1, (True, True), 1) for _ in range(2)]
 os.chdir("/")

@@ -14,7 +14,7 @@ from benchmarks.nets import shipped_nets
 from harness.traffic import network, tiles
 from harness.traffic.net_file import check_net
 from harness.traffic.scene import OpenScene
-from harness.traffic.tiled_file import write_tiles
+from harness.traffic.tiles import write_tiles
 
 
 @pytest.fixture

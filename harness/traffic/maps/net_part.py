@@ -11,7 +11,7 @@ import numpy as np
 from sumolib.net import Net
 
 from harness.traffic.network import junctions_near
-from harness.traffic.tiled_file import write_tiles
+from harness.traffic.tiles import write_tiles
 from harness.traffic.xml_file import parse_xml
 
 

@@ -15,7 +15,7 @@ from harness.game.road import SPACING_M
 from harness.traffic.maps.candidates import Candidate, Kind, Way, candidates, following
 from harness.traffic.maps.footways import way_over
 from harness.traffic.maps.routes import PlannedRoute, following_m, meeting_near, planned_route
-from harness.traffic.start_ranges import meeting_of_lines
+from harness.traffic.meeting import meeting_of_lines
 
 Range = tuple[float, float]
 

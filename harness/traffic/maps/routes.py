@@ -14,8 +14,8 @@ from sumolib.net.edge import Edge
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
 from harness.traffic.maps.candidates import Way, for_cars
+from harness.traffic.meeting import Meeting, meeting_of_lines
 from harness.traffic.route_table import route_line
-from harness.traffic.start_ranges import Meeting, meeting_of_lines
 
 BEYOND_M = 45.0  # of the goal behind the junction
 _ROOM_M = 8.0  # behind a goal, at the end of the last edge
