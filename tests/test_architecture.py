@@ -75,7 +75,7 @@ FILE_ACCESS_CALLS = {
     *("fromfile", "genfromtxt", "load", "loadtxt", "memmap", "open", "save", "savetxt", "savez", "tofile"),
 }
 FORBIDDEN_WORDS = {"utils", "helpers", "common", "base", "core", "manager", "handler", "misc"}
-LONGEST = {".py": 300, ".jinja": 400, ".css": 400, ".js": 400}
+LONGEST = {".py": 350, ".jinja": 400, ".css": 400, ".js": 400}
 TESTS = sorted((REPOSITORY / "tests").rglob("*.py"))
 SEEDED_RANDOMNESS = {"Generator", "BitGenerator", "SeedSequence", "PCG64", "Philox", "default_rng"}
 

@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.errors import plain
-from harness.traffic.maps.candidates import Kind
+from harness.traffic.maps.candidates import CandidateKind
 from harness.traffic.maps.plans import GamePlan
 from harness.traffic.net_conflicts import ListedConflict, Priority
 from harness.traffic.net_listing import ListedLane
@@ -50,7 +50,7 @@ def plan_table(rows: Sequence[tuple[GamePlan, str]]) -> Table:
 def plan_priority(plan: GamePlan) -> str:
     """Which player has priority."""
     candidate = plan.candidate
-    if candidate.kind is Kind.ZEBRA:
+    if candidate.kind is CandidateKind.ZEBRA:
         return "the person"
     rule = {Priority.FIRST: "the ego"}.get(candidate.priority, _RULES[candidate.priority])
     return f"signals, then {rule}" if candidate.with_signals else rule

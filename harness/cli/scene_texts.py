@@ -8,27 +8,27 @@ from collections.abc import Mapping, Sequence
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from harness.errors import plain
-from harness.traffic.maps.candidates import Kind
+from harness.traffic.maps.candidates import CandidateKind
 from harness.traffic.maps.open_map import OpenMap
 from harness.traffic.maps.plans import GamePlan
 from harness.traffic.network import KEPT_M
 
 _ON_ROADS = ("speedy", "distracted")
 _PERSONAS = {
-    Kind.MERGE: _ON_ROADS,
-    Kind.LANE_END: _ON_ROADS,
-    Kind.FOLLOWING: _ON_ROADS,
-    Kind.ZEBRA: ("jaywalker", "phone_walker"),
+    CandidateKind.MERGE: _ON_ROADS,
+    CandidateKind.LANE_END: _ON_ROADS,
+    CandidateKind.FOLLOWING: _ON_ROADS,
+    CandidateKind.ZEBRA: ("jaywalker", "phone_walker"),
 }
-_EGO_WAITS = (Kind.ZEBRA, Kind.FOLLOWING)  # for the non-ego, which is before it or has priority
+_EGO_WAITS = (CandidateKind.ZEBRA, CandidateKind.FOLLOWING)  # for the non-ego, which is before it or has priority
 _MEANINGS = {
-    Kind.TURN_ACROSS: "the non-ego comes towards the ego and turns across its way",
-    Kind.CROSSING: "the non-ego crosses the ego's way",
-    Kind.ROUNDABOUT: "the non-ego enters a roundabout in front of the ego",
-    Kind.MERGE: "the non-ego joins the ego's road",
-    Kind.LANE_END: "the non-ego's lane ends beside the ego's",
-    Kind.ZEBRA: "the non-ego, on foot, crosses the ego's road on a marked crossing",
-    Kind.FOLLOWING: "the non-ego is ahead of the ego",
+    CandidateKind.TURN_ACROSS: "the non-ego comes towards the ego and turns across its way",
+    CandidateKind.CROSSING: "the non-ego crosses the ego's way",
+    CandidateKind.ROUNDABOUT: "the non-ego enters a roundabout in front of the ego",
+    CandidateKind.MERGE: "the non-ego joins the ego's road",
+    CandidateKind.LANE_END: "the non-ego's lane ends beside the ego's",
+    CandidateKind.ZEBRA: "the non-ego, on foot, crosses the ego's road on a marked crossing",
+    CandidateKind.FOLLOWING: "the non-ego is ahead of the ego",
 }
 
 
@@ -59,7 +59,7 @@ def campaign_text(name: str, plan: GamePlan) -> str:
 
 def personas_for(plan: GamePlan) -> Sequence[str]:
     """The shipped personas that suit a game."""
-    signals = plan.candidate.kind is Kind.CROSSING and plan.candidate.with_signals
+    signals = plan.candidate.kind is CandidateKind.CROSSING and plan.candidate.with_signals
     return ("red_light_runner",) if signals else _PERSONAS.get(plan.candidate.kind, ("impatient",))
 
 

@@ -21,7 +21,7 @@ from harness.drivers.protocol import Driver
 from harness.drivers.reference_drivers import REFERENCES, FullBraking, lane_width_of, reference_driver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.environments.recorded_courses import Course, RecordedCourses, Replay, course_of, start_of
+from harness.environments.recorded_courses import CourseReplay, RecordedCourse, RecordedCourses, course_of, start_of
 from harness.environments.rollout import parts_of
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import HumanFactors
@@ -44,7 +44,7 @@ class Collision:
     """A recorded game in which the ego touched another road user."""
 
     episode: int
-    course: Course
+    course: RecordedCourse
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +134,7 @@ class ConflictReplay:
 
     def _observed(self) -> FloatArray:
         """[T, N, SIZE] what the ego sees of its opponent in each step of each collision; T is that of the longest."""
-        replays = [Replay(course=each.course, only_opponent=True) for each in self._collisions]
+        replays = [CourseReplay(course=each.course, only_opponent=True) for each in self._collisions]
         arena = self._arena(replays, [SumoDriver()] * len(self._scene.world.roles))
         arena.take_over([self._start(game, replay) for game, replay in enumerate(replays)], replays)
         observations = [arena.observation[:, EGO].copy()]
@@ -153,7 +153,7 @@ class ConflictReplay:
 
     def _prevented_at_once(self, games: IntArray, steps: IntArray, driver: Driver) -> BoolArray:
         replays = [
-            Replay(course=self._collisions[game].course, first_step=step, without_followers=True)
+            CourseReplay(course=self._collisions[game].course, first_step=step, without_followers=True)
             for game, step in zip(games.tolist(), steps.tolist(), strict=True)
         ]
         people = len(self._scene.world.roles) - 1
@@ -168,11 +168,11 @@ class ConflictReplay:
             prevented &= ~(failed & (step <= lengths))
         return prevented
 
-    def _arena(self, replays: Sequence[Replay], drivers: Sequence[Driver]) -> _Replayed:
+    def _arena(self, replays: Sequence[CourseReplay], drivers: Sequence[Driver]) -> _Replayed:
         simulation = RecordedCourses(replays, [each.takes_over for each in drivers])
         return _Replayed(self._scene, [Seat(each) for each in drivers], simulation, len(replays))
 
-    def _start(self, game: int, replay: Replay) -> InitialState:
+    def _start(self, game: int, replay: CourseReplay) -> InitialState:
         """The state in which a replay begins; its road is as slippery as in the recorded game."""
         present = [1.0] * len(self._scene.world.roles)
         distribution = self._scene.start_distribution([HumanFactors()] * len(present), present)
@@ -190,7 +190,7 @@ class _Replayed(Arena):
         self._on_wheels = self._taken_over & ~self.world.walks
         self._slack_m = slack_m(self._taken_over)
 
-    def take_over(self, starts: Sequence[InitialState], replays: Sequence[Replay]) -> None:
+    def take_over(self, starts: Sequence[InitialState], replays: Sequence[CourseReplay]) -> None:
         """Reset every game to its start, with the ego's recorded acceleration and steering, and observe."""
         self.reset(dict(enumerate(starts)))
         for game, each in enumerate(replays):

@@ -30,7 +30,7 @@ _POSE = ("x_m", "y_m", "heading_rad", "speed_mps")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Course:
+class RecordedCourse:
     """What all road users of one game did up to the ego's failure, and how they go on. T steps, players P, others B."""
 
     failed_step: int
@@ -56,7 +56,7 @@ class Course:
     """The road user that the ego touched: a player P > 0, or P + b for other vehicle b; -1 if it touched none."""
 
 
-def course_of(trace: pd.DataFrame, scene: OpenScene, afterwards_s: float) -> Course:
+def course_of(trace: pd.DataFrame, scene: OpenScene, afterwards_s: float) -> RecordedCourse:
     """The course of a recorded game in which the ego failed, continued for a time after the failure.
 
     `trace` has the columns of a trace file. Raises ValueError if the ego did not fail in it.
@@ -73,7 +73,7 @@ def course_of(trace: pd.DataFrame, scene: OpenScene, afterwards_s: float) -> Cou
     more = round(afterwards_s / world.step_s)
     players = np.stack([getattr(state, name) for name in _POSE], axis=-1)
     others = np.stack([getattr(bodies, name)[:, count:] for name in _POSE], axis=-1)
-    return Course(
+    return RecordedCourse(
         failed_step=failed,
         players=np.concatenate((players, _along_routes(quantities, more))),
         players_present=_held(state.present, more),
@@ -135,10 +135,10 @@ _TOUCHING_M = 0.01  # coordinates in a trace are exact; the margin covers the ro
 
 
 @dataclass(frozen=True, kw_only=True)
-class Replay:
+class CourseReplay:
     """One replayed game: a course, the step in which it begins, and what is left out of it."""
 
-    course: Course
+    course: RecordedCourse
     first_step: int = 0
     only_opponent: bool = False
     """Whether the road users that the ego did not touch are left out."""
@@ -149,7 +149,7 @@ class Replay:
 class RecordedCourses:
     """The replayed games as a simulation. A game is one of `replays`, in their order."""
 
-    def __init__(self, replays: Sequence[Replay], taken_over: Sequence[bool]) -> None:
+    def __init__(self, replays: Sequence[CourseReplay], taken_over: Sequence[bool]) -> None:
         self._replays, self._taken_over = replays, np.array(taken_over)
         self._clock = np.array([each.first_step for each in replays])
         most = max(each.course.others.shape[1] for each in replays)
@@ -205,7 +205,7 @@ class RecordedCourses:
         return Reading(names, names, x_m, y_m, heading_rad, speed_mps, length_m, width_m, shown)
 
 
-def _shown(replay: Replay) -> BoolArray:
+def _shown(replay: CourseReplay) -> BoolArray:
     """[B] which other vehicles take part in a replay."""
     course, first = replay.course, replay.first_step
     players, others = course.players.shape[1], course.others.shape[1]
@@ -220,7 +220,7 @@ def _shown(replay: Replay) -> BoolArray:
     return shown
 
 
-def start_of(replay: Replay, drawn: InitialState) -> InitialState:
+def start_of(replay: CourseReplay, drawn: InitialState) -> InitialState:
     """The state in which a replay begins. What a recording does not hold, such as the friction, is that of `drawn`.
     Only the ego and the opponent take part where the others are left out."""
     course, step = replay.course, replay.first_step

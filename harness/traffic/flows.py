@@ -15,7 +15,7 @@ _LEAST_DENSITY = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rate:
+class FlowRate:
     """The rate of a flow: one of a period, a mean period of random departures, and a probability per second."""
 
     period_s: float | None = None
@@ -28,7 +28,7 @@ class Rate:
 
 
 def times_of(
-    rate: Rate, first_s: float, end_s: float, begin_s: float, density: float, generator: np.random.Generator
+    rate: FlowRate, first_s: float, end_s: float, begin_s: float, density: float, generator: np.random.Generator
 ) -> list[tuple[int, float]]:
     """The number and the time of each departure of a flow, which runs from `first_s` to `end_s`, from `begin_s` on.
 

@@ -15,7 +15,7 @@ import numpy as np
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.traffic.schema import PARAM, Kind, problems_in
+from harness.traffic.schema import PARAM, ElementKind, problems_in
 from harness.traffic.xml_file import number_of, parse_xml
 
 _REMEDY = "build it with netconvert or netedit"
@@ -38,9 +38,10 @@ _CHILDREN = {
 _LEAVES = {child for children in _CHILDREN.values() for child in children.split()} - _CHILDREN.keys()
 _KINDS = {
     "param": PARAM,
-    **dict.fromkeys(_LEAVES, Kind(None, {"param": "param"})),
+    **dict.fromkeys(_LEAVES, ElementKind(None, {"param": "param"})),
     **{
-        tag: Kind(None, {child: child for child in (*children.split(), "param")}) for tag, children in _CHILDREN.items()
+        tag: ElementKind(None, {child: child for child in (*children.split(), "param")})
+        for tag, children in _CHILDREN.items()
     },
 }
 """The elements of a net that SUMO and the harness read, by the element around them."""

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.traffic.flows import Rate, times_of
+from harness.traffic.flows import FlowRate, times_of
 from harness.traffic.stops import Stop
 
 SIZES_M = {
@@ -118,7 +118,7 @@ class Flow:
 
     departure: Departure
     end_s: float
-    rate: Rate
+    rate: FlowRate
 
 
 @dataclass(frozen=True, kw_only=True)

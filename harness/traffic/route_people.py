@@ -17,7 +17,7 @@ from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError
 from harness.traffic.route_elements import Types, ranged
 from harness.traffic.route_file import DESIRED_SPEEDS_MPS, SIZES_M, Departure, VehicleType
-from harness.traffic.schema import Kind
+from harness.traffic.schema import ElementKind
 from harness.traffic.xml_file import number_in, number_of, required, seconds_in
 
 PEOPLE = ("person", "personFlow")
@@ -48,16 +48,16 @@ _UNUSED_OF_WALKS = ("cost", "routeLength", "exitTimes", "started", "ended", "wai
 _FASTEST_MPS = 12.5
 
 
-def kinds_of_people() -> dict[str, Kind]:
+def kinds_of_people() -> dict[str, ElementKind]:
     """The supported attributes and children of persons, flows of them, and walks."""
     person = dict.fromkeys(("type", "departPos", "arrivalPos", "color", "arrival", "speedFactor"), False)
     inside = {"walk": "walk", "param": "param"}
     rates = dict.fromkeys(("begin", "end", *PERSONS_RATES), False)
     walk = ("edges", "from", "to", "departPos", "arrivalPos", "speed", *_UNUSED_OF_WALKS)
     return {
-        "person": Kind({"id": True, "depart": True, **person}, inside),
-        "personFlow": Kind({"id": True, **rates, **person}, inside),
-        "walk": Kind(dict.fromkeys(walk, False), {"param": "param"}),
+        "person": ElementKind({"id": True, "depart": True, **person}, inside),
+        "personFlow": ElementKind({"id": True, **rates, **person}, inside),
+        "walk": ElementKind(dict.fromkeys(walk, False), {"param": "param"}),
     }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
-from harness.traffic.flows import LEAST_PERIOD_S, MOST_AT_ONCE, Rate
+from harness.traffic.flows import LEAST_PERIOD_S, MOST_AT_ONCE, FlowRate
 from harness.traffic.route_elements import NamedRoutes, Types, choices_in, ranged, read_routes, read_types, route_in
 from harness.traffic.route_file import DEFAULT_TYPE, Departure, Flow, RouteChoice, RouteFile
 from harness.traffic.route_people import DEFAULT_PERSONS_TYPE, PEOPLE, PERSONS_TYPE, person_in
@@ -184,7 +184,7 @@ def _flow(path: Path, element: ElementTree.Element, departure: Departure) -> Flo
         raise UsageError.of(path, f"{where}.end", "does not lie after its begin", "give a later end")
     if rates == ["number"]:
         assert number is not None
-        rate = Rate(period_s=(end_s - departure.depart_s) / max(number, 1), number=number, spread=True)
+        rate = FlowRate(period_s=(end_s - departure.depart_s) / max(number, 1), number=number, spread=True)
         if number > MOST_AT_ONCE if at_once else (rate.period_s or 0.0) < LEAST_PERIOD_S:
             message = f"one vehicle every {rate.period_s:g} s is more than the capacity of a lane"
             raise UsageError.of(path, f"{where}.number", message, "give a smaller number")
@@ -200,18 +200,18 @@ def _number(path: Path, where: str, element: ElementTree.Element) -> int:
     return int(number)
 
 
-def _rate(path: Path, where: str, element: ElementTree.Element) -> Rate:
+def _rate(path: Path, where: str, element: ElementTree.Element) -> FlowRate:
     if element.get("probability") is not None:
-        return Rate(probability_per_s=ranged(path, element, "probability", 0.0))
+        return FlowRate(probability_per_s=ranged(path, element, "probability", 0.0))
     for name in ("vehsPerHour", "personsPerHour", "perHour"):
         if element.get(name) is not None:
-            return Rate(period_s=3600.0 / ranged(path, element, name, 1.0))
+            return FlowRate(period_s=3600.0 / ranged(path, element, name, 1.0))
     random = _RANDOM_PERIOD.fullmatch(element.get("period", "").strip())
     if random is None:
-        return Rate(period_s=ranged(path, element, "period", 1.0))
+        return FlowRate(period_s=ranged(path, element, "period", 1.0))
     per_second = number_of(random[1])
     if not 0.0 < per_second <= 1.0 / LEAST_PERIOD_S:
         message = f"{random[0][:60]!r} is not a rate that is possible here"
         remedy = f"give exp(vehicles per second), above 0 and up to {1.0 / LEAST_PERIOD_S:g}"
         raise UsageError.of(path, f"{where}.period", message, remedy)
-    return Rate(mean_period_s=1.0 / per_second)
+    return FlowRate(mean_period_s=1.0 / per_second)

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 
 from harness.errors import Problem, UsageError
 from harness.traffic.route_people import PEOPLE, kinds_of_people, without_other_stages
-from harness.traffic.schema import PARAM, Kind, problems_in
+from harness.traffic.schema import PARAM, ElementKind, problems_in
 from harness.traffic.stops import STOP_ATTRIBUTES
 
 ROOTS = ("routes", "additional", "flows", "trips")
@@ -125,7 +125,7 @@ def _invalid_names(path: Path, root: ElementTree.Element) -> Iterator[Problem]:
 
 
 @cache
-def _supported_kinds() -> Mapping[str, Kind]:
+def _supported_kinds() -> Mapping[str, ElementKind]:
     """What the harness reads, and vehicle types, whose attributes SUMO checks."""
     departs = ("type", "departLane", "departPos", "departSpeed", "departPosLat", "departEdge")
     arrives = ("arrivalLane", "arrivalPos", "arrivalSpeed", "arrivalEdge", "speedFactor", *_NO_EFFECT["vehicle"])
@@ -137,24 +137,26 @@ def _supported_kinds() -> Mapping[str, Kind]:
     unused = ("arrival", "routeLength")
     top = (*VEHICLES, *PEOPLE, "vType", "vTypeDistribution", "route", "routeDistribution", "interval", "busStop")
     return {
-        "root": Kind(children={name: name for name in top}),
-        "vType": Kind(None, {"param": "param"}),
-        "vTypeDistribution": Kind({"id": True, "vTypes": False, "probabilities": False}, {"vType": "vType"}),
-        "route": Kind({"id": True, "edges": True, **route}, {"stop": "stop", "param": "param"}),
-        "route within": Kind({"id": False, "edges": True, **route}, {"stop": "stop", "param": "param"}),
-        "route listed": Kind(
+        "root": ElementKind(children={name: name for name in top}),
+        "vType": ElementKind(None, {"param": "param"}),
+        "vTypeDistribution": ElementKind({"id": True, "vTypes": False, "probabilities": False}, {"vType": "vType"}),
+        "route": ElementKind({"id": True, "edges": True, **route}, {"stop": "stop", "param": "param"}),
+        "route within": ElementKind({"id": False, "edges": True, **route}, {"stop": "stop", "param": "param"}),
+        "route listed": ElementKind(
             {"id": False, "refId": False, "edges": False, **route}, {"stop": "stop", "param": "param"}
         ),
-        "routeDistribution": Kind(
+        "routeDistribution": ElementKind(
             {"id": True, "last": False, "routes": False, "probabilities": False}, {"route": "route listed"}
         ),
-        "routes within": Kind({"last": False, "routes": False, "probabilities": False}, {"route": "route listed"}),
-        "vehicle": Kind({**once, "route": False, **dict.fromkeys(unused, False)}, routed),
-        "trip": Kind({**once, **between}, {"stop": "stop", "param": "param"}),
-        "flow": Kind({"id": True, "route": False, **rates, **vehicle, **between}, routed),
-        "interval": Kind({"begin": True, "end": True, "id": False}, {"flow": "flow"}),
-        "stop": Kind(dict.fromkeys((*STOP_ATTRIBUTES, *_NO_EFFECT["stop"]), False), {"param": "param"}),
-        "busStop": Kind(
+        "routes within": ElementKind(
+            {"last": False, "routes": False, "probabilities": False}, {"route": "route listed"}
+        ),
+        "vehicle": ElementKind({**once, "route": False, **dict.fromkeys(unused, False)}, routed),
+        "trip": ElementKind({**once, **between}, {"stop": "stop", "param": "param"}),
+        "flow": ElementKind({"id": True, "route": False, **rates, **vehicle, **between}, routed),
+        "interval": ElementKind({"begin": True, "end": True, "id": False}, {"flow": "flow"}),
+        "stop": ElementKind(dict.fromkeys((*STOP_ATTRIBUTES, *_NO_EFFECT["stop"]), False), {"param": "param"}),
+        "busStop": ElementKind(
             {
                 "id": True,
                 "lane": True,
@@ -164,7 +166,7 @@ def _supported_kinds() -> Mapping[str, Kind]:
             },
             {"param": "param", "access": "access"},
         ),
-        "access": Kind(dict.fromkeys(("lane", "pos", "length", "friendlyPos"), False)),
+        "access": ElementKind(dict.fromkeys(("lane", "pos", "length", "friendlyPos"), False)),
         "param": PARAM,
         **kinds_of_people(),
     }

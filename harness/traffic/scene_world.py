@@ -29,7 +29,7 @@ from harness.traffic.player import OpenPlayer, open_player
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.scene_files import SceneFiles
 from harness.traffic.start_ranges import start_range
-from harness.traffic.walker_conflicts import Way, ways_of, with_walkers_conflicts
+from harness.traffic.walker_conflicts import WalkersWay, ways_of, with_walkers_conflicts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class SceneWorld:
     players: Sequence[OpenPlayer]
     places: tuple[StartRange, ...]
     obstacles: Obstacles
-    ways: Sequence[Way]
+    ways: Sequence[WalkersWay]
     """Those of the players on foot."""
     world: World
 
@@ -118,7 +118,7 @@ def _places(files: SceneFiles, players: Sequence[OpenPlayer]) -> tuple[StartRang
     return tuple(start for start in starts if start is not None)
 
 
-def _right_of_way(files: SceneFiles, ways: Sequence[Way], players: Sequence[OpenPlayer]) -> RightOfWay:
+def _right_of_way(files: SceneFiles, ways: Sequence[WalkersWay], players: Sequence[OpenPlayer]) -> RightOfWay:
     net, walkers = files.net, {way.player for way in ways}
     routes = [[] if k in walkers else [net.getEdge(name) for name in player.edges] for k, player in enumerate(players)]
     table = right_of_way(net, routes, [lanes_for(player.kind) for player in files.document.players])

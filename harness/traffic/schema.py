@@ -23,7 +23,7 @@ _CLASS_ATTRIBUTES = ("allow", "disallow", "prefer", "vClass")
 
 
 @dataclass(frozen=True)
-class Kind:
+class ElementKind:
     """The content of an element: its attributes (True: required; None: left to SUMO), and the kind of each child by its
     tag."""
 
@@ -31,10 +31,12 @@ class Kind:
     children: Mapping[str, str] = field(default_factory=dict)
 
 
-PARAM = Kind({"key": True, "value": False})
+PARAM = ElementKind({"key": True, "value": False})
 
 
-def problems_in(path: Path, root: ElementTree.Element, known: Mapping[str, Kind], kind: str) -> Iterator[Problem]:
+def problems_in(
+    path: Path, root: ElementTree.Element, known: Mapping[str, ElementKind], kind: str
+) -> Iterator[Problem]:
     """The first problems with the names of an element of this kind and of its descendants."""
     for count, problem in enumerate(_problems(str(path), root, known, kind=kind, where=root.tag)):
         if count == _MOST_PROBLEMS:
@@ -43,9 +45,9 @@ def problems_in(path: Path, root: ElementTree.Element, known: Mapping[str, Kind]
 
 
 def _problems(
-    path: str, element: ElementTree.Element, known: Mapping[str, Kind], *, kind: str, where: str
+    path: str, element: ElementTree.Element, known: Mapping[str, ElementKind], *, kind: str, where: str
 ) -> Iterator[Problem]:
-    allowed = known.get(kind, Kind())
+    allowed = known.get(kind, ElementKind())
     attributes = allowed.attributes or {}
     for name in element.attrib if allowed.attributes is not None else ():
         if name not in attributes and not name.startswith("{http://www.w3.org/2001/XMLSchema-instance}"):

@@ -34,7 +34,7 @@ _CORRIDOR_STYLE: dict[str, Any] = {"cap_style": "flat", "join_style": "mitre"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Way:
+class WalkersWay:
     """The way of a player on foot."""
 
     player: int
@@ -63,17 +63,17 @@ class _Crossed:
     width_m: float
 
 
-def ways_of(document: Scene, net: Net) -> list[Way]:
+def ways_of(document: Scene, net: Net) -> list[WalkersWay]:
     """The ways of a scene's players on foot."""
     return [
-        Way(player=k, line=line, marked=follows_crossing(net, line))
+        WalkersWay(player=k, line=line, marked=follows_crossing(net, line))
         for k, player in enumerate(document.players)
         if player.way is not None and (line := shapely.LineString(player.way))
     ]
 
 
 def with_walkers_conflicts(
-    right_of_way: RightOfWay, net: Net, routes: Sequence[Route], ways: Sequence[Way]
+    right_of_way: RightOfWay, net: Net, routes: Sequence[Route], ways: Sequence[WalkersWay]
 ) -> RightOfWay:
     """The table with the conflicts of players on foot added; `routes` [P] are those of all players."""
     if not ways:
@@ -132,7 +132,7 @@ def _lanes_crossed(feeders: Feeders, way: shapely.LineString) -> Iterator[_Cross
                 )
 
 
-def _links_crossed(feeders: Feeders, way: Way) -> Iterator[_Crossed]:
+def _links_crossed(feeders: Feeders, way: WalkersWay) -> Iterator[_Crossed]:
     """The links of junctions that a marked way crosses inside them, in the order of the net."""
     if not way.marked:
         return

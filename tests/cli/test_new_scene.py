@@ -18,7 +18,7 @@ from harness.cli.main import app
 from harness.cli.scene_writing import write_scenes
 from harness.errors import UsageError
 from harness.game.initial_state import draw_initial_state
-from harness.traffic.maps.candidates import Kind
+from harness.traffic.maps.candidates import CandidateKind
 from harness.traffic.maps.open_map import OpenMap, open_map
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.esmini import require_esmini
@@ -99,7 +99,7 @@ def test_new__from_opendrive_the_players_meet(tmp_path: Path, new: Run) -> None:
 
 
 def test_write__scenes_of_other_kinds_are_in_order(town: OpenMap, tmp_path: Path) -> None:
-    kinds = {"ring": Kind.ROUNDABOUT, "ramp": Kind.LANE_END}
+    kinds = {"ring": CandidateKind.ROUNDABOUT, "ramp": CandidateKind.LANE_END}
     chosen = {name: next(plan for plan in town.plans if plan.candidate.kind is kind) for name, kind in kinds.items()}
     assert write_scenes(town, chosen, tmp_path) == (list(kinds), [])
     scenes = {name: open_scene(tmp_path / "networks" / name) for name in kinds}
@@ -107,7 +107,7 @@ def test_write__scenes_of_other_kinds_are_in_order(town: OpenMap, tmp_path: Path
 
 
 def test_write__a_zebra_crossing_of_a_map_the_ego_must_yield(town: OpenMap, tmp_path: Path) -> None:
-    zebra = next(plan for plan in town.plans if plan.candidate.kind is Kind.ZEBRA)
+    zebra = next(plan for plan in town.plans if plan.candidate.kind is CandidateKind.ZEBRA)
     assert write_scenes(town, {"zebra": zebra}, tmp_path) == (["zebra"], [])
     scene = open_scene(tmp_path / "networks" / "zebra")
     table = scene.world.right_of_way.conflicts
@@ -119,7 +119,7 @@ def test_write__a_zebra_crossing_of_a_map_the_ego_must_yield(town: OpenMap, tmp_
 
 
 def test_write__where_the_ego_need_not_wait_it_trains_alone(town: OpenMap, tmp_path: Path) -> None:
-    crossing = next(plan for plan in town.plans if plan.candidate.kind is Kind.CROSSING)
+    crossing = next(plan for plan in town.plans if plan.candidate.kind is CandidateKind.CROSSING)
     write_scenes(town, {"crossing": crossing}, tmp_path)
     assert open_campaign(tmp_path / "campaigns" / "crossing.toml").document.naive_training.alone_share == 1.0
 
@@ -181,7 +181,7 @@ def test_new__a_list_writes_nothing_but_the_page(tmp_path: Path, new: Run) -> No
 
 def test_near__an_edge_the_conflicts_keep_their_numbers(town: OpenMap) -> None:
     ring = town.near("104#0", 1.0)
-    assert {plan.candidate.kind for plan in ring} == {Kind.ROUNDABOUT}
+    assert {plan.candidate.kind for plan in ring} == {CandidateKind.ROUNDABOUT}
     assert ring == [town.plans[plan.number - 1] for plan in ring]
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from harness.drivers.reference_drivers import PERSONS, REFERENCES
 from harness.environments.conflict_replay import AFTERWARDS_S, Collision, ConflictReplay, collision_of
-from harness.environments.recorded_courses import Course
+from harness.environments.recorded_courses import RecordedCourse
 from harness.game.arrays import FloatArray
 from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
@@ -54,7 +54,7 @@ def straight(tmp_path_factory: pytest.TempPathFactory) -> OpenScene:
     return replace(scene, world=replace(scene.world, **sizes))
 
 
-def cut_in(scene: OpenScene, *, gap_m: float, own_kmh: float, other_kmh: float, approach_mps: float) -> Course:
+def cut_in(scene: OpenScene, *, gap_m: float, own_kmh: float, other_kmh: float, approach_mps: float) -> RecordedCourse:
     """The course of a cut-in: both keep their speeds, and the other moves over until it is in the ego's lane."""
     own, other = own_kmh * KMH, other_kmh * KMH
     time = np.arange(0.0, 60.0, STEP_S)
@@ -67,7 +67,7 @@ def cut_in(scene: OpenScene, *, gap_m: float, own_kmh: float, other_kmh: float, 
     players = np.zeros((steps, 2, 4))
     players[:, EGO] = np.stack(poses(START_X_M + own * time, np.full_like(time, lane_y), own), axis=1)[:steps]
     players[:, 1] = np.stack(poses(START_X_M + own * time + ahead, lane_y - offset, other), axis=1)[:steps]
-    return Course(
+    return RecordedCourse(
         failed_step=failed,
         players=players,
         players_present=np.ones((steps, 2), dtype=bool),

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from harness.errors import UsageError
-from harness.traffic.flows import Rate, times_of
+from harness.traffic.flows import FlowRate, times_of
 from harness.traffic.route_file import Departure, Flow, RouteFile, VehicleType
 from harness.traffic.route_reading import read_route_file
 
@@ -295,7 +295,7 @@ def test_file__each_kind_of_refused_element_is_one_problem(write: Write) -> None
 def test_flow__a_window_and_the_rest_make_up_the_whole(
     begin_s: float, period_s: float, split_s: float, number: int | None
 ) -> None:
-    rate = Rate(period_s=period_s, number=number)
+    rate = FlowRate(period_s=period_s, number=number)
     draw = partial(times_of, rate, begin_s, density=1.0, generator=np.random.default_rng(0))
     whole = draw(end_s=100.0, begin_s=0.0)
     assert draw(end_s=min(split_s, 100.0), begin_s=0.0) + draw(end_s=100.0, begin_s=split_s) == whole
@@ -317,8 +317,8 @@ def test_density__is_a_factor_on_all_traffic() -> None:
 
 def _many() -> RouteFile:
     departure = Departure(name="", vehicle_type="t", edges=("a",), depart_s=0.0, lane="0", position="0", speed="0")
-    rates = (Rate(period_s=3.0), Rate(period_s=2.0, number=30, spread=True))
-    rates += (Rate(probability_per_s=0.2), Rate(mean_period_s=5.0))
+    rates = (FlowRate(period_s=3.0), FlowRate(period_s=2.0, number=30, spread=True))
+    rates += (FlowRate(probability_per_s=0.2), FlowRate(mean_period_s=5.0))
     flows = (Flow(departure=replace(departure, name=f"f{k}"), end_s=60.0, rate=rate) for k, rate in enumerate(rates))
     vehicles = {f"v{k}": replace(departure, name=f"v{k}", depart_s=9.0 * k) for k in range(6)}
     return RouteFile(path=Path("a.rou.xml"), types={}, vehicles=vehicles, flows=tuple(flows), types_xml="")

@@ -32,7 +32,7 @@ _FORK = 3  # arms of a junction at which all ways may turn; elsewhere, two ways 
 _BESIDE_M = 6.0  # of a junction, in which a crossing may be
 
 
-class Kind(Enum):
+class CandidateKind(Enum):
     """The kinds of candidates, in the order in which they are numbered."""
 
     TURN_ACROSS = "turn across"
@@ -45,7 +45,7 @@ class Kind(Enum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Way:
+class LaneWay:
     """A way of cars over a junction, between two lanes."""
 
     start: Lane
@@ -61,10 +61,10 @@ class Way:
 class Candidate:
     """A place where two ways meet. The first is the ego's: the one with priority, if a vehicle has it."""
 
-    kind: Kind
+    kind: CandidateKind
     junction: str
-    first: Way
-    second: Way | None  # None at a zebra crossing: the second is on foot
+    first: LaneWay
+    second: LaneWay | None  # None at a zebra crossing: the second is on foot
     priority: Priority
     with_signals: bool
     place: FloatArray  # [2]
@@ -74,7 +74,7 @@ class Candidate:
     def order(self) -> tuple[int, str, tuple[str, ...], tuple[str, ...]]:
         """By kind, then by name."""
         second = self.second.edges if self.second is not None else ()
-        return list(Kind).index(self.kind), self.junction, self.first.edges, second
+        return list(CandidateKind).index(self.kind), self.junction, self.first.edges, second
 
 
 def candidates(net: Net) -> list[Candidate]:
@@ -128,25 +128,25 @@ def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Cand
         yield _candidate(node, kind, one, other, place)
 
 
-def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> Kind | None:
+def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> CandidateKind | None:
     """The kind of a conflict of two connections of a junction with so many arms; None for one that makes no scene."""
     if one.getFromLane() is other.getFromLane():
         return None
     if one.getFrom() is other.getFrom():
-        return Kind.LANE_END if one.getToLane() is other.getToLane() else None
+        return CandidateKind.LANE_END if one.getToLane() is other.getToLane() else None
     in_ring = [link.getFrom().getID() in rings for link in (one, other)]
     if any(in_ring):
-        return None if all(in_ring) else Kind.ROUNDABOUT
+        return None if all(in_ring) else CandidateKind.ROUNDABOUT
     turns = [float(_out(link) @ _into(link)) < _STRAIGHT for link in (one, other)]
     if all(turns) and arms > _FORK:
         return None
     if one.getToLane() is other.getToLane():
-        return Kind.MERGE
+        return CandidateKind.MERGE
     opposite = float(_into(one) @ _into(other)) < _OPPOSITE
-    return Kind.TURN_ACROSS if opposite and any(turns) else Kind.CROSSING
+    return CandidateKind.TURN_ACROSS if opposite and any(turns) else CandidateKind.CROSSING
 
 
-def _candidate(node: Node, kind: Kind, one: Connection, other: Connection, place: FloatArray) -> Candidate:
+def _candidate(node: Node, kind: CandidateKind, one: Connection, other: Connection, place: FloatArray) -> Candidate:
     one_yields, first_come = yields_to(one, other)
     other_yields, _ = yields_to(other, one)
     signals = bool(one.getTLSID() or other.getTLSID())
@@ -155,7 +155,7 @@ def _candidate(node: Node, kind: Kind, one: Connection, other: Connection, place
     swapped = one_yields if has_priority else turning  # of equal ones, the straighter way is the ego's
     first, second = (other, one) if swapped else (one, other)
     rule = Priority.FIRST if has_priority else Priority.FIRST_TO_ARRIVE if first_come else Priority.NONE
-    ways = [Way(start=link.getFromLane(), end=link.getToLane()) for link in (first, second)]
+    ways = [LaneWay(start=link.getFromLane(), end=link.getToLane()) for link in (first, second)]
     return Candidate(
         kind=kind,
         junction=node.getID(),
@@ -176,12 +176,12 @@ def _lane_ends(edge: Edge) -> Iterator[Candidate]:
         if onward[lane] or not beside:
             continue
         through = onward[beside[-1]][0]
-        first = Way(start=through.getFromLane(), end=through.getToLane())
+        first = LaneWay(start=through.getFromLane(), end=through.getToLane())
         yield Candidate(
-            kind=Kind.LANE_END,
+            kind=CandidateKind.LANE_END,
             junction=edge.getToNode().getID(),
             first=first,
-            second=Way(start=lane, end=through.getToLane()),
+            second=LaneWay(start=lane, end=through.getToLane()),
             priority=Priority.FIRST,
             with_signals=False,
             place=lane_line(lane)[-1],
@@ -198,9 +198,9 @@ def _zebra(net: Net, crossing: Edge) -> Iterator[Candidate]:
         link = max(links, key=lambda link: float(_out(link) @ _into(link)), default=None)
         if link is not None and shapely.intersects(shapely.LineString(line), _over(net, link)):
             yield Candidate(
-                kind=Kind.ZEBRA,
+                kind=CandidateKind.ZEBRA,
                 junction=node.getID(),
-                first=Way(start=link.getFromLane(), end=link.getToLane()),
+                first=LaneWay(start=link.getFromLane(), end=link.getToLane()),
                 second=None,
                 priority=Priority.NONE,
                 with_signals=False,
@@ -222,10 +222,10 @@ def following(net: Net) -> Iterator[Candidate]:
     edges = [edge for edge in net.getEdges(withInternal=False) if car_lanes(edge)]
     for edge in sorted(edges, key=lambda edge: (-edge.getLength(), edge.getID()))[:10]:
         lane = car_lanes(edge)[0]
-        way = Way(start=lane, end=lane)
+        way = LaneWay(start=lane, end=lane)
         line = lane_line(lane)
         yield Candidate(
-            kind=Kind.FOLLOWING,
+            kind=CandidateKind.FOLLOWING,
             junction=edge.getToNode().getID(),
             first=way,
             second=way,

@@ -12,7 +12,7 @@ from sumolib.net import Net
 
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
-from harness.traffic.maps.candidates import Candidate, Kind, Way, candidates, following
+from harness.traffic.maps.candidates import Candidate, CandidateKind, LaneWay, candidates, following
 from harness.traffic.maps.footways import way_over
 from harness.traffic.maps.routes import PlannedRoute, following_m, meeting_near, planned_route
 from harness.traffic.meeting import meeting_of_lines
@@ -93,7 +93,7 @@ class Plans:
     def __init__(self, net: Net) -> None:
         self.net = net
         self.left_out: dict[str, int] = {}
-        self._routes: dict[tuple[Way, float], PlannedRoute | None] = {}
+        self._routes: dict[tuple[LaneWay, float], PlannedRoute | None] = {}
         self._rings = {name for each in net.getRoundabouts() for name in each.getEdges()}
 
     @cached_property
@@ -121,7 +121,7 @@ class Plans:
             return "no room for a goal behind it"
         if candidate.second is None:
             return self._on_foot(candidate, number, ego_route)
-        if candidate.kind is Kind.FOLLOWING:
+        if candidate.kind is CandidateKind.FOLLOWING:
             return _one_behind_the_other(candidate, number, ego_route)
         route = self._route(candidate.second)
         if route is None:
@@ -131,7 +131,7 @@ class Plans:
             return merging or "too little road before it"
         return _timed(candidate, number, ego_route, route, _NEAR_M) or self._shorter(candidate, number)
 
-    def _route(self, way: Way, before_m: float | None = None) -> PlannedRoute | None:
+    def _route(self, way: LaneWay, before_m: float | None = None) -> PlannedRoute | None:
         """The route over a way, with so much road before its junction that a game can start at speed."""
         wanted_m = before_m or _BEFORE_S * _SHARES[1] * float(way.start.getSpeed())
         key = (way, wanted_m)
@@ -268,7 +268,7 @@ def _speeds(limit_mps: float, slower: float) -> Range:
     return _rounded(low, max(high, low + 1.0))
 
 
-def _narrow(ways: list[Way]) -> str:
+def _narrow(ways: list[LaneWay]) -> str:
     """The reason against a way on a lane that is too narrow for a car; empty if there is none."""
     for lane in (lane for way in ways for lane in (way.start, way.end)):
         if lane.getWidth() < _NARROWEST_M:

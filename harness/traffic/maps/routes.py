@@ -13,7 +13,7 @@ from sumolib.net.edge import Edge
 
 from harness.game.arrays import FloatArray
 from harness.game.road import SPACING_M
-from harness.traffic.maps.candidates import Way, for_cars
+from harness.traffic.maps.candidates import LaneWay, for_cars
 from harness.traffic.meeting import Meeting, meeting_of_lines
 from harness.traffic.route_table import route_line
 
@@ -40,7 +40,7 @@ class PlannedRoute:
     lights: tuple[tuple[float, str], ...]  # up to the junction: station and id of each traffic light
 
 
-def planned_route(net: Net, way: Way, before_m: float, rings: Collection[str]) -> PlannedRoute | None:
+def planned_route(net: Net, way: LaneWay, before_m: float, rings: Collection[str]) -> PlannedRoute | None:
     """A route over a way with at least `before_m` of road before its junction, if there is as much; None if there is
     no room for a goal behind it. On the way back, straight roads with priority are preferred."""
     edges = [way.start.getEdge()]
@@ -110,7 +110,7 @@ def meeting_near(ego: PlannedRoute, other: PlannedRoute, place: FloatArray, with
     return found if float(np.hypot(*(point - place))) <= within_m else None
 
 
-def _previous(way: Way | None, edges: Sequence[Edge], rings: Collection[str]) -> Connection | None:
+def _previous(way: LaneWay | None, edges: Sequence[Edge], rings: Collection[str]) -> Connection | None:
     """The connection over which a route comes to its first edge: straight, with priority, not along a roundabout."""
     first = edges[0]
     links = for_cars(link for incoming in first.getIncoming().values() for link in incoming)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from harness.game.road import SPACING_M
-from harness.traffic.maps.candidates import Kind
+from harness.traffic.maps.candidates import CandidateKind
 from harness.traffic.maps.import_map import import_map
 from harness.traffic.maps.plans import GamePlan, Plans
 from harness.traffic.network import read_net
@@ -24,7 +24,7 @@ def town(tmp_path_factory: pytest.TempPathFactory) -> Plans:
     return Plans(import_map(MAPS / "town.osm", tmp_path_factory.mktemp("town"), left_hand=False)[1])
 
 
-def of_kind(plans: Plans, kind: Kind) -> list[GamePlan]:
+def of_kind(plans: Plans, kind: CandidateKind) -> list[GamePlan]:
     return [plan for plan in plans.all if plan.candidate.kind is kind]
 
 
@@ -35,7 +35,7 @@ def test_plans__of_the_town_exist_for_every_conflict(town: Plans) -> None:
 
 # a start at 9.0 to 13.2 m/s under a limit of 13.89 m/s: 65 to 95 %
 def test_plans__start_the_ego_seconds_before_the_place_below_its_limit(town: Plans) -> None:
-    plan = next(plan for plan in of_kind(town, Kind.TURN_ACROSS) if plan.candidate.with_signals)
+    plan = next(plan for plan in of_kind(town, CandidateKind.TURN_ACROSS) if plan.candidate.with_signals)
     assert plan.ego.speed_mps == (9.0, 13.2)
     low_m, high_m = plan.ego.range
     line = plan.ego_route.line
@@ -47,13 +47,13 @@ def test_plans__start_the_ego_seconds_before_the_place_below_its_limit(town: Pla
 
 def test_plans__the_ego_of_a_roundabout_comes_from_an_arm_and_leaves_it(town: Plans) -> None:
     ring = {name for each in town.net.getRoundabouts() for name in each.getEdges()}
-    for plan in of_kind(town, Kind.ROUNDABOUT):
+    for plan in of_kind(town, CandidateKind.ROUNDABOUT):
         assert plan.ego_route.edges[0] not in ring
         assert plan.ego_route.edges[-1] not in ring
 
 
 def test_plans__a_person_on_a_zebra_crossing_comes_along_the_pavement(town: Plans) -> None:
-    for plan in of_kind(town, Kind.ZEBRA):
+    for plan in of_kind(town, CandidateKind.ZEBRA):
         assert plan.way is not None
         assert plan.person_route is None
         along, across = plan.way[1] - plan.way[0], plan.way[3] - plan.way[2]
@@ -61,7 +61,7 @@ def test_plans__a_person_on_a_zebra_crossing_comes_along_the_pavement(town: Plan
 
 
 def test_plans__of_a_ramp_let_the_person_come_from_it(town: Plans) -> None:
-    (plan,) = of_kind(town, Kind.LANE_END)
+    (plan,) = of_kind(town, CandidateKind.LANE_END)
     assert plan.person_route is not None
     assert plan.person_route.edges[0] != plan.ego_route.edges[0]
 
@@ -89,7 +89,7 @@ TO_STUBS = '<edge id="{0}{1}" from="{0}" to="{1}" speed="13.89"/>'
 def test_plans__on_a_road_without_conflicts_one_follows_the_other(build_net: Callable[..., Path]) -> None:
     edges = "".join(TO_STUBS.format(*each) for each in ("ab", "cb", "bd"))
     plans = Plans(read_net(build_net(STUBS, edges, "", "--no-turnarounds")))
-    assert [plan.candidate.kind for plan in plans.all] == [Kind.FOLLOWING]
+    assert [plan.candidate.kind for plan in plans.all] == [CandidateKind.FOLLOWING]
     assert "no room for a goal behind it" in plans.left_out  # of the merge before the short road
     (plan,) = plans.all
     assert plan.ego_route.goal_position_m == pytest.approx(283.3, abs=0.1)
