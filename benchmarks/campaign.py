@@ -29,6 +29,7 @@ from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.schedule import Schedule
 from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import Stage, TrainingStage
@@ -177,9 +178,10 @@ def assessment_side(timer: LapTimer) -> None:
         arm = next(stage for stage in stages if stage.id == _ARM)
         for needed in arm.needs:
             write_policy(coasting_policy(), folder.policy(needed))
+        run = StageRun(context=context, on_progress=lambda done, total: timer.progress(done / total))
         timer.ready()
         while True:
-            info = carry_out(arm, context, lambda done, total: timer.progress(done / total))
+            info = carry_out(arm, run)
             timer.finish_lap(float(info["episodes"]))
 
 

@@ -117,9 +117,9 @@ def _plan(personas: Sequence[str], seeds: int, rounds: int) -> list[Stage]:
 
 def _kind(stage: Stage) -> str:
     if isinstance(stage, TrainingStage):
-        return "naive" if stage.opponent is None else "ego" if stage.learner == EGO else "non_ego"
+        return "naive" if not stage.opponent else "ego" if stage.learner == EGO else "non_ego"
     assert isinstance(stage, AssessmentStage)
-    return "alone" if None in stage.drivers else "pair"
+    return "pair" if all(stage.sides) else "alone"
 
 
 def scale_text(results: Mapping[str, Any]) -> str:

@@ -61,7 +61,7 @@ vehicle = "ego"
 lane = "approach_1"
 position_m = [{_START_M}, {_START_M}]
 speed_mps = [7.0, 8.0]
-[non_ego]
+[[non_ego]]
 vehicle = "non_ego"
 lane = "approach_2"
 beside_ego_m = [8.0, 10.0]

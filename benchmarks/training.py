@@ -23,6 +23,7 @@ from benchmarks.games import GAMES, MERGE, coasting_policy, merge_scene, persona
 from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers, take_turns
 from harness.campaign.execution.worker_pool import cores
 from harness.config.training import Retraining, Training
+from harness.drivers.mixture import mixture_of
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import write_policy
 from harness.environments.gymnasium_env import DrivingEnv
@@ -30,7 +31,7 @@ from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.game.arrays import FloatArray
 from harness.game.roles import EGO
 from harness.training.ppo import train
-from harness.training.training_games import TrainingSpec
+from harness.training.training_games import LearningPlace, TrainingSpec
 
 _ENDLESS = 1_000_000_000
 _WARM_UP_UPDATES = 3
@@ -39,12 +40,12 @@ _OPPONENT = "speedy"
 
 def training_spec(settings: Training) -> TrainingSpec:
     """The ego's retraining against a persona with a policy."""
-    personas = (persona("careful"), persona(_OPPONENT))
+    opponent = persona(_OPPONENT)
+    driver = LearnedDriver(coasting_policy(), sampled=opponent.decisions == "sampled")
     return TrainingSpec(
         scene=merge_scene(),
-        learner=EGO,
-        personas=personas,
-        opponent=LearnedDriver(coasting_policy(), sampled=personas[1].decisions == "sampled"),
+        persona=persona("careful"),
+        places=(LearningPlace(player=EGO, drivers=(None, mixture_of(driver, opponent))),),
         alone_share=Retraining().alone_share,
         attentive_share=0.0,
         initial=coasting_policy(),

@@ -20,6 +20,7 @@ import typer
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
+from harness.drivers.mixture import mixture_of
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.sumo import SumoDriver
@@ -183,7 +184,8 @@ def _play_lawful_driver(run: Path, seed: int, episodes: int) -> tuple[float, flo
     scene = open_scene(ROOT / "networks" / "merge")
     careful, speedy = (read_document(ROOT / "personas" / f"{n}.toml", Persona) for n in ("careful", "speedy"))
     naive = LearnedDriver(read_policy(run / "policies" / f"naive-seed{seed}"), careful.decisions == "sampled")
-    arm = Arm(name="lawful", scene=scene, drivers=(naive, SumoDriver()), personas=(careful, speedy), seed=seed)
+    drivers = (mixture_of(naive, careful), mixture_of(SumoDriver(), speedy))
+    arm = Arm(name="lawful", scene=scene, drivers=drivers, seed=seed)
     payoffs = [game.record["non_ego_payoff"] for game in assess(arm, episodes)]
     routes = scene.world.road.routes
     return float(np.mean(payoffs)), float(routes.speed_limit_mps[routes.first_row[1]])

@@ -14,11 +14,10 @@ from pathlib import Path
 from typing import Any
 
 from harness.campaign.named_documents import NamedDocuments, find_named, read_named_persona, read_names
-from harness.campaign.plan.name_checks import check_names
-from harness.campaign.plan.people_checks import check_people
+from harness.campaign.plan.campaign_checks import check_names, check_people
 from harness.campaign.plan.persona_remarks import persona_remarks
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.strategy_drivers import crossplay_name
+from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
 from harness.config.campaign import LEARNED, SUMO, Campaign
 from harness.config.persona import Persona
@@ -98,7 +97,7 @@ def open_campaign(
     ego_persona, *personas = (persona for persona in found.personas if persona is not None)
     names = [persona.name for persona in personas]
     tunable = _is_tunable(found.ego_driver)
-    check_people(file, document, len(found.scene.world.roles) - 1)
+    check_people(file, document, len(found.scene.document.non_ego))
     check_names(file, document, names, tunable)
     _check_stage_names(file, document, names, tunable)
     files, read = [file], None

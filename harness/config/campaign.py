@@ -187,9 +187,11 @@ class Campaign(Document):
         return [name for name in given if name in ("naive_training", "retraining")]  # best responses are trained
 
     @property
-    def mixed_people(self) -> list[str]:
-        """The names of populations and crowds."""
-        return [*(each.name for each in self.population), *(each.name for each in self.crowd)]
+    def mixed_people(self) -> dict[str, tuple[dict[str, float], ...]]:
+        """Populations and crowds by name: the shares of personas in the places of the non-egos, in their order and from
+        the first again."""
+        populations = {each.name: (each.shares,) for each in self.population}
+        return populations | {each.name: tuple({name: 1.0} for name in each.personas) for each in self.crowd}
 
     @property
     def stops_early(self) -> bool:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from harness.config.obstacle import Obstacle
 from harness.config.road_user import CYCLING, WALKER_RUN_MPS, Actuators, Kind
-from harness.config.toml_reading import TABLE, TABLES, Document, Interval, Mistakes
+from harness.config.toml_reading import Document, Interval, Mistakes
 from harness.game.roles import MOST_PEOPLE, roles_of
 
 
@@ -112,17 +112,7 @@ def _one_to_four(people: tuple[Player, ...]) -> tuple[Player, ...]:
     return people
 
 
-def _one_alone(people: Player | tuple[Player, ...]) -> Player | tuple[Player, ...]:
-    """One `[[non_ego]]` is the same as `[non_ego]`."""
-    return people[0] if isinstance(people, tuple) and len(people) == 1 else people
-
-
 _COUNTS = Field(json_schema_extra={"minItems": 1, "maxItems": MOST_PEOPLE})  # `_one_to_four` words the mistake
-NonEgos = Annotated[
-    Annotated[Player, Tag(TABLE)] | Annotated[tuple[Player, ...], AfterValidator(_one_to_four), _COUNTS, Tag(TABLES)],
-    Discriminator(lambda value: TABLES if isinstance(value, list | tuple) else TABLE),
-    AfterValidator(_one_alone),
-]
 
 
 class Varies(Document):
@@ -162,9 +152,9 @@ class Scene(Document):
     goal: Goal | None = None
     """The destination of every player that has none of its own."""
     ego: Player
-    non_ego: NonEgos
-    """The person that the ego meets, or `[[non_ego]]` for each of several: up to four, named `non_ego_1`, `non_ego_2`
-    and so on."""
+    non_ego: Annotated[tuple[Player, ...], AfterValidator(_one_to_four), _COUNTS]
+    """The people that the ego meets, one to four: `[[non_ego]]` for each. They are called `non_ego`, `non_ego_2`,
+    `non_ego_3` and `non_ego_4`, in the order of the document."""
     obstacle: tuple[Obstacle, ...] = Field((), max_length=50)
     """What stands on the road or beside it: `[[obstacle]]` for each, named `obstacle_1`, `obstacle_2` and so on."""
 
@@ -177,31 +167,26 @@ class Scene(Document):
             if player.beside_ego_m is not None and self.ego.position_m is None:
                 raise ValueError(f"{role}.beside_ego_m needs ego.position_m, along the ego's lane")
             if self.goal is None and player.goal is None and not player.on_foot:
-                raise ValueError(f"{role} has no goal: give [goal] for all players, or [{role}.goal]")
+                raise ValueError(f"{role} has no goal: give [goal] for all players, or give {role} a goal")
         if self.goal is not None and all(player.goal is not None or player.on_foot for player in self.players):
             raise ValueError("every player has a goal of its own: leave out [goal]")
         return self
 
     @classmethod
     def named_location(cls, location: list[Any]) -> list[Any]:
-        """Places among several people are their names."""
+        """Places among people and obstacles are their names."""
         match location:
-            case ["non_ego", int(place), *rest]:
-                return [f"non_ego_{place + 1}", *rest]
+            case ["non_ego", int(place), *rest] if place < MOST_PEOPLE:
+                return [roles_of(1 + MOST_PEOPLE)[1 + place], *rest]
             case ["obstacle", int(place), *rest]:
                 return [f"obstacle_{place + 1}", *rest]
             case _:
                 return location
 
     @property
-    def people(self) -> tuple[Player, ...]:
-        """The non-egos."""
-        return self.non_ego if isinstance(self.non_ego, tuple) else (self.non_ego,)
-
-    @property
     def players(self) -> tuple[Player, ...]:
         """Ego and non-egos, in the order of the player axis of arrays."""
-        return self.ego, *self.people
+        return self.ego, *self.non_ego
 
     @property
     def roles(self) -> tuple[str, ...]:

@@ -134,6 +134,8 @@ def _problems(path: Path, model: type[BaseModel], error: Any) -> Iterator[Proble
         )
     elif error["type"] == "missing":
         yield Problem(str(path), key, "is missing", "add it")
+    elif error["type"] in ("tuple_type", "list_type") and isinstance(error["input"], dict):
+        yield Problem(str(path), key, "is one table", f"write [[{key}]]: a table for each")
     elif isinstance(cause, Mistakes):
         for below, message, remedy in cause.mistakes:
             yield Problem(str(path), ".".join(filter(None, (key, below))), message, remedy)

@@ -1,13 +1,12 @@
 """A mixed strategy: several drivers for one player; each game has one of them, drawn when the game is reset.
 
-A population of people is a mixture, and so is the mixture of all opponents of earlier rounds. A single driver is a
-mixture of one.
+A population of people is a mixture, and so is the mixture of all opponents of earlier rounds. A driver that plays every
+game is a mixture of one. A player that is in no game has None instead of a mixture.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeAlias
 
 from harness.config.persona import Persona
 from harness.drivers.protocol import Driver
@@ -41,21 +40,17 @@ class Mixture:
         """False: SUMO drives the player."""
         return self.members[0].driver.takes_over
 
-    @property
-    def human_factors(self) -> list[HumanFactors]:
-        """The members' human factors."""
-        return [each.persona.human_factors for each in self.members]
 
-    @property
-    def shares(self) -> list[float]:
-        """The members' shares."""
-        return [each.share for each in self.members]
+def mixture_of(driver: Driver, persona: Persona) -> Mixture:
+    """A driver that plays every game, with its persona."""
+    return Mixture((Member(driver=driver, persona=persona),))
 
 
-Player: TypeAlias = Driver | Mixture | None
-"""The driver of a player's seat: one driver, one of several in each game, or None (the player does not take part)."""
+def factors_of(player: Mixture | None) -> list[HumanFactors]:
+    """The human factors of a player's drivers; none where no one drives."""
+    return [HumanFactors()] if player is None else [each.persona.human_factors for each in player.members]
 
 
-def mixture_of(player: Driver | Mixture, persona: Persona) -> Mixture:
-    """A driver as a mixture of one, with `persona`; a mixture unchanged."""
-    return player if isinstance(player, Mixture) else Mixture((Member(driver=player, persona=persona),))
+def shares_of(player: Mixture | None) -> list[float]:
+    """The shares of a player's drivers, one for each of `factors_of`."""
+    return [1.0] if player is None else [each.share for each in player.members]

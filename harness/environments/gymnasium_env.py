@@ -100,7 +100,7 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
     ) -> None:
         """Open the scene and load SUMO.
 
-        `player` (a name of the scene: "ego" or "non_ego", with several people "non_ego_1" and so on) is the learner; it
+        `player` (a name of the scene: "ego", "non_ego", with more people "non_ego_2" and so on) is the learner; it
         has the payoff and the human factors of `persona`. `other` is the driver of every other player: None (the player
         is alone), "sumo", or what `[ego] driver` of a campaign may be: the folder of a policy, a driver document, the
         name of a shipped driver or of an installed package. It has the human factors of `other_persona`. Code in files
@@ -152,7 +152,7 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
 
 
 class ParallelDrivingEnv(LiveSimulation, ParallelEnv[str, FloatArray, FloatArray]):
-    """The players' game with the agents "ego" and "non_ego"; with several people "non_ego_1", "non_ego_2" and so on.
+    """The players' game with the agents "ego" and "non_ego", with more people "non_ego_2" and so on.
 
     Observation, action, end and info of each agent: as in `DrivingEnv`, in dictionaries by agent.
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.config.persona import Persona
-from harness.drivers.mixture import Player, mixture_of
-from harness.environments.arena import Arena, Seat, Step
+from harness.drivers.mixture import Mixture, factors_of, shares_of
+from harness.environments.arena import Arena, Step
+from harness.environments.seats import seats_of
 from harness.evaluation.encounters import Encounter, encounters_of
 from harness.evaluation.metrics import OF_EGO, PlayerSeries
 from harness.evaluation.people import COLLIDED_WITH, of_person
@@ -32,17 +32,15 @@ from harness.traffic.scene import OpenScene
 
 @dataclass(frozen=True, kw_only=True)
 class Arm:
-    """A pairing to assess. A driver of None: the player does not take part. A mixture: one of its members per game.
+    """A pairing to assess. Each player has one of the drivers of its mixture per game; None: it does not take part.
 
     Several people without an ego drive one at a time: in episode k, person k modulo their number (`present_in`).
     """
 
     name: str
     scene: OpenScene
-    drivers: tuple[Player, ...]
+    drivers: tuple[Mixture | None, ...]
     """[P], ego first."""
-    personas: tuple[Persona, ...]
-    """Of the drivers; a member of a mixture has a persona of its own."""
     seed: int
 
     def present_in(self, episode: int) -> list[bool]:
@@ -76,14 +74,9 @@ def assess(
     has the reason as its error. `start_from` may change the start that is drawn for a game.
     Raises SimulationError if SUMO can't load the scene.
     """
-    players = [
-        mixture_of(each or _AbsentDriver(), persona) for each, persona in zip(arm.drivers, arm.personas, strict=True)
-    ]
-    start_distribution = arm.scene.start_distribution(
-        [each.human_factors for each in players], [1.0] * len(players), [each.shares for each in players]
-    )
-    seats = [[Seat(member.driver, member.persona.payoff) for member in each.members] for each in players]
-    arena = Arena(arm.scene, 1, seats, recorded=True)
+    factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
+    start_distribution = arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
+    arena = Arena(arm.scene, 1, [seats_of(each, paid=True) for each in arm.drivers], recorded=True)
     try:
         for episode in range(episodes) if isinstance(episodes, int) else episodes:
             if episode in abandoned:
@@ -98,19 +91,6 @@ def assess(
                 yield Game(record=_failed(arm, episode, f"{type(error).__name__}: {error}"), trace=None)
     finally:
         arena.close()
-
-
-class _AbsentDriver:
-    """Takes the seat of a player that is in no game."""
-
-    takes_over = True
-
-    def reset(self, games: Any) -> None:
-        """Do nothing."""
-
-    def decide(self, games: Any, observation: FloatArray, noise: FloatArray) -> FloatArray:
-        """Actions [N, 2] of zeros; N is 0."""
-        return np.zeros((len(games), 2))
 
 
 def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from harness.drivers.mixture import Mixture
 from harness.drivers.ordinary_walker import OrdinaryWalker
 from harness.drivers.protocol import Driver
 from harness.game.payoff import Payoff
@@ -23,6 +24,13 @@ class Seat:
     driver: Driver | None
     """None: a learner; its actions are an argument of `Arena.step`."""
     payoff: Payoff | None = None
+
+
+def seats_of(player: Mixture | None, *, paid: bool) -> tuple[Seat, ...]:
+    """The seats of a player's drivers, with the payoffs of their personas if `paid`; a free one where no one drives."""
+    if player is None:
+        return (Seat(None),)
+    return tuple(Seat(each.driver, each.persona.payoff if paid else None) for each in player.members)
 
 
 def with_walkers(seats: Sequence[Sequence[Seat]], world: World) -> tuple[tuple[Seat, ...], ...]:

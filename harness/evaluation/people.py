@@ -1,7 +1,6 @@
-"""Games with several people: the columns of each person in `episodes.csv`, and values over all of them.
+"""The people of a game: the columns of each person in `episodes.csv`, and values over all of them.
 
-A person's columns begin with its name (`game.roles.roles_of`): `non_ego_outcome` with one person, `non_ego_1_outcome`,
-`non_ego_2_outcome` and so on with several.
+A person's columns begin with its name (`game.roles.roles_of`): `non_ego_outcome`, `non_ego_2_outcome` and so on.
 """
 
 from __future__ import annotations
@@ -27,11 +26,7 @@ def of_person(name: str) -> Mapping[str, Callable[[PlayerSeries], float | None]]
 def people_in(columns: Iterable[str]) -> tuple[str, ...]:
     """The names of the people in a table of games with these columns."""
     columns = set(columns)
-    for people in range(MOST_PEOPLE, 1, -1):
-        names = roles_of(people + 1)[1:]
-        if f"{names[-1]}_outcome" in columns:
-            return names
-    return ROLES[NON_EGO:]
+    return tuple(name for name in roles_of(1 + MOST_PEOPLE)[NON_EGO:] if f"{name}_outcome" in columns)
 
 
 def columns_for(people: int, columns: Mapping[str, str]) -> dict[str, str]:
@@ -40,7 +35,7 @@ def columns_for(people: int, columns: Mapping[str, str]) -> dict[str, str]:
     With several, those of a person occur for each of them, and `COLLIDED_WITH` follows `ego_failed`.
     """
     result: dict[str, str] = {}
-    names = roles_of(people + 1)[1:]
+    names = roles_of(1 + people)[NON_EGO:]
     own = {name: dtype for name, dtype in columns.items() if name.startswith(_ONE)}
     for name, dtype in columns.items():
         if name not in own:

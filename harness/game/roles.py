@@ -13,6 +13,6 @@ MOST_PEOPLE = 4
 
 @cache
 def roles_of(players: int) -> tuple[str, ...]:
-    """The names of the players [P] of a game in every file: `ego` and `non_ego`; with several non-egos `ego`,
-    `non_ego_1`, `non_ego_2` and so on."""
-    return ROLES if players == len(ROLES) else ("ego", *(f"non_ego_{place}" for place in range(1, players)))
+    """The names of the players [P] of a game in every file: `ego`, `non_ego`, and with more people `non_ego_2`,
+    `non_ego_3` and so on."""
+    return (*ROLES, *(f"{ROLES[NON_EGO]}_{place}" for place in range(2, players)))

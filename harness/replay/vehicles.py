@@ -17,12 +17,11 @@ from harness.traffic.xml_file import parse_xml
 PLAYER_COLOURS = {
     "ego": "31,119,255",  # blue and orange, as in the paper's figure 2
     "non_ego": "255,127,14",
-    "non_ego_1": "255,127,14",
     "non_ego_2": "214,39,40",
     "non_ego_3": "148,103,189",
     "non_ego_4": "140,86,75",
 }
-_COLOUR_NAMES = {"ego": "blue", "non_ego": "orange", "non_ego_1": "orange", "non_ego_2": "red"}
+_COLOUR_NAMES = {"ego": "blue", "non_ego": "orange", "non_ego_2": "red"}
 _COLOUR_NAMES |= {"non_ego_3": "purple", "non_ego_4": "brown"}
 OBSTACLE_COLOUR = "110,110,120"
 _OBSTACLE_SHAPES = {

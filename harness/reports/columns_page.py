@@ -10,7 +10,7 @@ _INTRODUCTION = """# Columns of `episodes.csv`
 <!-- made by `harness columns --out docs/columns.md` from harness/evaluation/columns.py -->
 
 A row is a game. An empty cell means that the quantity can't be measured in this game, never 0. With several people, the
-columns of the non-ego occur for each of them, as `non_ego_1_outcome`, and `ego_collided_with` names the road user that
+columns of the non-ego occur for each of them, as `non_ego_2_outcome`, and `ego_collided_with` names the road user that
 the ego touched. The columns from `closing_speed_mps` to `severity` are worked out from the traces.
 
 | column | unit | meaning | source |

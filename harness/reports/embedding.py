@@ -17,6 +17,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from harness.game.roles import NON_EGO, roles_of
 from harness.reports.page_template import json_text
 from harness.reports.player_data import FloatArray, GameTracks, SceneDrawing, Track, key
 
@@ -153,9 +154,9 @@ def _track(track: Track) -> dict[str, Any]:
 
 
 def _persona(player: Track, crowd: Sequence[str]) -> dict[str, str]:
-    """The persona of one of the people of a crowd: `non_ego_2` has the second."""
-    place = player.name.rpartition("_")[2]
-    return {"persona": crowd[int(place) - 1]} if crowd and place.isdecimal() else {}
+    """The persona of one of the people of a crowd; empty for the ego and without a crowd."""
+    people = roles_of(1 + len(crowd))[NON_EGO:] if crowd else ()
+    return {"persona": crowd[people.index(player.name)]} if player.name in people else {}
 
 
 def columns_of(game: GameTracks) -> Iterator[tuple[IntArray, int]]:

@@ -18,7 +18,7 @@ class Track:
     """The track of one road user: arrays [n], a value per step from `first_step` on, of the body's centre."""
 
     name: str
-    """`ego`, `non_ego` (of several: `non_ego_1` and so on), or SUMO's id of a background vehicle."""
+    """`ego`, `non_ego`, `non_ego_2` and so on, or SUMO's id of a background vehicle."""
     length_m: float
     width_m: float
     first_step: int

@@ -64,7 +64,7 @@ def open_player(role: str, files: SceneFiles, area: BaseGeometry) -> OpenPlayer:
         )
         names = ", ".join(edge.getID() for edge in route_edges[-3:])
         raise UsageError.of(
-            file, f"{key}.edge", message, f"choose one of its edges (it ends with {names}), or give [{role}.goal]"
+            file, f"{key}.edge", message, f"choose one of its edges (it ends with {names}), or give {role} a goal"
         )
     length_m = sum(each.getLength() for each in route_edges)
     key = f"vehicle {vehicle.name}"

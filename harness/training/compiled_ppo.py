@@ -35,6 +35,7 @@ from harness.training.ppo_kernel import (
     Adam,
     Objective,
     Samples,
+    Update,
     epoch,
 )
 
@@ -121,13 +122,13 @@ class CompiledPPO(PPO):
         networks = networks_of(self.policy)
         state = [optimizer.state[each] for each in order]
         adam, taken = _adam(self, state, len(networks.parameters)), int(state[0]["step"]) if state[0] else 0
-        samples, objective = _samples(self), self._objective()
+        samples = _samples(self)
         minibatch = min(self.batch_size, len(samples.returns))
-        work = workspace_of(networks, minibatch)
+        update = Update(networks, adam, samples, self._objective(), workspace_of(networks, minibatch))
         losses: list[FloatArray] = []
         for _ in range(self.n_epochs):
             shuffled = np.random.permutation(len(samples.returns))  # noqa: NPY002 - as SB3 draws it
-            of_epoch, ended = epoch(networks, adam, taken, samples, shuffled, minibatch, objective, work)
+            of_epoch, ended = epoch(update, shuffled, minibatch, taken)
             losses.append(of_epoch)
             if not np.isfinite(of_epoch).all():
                 raise FloatingPointError("a loss of PPO is not finite")

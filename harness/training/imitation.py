@@ -18,7 +18,7 @@ from stable_baselines3 import PPO
 from harness.config.rule_driver import Cruise, LaneKeeping, Rules
 from harness.drivers.car import car_of
 from harness.drivers.rules import RulesDriver
-from harness.environments.vector_env import ArenaVecEnv, GamesVecEnv, JoinedVecEnv
+from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
 
 _EPOCHS, _MINIBATCH, _LEARNING_RATE = 30, 512, 1e-3
@@ -33,17 +33,14 @@ class _Demonstrations:
     returns: FloatArray  # [T, G], NaN in games that had not ended
 
 
-def imitate(model: PPO, environment: GamesVecEnv, *, steps: int, deviation: float, seed: int) -> None:
+def imitate(model: PPO, environment: JoinedVecEnv, *, steps: int, deviation: float, seed: int) -> None:
     """Fit a new model's actor to the demonstrator's actions, and its critic to the payoffs, in `steps` steps over all
     games. The noise added to an action has the standard deviation `deviation`, which is that of the new policy.
 
     A learner on foot keeps to no lane and has no demonstrator: its model is left as it is.
     Raises SimulationError if SUMO fails, FloatingPointError if a number of a game is impossible.
     """
-    places = environment.environments if isinstance(environment, JoinedVecEnv) else (environment,)
-    driven = [
-        place for place in places if isinstance(place, ArenaVecEnv) and not place.arena.world.walks[place.learner]
-    ]
+    driven = [place for place in environment.environments if not place.arena.world.walks[place.learner]]
     rounds = steps // environment.num_envs
     if not driven or not rounds:
         return

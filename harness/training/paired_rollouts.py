@@ -9,13 +9,14 @@ from math import ceil
 import numpy as np
 
 from harness.config.persona import Persona
-from harness.drivers.mixture import Mixture, mixture_of
+from harness.drivers.mixture import Mixture, factors_of, shares_of
 from harness.drivers.protocol import Driver
 from harness.environments.arena import Arena, Seat
+from harness.environments.seats import seats_of
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
-from harness.game.roles import EGO, NON_EGO
+from harness.game.roles import EGO
 from harness.game.seeding import generator_of, seed_of
 from harness.traffic.scene import OpenScene
 
@@ -35,15 +36,15 @@ class PairedRollouts:
         self,
         scene: OpenScene,
         *,
-        personas: tuple[Persona, Persona],
-        opponent: Driver | Mixture | tuple[Mixture, ...],
+        persona: Persona,
+        people: Sequence[Mixture | None],
         games: int,
         at_once: int,
         alone_share: float,
         parts: Sequence[str | int],
     ) -> None:
-        """Load SUMO. `alone_share` is the share of games without the opponent; `parts` name the random numbers. With
-        several people, `opponent` has a mixture for each.
+        """Load SUMO. `persona` is the ego's, `people` are the drivers of the non-egos. `alone_share` is the share of
+        games without them; `parts` name the random numbers.
 
         Raises SimulationError if SUMO can't load the scene.
         """
@@ -51,12 +52,10 @@ class PairedRollouts:
         self._loads = ceil(games / at_once)
         self._tiles = ceil(games / self._loads)
         self._ego = _CurrentDriver()
-        people = opponent if isinstance(opponent, tuple) else (mixture_of(opponent, personas[NON_EGO]),)
-        ego = personas[EGO]
-        human_factors = [[ego.human_factors], *(each.human_factors for each in people)]
-        shares, present = [[1.0], *(each.shares for each in people)], [1.0, *[1.0 - alone_share] * len(people)]
+        human_factors = [[persona.human_factors], *map(factors_of, people)]
+        shares, present = [[1.0], *map(shares_of, people)], [1.0, *[1.0 - alone_share] * len(people)]
         self._start_distribution = scene.start_distribution(human_factors, present, shares)
-        seats = [[Seat(self._ego, ego.payoff)], *([Seat(member.driver) for member in each.members] for each in people)]
+        seats = [(Seat(self._ego, persona.payoff),), *(seats_of(each, paid=False) for each in people)]
         self._arena = Arena(scene, self._tiles, seats)
 
     def play(self, driver: Driver) -> RolloutTotals:

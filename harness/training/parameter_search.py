@@ -34,14 +34,13 @@ from harness.training.paired_rollouts import PairedRollouts
 
 
 @dataclass(frozen=True, kw_only=True)
-class Search:
-    """The inputs of a search: the driver with its parameters, the personas, and the opponent."""
+class SearchSpec:
+    """The inputs of a search: the ego's driver with its parameters, its persona, and the people that it meets."""
 
     scene: OpenScene
     driver: ExternalDriver
-    personas: tuple[Persona, Persona]  # of the ego's seat and of the non-ego's
-    opponent: Driver | Mixture | tuple[Mixture, ...]
-    """With several people, a mixture for each."""
+    persona: Persona
+    people: tuple[Mixture | None, ...]
     settings: Reconfiguration
     parts: tuple[str | int, ...]
     """They name the random numbers of the search."""
@@ -60,7 +59,7 @@ class Trial:
 
 
 def run_search(
-    search: Search,
+    search: SearchSpec,
     file: Path,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     on_start: Callable[[int], None] = lambda trial: None,
@@ -79,8 +78,8 @@ def run_search(
     with closing(
         PairedRollouts(
             search.scene,
-            personas=search.personas,
-            opponent=search.opponent,
+            persona=search.persona,
+            people=search.people,
             games=settings.games,
             at_once=settings.games_at_once,
             alone_share=settings.alone_share,
@@ -120,8 +119,8 @@ def propose(tunable: Sequence[Tunable], trials: Sequence[Trial], *parts: str | i
     return dict(study.ask(ranges).params)
 
 
-def _run_trial(search: Search, games: PairedRollouts, values: Mapping[str, float]) -> Trial:
-    sampled = search.personas[EGO].decisions == "sampled"
+def _run_trial(search: SearchSpec, games: PairedRollouts, values: Mapping[str, float]) -> Trial:
+    sampled = search.persona.decisions == "sampled"
     driver: Driver | None = None
     try:
         external = search.driver if values == search.driver.numbers else search.driver.tuned(values)

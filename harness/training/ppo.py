@@ -19,7 +19,7 @@ from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 
 from harness.drivers.policy_file import Policy
-from harness.environments.vector_env import GamesVecEnv
+from harness.environments.vector_env import JoinedVecEnv
 from harness.game.observation_layout import OF_OTHERS
 from harness.game.outcome import Outcome
 from harness.game.seeding import seed_of
@@ -37,7 +37,7 @@ _ALGORITHMS: dict[str, type[PPO]] = {"compiled": CompiledPPO, "stable_baselines3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Trained:
+class TrainingResult:
     """The result of a training."""
 
     policy: Policy
@@ -54,7 +54,7 @@ def train(
     tensorboard: Path | None = None,
     on_progress: Callable[[int, int], None] = lambda done, total: None,
     on_start: Callable[[int], None] = lambda segment: None,
-) -> Trained:
+) -> TrainingResult:
     """Train until convergence or the end of the budget; the last part is that of `Narrowing`. Training continues from
     `checkpoint` if it has this `key`.
 
@@ -75,7 +75,7 @@ def train(
             on_start(progress.segments)
             progress = _segment(spec, model, environment, progress=progress, on_progress=on_progress)
             write_checkpoint(model, progress, key, checkpoint)
-        return Trained(policy=policy_of(model, card), progress=progress, stopped=stopped)
+        return TrainingResult(policy=policy_of(model, card), progress=progress, stopped=stopped)
     finally:
         environment.close()
 
@@ -98,7 +98,7 @@ def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
     return progress.steps if not fails and has_converged(progress.segment_payoffs[attentive:]) else None
 
 
-def _learner(spec: TrainingSpec, environment: GamesVecEnv, tensorboard: Path | None) -> PPO:
+def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | None) -> PPO:
     settings = spec.settings
     set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
     leave_out_compiler()
@@ -129,11 +129,11 @@ def _learner(spec: TrainingSpec, environment: GamesVecEnv, tensorboard: Path | N
 
 def _initial_deviation(spec: TrainingSpec) -> float:
     """The standard deviation of a new policy's actions. On foot, with more of it a learner learns to walk sooner."""
-    walks = spec.scene.world.walks[spec.learner]
+    walks = spec.scene.world.walks[spec.places[0].player]
     return spec.settings.max_deviation if walks else spec.settings.initial_deviation
 
 
-def _imitate(spec: TrainingSpec, model: PPO, environment: GamesVecEnv) -> None:
+def _imitate(spec: TrainingSpec, model: PPO, environment: JoinedVecEnv) -> None:
     """Let a policy without a past imitate the demonstrator."""
     settings = spec.settings
     if spec.initial is None:
@@ -160,7 +160,7 @@ def _zero_other_weights(model: PPO) -> None:
 def _segment(
     spec: TrainingSpec,
     model: PPO,
-    environment: GamesVecEnv,
+    environment: JoinedVecEnv,
     *,
     progress: Progress,
     on_progress: Callable[[int, int], None],

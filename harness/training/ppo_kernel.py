@@ -59,24 +59,33 @@ class Objective(NamedTuple):
     target_kl: float
 
 
+class Update(NamedTuple):
+    """What the gradient steps of an update share."""
+
+    networks: Networks
+    adam: Adam
+    samples: Samples
+    objective: Objective
+    work: Workspace
+
+
 @compiled
-def gradient(
-    networks: Networks, samples: Samples, chosen: IntArray, objective: Objective, work: Workspace
-) -> FloatArray:
+def gradient(update: Update, chosen: IntArray) -> FloatArray:
     """The losses [LOSSES] of the samples `chosen`; the gradient of PPO's loss is in `work.gradient` afterwards.
 
     PPO: Schulman et al. 2017, equations 7 and 9, with the details of Stable-Baselines3: advantages are normalised per
     minibatch, and the value loss is the mean squared error to the returns.
     """
+    networks, samples, work = update.networks, update.samples, update.work
     size, inputs, axes = len(chosen), samples.observations.shape[1], samples.actions.shape[1]
     observations = work.observations[: size * inputs].reshape(size, inputs)
     for sample in range(size):
         observations[sample] = samples.observations[chosen[sample]]
-    _take_advantages(samples, chosen, objective.normalize_advantages, work.advantages)
+    _take_advantages(samples, chosen, update.objective.normalize_advantages, work.advantages)
     output = forward(networks, observations, work.activations)
     units = networks.actor_units.sum() + networks.critic_units.sum()
     delta = work.deltas[(units - axes - 1) * size : units * size].reshape(axes + 1, size)
-    losses = _loss(networks, samples, chosen, objective, work, output, delta)
+    losses = _loss(update, chosen, output, delta)
     backward(networks, observations, work)
     return losses
 
@@ -99,18 +108,11 @@ def _take_advantages(samples: Samples, chosen: IntArray, normalize: bool, advant
 
 
 @compiled
-def _loss(
-    networks: Networks,
-    samples: Samples,
-    chosen: IntArray,
-    objective: Objective,
-    work: Workspace,
-    output: FloatArray,
-    delta: FloatArray,
-) -> FloatArray:
+def _loss(update: Update, chosen: IntArray, output: FloatArray, delta: FloatArray) -> FloatArray:
     """The losses, and the loss's derivative by the output, in `delta`, and by the log-deviations, in the gradient."""
+    samples, objective, work = update.samples, update.objective, update.work
     size, axes = len(chosen), samples.actions.shape[1]
-    log_deviation = networks.parameters[-axes:]
+    log_deviation = update.networks.parameters[-axes:]
     by_deviation = work.gradient[-axes:]
     by_deviation[:] = 0.0
     actions = samples.actions[chosen]
@@ -141,16 +143,7 @@ def _loss(
 
 
 @compiled
-def epoch(
-    networks: Networks,
-    adam: Adam,
-    steps: int,
-    samples: Samples,
-    order: IntArray,
-    minibatch: int,
-    objective: Objective,
-    work: Workspace,
-) -> tuple[FloatArray, bool]:
+def epoch(update: Update, order: IntArray, minibatch: int, steps: int) -> tuple[FloatArray, bool]:
     """One pass over the samples in `order` [N], a gradient step per minibatch, after `steps` gradient steps before.
 
     Returns the losses [minibatches, LOSSES] and whether the KL divergence ended the pass: the gradient step of the last
@@ -159,12 +152,12 @@ def epoch(
     losses = np.zeros(((len(order) + minibatch - 1) // minibatch, LOSSES))
     for batch in range(len(losses)):
         chosen = order[batch * minibatch : (batch + 1) * minibatch]
-        losses[batch] = gradient(networks, samples, chosen, objective, work)
+        losses[batch] = gradient(update, chosen)
         if not np.isfinite(losses[batch]).all():
             return losses[: batch + 1], False
-        if losses[batch, APPROXIMATE_KL] > 1.5 * objective.target_kl:
+        if losses[batch, APPROXIMATE_KL] > 1.5 * update.objective.target_kl:
             return losses[: batch + 1], True
-        adam_step(networks.parameters, work.gradient, adam, steps + batch + 1)
+        adam_step(update.networks.parameters, update.work.gradient, update.adam, steps + batch + 1)
     return losses, False
 
 

@@ -9,6 +9,7 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,10 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
+from harness.campaign.execution.crash_retries import MOST_CRASHES
 from harness.campaign.execution.run_campaign import run_campaign
-from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_events import Work
+from harness.campaign.execution.stage_run import StageRun, Work
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import open_campaign
@@ -54,21 +54,19 @@ def command_of(folder: Path) -> tuple[object, ...]:
 # --- a dying simulator ------------------------------------------------------------------------------------------------
 
 
-def die_in_game_1(
-    stage: Stage, conditions: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
-) -> dict[str, Any]:
+def die_in_game_1(stage: Stage, run: StageRun) -> dict[str, Any]:
     """Game 1 of one arm is SUMO's death; one of a training's segments is so once."""
 
     def begin_or_die(place: int) -> None:
-        begin(place)
-        once = conditions.folder.with_name("died")
+        run.on_start(place)
+        once = run.context.folder.with_name("died")
         if stage.id == "naive_vs_sumo-seed1" and place == 1:
             os.kill(os.getpid(), signal.SIGSEGV)
         if stage.id == "speedy-seed1" and place == 1 and not once.exists():
             once.touch()
             os.kill(os.getpid(), signal.SIGSEGV)
 
-    return carry_out(stage, conditions, report, begin_or_die, attempt)
+    return carry_out(stage, replace(run, on_start=begin_or_die))
 
 
 def run_by(work: Work, folder: Path) -> tuple[RunResult, str]:

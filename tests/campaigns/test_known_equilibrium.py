@@ -32,7 +32,7 @@ import pytest
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
-from harness.drivers.mixture import Member, Mixture, Player
+from harness.drivers.mixture import Member, Mixture
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.protocol import Driver
@@ -47,7 +47,7 @@ from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO, ROLES
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.ppo import train
-from harness.training.training_games import TrainingSpec
+from harness.training.training_games import LearningPlace, TrainingSpec
 from tests.support.scenes import build_scene
 from tests.support.shared import built_once
 from tests.support.tiny import finished, settings
@@ -79,7 +79,7 @@ lane = "road_0"
 position_m = [50.0, 50.0]
 speed_mps = [15.0, 15.0]
 actuators = {CAR}
-[non_ego]
+[[non_ego]]
 vehicle = "non_ego"
 lane = "road_1"
 beside_ego_m = [{-MOST_AHEAD_M}, {MOST_AHEAD_M}]
@@ -352,10 +352,8 @@ class Coin:
         drivers = (LearnedDriver(always(each), sampled=False) for each in (FAST, SLOW))
         return Mixture(tuple(Member(driver=each, persona=self.personas[1]) for each in drivers))
 
-    def games(self, arm: str, ego: Player, episodes: int = 40) -> pd.DataFrame:
-        played = assess(
-            Arm(name=arm, scene=self.scene, drivers=(ego, self.player), personas=self.personas, seed=1), episodes
-        )
+    def games(self, arm: str, ego: Mixture, episodes: int = 40) -> pd.DataFrame:
+        played = assess(Arm(name=arm, scene=self.scene, drivers=(ego, self.player), seed=1), episodes)
         rows = pd.DataFrame([{"arm": arm, "persona": "blind", "seed": 1, **game.record} for game in played])
         return typed(rows.reindex(columns=list(EPISODE_COLUMNS)))
 
@@ -363,9 +361,8 @@ class Coin:
         how, named = settings(**TRAINING), ("coin", 1)
         spec = TrainingSpec(
             scene=self.scene,
-            learner=EGO,
-            personas=self.personas,
-            opponent=self.player,
+            persona=self.personas[EGO],
+            places=(LearningPlace(player=EGO, drivers=(None, self.player)),),
             alone_share=0.0,
             attentive_share=0.0,
             initial=initial,

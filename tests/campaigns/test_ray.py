@@ -12,12 +12,12 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
+from harness.campaign.execution.crash_retries import MOST_CRASHES
 from harness.campaign.execution.ray_cluster import ray_cluster
 from harness.campaign.execution.ray_workers import RayWorkers
-from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stages import run_stages
 from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.cli.wording import INTERRUPTED
@@ -175,17 +175,15 @@ def test_ray__that_is_not_installed_is_named_with_the_remedy(tmp_path: Path) -> 
 # --- deaths of workers ------------------------------------------------------------------------------------------------
 
 
-def die_in_segments(
-    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
-) -> dict[str, Any]:
-    """`a` dies in its second segment twice, `b` in every attempt."""
-    times = context.folder / f"{stage.id}.times"
+def die_in_segments(stage: Stage, run: StageRun) -> dict[str, Any]:
+    """`a` dies in its second segment twice, `b` in every run.attempt."""
+    times = run.context.folder / f"{stage.id}.times"
     times.write_text(times.read_text() + "x" if times.exists() else "x")
-    begin(0)
-    begin(1)
+    run.on_start(0)
+    run.on_start(1)
     if stage.id == "b-seed1" or (stage.id == "a-seed1" and len(times.read_text()) < MOST_CRASHES):
         os.kill(os.getpid(), signal.SIGSEGV)
-    return {"first": attempt.first}
+    return {"first": run.attempt.first}
 
 
 def test_ray__deaths_of_workers_follow_the_rule_of_the_harness(cluster: Any, tmp_path: Path) -> None:

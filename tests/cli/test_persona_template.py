@@ -23,7 +23,7 @@ from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
 from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from harness.training.ppo import train
-from harness.training.training_games import TrainingSpec
+from harness.training.training_games import LearningPlace, TrainingSpec
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, settings, write_campaign
 
@@ -192,9 +192,8 @@ def test_new__can_be_trained(tmp_path: Path, merge: OpenScene) -> None:
     anna = read_document(create_persona("anna", tmp_path / "anna.toml"), Persona)
     spec = TrainingSpec(
         scene=merge,
-        learner=EGO,
-        personas=(anna, anna),
-        opponent=None,
+        persona=anna,
+        places=(LearningPlace(player=EGO, drivers=(None, None)),),
         alone_share=1.0,
         attentive_share=0.0,
         initial=None,

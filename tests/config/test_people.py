@@ -1,4 +1,4 @@
-"""The people of a scene document: `[non_ego]`, or `[[non_ego]]` for each of several."""
+"""The people of a scene document: `[[non_ego]]` for each."""
 
 from __future__ import annotations
 
@@ -6,15 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from harness.config.scene import Scene
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
 from harness.game.roles import roles_of
-
-SPAN = st.tuples(st.floats(0.0, 20.0), st.floats(20.0, 40.0)).map(list)
 
 
 def document(non_ego: Any) -> dict[str, Any]:
@@ -32,17 +28,9 @@ def person(lane: str = "road_1") -> dict[str, Any]:
     return {"vehicle": "person", "lane": lane, "position_m": [30.0, 40.0], "speed_mps": [8.0, 12.0]}
 
 
-@given(position_m=SPAN, speed_mps=SPAN)
-def test_scene__one_in_a_list_is_one(position_m: list[float], speed_mps: list[float]) -> None:
-    written = {**person(), "position_m": position_m, "speed_mps": speed_mps}
-    assert scene_of([written]) == scene_of(written)
-    assert scene_of([written]).model_dump() == scene_of(written).model_dump()
-    assert scene_of([written]).roles == ("ego", "non_ego")
-
-
 def test_scene__several_people_are_numbered() -> None:
     scene = scene_of([person("road_0"), person("road_1"), person("road_2")])
-    assert scene.roles == ("ego", "non_ego_1", "non_ego_2", "non_ego_3")
+    assert scene.roles == ("ego", "non_ego", "non_ego_2", "non_ego_3")
     assert scene.player("non_ego_2").lane == "road_1"
     assert [player.lane for player in scene.players] == ["road_0", "road_0", "road_1", "road_2"]
 
@@ -74,6 +62,10 @@ ego = { vehicle = "ego", lane = "road_0", position_m = [30.0, 40.0], speed_mps =
     ("people", "message"),
     [
         (PEOPLE * 5, "non_ego: 5 people; a scene has one to 4"),
+        (
+            PEOPLE.replace("[[non_ego]]", "[non_ego]"),
+            "non_ego: is one table (write [[non_ego]]",
+        ),
         ("non_ego = []", "non_ego: 0 people; a scene has one to 4"),
         (PEOPLE + PEOPLE.replace("30.0", '"far"'), "non_ego_2.position_m"),
         (PEOPLE + PEOPLE + 'colour = "red"', "non_ego_2.colour: unknown key"),
@@ -89,6 +81,6 @@ def test_scene__a_mistake_names_the_person(people: str, message: str, tmp_path: 
     assert len(str(refused.value).splitlines()) == 1
 
 
-def test_roles__count_from_one_only_among_several() -> None:
+def test_roles__of_more_people_begin_with_those_of_fewer() -> None:
     assert roles_of(2) == ("ego", "non_ego")
-    assert roles_of(3) == ("ego", "non_ego_1", "non_ego_2")
+    assert roles_of(4) == ("ego", "non_ego", "non_ego_2", "non_ego_3")

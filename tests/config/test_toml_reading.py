@@ -31,7 +31,7 @@ vehicle = "ego"
 lane = "approach_1"
 position_m = [30.0, 45.0]
 speed_mps = [11, 14]
-[non_ego]
+[[non_ego]]
 vehicle = "non_ego"
 lane = "approach_0"
 beside_ego_m = [-8.0, 8.0]

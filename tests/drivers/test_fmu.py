@@ -16,6 +16,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
+from harness.drivers.mixture import mixture_of
 from harness.environments.rollout import Arm, assess
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
@@ -67,8 +68,7 @@ def test_fmu__drives_to_the_goal(fmi: int, twins: dict[int, Path], merge: OpenSc
     arm = Arm(
         name="naive_alone",
         scene=merge,
-        drivers=(fmu_driver(document(), twins[fmi], car), None),
-        personas=(careful, careful),
+        drivers=(mixture_of(fmu_driver(document(), twins[fmi], car), careful), None),
         seed=1,
     )
     games = [game.record for game in assess(arm, 3)]

@@ -29,6 +29,7 @@ from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.external_drivers import fmu_example
+from tests.support.rollouts import seated
 from tests.support.tiny import CAREFUL
 
 NUMBERS = ("Float32", *INTEGERS[1:], "Boolean")
@@ -188,7 +189,7 @@ def test_reference_fmus__what_goes_in_comes_out(version: str, merge: OpenScene, 
     wanted = car.physical(view)[:, LAYOUT.index("speed_over_limit")]
     np.testing.assert_allclose(first_action(driver, view), car.actions(wanted, np.zeros(1), view), atol=1e-6)
     careful = read_document(CAREFUL, Persona)
-    arm = Arm(name="a", scene=merge, drivers=(driver, None), personas=(careful, careful), seed=1)
+    arm = Arm(name="a", scene=merge, drivers=seated((driver, None), (careful, careful)), seed=1)
     games = [game.record for game in assess(arm, 3)]
     assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 3
 

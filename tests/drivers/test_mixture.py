@@ -116,7 +116,7 @@ def test_assess__an_episode_is_that_of_its_member_alone(merge: OpenScene, people
         Member(driver=Steady(0.1), persona=careful, share=1.0),
         Member(driver=Steady(0.4), persona=speedy, share=1.0),
     )
-    mixed = Arm(name="mixed", scene=merge, drivers=(Steady(0.0), Mixture(members)), personas=(careful, careful), seed=1)
+    mixed = Arm(name="mixed", scene=merge, drivers=(mixture_of(Steady(0.0), careful), Mixture(members)), seed=1)
     alone = [
         records(
             list(
@@ -124,8 +124,7 @@ def test_assess__an_episode_is_that_of_its_member_alone(merge: OpenScene, people
                     Arm(
                         name="alone",
                         scene=merge,
-                        drivers=(Steady(0.0), each.driver),
-                        personas=(careful, each.persona),
+                        drivers=(mixture_of(Steady(0.0), careful), mixture_of(each.driver, each.persona)),
                         seed=1,
                     ),
                     6,
@@ -166,8 +165,7 @@ def test_by_who_drove__has_the_members_of_the_games(merge: OpenScene, people: di
     arm = Arm(
         name="naive_vs_town",
         scene=merge,
-        drivers=(Steady(0.0), Mixture(members)),
-        personas=(people["careful"], people["careful"]),
+        drivers=(mixture_of(Steady(0.0), people["careful"]), Mixture(members)),
         seed=3,
     )
     played = pd.DataFrame([{"arm": arm.name, "persona": "town", "seed": 3, **game.record} for game in assess(arm, 8)])

@@ -25,6 +25,7 @@ from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 from tests.support.processes import driver, is_running, started
 from tests.support.repository import REPOSITORY
+from tests.support.rollouts import seated
 from tests.support.tiny import CAREFUL, wait_for
 
 GAMES = np.array([3, 7])
@@ -190,7 +191,7 @@ def test_process__a_crash_costs_one_game(tmp_path: Path, merge: OpenScene, car: 
         "n == 2 and message['type'] == 'decide' and steps == 4 and sys.exit('flat tyre')"
     )
     mine, careful = driver(tmp_path, car, counts), read_document(CAREFUL, Persona)
-    arm = Arm(name="naive_alone", scene=merge, drivers=(mine, None), personas=(careful, careful), seed=1)
+    arm = Arm(name="naive_alone", scene=merge, drivers=seated((mine, None), (careful, careful)), seed=1)
     games = [game.record for game in assess(arm, 4)]
     assert [game["ego_outcome"] == "error" for game in games] == [False, True, False, False]
     assert "DriverError" in games[1]["error"]
@@ -204,7 +205,7 @@ def test_process__the_example_in_perl_reaches_its_goal(merge: OpenScene, car: Ca
     games = [
         game.record
         for game in assess(
-            Arm(name="naive_alone", scene=merge, drivers=(mine, None), personas=(careful, careful), seed=1), 4
+            Arm(name="naive_alone", scene=merge, drivers=seated((mine, None), (careful, careful)), seed=1), 4
         )
     ]
     assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 4

@@ -33,6 +33,7 @@ from harness.game.roles import EGO
 from harness.game.state import State
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.observations import observation_of
+from tests.support.rollouts import seated
 from tests.support.scenes import build_scene
 
 EGOS = ("adas", "careful_and_competent", "fuzzy", "rss")
@@ -389,7 +390,7 @@ def play(repository: Path, scene: OpenScene, *, ego: str, other: Driver | None, 
     assert isinstance(document, Rules)
     careful = read_document(repository / "personas" / "careful.toml", Persona)
     driver = RulesDriver(document, car_of(scene.world, EGO))
-    arm = Arm(name="arm", scene=scene, drivers=(driver, other), personas=(careful, careful), seed=1)
+    arm = Arm(name="arm", scene=scene, drivers=seated((driver, other), (careful, careful)), seed=1)
     return [game.record for game in assess(arm, games)]
 
 

@@ -28,6 +28,7 @@ from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
 from harness.traffic.scene import OpenScene
 from tests.support.random_observations import Recorded
+from tests.support.rollouts import seated
 from tests.support.tiny import CAREFUL
 
 torch.set_num_threads(1)  # tiny networks: more threads only wait for each other
@@ -114,7 +115,7 @@ def test_saved__plays_games(name: str, saved: dict[str, Path], merge: OpenScene)
     careful = read_document(CAREFUL, Persona)
     driver = Sb3Driver(document(name), saved[name], sampled=False)
     (game,) = assess(
-        Arm(name="naive_alone", scene=merge, drivers=(driver, None), personas=(careful, careful), seed=1), 1
+        Arm(name="naive_alone", scene=merge, drivers=seated((driver, None), (careful, careful)), seed=1), 1
     )
     assert game.record["error"] == ""
 

@@ -19,6 +19,7 @@ from harness.environments.rollout import Arm, Game, assess
 from harness.errors import UsageError
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.policies import some_policy
+from tests.support.rollouts import seated
 from tests.support.tiny import CAREFUL, MERGE
 
 FOLLOWING = ("Krauss", "IDM", "EIDM", "ACC", "CACC")
@@ -46,7 +47,7 @@ def play(scene: OpenScene, non_ego: Driver | None, episodes: int) -> list[Game]:
     careful = read_document(CAREFUL, Persona)
     return list(
         assess(
-            Arm(name="naive_alone", scene=scene, drivers=(SumoDriver(), non_ego), personas=(careful, careful), seed=1),
+            Arm(name="naive_alone", scene=scene, drivers=seated((SumoDriver(), non_ego), (careful, careful)), seed=1),
             episodes,
         )
     )

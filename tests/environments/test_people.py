@@ -23,11 +23,11 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.attention import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.traffic.scene import OpenScene, open_scene
-from tests.support.rollouts import play, trace
+from tests.support.rollouts import play, seated, trace
 from tests.support.scenes import LEFT_Y, RIGHT_Y, THREE_PEOPLE, build_scene, placed
 from tests.support.tiny import CAREFUL
 
-ROLES = ["ego", "non_ego_1", "non_ego_2", "non_ego_3"]
+ROLES = ["ego", "non_ego", "non_ego_2", "non_ego_3"]
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ class Pedals:
 
 def played(scene: OpenScene, *drivers: Any, episodes: int = 1) -> list[Game]:
     careful = read_document(CAREFUL, Persona)
-    return play(Arm(name="any", scene=scene, drivers=drivers, personas=(careful,) * 4, seed=1), episodes)
+    return play(Arm(name="any", scene=scene, drivers=seated(drivers, (careful,) * 4), seed=1), episodes)
 
 
 def table(games: list[Game]) -> pd.DataFrame:
@@ -73,7 +73,7 @@ def test_game__names_the_person_that_the_ego_collided_with(scene: OpenScene) -> 
     (game,) = played(scene, Pedals(1.0), SumoDriver(), Pedals(-0.2), SumoDriver())
     (row,) = table([game]).to_dict("records")
     assert (row["ego_outcome"], row[COLLIDED_WITH]) == ("collision", "non_ego_2")
-    assert (row["non_ego_1_outcome"], row["non_ego_2_outcome"], row["non_ego_3_outcome"]) == (
+    assert (row["non_ego_outcome"], row["non_ego_2_outcome"], row["non_ego_3_outcome"]) == (
         "goal",
         "collision",
         "goal",
@@ -83,10 +83,10 @@ def test_game__names_the_person_that_the_ego_collided_with(scene: OpenScene) -> 
 def test_game__people_without_an_ego_drive_one_at_a_time(scene: OpenScene) -> None:
     games = played(scene, None, *[Pedals(0.3)] * 3, episodes=4)
     assert [set(trace(game)["player"]) for game in games] == [
-        {"non_ego_1"},
+        {"non_ego"},
         {"non_ego_2"},
         {"non_ego_3"},
-        {"non_ego_1"},
+        {"non_ego"},
     ]
     rows = table(games)
     assert (rows["ego_outcome"] == "").all()
@@ -150,8 +150,8 @@ def test_environment__the_learner_may_be_any_person(scene: OpenScene) -> None:
         assert np.abs(observation).max() <= 1.0
     finally:
         environment.close()
-    with pytest.raises(UsageError, match="there is no player 'non_ego'"):
-        DrivingEnv(scene, player="non_ego")
+    with pytest.raises(UsageError, match="there is no player 'non_ego_4'"):
+        DrivingEnv(scene, player="non_ego_4")
 
 
 def test_joined_environment__is_its_arenas_one_after_the_other(scene: OpenScene) -> None:

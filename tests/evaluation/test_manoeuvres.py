@@ -27,6 +27,7 @@ from harness.evaluation.manoeuvres import (
 from harness.evaluation.tables import MANOEUVRE_COLUMNS, typed
 from harness.game.arrays import FloatArray, IntArray
 from harness.traffic.scene import OpenScene
+from tests.support.rollouts import seated
 from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, build_scene
 
 STEP_S = 0.1
@@ -509,7 +510,7 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path,
         read_document(repository / "personas" / f"{name}.toml", Persona) for name in ("careful", "distracted")
     )
     drivers = (Scripted([0.0] * 30 + [0.9] * 10), Scripted([0.0]))
-    arm = Arm(name="naive_vs_distracted", scene=merge, drivers=drivers, personas=(careful, distracted), seed=1)
+    arm = Arm(name="naive_vs_distracted", scene=merge, drivers=seated(drivers, (careful, distracted)), seed=1)
     stories = {}
     for game in assess(arm, 12):
         assert game.trace is not None

@@ -16,7 +16,7 @@ from harness.evaluation.tables import EPISODE_COLUMNS, read_csv, typed, write_cs
 from tests.support.scenes import LEFT_Y, RIGHT_Y, THREE_PEOPLE, build_scene
 from tests.support.traces import drawn
 
-PEOPLE = ("non_ego_1", "non_ego_2", "non_ego_3")
+PEOPLE = ("non_ego", "non_ego_2", "non_ego_3")
 
 
 def games(*rows: dict[str, object], arm: str = "naive_vs_speedy") -> pd.DataFrame:
@@ -32,7 +32,7 @@ def test_columns__of_one_person_are_those_of_the_table() -> None:
 @pytest.mark.parametrize("people", [2, 3, 4])
 def test_columns__of_several_people_are_each_person_s(people: int) -> None:
     columns = columns_for(people, EPISODE_COLUMNS)
-    assert people_in(columns) == tuple(f"non_ego_{place}" for place in range(1, people + 1))
+    assert people_in(columns) == ("non_ego", "non_ego_2", "non_ego_3", "non_ego_4")[:people]
     own = [name for name in EPISODE_COLUMNS if name.startswith("non_ego_")]
     assert len(columns) == len(EPISODE_COLUMNS) + (people - 1) * len(own) + 1
     assert list(columns).index(COLLIDED_WITH) == list(columns).index("ego_failed") + 1
@@ -46,7 +46,7 @@ def test_table__of_several_people_is_read_as_it_was_written(tmp_path: Path) -> N
 
 def test_judged__is_the_ego_or_the_person_that_drives() -> None:
     table = games(
-        {"ego_outcome": "goal", "non_ego_1_outcome": "rail"},
+        {"ego_outcome": "goal", "non_ego_outcome": "rail"},
         {"non_ego_2_outcome": "rail"},
         {"non_ego_3_outcome": "goal"},
     )
@@ -84,7 +84,7 @@ def test_manoeuvres__name_the_person_and_before_which_player(tmp_path: Path) -> 
     ego = [40.0 + 1.2 * step for step in steps]
     trace = drawn(
         ego=(ego, 12.0, RIGHT_Y, {}),
-        non_ego_1=([20.0 + 1.2 * step for step in steps], 12.0, LEFT_Y, {}),
+        non_ego=([20.0 + 1.2 * step for step in steps], 12.0, LEFT_Y, {}),
         non_ego_2=([x_m + 9.0 for x_m in ego], 12.0, LEFT_Y, {}),
         non_ego_3=([x_m + 60.0 for x_m in ego], 12.0, LEFT_Y, {}),
     )

@@ -19,6 +19,7 @@ import harness.environments.arena
 from harness.campaign.execution.cache_keys import stage_keys
 from harness.campaign.execution.run_context import run_context_of
 from harness.campaign.execution.run_stage import carry_out
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
@@ -172,7 +173,7 @@ def test_payoff__that_is_not_finite_fails_a_training_stage_by_name(
     monkeypatch.setattr(Quantities, "lane_offset_m", faulty(Quantities.lane_offset_m, np.nan))
     expected = rf"^naive-seed1: the payoff of ego is nan in step {STEP} of game 0, in a demonstration$"
     with pytest.raises(StageFailed, match=expected):
-        carry_out(stages[0], run_context_of(campaign, folder, keys), lambda done, total: None)
+        carry_out(stages[0], StageRun(context=run_context_of(campaign, folder, keys)))
     assert folder.finished(stages[0].id, keys[stages[0].id]) is None
     assert not folder.policy(stages[0].id).exists()
 

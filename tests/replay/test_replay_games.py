@@ -18,6 +18,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.replay import write_replay
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.replays import assert_plays
+from tests.support.rollouts import seated
 from tests.support.scenes import CARS, build_scene
 
 TRAFFIC = """
@@ -63,7 +64,7 @@ def played(
     scene: OpenScene, persona: Persona, drivers: tuple[Driver, Driver], outcome: str, episodes: int = 8
 ) -> pd.DataFrame:
     """The trace of the first game with such an outcome of the ego."""
-    for game in assess(Arm(name="arm", scene=scene, drivers=drivers, personas=(persona, persona), seed=1), episodes):
+    for game in assess(Arm(name="arm", scene=scene, drivers=seated(drivers, (persona, persona)), seed=1), episodes):
         if game.record["ego_outcome"] == outcome:
             assert game.trace is not None
             return pd.DataFrame(dict(game.trace))

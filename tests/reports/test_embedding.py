@@ -70,7 +70,7 @@ def test_embedded__without_a_road_there_are_no_games(games):
 
 def test_document__names_the_persona_of_each_of_a_crowd(games):
     ego, person = games[0].players[:2]
-    people = [replace(person, name=f"non_ego_{place}") for place in (1, 2)]
+    people = [replace(person, name=name) for name in ("non_ego", "non_ego_2")]
     game = replace(games[0], persona="rush", players=[ego, *people])
     for crowds, expected in ({"rush": ["speedy", "anna"]}, [None, "speedy", "anna"]), ({}, [None, None, None]):
         embedded = Embedded(SCENE, [game], {}, 10_000_000, crowds)

@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 
-from harness.campaign.plan.competence import alone_bounds
+from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.config.campaign import Campaign
 from harness.evaluation.comparison import compare
 from harness.evaluation.research_questions import Question, ResearchQuestion

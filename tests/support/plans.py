@@ -27,9 +27,15 @@ def planned(folder: Path, **changes: Any) -> tuple[dict[str, Stage], dict[str, s
 
 def training_of(name: str, *needs: str) -> Stage:
     """A training that needs others: as its initial policy and as its opponent."""
-    initial, opponent, *_ = [*(Trained(stage=f"{each}-seed1") for each in needs), None, None]
-    strategy = PersonaNonEgo(persona=name)
-    return TrainingStage(seed=1, persona="", strategy=strategy, opponent=opponent, initial=initial, alone_share=0.0)
+    needed = tuple(Trained(stage=f"{each}-seed1") for each in needs)
+    return TrainingStage(
+        seed=1,
+        persona="",
+        strategy=PersonaNonEgo(persona=name),
+        opponent=needed[1:],
+        initial=needed[0] if needed else None,
+        alone_share=0.0,
+    )
 
 
 def empty_context(folder: Path) -> RunContext:

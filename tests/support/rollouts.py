@@ -10,6 +10,7 @@ import pandas as pd
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
+from harness.drivers.mixture import Mixture, mixture_of
 from harness.drivers.protocol import Driver
 from harness.environments.rollout import Arm, Game, assess
 from harness.game.arrays import FloatArray, IntArray
@@ -29,10 +30,17 @@ class Steady:
         return np.zeros((len(games), 2))
 
 
+def seated(drivers: Sequence[Driver | None], personas: Sequence[Persona]) -> tuple[Mixture | None, ...]:
+    """Drivers, each with its persona."""
+    return tuple(
+        None if each is None else mixture_of(each, persona) for each, persona in zip(drivers, personas, strict=True)
+    )
+
+
 def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: int = 1) -> Arm:
     """An arm in which a careful ego meets a driver of the persona."""
     careful, other = (read_document(file, Persona) for file in (CAREFUL, persona))
-    return Arm(name="naive_vs_someone", scene=merge, drivers=drivers, personas=(careful, other), seed=seed)
+    return Arm(name="naive_vs_someone", scene=merge, drivers=seated(drivers, (careful, other)), seed=seed)
 
 
 def play(assessed: Arm, episodes: int = 3) -> list[Game]:

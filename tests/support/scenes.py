@@ -22,7 +22,7 @@ STRAIGHT_EDGES = '<edge id="road" from="a" to="b" numLanes="2" speed="13.89" spr
 STRAIGHT = {"ego": ("road", "road_0"), "non_ego": ("road", "road_1"), "goal": "road"}
 THREE_PEOPLE = {
     "ego": ("road", "road_0"),
-    "non_ego_1": ("road", "road_1"),
+    "non_ego": ("road", "road_1"),
     "non_ego_2": ("road", "road_0", "[60.0, 70.0]"),
     "non_ego_3": ("road", "road_1", "[60.0, 70.0]"),
     "goal": "road",
@@ -94,7 +94,7 @@ routes = "n.rou.xml"
 time_limit_s = {time_limit_s}
 goal = {{ edge = "{places["goal"]}", position_m = {goal_m} }}
 ego = {starts["ego"]}
-non_ego = {people[0] if "non_ego" in players else f"[{', '.join(people)}]"}
+non_ego = [{", ".join(people)}]
 """
     )
     return open_scene(folder)

@@ -113,7 +113,7 @@ vehicle = "ego"
 route_m = [60.0, 80.0]
 speed_mps = [8.0, 13.0]
 goal = { edge = "me", position_m = 50.0 }
-[non_ego]
+[[non_ego]]
 kind = "pedestrian"
 way = [[135.0, 4.2], [X, 4.2], [X, -4.2]]
 arrival_after_ego_s = [-2.0, 2.0]

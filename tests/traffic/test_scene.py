@@ -68,7 +68,7 @@ def test_scene__departures_are_those_of_the_background_traffic(folder: Path) -> 
 
 def test_scene__each_player_has_its_own_actuators_and_size(folder: Path) -> None:
     change(folder, "merge.rou.xml", 'id="person_car" length="4.60"', 'id="person_car" length="9.10"')
-    change(folder, "scene.toml", "[non_ego]", "[ego.actuators]\nmax_braking_mps2 = 5.5\n[non_ego]")
+    change(folder, "scene.toml", "[[non_ego]]", "[ego.actuators]\nmax_braking_mps2 = 5.5\n[[non_ego]]")
     world = open_scene(folder).world
     assert world.length_m.tolist() == [4.6, 9.1]
     assert world.actuators.max_braking_mps2.tolist() == [5.5, 8.0]
@@ -231,7 +231,7 @@ def test_route__must_reach_the_goal(folder: Path) -> None:
     own_route(folder, "approach")
     expected = (
         "edge 'exit' is not on the route of vehicle 'ego' in merge.rou.xml, after its start "
-        "(choose one of its edges (it ends with approach), or give [ego.goal])"
+        "(choose one of its edges (it ends with approach), or give ego a goal)"
     )
     assert only(folder) == ("scene.toml", "goal.edge", expected)
 

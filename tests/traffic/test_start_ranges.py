@@ -55,8 +55,10 @@ def write(built: Path, tmp_path: Path) -> Write:
         )
         (folder / "n.rou.xml").write_text(f"<routes>{CARS}{cars}</routes>")
         players = "".join(
-            f'[{role}]\nvehicle = "{role}"\n{start}\nspeed_mps = {speed}\ngoal = {goal}\n'
-            for role, start, speed, goal in zip(("ego", "non_ego"), (ego, non_ego), speeds, goals, strict=True)
+            f'{header}\nvehicle = "{role}"\n{start}\nspeed_mps = {speed}\ngoal = {goal}\n'
+            for header, role, start, speed, goal in zip(
+                ("[ego]", "[[non_ego]]"), ("ego", "non_ego"), (ego, non_ego), speeds, goals, strict=True
+            )
         )
         text = f'name = "small"\nnet = "n.net.xml"\nroutes = "n.rou.xml"\ntime_limit_s = 30.0\n{players}'
         (folder / "scene.toml").write_text(text)
@@ -235,7 +237,7 @@ def test_goals__one_for_both_may_stand_beside_none(write: Write) -> None:
         (
             {"goals": ('{ edge = "cn", position_m = 40.0 }', GOALS[1])},
             r"ego.goal.edge: edge 'cn' is not on the route of vehicle 'ego' in \S+, after its start "
-            r"\(choose one of its edges \(it ends with wc, ce\), or give \[ego.goal\]\)",
+            r"\(choose one of its edges \(it ends with wc, ce\), or give ego a goal\)",
         ),
         (
             {"goals": (GOALS[0], '{ edge = "cn", position_m = 400.0 }')},

@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import DummyVecEnv
 from harness.training.actor_critic_kernel import Networks, backward, forward, log_probabilities, workspace_of
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.policy_arrays import networks_of, parameter_order, vector_of
-from harness.training.ppo_kernel import Adam, Objective, Samples, adam_step, epoch, gradient
+from harness.training.ppo_kernel import Adam, Objective, Samples, Update, adam_step, epoch, gradient
 
 BOUND = 1e-6
 """Largest difference from autograd and from SB3, of numbers of the order of 1."""
@@ -257,7 +257,7 @@ def assert_gradient_is_that_of_autograd(term: str, seed: int, count: int, clip: 
 
     networks = networks_of(model.policy)
     work = workspace_of(networks, count)
-    losses = gradient(networks, samples, np.arange(count), objective, work)
+    losses = gradient(Update(networks, adam(0), samples, objective, work), np.arange(count))
 
     assert losses[:3] == pytest.approx([policy.item(), value.item(), entropy.item()], abs=bound)
     assert np.abs(work.gradient - expected).max() <= bound
@@ -332,10 +332,10 @@ def test_epoch__takes_every_sample_once_and_the_rest_in_a_smaller_minibatch() ->
     objective = Objective(0.1, 0.5, 0.02, True, float("inf"))
     still = adam(len(networks.parameters), learning_rate=0.0)  # each minibatch is judged by the same parameters
     order = np.array([9, 8, 7, 6, 5, 4, 3, 2, 1, 0])
-    work = workspace_of(networks, 4)
-    losses, ended = epoch(networks, still, 0, samples, order, 4, objective, work)
+    update = Update(networks, still, samples, objective, workspace_of(networks, 4))
+    losses, ended = epoch(update, order, 4, 0)
     assert not ended
-    parts = [gradient(networks, samples, order[i : i + 4], objective, work).copy() for i in (0, 4, 8)]
+    parts = [gradient(update, order[i : i + 4]).copy() for i in (0, 4, 8)]
     assert losses == pytest.approx(np.array(parts))
 
 

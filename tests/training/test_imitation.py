@@ -14,7 +14,7 @@ from harness.game.roles import NON_EGO
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.imitation import returns_of
 from tests.support.tiny import settings
-from tests.support.trainings import in_one_go, naive_ego
+from tests.support.trainings import beside, in_one_go, naive_ego
 
 NO_LEARNING = 1e-9  # step size of Adam in the training after the imitation
 
@@ -49,7 +49,7 @@ def first_policy(scene: OpenScene, folder: Path, learner: int, demonstration_ste
         steps=1024, learning_rate=NO_LEARNING, demonstration_steps=demonstration_steps, final_deviation=0.5
     )
     spec = naive_ego(scene)
-    return in_one_go(replace(spec, learner=learner, settings=chosen), folder).policy
+    return in_one_go(beside(spec, learner, None, settings=chosen), folder).policy
 
 
 def test_imitation__a_learner_on_foot_has_no_demonstrator(repository: Path, tmp_path: Path) -> None:

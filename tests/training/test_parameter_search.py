@@ -17,7 +17,7 @@ from harness.config.toml_reading import read_document
 from harness.config.training import Reconfiguration
 from harness.config.tunable import Tunable
 from harness.drivers.car import car_of
-from harness.drivers.mixture import Member, Mixture
+from harness.drivers.mixture import Member, Mixture, mixture_of
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.protocol import Driver
@@ -26,7 +26,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.paired_rollouts import PairedRollouts
-from harness.training.parameter_search import Search, Trial, best, propose, read_trials, run_search, write_trials
+from harness.training.parameter_search import SearchSpec, Trial, best, propose, read_trials, run_search, write_trials
 from tests.support.external_drivers import document, find, fmu_example, install
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, SPEEDY
@@ -40,22 +40,19 @@ def scene() -> OpenScene:
     return open_scene(REPOSITORY / "networks" / "merge")
 
 
-def opponent() -> Driver:
-    return LearnedDriver(read_policy(REPOSITORY / "policies" / "merge" / "speedy-seed1"), sampled=False)
+def opponent() -> Mixture:
+    policy = read_policy(REPOSITORY / "policies" / "merge" / "speedy-seed1")
+    return mixture_of(LearnedDriver(policy, sampled=False), read_document(SPEEDY, Persona))
 
 
-def personas() -> tuple[Persona, Persona]:
-    return read_document(CAREFUL, Persona), read_document(SPEEDY, Persona)
-
-
-def search_of(scene: OpenScene, folder: Path, text: str, **settings: Any) -> Search:
+def search_of(scene: OpenScene, folder: Path, text: str, **settings: Any) -> SearchSpec:
     external = find(document(folder, text), folder)
     few = {"trials": 5, "games": 6, "games_at_once": 6, **settings}
-    return Search(
+    return SearchSpec(
         scene=scene,
         driver=external,
-        personas=personas(),
-        opponent=opponent(),
+        persona=read_document(CAREFUL, Persona),
+        people=(opponent(),),
         settings=Reconfiguration(**few),
         parts=("reconfiguration", 1, "test"),
     )
@@ -85,9 +82,10 @@ class Recording:
         return self._driver.decide(games, observation, noise)
 
 
-def play(scene: OpenScene, driver: Driver, other: Driver | Mixture | None = None, **changes: Any) -> Any:
+def play(scene: OpenScene, driver: Driver, other: Mixture | None = None, **changes: Any) -> Any:
     arguments = {"games": 7, "at_once": 3, "alone_share": 0.3, "parts": ("test", 1)} | changes
-    games = PairedRollouts(scene, personas=personas(), opponent=other or opponent(), **arguments)
+    careful = read_document(CAREFUL, Persona)
+    games = PairedRollouts(scene, persona=careful, people=(other or opponent(),), **arguments)
     try:
         return games.play(driver), games.play(driver)
     finally:
@@ -115,7 +113,14 @@ def test_games__do_not_depend_on_the_number_at_once(scene: OpenScene) -> None:
 @pytest.mark.parametrize(("share", "opponents"), [(0.0, range(20, 21)), (1.0, range(1)), (0.5, range(4, 17))])
 def test_games__are_without_the_opponent_in_their_share(share: float, opponents: range, scene: OpenScene) -> None:
     other = _Counting()
-    play(scene, Recording(scene), other, games=20, at_once=20, alone_share=share)
+    play(
+        scene,
+        Recording(scene),
+        mixture_of(other, read_document(CAREFUL, Persona)),
+        games=20,
+        at_once=20,
+        alone_share=share,
+    )
     assert len(other.games) in opponents
 
 
@@ -134,7 +139,7 @@ class _Counting:
 
 
 def test_games__may_be_against_a_mixture(scene: OpenScene) -> None:
-    _, speedy = personas()
+    speedy = read_document(SPEEDY, Persona)
     both = _Counting(), _Counting()
     play(
         scene,
@@ -250,7 +255,7 @@ def test_trials__are_read_back_exactly_or_not_at_all(tmp_path: Path) -> None:
 class _Failing:
     """An ego that can't be made with some values."""
 
-    def __init__(self, search: Search, fails: Any) -> None:
+    def __init__(self, search: SearchSpec, fails: Any) -> None:
         self._driver, self._fails = search.driver, fails
 
     @property

@@ -18,6 +18,7 @@ import harness.training.ppo
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.config.training import Training
+from harness.drivers.mixture import mixture_of
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import write_policy
 from harness.drivers.sumo import SumoDriver
@@ -29,10 +30,10 @@ from harness.game.quantities import Quantities
 from harness.game.roles import EGO, NON_EGO
 from harness.traffic.scene import OpenScene
 from harness.training.checkpoint import Progress
-from harness.training.ppo import Trained, train
+from harness.training.ppo import TrainingResult, train
 from harness.training.training_games import TrainingSpec
-from tests.support.tiny import DISTRACTED, settings
-from tests.support.trainings import in_one_go, naive_ego
+from tests.support.tiny import DISTRACTED, SPEEDY, settings
+from tests.support.trainings import beside, in_one_go, naive_ego
 
 OTHERS = np.flatnonzero(OF_OTHERS)
 
@@ -43,7 +44,7 @@ def alone(merge: OpenScene) -> TrainingSpec:
 
 
 @pytest.fixture(scope="session")
-def trained(alone: TrainingSpec, tmp_path_factory: pytest.TempPathFactory) -> Trained:
+def trained(alone: TrainingSpec, tmp_path_factory: pytest.TempPathFactory) -> TrainingResult:
     """The result of a training without interruption."""
     return in_one_go(alone, tmp_path_factory.mktemp("training"))
 
@@ -58,14 +59,14 @@ def stop_after(segments: int) -> Callable[[int, int], None]:
     return report
 
 
-def same(one: Trained, other: Trained, folder: Path) -> bool:
+def same(one: TrainingResult, other: TrainingResult, folder: Path) -> bool:
     for name, each in (("one", one), ("other", other)):
         write_policy(each.policy, folder / name)
     one_bytes, other_bytes = ((folder / name / "policy.safetensors").read_bytes() for name in ("one", "other"))
     return one_bytes == other_bytes and one.progress == other.progress and one.stopped == other.stopped
 
 
-def test_train__has_a_complete_curve(alone: TrainingSpec, trained: Trained) -> None:
+def test_train__has_a_complete_curve(alone: TrainingSpec, trained: TrainingResult) -> None:
     assert trained.stopped == "budget"
     assert trained.progress.steps == 3072
     assert trained.progress.segments == len(trained.progress.segment_payoffs) == 3
@@ -77,14 +78,14 @@ def test_train__has_a_complete_curve(alone: TrainingSpec, trained: Trained) -> N
     assert [window.mean_payoff for window in curve] == pytest.approx(trained.progress.segment_payoffs)
 
 
-def test_train__again_is_the_same(alone: TrainingSpec, trained: Trained, tmp_path: Path) -> None:
+def test_train__again_is_the_same(alone: TrainingSpec, trained: TrainingResult, tmp_path: Path) -> None:
     assert same(in_one_go(alone, tmp_path, tensorboard=tmp_path / "events"), trained, tmp_path)
     assert list((tmp_path / "events").glob("events.out.tfevents*"))
 
 
 @pytest.mark.parametrize("segments", [0, 1, 2])
 def test_train__an_interruption_does_not_change_the_policy(
-    segments: int, alone: TrainingSpec, trained: Trained, tmp_path: Path
+    segments: int, alone: TrainingSpec, trained: TrainingResult, tmp_path: Path
 ) -> None:
     with pytest.raises(KeyboardInterrupt):
         in_one_go(alone, tmp_path, on_progress=stop_after(segments))
@@ -97,7 +98,7 @@ def test_train__an_interruption_does_not_change_the_policy(
 
 
 def test_train__continuing_a_finished_training_changes_nothing(
-    alone: TrainingSpec, trained: Trained, tmp_path: Path
+    alone: TrainingSpec, trained: TrainingResult, tmp_path: Path
 ) -> None:
     in_one_go(alone, tmp_path)
     assert same(in_one_go(alone, tmp_path, on_progress=stop_after(0)), trained, tmp_path)
@@ -128,7 +129,7 @@ def test_train__a_continued_converged_training_stays_converged(
     ids=["another key", "truncated", "empty", "without metadata"],
 )
 def test_train__ignores_a_damaged_checkpoint_or_one_with_another_key(
-    damage: Callable[[Path], object], alone: TrainingSpec, trained: Trained, tmp_path: Path
+    damage: Callable[[Path], object], alone: TrainingSpec, trained: TrainingResult, tmp_path: Path
 ) -> None:
     checkpoint = tmp_path / "checkpoint.safetensors"
     short = replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive"))
@@ -161,7 +162,10 @@ def test_train__ignores_a_damaged_checkpoint_or_one_with_another_key(
     ],
 )
 def test_train__ignores_a_checkpoint_of_another_learner(
-    change: Callable[[dict[str, Any], dict[str, str]], object], alone: TrainingSpec, trained: Trained, tmp_path: Path
+    change: Callable[[dict[str, Any], dict[str, str]], object],
+    alone: TrainingSpec,
+    trained: TrainingResult,
+    tmp_path: Path,
 ) -> None:
     checkpoint = tmp_path / "checkpoint.safetensors"
     in_one_go(replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive")), tmp_path)
@@ -173,13 +177,13 @@ def test_train__ignores_a_checkpoint_of_another_learner(
     assert same(in_one_go(alone, tmp_path), trained, tmp_path)
 
 
-def test_train__another_seed_gives_another_policy(alone: TrainingSpec, trained: Trained, tmp_path: Path) -> None:
+def test_train__another_seed_gives_another_policy(alone: TrainingSpec, trained: TrainingResult, tmp_path: Path) -> None:
     other = in_one_go(replace(alone, parts=("training", 2, "naive")), tmp_path)
     assert not same(other, trained, tmp_path)
     assert other.progress.segment_payoffs != trained.progress.segment_payoffs
 
 
-def test_train__a_policy_trained_alone_ignores_other_road_users(trained: Trained) -> None:
+def test_train__a_policy_trained_alone_ignores_other_road_users(trained: TrainingResult) -> None:
     weight = trained.policy.tensors["actor.0.weight"]
     assert np.all(weight[:, OTHERS] == 0.0)
     assert np.all(trained.policy.tensors["critic.0.weight"][:, OTHERS] == 0.0)
@@ -193,16 +197,16 @@ def test_train__a_policy_trained_alone_ignores_other_road_users(trained: Trained
 
 
 def test_train__a_policy_trained_with_an_opponent_observes_it(
-    alone: TrainingSpec, trained: Trained, tmp_path: Path
+    alone: TrainingSpec, trained: TrainingResult, tmp_path: Path
 ) -> None:
     ego = LearnedDriver(trained.policy, sampled=False)
-    spec = replace(alone, learner=NON_EGO, opponent=ego, alone_share=0.25, settings=settings(steps=1024))
+    spec = beside(alone, NON_EGO, mixture_of(ego, alone.persona), alone_share=0.25, settings=settings(steps=1024))
     with_opponent = in_one_go(spec, tmp_path)
     assert np.abs(with_opponent.policy.tensors["actor.0.weight"][:, OTHERS]).max() > 0.0
 
 
 def test_train__starts_from_the_initial_policy(
-    alone: TrainingSpec, trained: Trained, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    alone: TrainingSpec, trained: TrainingResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         harness.training.ppo,
@@ -219,7 +223,7 @@ def test_train__starts_from_the_initial_policy(
 
 
 def test_train__an_initial_policy_of_another_network_is_refused(
-    alone: TrainingSpec, trained: Trained, tmp_path: Path
+    alone: TrainingSpec, trained: TrainingResult, tmp_path: Path
 ) -> None:
     larger = replace(alone, initial=trained.policy, settings=settings(network=[9]))
     with pytest.raises(ValueError, match="other layer sizes"):
@@ -240,7 +244,7 @@ def test_train__alone_share_is_the_share_of_games_without_opponent(
 
     monkeypatch.setattr(harness.environments.vector_env.Arena, "reset", recording)
     short_games = alone.settings.model_copy(update={"initial_deviation": 0.5})  # most of them end at the rail
-    spec = replace(alone, opponent=SumoDriver(), alone_share=share, settings=short_games)
+    spec = beside(alone, EGO, mixture_of(SumoDriver(), alone.persona), alone_share=share, settings=short_games)
     progress = in_one_go(spec, tmp_path).progress
     assert len(present) > 60
     tolerance = 0.15 if 0.0 < share < 1.0 else 0.0
@@ -264,8 +268,8 @@ def test_train__lapses_of_attention_start_after_the_attentive_share(
         sample_from(environment, start_distribution, *parts)
 
     monkeypatch.setattr(ArenaVecEnv, "sample_from", recording)
-    careful, distracted = alone.personas[0], read_document(DISTRACTED, Persona)
-    in_one_go(replace(alone, personas=(careful, distracted), attentive_share=share), tmp_path)
+    distracted = mixture_of(SumoDriver(), read_document(DISTRACTED, Persona))
+    in_one_go(beside(alone, EGO, distracted, attentive_share=share), tmp_path)
     assert seen == lapsing
 
 
@@ -281,10 +285,10 @@ def test_train__the_learner_checks_its_blind_spot_and_the_opponent_does_not(
         sample_from(environment, start_distribution, *parts)
 
     monkeypatch.setattr(ArenaVecEnv, "sample_from", recording)
-    speedy = alone.personas[1]
+    speedy = read_document(SPEEDY, Persona)
     share = speedy.human_factors.no_blind_spot_check.share
     assert share > 0.0
-    in_one_go(replace(alone, learner=learner, personas=(speedy, speedy)), tmp_path)
+    in_one_go(beside(alone, learner, mixture_of(SumoDriver(), speedy), persona=speedy), tmp_path)
     assert seen
     assert all(shares[learner] == 0.0 and shares[1 - learner] == share for shares in seen)
 

@@ -53,8 +53,8 @@ def _inputs(campaign: OpenCampaign, stage: Stage) -> dict[str, Any]:
         read = {name: policy_files(campaign.policies / name) for name in stage.reads if name not in others}
         inputs["policies"] = {name: [campaign.hash_of(file) for file in each] for name, each in read.items()}
         inputs["policies"] |= {name: others[name].identity for name in stage.reads if name in others}
-    drivers = [each for driver in stage.drivers for each in members_of(driver)]
-    if crossplay := sorted({each.name for each in drivers if isinstance(each, External) and each.name}):
+    named = {each.name for each in members_of(*stage.drivers) if isinstance(each, External)}
+    if crossplay := sorted(named - {""}):
         inputs["others"] = {name: campaign.other_egos[name].identity for name in crossplay}
     if any(isinstance(each, BestOf) for each in stage.drivers):
         inputs["choice_episodes"] = document.assessment.episodes
@@ -68,6 +68,6 @@ def _personas(campaign: OpenCampaign, stage: Stage) -> list[Any]:
     """The documents of the ego's persona, the stage's own, and those of its drivers, each once."""
     personas = {"": campaign.ego_persona, **{each.name: each for each in campaign.personas}}
     own = [stage.persona] if stage.persona in personas else []
-    players = (stage.opponent,) if isinstance(stage, TrainingStage | SearchStage) else stage.drivers
-    names = ["", *own, *(persona_of(each) for driver in players for each in members_of(driver))]
+    players = stage.opponent if isinstance(stage, TrainingStage | SearchStage) else stage.drivers
+    names = ["", *own, *map(persona_of, members_of(*players))]
     return [personas[name].record() for name in dict.fromkeys(names)]

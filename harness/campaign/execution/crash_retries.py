@@ -3,34 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from harness.campaign.execution.stage_run import Attempt
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage
-
-OnProgress = Callable[[int, int], None]
-"""Called with what is done of a stage, and with its total: steps, games or trials."""
-OnStart = Callable[[int], None]
-"""Called with the number of each segment of a training, game of an arm or trial of a search before it starts: if the
-process crashes, the place is known."""
 
 MOST_CRASHES = 3
 """Crashes of one segment or game after which it is not tried again."""
 MOST_ABANDONED = 20
 """Games of an arm that may be abandoned in one run of the command. With more, the scene is at fault and not a game."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Attempt:
-    """What earlier attempts at a stage, in this run of the command, leave to the next one."""
-
-    first: bool = True
-    """The first attempt plays again the games that could not be played in an earlier run of the command."""
-    abandoned: Mapping[int, str] = field(default_factory=dict)
-    """Episodes that crashed their worker too often, each with the reason."""
-
-
-FIRST = Attempt()
 
 
 @dataclass(frozen=True, kw_only=True)

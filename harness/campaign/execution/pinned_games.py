@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from harness.campaign.execution.run_players import RunPlayers, Seated, seated_arm
+from harness.campaign.execution.run_players import RunPlayers, SeatedDriver, seated_arm
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
@@ -106,7 +106,7 @@ class PinnedGames:
         """Minimise a failure and write it. Raises UsageError if the game can't be repeated, SimulationError."""
         stage = self._players.arm(failure.arm, failure.seed)
         ego, people = self._players.ego(stage), self._players.people(stage, failure.episode)
-        arm = seated_arm(self._players.scene, failure.arm, failure.seed, ego, people)
+        arm = seated_arm(self._players.scene, failure.arm, failure.seed, (ego, *people))
         with StartTrials(arm, failure.episode) as trials:
             game = trials.drawn()
             if not game.record.get("ego_failed"):
@@ -155,7 +155,7 @@ class PinnedGames:
         stage: AssessmentStage,
         outcome: str,
         starts: Mapping[str, FloatArray | None],
-        people: Sequence[Seated],
+        people: Sequence[SeatedDriver],
     ) -> PinnedGame:
         ego = self._players.ego(stage)
         return PinnedGame.model_validate(
@@ -191,7 +191,7 @@ class PinnedGames:
         write_atomically(self._out / written, toml_of(persona).encode())
         return written
 
-    def _person(self, seated: Seated) -> PinnedPerson:
+    def _person(self, seated: SeatedDriver) -> PinnedPerson:
         persona = self._copied_persona(seated.persona)
         if seated.policy is None:
             return PinnedPerson(persona=persona)

@@ -2,32 +2,37 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from harness.campaign.execution.run_context import RunContext
+from harness.campaign.execution.stage_run import StageInputs
 from harness.campaign.plan.planned_drivers import (
     BestOf,
-    Crowd,
     EquilibriumMixture,
     External,
-    Mixture,
+    FixedMixture,
     PlannedDriver,
     PlannedMember,
     Reconfigured,
+    Side,
     SumoDriven,
     Trained,
     TrainedBefore,
     description,
+    driver_in,
     persona_of,
 )
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.run_folder import RunFolder
-from harness.config.persona import Persona
+from harness.config.driver import read_driver
+from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
-from harness.drivers.mixture import Member, Player
+from harness.drivers.external import ExternalDriver
+from harness.drivers.mixture import Member
 from harness.drivers.mixture import Mixture as DriverMixture
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
@@ -40,74 +45,75 @@ from harness.evaluation.tables import read_csv
 from harness.game.roles import EGO, ROLES
 from harness.traffic.scene import OpenScene
 
+DRIVER = "driver.toml"
+"""The file of the driver that a search found, in the folder of its stage."""
 _LEAST_SHARE = 1e-6  # members of a mixture with a smaller share are left out
 
 
 @dataclass(frozen=True, kw_only=True)
-class Choice:
-    """Of several drivers the one that was chosen, and the mean payoff of each, in their order."""
-
-    stages: tuple[str, ...]
-    mean_payoffs: tuple[float, ...]
-
-    @property
-    def best(self) -> int:
-        """The place of the chosen one."""
-        return int(np.argmax(self.mean_payoffs))
-
-
-@dataclass(frozen=True, kw_only=True)
 class PlayerFactory:
-    """Makes players from planned drivers."""
+    """Makes players from planned drivers. A policy that can't be read raises UsageError, a driver that can't be made
+    DriverError, and arms that weigh a mixture and have no equilibrium StageFailed."""
 
     context: RunContext
     folder: RunFolder
     scene: OpenScene
 
-    def player(self, planned: PlannedDriver | None) -> Player:
-        """The player of a planned driver; None for none. Not for `BestOf`, which has to be chosen first, and not for
-        `Crowd`, which is several players (`people.people_of`).
+    @classmethod
+    def of(cls, inputs: StageInputs) -> PlayerFactory:
+        """The factory of an attempt at a stage."""
+        return cls(context=inputs.run.context, folder=inputs.run.folder, scene=inputs.scene)
 
-        Raises UsageError where a policy can't be read, DriverError where a driver can't be made, StageFailed where the
-        arms that weigh a mixture have no equilibrium.
-        """
+    def arm(self, stage: AssessmentStage) -> Arm:
+        """The arm of an assessment. A `BestOf` in it has to be `chosen` first."""
+        drivers = (self.ego(stage.ego), *self.people(stage.non_ego))
+        return Arm(name=stage.name, scene=self.scene, drivers=drivers, seed=stage.seed)
+
+    def ego(self, side: Side) -> DriverMixture | None:
+        """The ego's drivers."""
+        return self.player(driver_in(side, 0))
+
+    def people(self, side: Side) -> tuple[DriverMixture | None, ...]:
+        """The drivers in each place of the non-egos, each made anew."""
+        return tuple(self.player(driver_in(side, place)) for place in range(len(self.scene.world.roles) - 1))
+
+    def player(self, planned: PlannedDriver | None) -> DriverMixture | None:
+        """The player of a planned driver; None for none."""
         match planned:
             case None:
                 return None
-            case Mixture(members=members, shares=shares):
+            case FixedMixture(members=members, shares=shares):
                 return self._mixture(members, shares)
             case EquilibriumMixture(members=members):
                 return self._mixture(members, equilibrium_of(planned, self.folder))
             case BestOf():
-                raise TypeError("choose the best with `choose` first")
-            case Crowd():
-                raise TypeError("a crowd is several players")
+                raise TypeError("choose the best with `chosen` first")
             case _:
-                return self._driver(planned)
+                return self._mixture((planned,), (1.0,))
 
-    def choose(self, stage: AssessmentStage, personas: tuple[Persona, Persona], learner: int) -> tuple[Driver, Choice]:
-        """The best of the drivers planned for a player of an arm, by its mean payoff in games beside the arm's own.
+    def chosen(self, stage: AssessmentStage) -> tuple[AssessmentStage, dict[str, Any]]:
+        """An assessment with the best driver in place of a `BestOf`, by its mean payoff in games beside the arm's own;
+        and the facts of the choice. Other assessments are unchanged.
 
-        Raises as `player` does, and StageFailed where none of these games could be played.
+        Raises StageFailed where none of the games of a driver could be played.
         """
-        planned = stage.drivers[learner]
-        assert isinstance(planned, BestOf)
-        other = self.player(stage.drivers[1 - learner])
-        episodes = self.context.document.assessment.episodes
-        games = range(episodes, 2 * episodes)
-        candidates = [self._driver(each) for each in planned.members]
-        mean_payoffs = []
-        for candidate in candidates:
-            drivers = (candidate, other) if learner == EGO else (other, candidate)
-            arm = Arm(name=stage.name, scene=self.scene, drivers=drivers, personas=personas, seed=stage.seed)
-            payoffs = [game.record.get(f"{ROLES[learner]}_payoff") for game in assess(arm, games)]
+        planned = next((each for each in stage.drivers if isinstance(each, BestOf)), None)
+        learner, episodes = stage.arm.best_response_of, self.context.document.assessment.episodes
+        if planned is None or learner is None:
+            return stage, {}
+        games, candidates, earned = range(episodes, 2 * episodes), [], []
+        for member in planned.members:
+            sides = [*stage.sides]
+            sides[learner] = (member,)
+            candidates.append(replace(stage, ego=sides[0], non_ego=sides[1]))
+            payoffs = [game.record.get(f"{ROLES[learner]}_payoff") for game in assess(self.arm(candidates[-1]), games)]
             measured = [payoff for payoff in payoffs if payoff is not None]
             if not measured:
                 raise StageFailed(f"{stage.id}: none of the games that choose the best response could be played")
-            mean_payoffs.append(float(np.mean(measured)))
-        stages = tuple(each.stage for each in planned.members if isinstance(each, Trained))
-        choice = Choice(stages=stages, mean_payoffs=tuple(mean_payoffs))
-        return candidates[choice.best], choice
+            earned.append(float(np.mean(measured)))
+        stages = [each.stage for each in planned.members if isinstance(each, Trained)]
+        best = int(np.argmax(earned))
+        return candidates[best], {"chosen": stages[best], "earned": dict(zip(stages, earned, strict=True))}
 
     def policy_folder(self, planned: Trained | TrainedBefore) -> Path:
         """The folder of a policy, of this run or of another."""
@@ -120,13 +126,14 @@ class PlayerFactory:
     def _mixture(self, members: tuple[PlannedMember, ...], shares: tuple[float, ...]) -> DriverMixture:
         return DriverMixture(
             tuple(
-                Member(driver=self._driver(each), persona=self.context.persona(persona_of(each)), share=share)
+                Member(driver=self.driver(each), persona=self.context.persona(persona_of(each)), share=share)
                 for each, share in zip(members, shares, strict=True)
                 if share > _LEAST_SHARE
             )
         )
 
-    def _driver(self, planned: PlannedMember) -> Driver:
+    def driver(self, planned: PlannedMember) -> Driver:
+        """The driver itself, without its persona."""
         sampled = self.context.persona(persona_of(planned)).decisions == "sampled"
         match planned:
             case SumoDriven():
@@ -134,15 +141,21 @@ class PlayerFactory:
             case External(name=name):
                 return self.context.external_driver(name).make(car_of(self.scene.world, EGO), sampled)
             case Reconfigured(stage=stage):
-                from harness.campaign.execution.search_output import read_found  # Optuna is slow to import
-
-                found = read_found(self.context.external_driver(), self.folder.policy(stage))
+                found = _read_found(self.context.external_driver(), self.folder.policy(stage))
                 return found.make(car_of(self.scene.world, EGO), sampled)
             case TrainedBefore(stage=stage) if stage in self.context.policy_drivers:
                 car = car_of(self.scene.world, EGO + 1 if persona_of(planned) else EGO)
                 return self.context.policy_drivers[stage].make(car, sampled)
             case Trained() | TrainedBefore():
                 return LearnedDriver(read_policy(self.policy_folder(planned)), sampled)
+
+
+def _read_found(ego: ExternalDriver, folder: Path) -> ExternalDriver:
+    """The ego with the parameters that a search wrote into this folder."""
+    document = read_driver(folder / DRIVER)
+    if not isinstance(document, Adjustable):
+        raise StageFailed(f"{folder / DRIVER}: is not the result of a search")
+    return ego.tuned({key: document.numbers[key] for key in ego.numbers})
 
 
 def equilibrium_of(mixture: EquilibriumMixture, folder: RunFolder) -> tuple[float, ...]:

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
-from harness.campaign.execution.crash_retries import Attempt
 from harness.campaign.execution.ray_cluster import OPTION
 from harness.campaign.execution.ray_nodes import Node, Nodes, pinned, token_file
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_events import Event, Work, carry_out_with_events
+from harness.campaign.execution.stage_events import Event, StageJob
+from harness.campaign.execution.stage_run import Attempt, Work
 from harness.campaign.execution.worker_process import put_scratch_into
 from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.locks import held_by_worker
@@ -65,6 +65,7 @@ class RayWorkers:
         self,
         context: RunContext,
         stages_left: int,
+        *,
         ray: Any,
         jobs: int | None,
         warn: Callable[[str], None],
@@ -99,7 +100,8 @@ class RayWorkers:
         node = max(self._nodes.usable.values(), key=lambda each: each.cpus - each.running)
         task = _Task(number=self._started, stage=stage, node=node)
         remote = self._remote.options(scheduling_strategy=pinned(node.id))
-        ref = remote.remote(task.number, stage, attempt, self._context, self._work, self._inbox)
+        job = StageJob(stage=stage, attempt=attempt, context=self._context, work=self._work)
+        ref = remote.remote(task.number, job, self._inbox)
         self._tasks[ref] = task
         self._started += 1
         node.running += 1
@@ -165,7 +167,7 @@ def _cause(errors: Any, error: Exception, node: Node) -> str:
     return f"node {node.name} is lost ({type(error).__name__})"
 
 
-def _carry_out(number: int, stage: Stage, attempt: Attempt, context: RunContext, work: Work, inbox: Any) -> Event:
+def _carry_out(number: int, job: StageJob, inbox: Any) -> Event:
     """Carry a stage out in a process of Ray."""
     import ray
 
@@ -174,6 +176,6 @@ def _carry_out(number: int, stage: Stage, attempt: Attempt, context: RunContext,
         if event.kind == "segment":
             ray.get(message)  # if the process dies now, the place is known
 
-    put_scratch_into(context.folder)
-    registered = held_by_worker(RunFolder(context.folder).workers, stage.id, _LOST_S)
-    return carry_out_with_events(stage, attempt, context, work, send, registered)
+    folder = RunFolder(job.context.folder)
+    put_scratch_into(folder.path)
+    return job.carry_out(send, held_by_worker(folder.workers, job.stage.id, _LOST_S))

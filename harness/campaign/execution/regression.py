@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from harness.campaign.execution.run_players import Seated, seated_arm
+from harness.campaign.execution.run_players import SeatedDriver, seated_arm
 from harness.config.campaign import SUMO, resolve
 from harness.config.persona import Persona
 from harness.config.pinned_game import PinnedGame, PinnedPerson
@@ -54,7 +54,7 @@ class OpenedGame:
     game: PinnedGame
     scene: OpenScene
     ego_persona: Persona
-    people: tuple[Seated, ...]
+    people: tuple[SeatedDriver, ...]
 
 
 class Regression:
@@ -78,9 +78,9 @@ class Regression:
         for each in self.games:
             started = time.monotonic()
             persona = each.ego_persona
-            ego = Seated(driver=self._driver(self._ego, each.scene, persona), persona=persona)
+            ego = SeatedDriver(driver=self._driver(self._ego, each.scene, persona), persona=persona)
             game = each.game
-            with StartTrials(seated_arm(each.scene, game.arm, game.seed, ego, each.people), game.episode) as trials:
+            with StartTrials(seated_arm(each.scene, game.arm, game.seed, (ego, *each.people)), game.episode) as trials:
                 record = trials.play(np.array([*game.start.position_m, *game.start.speed_mps])).record
             yield PlayedAgain(
                 name=each.name,
@@ -120,16 +120,16 @@ def _check_scene(file: Path, hashes: Mapping[str, str], scene: OpenScene) -> Non
         raise UsageError.of(file, "scene", message, "pin the game again, or restore the scene")
 
 
-def _person(file: Path, person: PinnedPerson) -> Seated:
+def _person(file: Path, person: PinnedPerson) -> SeatedDriver:
     persona = read_document(resolve(file, person.persona), Persona)
     if person.policy is None:
-        return Seated(driver=SumoDriver(), persona=persona)
+        return SeatedDriver(driver=SumoDriver(), persona=persona)
     folder = resolve(file, person.policy)
     policy = read_policy(folder)
     if _sha256(policy_files(folder)[1]) != person.policy_sha256:
         message = f"{person.policy!r} is not the policy of this game"
         raise UsageError.of(file, "people.policy_sha256", message, "pin the game again, or restore the policy")
-    return Seated(driver=LearnedDriver(policy, persona.decisions == "sampled"), persona=persona, policy=folder)
+    return SeatedDriver(driver=LearnedDriver(policy, persona.decisions == "sampled"), persona=persona, policy=folder)
 
 
 def _sha256(file: Path) -> str:

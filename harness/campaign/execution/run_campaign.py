@@ -36,7 +36,7 @@ def run_campaign(
     campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console, keep_going: bool = False
 ) -> RunResult:
     """Carry out what is left of a campaign, and write its tables, replays and report. `keep_going` is that of
-    `arm_segments.play_segments`.
+    `assessment_stage.play_segments`.
 
     Raises UsageError if the folder can't be this campaign's. A stage that fails is in the result, not raised.
     """

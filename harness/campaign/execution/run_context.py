@@ -38,11 +38,6 @@ class RunContext:
         """A persona of the campaign; the ego's own for the empty name."""
         return self.personas[name] if name else self.ego_persona
 
-    def opponent_persona(self, name: str) -> Persona:
-        """The persona of the other player in a training or search: a population, whose members have each their own, and
-        the empty name have the ego's."""
-        return self.persona(name if name in self.personas else "")
-
     def external_driver(self, name: str = "") -> ExternalDriver:
         """An external driver of the campaign: its ego, or another one by name."""
         driver = self.other_egos[name] if name else self.ego_driver

@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from harness.campaign.execution.player_factory import PlayerFactory
-from harness.campaign.execution.policies_of_run import policies_of_run
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import (
     BestOf,
-    Crowd,
     EquilibriumMixture,
     External,
-    Mixture,
-    PlannedDriver,
+    FixedMixture,
     PlannedMember,
     Reconfigured,
     Trained,
     TrainedBefore,
+    driver_in,
     persona_of,
 )
 from harness.campaign.plan.stages import AssessmentStage
@@ -30,16 +30,22 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import nearest
 from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
+from harness.drivers.mixture import mixture_of
 from harness.drivers.protocol import Driver
 from harness.environments.rollout import Arm, parts_of
 from harness.errors import UsageError
+from harness.files import content_of
 from harness.game.initial_state import draw_member
 from harness.game.roles import EGO
+from harness.shipped_documents import shipped
 from harness.traffic.scene import OpenScene, open_scene
+
+_FILES = ("policy.json", "policy.safetensors")
+_MOST_BYTES = 1_000_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
-class Seated:
+class SeatedDriver:
     """A driver in a seat, with its persona; `policy` is the folder of its policy, None if it has none."""
 
     driver: Driver
@@ -77,7 +83,7 @@ class RunPlayers:
     def arms(self) -> list[AssessmentStage]:
         """The arms in which an ego meets people, with a driver each that this run can make again."""
         arms = [each for each in self._stages if isinstance(each, AssessmentStage)]
-        return [each for each in arms if each.ego is not None and each.non_ego is not None and not _chosen(each)]
+        return [each for each in arms if each.ego and each.non_ego and not _chosen(each)]
 
     def arm(self, name: str, seed: int) -> AssessmentStage:
         """An arm by name. Raises UsageError if there is none, or if its drivers were chosen by other arms."""
@@ -88,32 +94,24 @@ class RunPlayers:
             raise UsageError.of(self._folder.path, name, f"has no such arm of seed {seed}", remedy)
         return arms[name, seed]
 
-    def ego(self, stage: AssessmentStage) -> Seated:
+    def ego(self, stage: AssessmentStage) -> SeatedDriver:
         """The ego of an arm. Raises UsageError if it can't be made."""
-        persona = self._context.ego_persona
-        assert stage.ego is not None
-        if isinstance(stage.ego, External | Reconfigured):
-            if self._ego is None or isinstance(stage.ego, Reconfigured) or stage.ego.name:
+        persona, planned = self._context.ego_persona, _member(stage, EGO, episode=0)
+        if isinstance(planned, External | Reconfigured):
+            if self._ego is None or isinstance(planned, Reconfigured) or planned.name:
                 raise UsageError.of(
                     self._folder.path / MANIFEST, stage.name, "its ego is no policy of this run", "name it with --ego"
                 )
             driver = self._ego.make(car_of(self.scene.world, EGO), persona.decisions == "sampled")
-            return Seated(driver=driver, persona=persona)
-        return self._seated(stage.ego, persona)
+            return SeatedDriver(driver=driver, persona=persona)
+        return self._seated(planned, persona)
 
-    def people(self, stage: AssessmentStage, episode: int) -> tuple[Seated, ...]:
+    def people(self, stage: AssessmentStage, episode: int) -> tuple[SeatedDriver, ...]:
         """Each person of an arm in one episode. Raises UsageError if a policy can't be read."""
-        assert stage.non_ego is not None
-        count = len(self.scene.world.roles) - 1
-        planned = stage.non_ego.members if isinstance(stage.non_ego, Crowd) else (stage.non_ego,) * count
-        return tuple(
-            self._seated(
-                member := _member(each, player, stage.seed, episode), self._context.persona(persona_of(member))
-            )
-            for player, each in enumerate(planned, start=1)
-        )
+        members = (_member(stage, player, episode) for player in range(1, len(self.scene.world.roles)))
+        return tuple(self._seated(each, self._context.persona(persona_of(each))) for each in members)
 
-    def _seated(self, planned: PlannedDriver, persona: Persona) -> Seated:
+    def _seated(self, planned: PlannedMember, persona: Persona) -> SeatedDriver:
         players = PlayerFactory(context=self._context, folder=self._folder, scene=self.scene)
         policy = None
         if isinstance(planned, TrainedBefore) and self._context.policies is None:
@@ -121,21 +119,13 @@ class RunPlayers:
             raise UsageError.of(self._folder.path, planned.stage, message, "it is not found: name it with --policies")
         if isinstance(planned, Trained | TrainedBefore):
             policy = players.policy_folder(planned)
-        driver = players.player(planned)
-        assert isinstance(driver, Driver)
-        return Seated(driver=driver, persona=persona, policy=policy)
+        return SeatedDriver(driver=players.driver(planned), persona=persona, policy=policy)
 
 
-def seated_arm(scene: OpenScene, name: str, seed: int, ego: Seated, people: tuple[Seated, ...]) -> Arm:
-    """The arm of an ego and people."""
-    seats = (ego, *people)
-    return Arm(
-        name=name,
-        scene=scene,
-        drivers=tuple(each.driver for each in seats),
-        personas=tuple(each.persona for each in seats),
-        seed=seed,
-    )
+def seated_arm(scene: OpenScene, name: str, seed: int, seats: Sequence[SeatedDriver]) -> Arm:
+    """The arm of drivers in their seats, the ego's first."""
+    drivers = tuple(mixture_of(each.driver, each.persona) for each in seats)
+    return Arm(name=name, scene=scene, drivers=drivers, seed=seed)
 
 
 def _chosen(stage: AssessmentStage) -> bool:
@@ -143,9 +133,46 @@ def _chosen(stage: AssessmentStage) -> bool:
     return any(isinstance(each, BestOf | EquilibriumMixture) for each in stage.drivers)
 
 
-def _member(planned: PlannedDriver, player: int, seed: int, episode: int) -> PlannedMember:
-    """Who of a mixture drives in an episode; the driver itself where there is one."""
-    if isinstance(planned, Mixture):
-        return planned.members[draw_member(planned.shares, player, *parts_of(seed, episode))]
-    assert not isinstance(planned, BestOf | Crowd | EquilibriumMixture), "left out of `arms`"
+def _member(stage: AssessmentStage, player: int, episode: int) -> PlannedMember:
+    """Who of a mixture drives as a player in an episode; the driver itself where there is one."""
+    planned = driver_in(stage.ego, 0) if player == EGO else driver_in(stage.non_ego, player - 1)
+    if isinstance(planned, FixedMixture):
+        return planned.members[draw_member(planned.shares, player, *parts_of(stage.seed, episode))]
+    assert planned is not None
+    assert not isinstance(planned, BestOf | EquilibriumMixture), "left out of `arms`"
     return planned
+
+
+def policies_of_run(run: Path, written: str | None, hashes: Mapping[str, str]) -> Path | None:
+    """The folder of policies that a run's campaign wrote as `written`, found again by the checksums of its manifest;
+    None if there is none with the policies of `hashes`. The written path is not trusted.
+
+    Shipped policies are searched, then the path from a folder beside the run folder, such as `campaigns/` beside
+    `reports/`, and from the current folder.
+    """
+    read = {_place(name): digest for name, digest in hashes.items() if PurePosixPath(name).name in _FILES}
+    if written is None or not read:
+        return None
+    return next((folder for folder in _candidates(run, written) if _holds(folder, read)), None)
+
+
+def _place(name: str) -> str:
+    """The path of a policy's file within the folder of policies."""
+    return "/".join(PurePosixPath(name).parts[-2:])
+
+
+def _candidates(run: Path, written: str) -> Iterator[Path]:
+    ours = shipped("policies")
+    yield from sorted(each for each in ours.iterdir() if each.is_dir()) if ours.is_dir() else ()
+    if not PurePosixPath(written).is_absolute():
+        yield from (start / written for start in (run.absolute().parent, run.absolute().parent.parent, Path.cwd()))
+
+
+def _holds(folder: Path, read: Mapping[str, str]) -> bool:
+    try:
+        return all(
+            hashlib.sha256(content_of(folder / place, _MOST_BYTES)).hexdigest() == digest
+            for place, digest in read.items()
+        )
+    except OSError:
+        return False

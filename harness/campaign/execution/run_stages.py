@@ -14,10 +14,11 @@ from collections.abc import Callable, Iterable, Sequence
 from types import TracebackType
 from typing import Protocol, TypeAlias
 
-from harness.campaign.execution.crash_retries import Attempt, Crashes
+from harness.campaign.execution.crash_retries import Crashes
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.schedule import Schedule
 from harness.campaign.execution.stage_events import Emit, Event
+from harness.campaign.execution.stage_run import Attempt
 from harness.campaign.plan.stages import Stage
 
 

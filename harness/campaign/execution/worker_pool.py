@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from types import TracebackType
 
-from harness.campaign.execution.crash_retries import Attempt
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
-from harness.campaign.execution.stage_events import Event, Work
+from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.stage_run import Attempt, Work
 from harness.campaign.execution.worker_process import start_process
 from harness.campaign.plan.stages import Stage
 

@@ -20,7 +20,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from harness.campaign.execution.run_context import RunContext
-from harness.campaign.execution.stage_events import Work, carry_out_with_events
+from harness.campaign.execution.stage_events import StageJob
+from harness.campaign.execution.stage_run import Work
 from harness.campaign.storage.locks import register_worker
 from harness.campaign.storage.run_folder import RunFolder
 from harness.files import make_folder
@@ -76,9 +77,8 @@ def serve(descriptor: int) -> None:
         work, context = connection.recv()
         while True:
             stage, attempt = connection.recv()
-            connection.send(
-                carry_out_with_events(stage, attempt, context, work, connection.send, _registered(context.folder))
-            )
+            job = StageJob(stage=stage, attempt=attempt, context=context, work=work)
+            connection.send(job.carry_out(connection.send, _registered(context.folder)))
     except (EOFError, OSError):  # the parent is gone
         return
 

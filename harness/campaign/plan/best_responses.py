@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from harness.campaign.plan.competence import alone_bounds
+from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.planned_drivers import BestOf, Trained, TrainedBefore, persona_of
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage, stage_id
 from harness.config.campaign import Campaign
@@ -37,10 +37,8 @@ def _response_arm(pair: AssessmentStage, learner: int) -> Arm:
 
 def _plan_response(campaign: Campaign, pair: AssessmentStage, learner: int) -> list[Stage]:
     settings, arm = campaign.best_response, _response_arm(pair, learner)
-    own, other = pair.drivers[learner], pair.drivers[1 - learner]
+    (own,), other = pair.sides[learner], pair.sides[1 - learner]
     assert settings is not None
-    assert own is not None
-    assert other is not None
     present = own if isinstance(own, Trained | TrainedBefore) else None
     trainings = []
     for start in range(1, settings.starts + 1):
@@ -60,8 +58,5 @@ def _plan_response(campaign: Campaign, pair: AssessmentStage, learner: int) -> l
         )
     persona = persona_of(own)
     best = BestOf(members=tuple(Trained(stage=each.id, persona=persona) for each in trainings), persona=persona)
-    ego, non_ego = (best, other) if learner == EGO else (other, best)
-    assessment = AssessmentStage(
-        seed=pair.seed, persona=pair.persona, arm=arm, ego=ego, non_ego=non_ego, gates=pair.gates
-    )
-    return [*trainings, assessment]
+    ego, non_ego = ((best,), other) if learner == EGO else (other, (best,))
+    return [*trainings, replace(pair, arm=arm, ego=ego, non_ego=non_ego)]

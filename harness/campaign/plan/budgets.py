@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from harness.campaign.plan.planned_drivers import Crowd, members_of, persona_of
+from harness.campaign.plan.planned_drivers import members_of, persona_of
 from harness.campaign.plan.stages import TrainingStage
 from harness.config.campaign import Campaign
 from harness.config.training import Training
@@ -13,8 +13,8 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     """The settings of one training.
 
     A person has no demonstrator, unless the campaign says so. A best response has a budget of its own. A training
-    against several personas has the budget, and the segment length by which its learning curve is judged, times their
-    number.
+    that meets one of several personas in each game has the budget, and the segment length by which its learning curve
+    is judged, times their number.
     """
     settings = campaign.training
     if stage.learner != EGO and not campaign.non_ego_training.imitation:
@@ -22,8 +22,6 @@ def training_settings(campaign: Campaign, stage: TrainingStage) -> Training:
     if stage.is_best_response:
         assert campaign.best_response is not None
         return settings.model_copy(update={"steps": campaign.best_response.steps})
-    personas = len({persona_of(each) for each in members_of(stage.opponent)})
-    if personas <= 1 or isinstance(stage.opponent, Crowd):  # a crowd is met as a whole in every game
-        return settings
+    personas = max((len({persona_of(each) for each in members_of(driver)}) for driver in stage.opponent), default=1)
     more = {"steps": settings.steps * personas, "segment_steps": settings.segment_steps * personas}
     return settings.model_copy(update=more)

@@ -21,11 +21,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from harness.campaign.plan.best_responses import gate_of, plan_best_responses
-from harness.campaign.plan.planned_drivers import EquilibriumMixture, Mixture, PlannedDriver, PlannedMember
-from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage
-from harness.campaign.plan.strategy_drivers import driver_of, ego_learns, warm_start
-from harness.config.campaign import Campaign
-from harness.config.training import ATTENTIVE_SHARE
+from harness.campaign.plan.planned_drivers import EquilibriumMixture, FixedMixture, Side, members_of
+from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage
+from harness.campaign.plan.strategy_stages import SeedStages, ego_learns
 from harness.evaluation.strategies import (
     PAPER_ROUNDS,
     Arm,
@@ -35,26 +33,23 @@ from harness.evaluation.strategies import (
     ReconfiguredEgo,
     RetrainedEgo,
 )
-from harness.game.roles import EGO, NON_EGO
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ego:
-    """An ego strategy of a campaign, and the driver that plays it."""
+class PlannedEgo:
+    """An ego strategy of a campaign."""
 
     strategy: EgoStrategy
-    driver: PlannedMember
     persona: str = ""
     """The persona to whose rounds it belongs; empty: to none."""
     gates: tuple[EquilibriumGate, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
-class NonEgo:
-    """A non-ego strategy of a campaign, and the driver that plays it."""
+class PlannedNonEgo:
+    """A non-ego strategy of a campaign."""
 
     strategy: PersonaNonEgo
-    driver: PlannedMember
     gates: tuple[EquilibriumGate, ...] = ()
 
 
@@ -62,103 +57,81 @@ class NonEgo:
 class PersonaRounds:
     """All strategies of one persona's rounds, for one seed, and the stages of the rounds after the paper's."""
 
-    egos: tuple[Ego, ...]
-    non_egos: tuple[NonEgo, ...]
-    stages: tuple[Stage, ...] = ()
+    egos: list[PlannedEgo]
+    non_egos: list[PlannedNonEgo]
+    stages: list[Stage]
 
 
-def persona_rounds(campaign: Campaign, persona: str, seed: int, tunable: bool = False) -> PersonaRounds:
-    """All rounds of a persona. The stages of rounds 0 to 2 are those of `paper_rounds` and `search_rounds`."""
-    egos = [Ego(strategy=NaiveEgo(), driver=driver_of(campaign, NaiveEgo(), seed), persona=persona)]
-    non_egos = [_non_ego(campaign, PersonaNonEgo(persona=persona), seed)]
-    if not ego_learns(campaign):
-        if tunable:
-            egos.append(_ego(campaign, ReconfiguredEgo(against=persona), seed))
-        return PersonaRounds(egos=tuple(egos), non_egos=tuple(non_egos))
-    stages: list[Stage] = []
+def persona_rounds(of: SeedStages, persona: str, tunable: bool = False) -> PersonaRounds:
+    """All rounds of a persona. The stages of rounds 0 to 2 are those of `paper_rounds`."""
+    campaign = of.campaign
     gates: tuple[EquilibriumGate, ...] = ()
+    rounds = PersonaRounds(
+        egos=[PlannedEgo(strategy=NaiveEgo(), persona=persona)],
+        non_egos=[PlannedNonEgo(strategy=PersonaNonEgo(persona=persona))],
+        stages=[],
+    )
+    if not ego_learns(campaign):
+        rounds.egos.extend([PlannedEgo(strategy=ReconfiguredEgo(against=persona), persona=persona)] if tunable else [])
+        return rounds
     iterates = not campaign.rounds.personas or persona in campaign.rounds.personas
     last = campaign.rounds.count if iterates else PAPER_ROUNDS
     for round_ in range(PAPER_ROUNDS, last + 1):
-        if round_ % 2 == 0:
-            egos.append(_ego(campaign, RetrainedEgo(against=persona, round=round_), seed, gates))
+        learner_is_ego = round_ % 2 == 0
+        if learner_is_ego:
+            ego = RetrainedEgo(against=persona, round=round_)
+            rounds.egos.append(PlannedEgo(strategy=ego, persona=persona, gates=gates))
         else:
-            non_egos.append(_non_ego(campaign, PersonaNonEgo(persona=persona, round=round_), seed, gates))
+            non_ego = PersonaNonEgo(persona=persona, round=round_)
+            rounds.non_egos.append(PlannedNonEgo(strategy=non_ego, gates=gates))
         if round_ > PAPER_ROUNDS:
-            stages += _plan_round(campaign, persona, seed, round_, egos, non_egos)
-        if campaign.stops_early and round_ % 2 == 0 and round_ < last:
-            pair = pairing(egos[-1], non_egos[-1], seed)
-            stages += plan_best_responses(campaign, pair)
+            rounds.stages.extend(_plan_round(of, rounds, ego_learns=learner_is_ego))
+        if campaign.stops_early and learner_is_ego and round_ < last:
+            pair = pairing(of, rounds.egos[-1], rounds.non_egos[-1])
+            rounds.stages.extend(plan_best_responses(campaign, pair))
             gates = (*gates, gate_of(campaign, pair))
-    return PersonaRounds(egos=tuple(egos), non_egos=tuple(non_egos), stages=tuple(stages))
+    return rounds
 
 
-def pairing(ego: Ego, non_ego: NonEgo, seed: int) -> AssessmentStage:
+def pairing(of: SeedStages, ego: PlannedEgo, non_ego: PlannedNonEgo) -> AssessmentStage:
     """The assessment of an ego strategy against a non-ego strategy."""
     # In the rounds of one persona a later strategy has the gates of the earlier ones; across personas each has its own.
-    same = ego.persona == non_ego.strategy.persona
+    persona = non_ego.strategy.persona
+    same = ego.persona == persona
     gates = max(ego.gates, non_ego.gates, key=len) if same else (*ego.gates, *non_ego.gates)
-    return AssessmentStage(
-        seed=seed,
-        persona=non_ego.strategy.persona,
-        arm=Arm(ego=ego.strategy, non_ego=non_ego.strategy),
-        ego=ego.driver,
-        non_ego=non_ego.driver,
-        gates=gates,
-    )
+    return of.assessment(Arm(ego=ego.strategy, non_ego=non_ego.strategy), persona=persona, gates=gates)
 
 
-def _ego(
-    campaign: Campaign,
-    strategy: RetrainedEgo | ReconfiguredEgo,
-    seed: int,
-    gates: tuple[EquilibriumGate, ...] = (),
-) -> Ego:
-    driver = driver_of(campaign, strategy, seed)
-    return Ego(strategy=strategy, driver=driver, persona=strategy.against, gates=gates)
-
-
-def _non_ego(campaign: Campaign, strategy: PersonaNonEgo, seed: int, gates: tuple[EquilibriumGate, ...] = ()) -> NonEgo:
-    return NonEgo(strategy=strategy, driver=driver_of(campaign, strategy, seed), gates=gates)
-
-
-def _plan_round(
-    campaign: Campaign, persona: str, seed: int, round_: int, egos: Sequence[Ego], non_egos: Sequence[NonEgo]
-) -> list[Stage]:
-    """Train the latest strategy, the last of its player's, and assess it against the other player's and alone."""
-    learner = EGO if round_ % 2 == 0 else NON_EGO
-    latest: Ego | NonEgo = egos[-1] if learner == EGO else non_egos[-1]
-    settings = campaign.retraining if learner == EGO else campaign.non_ego_training
-    opponent, weighing = _opponent(campaign, learner, egos, non_egos, seed)
-    training = TrainingStage(
-        seed=seed,
-        persona=persona,
-        strategy=latest.strategy,
-        opponent=opponent,
-        initial=warm_start(campaign, seed) if learner == EGO else None,
-        alone_share=settings.alone_share,
-        attentive_share=ATTENTIVE_SHARE if learner == NON_EGO else 0.0,
-        gates=latest.gates,
-    )
-    if learner == EGO:
-        arm, ego, non_ego = Arm(ego=egos[-1].strategy), latest.driver, None
+def _plan_round(of: SeedStages, rounds: PersonaRounds, *, ego_learns: bool) -> list[Stage]:
+    """Train the latest strategy of a player, and assess it against the other player's latest and alone."""
+    egos, non_egos = rounds.egos, rounds.non_egos
+    persona = non_egos[0].strategy.persona
+    latest: PlannedEgo | PlannedNonEgo
+    others: Sequence[PlannedEgo | PlannedNonEgo]
+    if ego_learns:
+        latest, others, before, alone = egos[-1], non_egos, (egos[:-1], non_egos), Arm(ego=egos[-1].strategy)
     else:
-        arm, ego, non_ego = Arm(non_ego=non_egos[-1].strategy), None, latest.driver
-    alone = AssessmentStage(seed=seed, persona=persona, arm=arm, ego=ego, non_ego=non_ego, gates=latest.gates)
-    return [*weighing, training, pairing(egos[-1], non_egos[-1], seed), alone]
+        latest, others, before, alone = non_egos[-1], egos, (egos, non_egos[:-1]), Arm(non_ego=non_egos[-1].strategy)
+    opponent, weighing = _opponent(of, [of.side(each.strategy) for each in others], *before)
+    return [
+        *weighing,
+        of.training(latest.strategy, opponent, persona=persona, gates=latest.gates),
+        pairing(of, egos[-1], non_egos[-1]),
+        of.assessment(alone, persona=persona, gates=latest.gates),
+    ]
 
 
 def _opponent(
-    campaign: Campaign, learner: int, egos: Sequence[Ego], non_egos: Sequence[NonEgo], seed: int
-) -> tuple[PlannedDriver, list[AssessmentStage]]:
-    """The opponent in a training of the latest strategy, and the assessments by which it is weighed, if it is."""
-    others = [each.driver for each in (non_egos if learner == EGO else egos)]
-    if campaign.rounds.against == "latest" or len(others) == 1:
+    of: SeedStages, others: Sequence[Side], egos: Sequence[PlannedEgo], non_egos: Sequence[PlannedNonEgo]
+) -> tuple[Side, list[AssessmentStage]]:
+    """The opponent in a training, one or several of the sides `others`; and the assessments by which it is weighed, if
+    it is: those of `egos` against `non_egos`."""
+    against = of.campaign.rounds.against
+    if against == "latest" or len(others) == 1:
         return others[-1], []
-    if campaign.rounds.against == "all":
-        return Mixture(members=tuple(others), shares=(1.0,) * len(others)), []
-    rows = egos[:-1] if learner == EGO else egos
-    columns = non_egos if learner == EGO else non_egos[:-1]
-    arms = [[pairing(ego, non_ego, seed) for non_ego in columns] for ego in rows]
+    members = tuple(member for side in others for member in members_of(*side))
+    if against == "all":
+        return (FixedMixture(members=members, shares=(1.0,) * len(members)),), []
+    arms = [[pairing(of, ego, non_ego) for non_ego in non_egos] for ego in egos]
     ids = tuple(tuple(arm.id for arm in row) for row in arms)
-    return EquilibriumMixture(members=tuple(others), arms=ids), [arm for row in arms for arm in row]
+    return (EquilibriumMixture(members=members, arms=ids),), [arm for row in arms for arm in row]

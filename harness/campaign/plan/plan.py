@@ -8,11 +8,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from harness.campaign.plan.best_responses import plan_best_responses
-from harness.campaign.plan.iterated_rounds import Ego, PersonaRounds, pairing, persona_rounds
-from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust
-from harness.campaign.plan.search_rounds import plan_searches
+from harness.campaign.plan.iterated_rounds import PersonaRounds, PlannedEgo, pairing, persona_rounds
+from harness.campaign.plan.paper_rounds import plan_paper_rounds, plan_robust, plan_searches
 from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, Stage, TrainingStage
-from harness.campaign.plan.strategy_drivers import crossplay_drivers, driver_of, ego_learns
+from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name, ego_learns
 from harness.config.campaign import Campaign
 from harness.evaluation.strategies import OtherEgo, ReconfiguredEgo, RetrainedEgo, RobustEgo
 
@@ -23,63 +22,64 @@ def plan(campaign: Campaign, personas: Sequence[str], tunable: bool = False) -> 
     `tunable`: the campaign's ego is external and has tunable parameters. A campaign with a folder of policies trains
     nothing but best responses.
     """
-    stages = [stage for seed in campaign.seeds for stage in _plan_seed(campaign, personas, seed, tunable)]
+    seeds = [SeedStages(campaign=campaign, seed=seed) for seed in campaign.seeds]
+    stages = [stage for of in seeds for stage in _plan_seed(of, personas, tunable)]
     if campaign.policies is None:
         return stages
     return [each for each in stages if not isinstance(each, TrainingStage) or each.is_best_response]
 
 
-def _plan_seed(campaign: Campaign, personas: Sequence[str], seed: int, tunable: bool) -> list[Stage]:
-    rounds = [persona_rounds(campaign, persona, seed, tunable) for persona in personas]
-    stages = [*plan_paper_rounds(campaign, personas, seed), *plan_robust(campaign, personas, seed)]
-    stages += plan_searches(campaign, personas, seed) if tunable else []
+def _plan_seed(of: SeedStages, personas: Sequence[str], tunable: bool) -> list[Stage]:
+    rounds = [persona_rounds(of, persona, tunable) for persona in personas]
+    stages = [*plan_paper_rounds(of, personas), *plan_robust(of, personas)]
+    stages += plan_searches(of, personas) if tunable else []
     stages += [stage for each in rounds for stage in each.stages]
     judged = list(stages)
-    stages += _plan_crossplay(campaign, rounds, seed) if campaign.crossplay is not None else []
-    stages += _plan_responses(campaign, rounds, stages, seed)
-    stages += _plan_preventability(campaign, judged)
+    stages += _plan_crossplay(of, rounds)
+    stages += _plan_responses(of, rounds, stages)
+    stages += _plan_preventability(of.campaign, judged)
     return list(dict.fromkeys(stages))
 
 
-def _plan_responses(
-    campaign: Campaign, rounds: Sequence[PersonaRounds], stages: Iterable[Stage], seed: int
-) -> list[Stage]:
+def _plan_responses(of: SeedStages, rounds: Sequence[PersonaRounds], stages: Iterable[Stage]) -> list[Stage]:
     """Best responses in the last pair of each persona's rounds, and in the arms that the campaign names."""
-    if campaign.best_response is None:
+    if of.campaign.best_response is None:
         return []
-    last = [pairing(each.egos[-1], each.non_egos[-1], seed).name for each in rounds]
+    last = [pairing(of, each.egos[-1], each.non_egos[-1]).name for each in rounds]
     assessments = {stage.name: stage for stage in stages if isinstance(stage, AssessmentStage)}
-    names = dict.fromkeys((*last, *campaign.best_response.arms))
+    names = dict.fromkeys((*last, *of.campaign.best_response.arms))
     pairs = [assessments[name] for name in names if name in assessments and assessments[name].is_pair]
-    return [stage for pair in pairs for stage in plan_best_responses(campaign, pair)]
+    return [stage for pair in pairs for stage in plan_best_responses(of.campaign, pair)]
 
 
 def _plan_preventability(campaign: Campaign, stages: Iterable[Stage]) -> list[PreventabilityStage]:
     """The judgement of the failures in each arm of an ego against a persona, but for those of the cross-play alone."""
     if not campaign.assessment.reference_drivers:
         return []
-    arms = [each for each in stages if isinstance(each, AssessmentStage) and each.persona and each.ego is not None]
+    arms = dict.fromkeys(each for each in stages if isinstance(each, AssessmentStage) and each.persona)
     return [
         PreventabilityStage(seed=each.seed, persona=each.persona, gates=each.gates, of=each)
-        for each in dict.fromkeys(arms)
-        if each.non_ego is not None and each.arm.best_response_of is None
+        for each in arms
+        if each.ego and each.non_ego and each.arm.best_response_of is None
     ]
 
 
-def _plan_crossplay(campaign: Campaign, rounds: Sequence[PersonaRounds], seed: int) -> list[AssessmentStage]:
+def _plan_crossplay(of: SeedStages, rounds: Sequence[PersonaRounds]) -> list[AssessmentStage]:
     """The arms of every ego against every non-ego."""
+    if of.campaign.crossplay is None:
+        return []
     egos = {ego.strategy: ego for each in rounds for ego in each.egos}
-    egos |= {ego.strategy: ego for ego in _egos_of_no_persona(campaign, seed, has_round_2=len(egos) > 1)}
+    egos |= {ego.strategy: ego for ego in _egos_of_no_persona(of.campaign, has_round_2=len(egos) > 1)}
     non_egos = [non_ego for each in rounds for non_ego in each.non_egos]
-    return [pairing(ego, non_ego, seed) for ego in egos.values() for non_ego in non_egos]
+    return [pairing(of, ego, non_ego) for ego in egos.values() for non_ego in non_egos]
 
 
-def _egos_of_no_persona(campaign: Campaign, seed: int, has_round_2: bool) -> list[Ego]:
+def _egos_of_no_persona(campaign: Campaign, has_round_2: bool) -> list[PlannedEgo]:
     """The egos that belong to no single persona: of populations, of several personas, or from outside."""
     round_2 = RetrainedEgo if ego_learns(campaign) else ReconfiguredEgo
-    strategies: list[RetrainedEgo | ReconfiguredEgo | RobustEgo] = []
-    strategies += [round_2(against=each.name) for each in campaign.population] if has_round_2 else []
+    strategies: list[RetrainedEgo | ReconfiguredEgo | RobustEgo | OtherEgo] = []
+    strategies += [round_2(against=each) for each in campaign.mixed_people] if has_round_2 else []
     strategies += [RobustEgo()] if ego_learns(campaign) and campaign.retraining.against else []
-    egos = [Ego(strategy=each, driver=driver_of(campaign, each, seed)) for each in strategies]
-    outside = crossplay_drivers(campaign).items()
-    return [*egos, *(Ego(strategy=OtherEgo(driver=name), driver=driver) for name, driver in outside)]
+    written = campaign.crossplay.egos if campaign.crossplay is not None else []
+    strategies += [OtherEgo(driver=crossplay_name(each)) for each in written]
+    return [PlannedEgo(strategy=each) for each in strategies]

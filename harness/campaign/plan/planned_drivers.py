@@ -1,9 +1,14 @@
-"""Which driver plays a player in a stage: a closed union, of which `execution.player_factory` makes drivers."""
+"""Who drives the players of a stage: a closed union, of which `execution.player_factory` makes drivers.
+
+The two sides of a game are the ego and the non-egos. A persona drives in every place of the non-egos, a population is a
+mixture of personas in every place, and a crowd has a persona for each place: all are a `Side`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,18 +49,11 @@ class TrainedBefore:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Mixture:
+class FixedMixture:
     """One of several drivers in each game, drawn by fixed shares."""
 
     members: tuple[PlannedMember, ...]
     shares: tuple[float, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Crowd:
-    """A driver for each person of a scene with several, in their order. Any other driver drives all of them."""
-
-    members: tuple[PlannedMember, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,23 +75,24 @@ class BestOf:
 
 PlannedMember = SumoDriven | External | Reconfigured | Trained | TrainedBefore
 """One driver, the same in every game."""
-PlannedDriver = PlannedMember | Mixture | Crowd | EquilibriumMixture | BestOf
+PlannedDriver = PlannedMember | FixedMixture | EquilibriumMixture | BestOf
+Side: TypeAlias = tuple[PlannedDriver, ...]
+"""The drivers of a side: those of the non-egos' places in their order, from the first again where there are more places
+than drivers. Empty: the side takes no part."""
 
 
-def members_of(driver: PlannedDriver | None) -> tuple[PlannedMember, ...]:
-    """The drivers that may play: the members of a mixture or choice, or the driver itself."""
-    match driver:
-        case None:
-            return ()
-        case (
-            Mixture(members=members)
-            | Crowd(members=members)
-            | EquilibriumMixture(members=members)
-            | BestOf(members=members)
-        ):
-            return members
-        case _:
-            return (driver,)
+def driver_in(side: Side, place: int) -> PlannedDriver | None:
+    """The driver of a side in one of its places; None: no one."""
+    return side[place % len(side)] if side else None
+
+
+def members_of(*drivers: PlannedDriver) -> tuple[PlannedMember, ...]:
+    """The drivers that may play: the members of mixtures and choices, or the drivers themselves."""
+    return tuple(
+        member
+        for driver in drivers
+        for member in (driver.members if isinstance(driver, FixedMixture | EquilibriumMixture | BestOf) else (driver,))
+    )
 
 
 def persona_of(driver: PlannedDriver) -> str:
@@ -105,7 +104,7 @@ def persona_of(driver: PlannedDriver) -> str:
             return ""
 
 
-def stages_before(driver: PlannedDriver | None) -> Iterable[str]:
+def stages_before(driver: PlannedDriver) -> Iterable[str]:
     """The stages of this plan that have to be done before a driver can play."""
     for member in members_of(driver):
         match member:
@@ -116,7 +115,7 @@ def stages_before(driver: PlannedDriver | None) -> Iterable[str]:
             yield from row
 
 
-def policies_before(driver: PlannedDriver | None) -> Iterable[str]:
+def policies_before(driver: PlannedDriver) -> Iterable[str]:
     """The policies of another run that a driver reads, each named after the stage that made it."""
     for member in members_of(driver):
         if isinstance(member, TrainedBefore):
@@ -134,7 +133,5 @@ def description(driver: PlannedDriver) -> str:
             return stage
         case BestOf():
             return "best"
-        case Mixture(members=members) | EquilibriumMixture(members=members):
+        case FixedMixture(members=members) | EquilibriumMixture(members=members):
             return "one in each game of " + ", ".join(description(each) for each in members)
-        case Crowd(members=members):
-            return "together " + ", ".join(description(each) for each in members)

@@ -9,6 +9,7 @@ from typing import ClassVar
 
 from harness.campaign.plan.planned_drivers import (
     PlannedDriver,
+    Side,
     Trained,
     TrainedBefore,
     members_of,
@@ -61,7 +62,7 @@ class _Stage:
 
     @property
     @abstractmethod
-    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+    def drivers(self) -> tuple[PlannedDriver, ...]:
         """The drivers that play in it and do not learn."""
 
     @property
@@ -86,7 +87,7 @@ class TrainingStage(_Stage):
     """One training: which strategy is learned, against which driver, from which parameters."""
 
     strategy: Strategy
-    opponent: PlannedDriver | None
+    opponent: Side
     initial: Trained | TrainedBefore | None
     """The policy that it starts from; None: a new one."""
     alone_share: float
@@ -112,9 +113,9 @@ class TrainingStage(_Stage):
         return player_of(self.strategy)
 
     @property
-    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+    def drivers(self) -> tuple[PlannedDriver, ...]:
         """The initial policy and the opponent."""
-        return self.initial, self.opponent
+        return (*((self.initial,) if self.initial is not None else ()), *self.opponent)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,8 +123,8 @@ class AssessmentStage(_Stage):
     """The assessment of one arm."""
 
     arm: Arm
-    ego: PlannedDriver | None
-    non_ego: PlannedDriver | None
+    ego: Side
+    non_ego: Side
 
     kind, verb, unit = "assessment", "assess", "episodes"
 
@@ -133,15 +134,20 @@ class AssessmentStage(_Stage):
         return self.arm.name
 
     @property
-    def drivers(self) -> tuple[PlannedDriver | None, ...]:
-        """Ego and non-ego, in the order of the players' axis."""
+    def drivers(self) -> tuple[PlannedDriver, ...]:
+        """Those of the ego and of the non-egos."""
+        return (*self.ego, *self.non_ego)
+
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        """Ego and non-egos."""
         return self.ego, self.non_ego
 
     @property
     def is_pair(self) -> bool:
         """Whether an ego meets a persona's non-ego, and both drive the same way in every game. A mixture has no payoff
         of its own, SUMO's driver none at all."""
-        fixed = all(each is not None and members_of(each) == (each,) for each in self.drivers)
+        fixed = all(len(each) == 1 and members_of(*each) == each for each in self.sides)
         return fixed and bool(self.persona)
 
 
@@ -149,7 +155,7 @@ class AssessmentStage(_Stage):
 class SearchStage(_Stage):
     """One search: the external ego's parameters, on its own payoff, against one opponent."""
 
-    opponent: PlannedDriver
+    opponent: Side
 
     kind, verb, unit = "reconfiguration", "tune", "trials"
 
@@ -159,9 +165,9 @@ class SearchStage(_Stage):
         return strategy_name(ReconfiguredEgo(against=self.persona))
 
     @property
-    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+    def drivers(self) -> tuple[PlannedDriver, ...]:
         """The opponent."""
-        return (self.opponent,)
+        return self.opponent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -178,7 +184,7 @@ class PreventabilityStage(_Stage):
         return f"{self.of.name}_preventability"
 
     @property
-    def drivers(self) -> tuple[PlannedDriver | None, ...]:
+    def drivers(self) -> tuple[PlannedDriver, ...]:
         """Those of the arm."""
         return self.of.drivers
 

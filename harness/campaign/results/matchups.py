@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from harness.campaign.plan.competence import alone_bounds
+from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
 from harness.config.campaign import Campaign

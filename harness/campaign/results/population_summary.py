@@ -8,6 +8,7 @@ import pandas as pd
 
 from harness.config.campaign import Campaign, Population
 from harness.environments.rollout import parts_of
+from harness.evaluation.people import people_in
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, ReconfiguredEgo, RetrainedEgo
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import POPULATION_COLUMNS, typed
@@ -18,9 +19,10 @@ _SUMMARY_COLUMNS = [name for name in POPULATION_COLUMNS if name not in ("arm", "
 
 
 def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
-    """A row for each arm against a population, seed and persona that drove in it, with `POPULATION_COLUMNS`.
+    """A row for each arm against a population, seed and persona that drove in it, with `POPULATION_COLUMNS`. With
+    several people, the personas in their places.
 
-    The draw is repeated here: it depends on the arm's seed and the episode only.
+    The draw is repeated here: it depends on the place, the arm's seed and the episode only.
     """
     frames = [
         _rows(population, games) for population in campaign.population for games in _arms_of(population, episodes)
@@ -39,8 +41,9 @@ def _arms_of(population: Population, episodes: pd.DataFrame) -> Iterable[pd.Data
 
 def _rows(population: Population, games: pd.DataFrame) -> pd.DataFrame:
     names, shares = list(population.shares), list(population.shares.values())
+    players = range(NON_EGO, NON_EGO + len(people_in(games.columns)))
     drivers = [
-        names[draw_member(shares, NON_EGO, *parts_of(int(seed), int(episode)))]
+        ", ".join(names[draw_member(shares, player, *parts_of(int(seed), int(episode)))] for player in players)
         for seed, episode in zip(games["seed"], games["episode"], strict=True)
     ]
     rows = summarise(games.assign(persona=drivers)).sort_values(["seed", "persona"], kind="stable")

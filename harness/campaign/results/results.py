@@ -184,11 +184,8 @@ def _say(console: Console, what: str) -> None:
 def _goals(stages: Iterable[Stage], episodes: pd.DataFrame) -> dict[str, Goals]:
     """How often the player of each arm without another player reached its goal, by the arm's stage."""
     games = games_by_arm(episodes)
-    alone = [each for each in stages if isinstance(each, AssessmentStage) and None in each.drivers]
-    return {
-        each.id: goals_alone(games.get((each.name, each.seed)), "ego" if each.ego is not None else "non_ego")
-        for each in alone
-    }
+    alone = [each for each in stages if isinstance(each, AssessmentStage) and not all(each.sides)]
+    return {each.id: goals_alone(games.get((each.name, each.seed)), "ego" if each.ego else "non_ego") for each in alone}
 
 
 def _with_ends(training: pd.DataFrame, entries: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from harness.campaign.plan.competence import bound_of
+from harness.campaign.plan.alone_bounds import bound_of
 from harness.campaign.plan.stages import Stage, TrainingStage, stage_id
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import DID_NOT_LEARN, Goals

@@ -6,9 +6,9 @@ from harness.campaign.execution.crash_retries import MOST_ABANDONED, MOST_CRASHE
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo
 
-TRAINING = TrainingStage(seed=1, persona="", strategy=NaiveEgo(), opponent=None, initial=None, alone_share=1.0)
+TRAINING = TrainingStage(seed=1, persona="", strategy=NaiveEgo(), opponent=(), initial=None, alone_share=1.0)
 SPEEDY = PersonaNonEgo(persona="speedy")
-OTHER = TrainingStage(seed=1, persona="speedy", strategy=SPEEDY, opponent=None, initial=None, alone_share=0.0)
+OTHER = TrainingStage(seed=1, persona="speedy", strategy=SPEEDY, opponent=(), initial=None, alone_share=0.0)
 ARM = AssessmentStage(seed=1, persona="", arm=Arm(ego=NaiveEgo()), ego=None, non_ego=None)
 SEGV = "the worker died of SIGSEGV"
 

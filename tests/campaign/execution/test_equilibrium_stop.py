@@ -27,7 +27,7 @@ ROUND_3 = TrainingStage(
     seed=1,
     persona="anna",
     strategy=PersonaNonEgo(persona="anna", round=3),
-    opponent=None,
+    opponent=(),
     initial=None,
     alone_share=0.0,
     gates=(GATE,),

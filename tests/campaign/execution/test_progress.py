@@ -8,9 +8,8 @@ import logging
 import pytest
 from rich.console import Console
 
-from harness.campaign.execution.preparation import preparations_reported
 from harness.campaign.execution.progress import STARTING, StageProgress
-from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.stage_events import Event, preparations_reported
 from harness.campaign.plan.plan import plan
 from harness.config.campaign import Campaign
 from harness.evaluation.competence import DID_NOT_LEARN, Goals

@@ -13,10 +13,10 @@ from harness.evaluation.strategies import PersonaNonEgo
 
 def stage(name: str, *needs: str, seed: int = 1) -> Stage:
     """A training that needs up to two others: as its initial policy and as its opponent."""
-    initial, opponent, *_ = [*(Trained(stage=f"{each}-seed{seed}") for each in needs), None, None]
+    initial, *opponent = [*(Trained(stage=f"{each}-seed{seed}") for each in needs), None, None]
     strategy = PersonaNonEgo(persona=name)
     return TrainingStage(
-        seed=seed, persona=name, strategy=strategy, opponent=opponent, initial=initial, alone_share=0.0
+        seed=seed, persona=name, strategy=strategy, opponent=tuple(opponent), initial=initial, alone_share=0.0
     )
 
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.execution.crash_retries import MOST_CRASHES, Attempt, OnProgress, OnStart
-from harness.campaign.execution.run_context import RunContext
+from harness.campaign.execution.crash_retries import MOST_CRASHES
 from harness.campaign.execution.run_stages import run_stages
 from harness.campaign.execution.stage_events import Event
+from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.stages import Stage
 from harness.cli.wording import INTERRUPTED
@@ -50,23 +50,19 @@ def told(events: list[Event], kind: str) -> list[str]:
 # What the workers do here. They are in the processes that run_stages starts, which import this module.
 
 
-def note(stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt) -> dict[str, Any]:
-    with (context.folder / "done").open("a") as file:
+def note(stage: Stage, run: StageRun) -> dict[str, Any]:
+    with (run.context.folder / "done").open("a") as file:
         file.write(f"{stage.id}\n")
     return {"pid": os.getpid(), "deaf": signal.getsignal(signal.SIGINT) == signal.SIG_IGN}
 
 
-def report_much(
-    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
-) -> dict[str, Any]:
+def report_much(stage: Stage, run: StageRun) -> dict[str, Any]:
     for done in range(1, 1001):
-        report(done, 1000)
+        run.on_progress(done, 1000)
     return {}
 
 
-def raise_in_b(
-    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
-) -> dict[str, Any]:
+def raise_in_b(stage: Stage, run: StageRun) -> dict[str, Any]:
     if stage.id == "b-seed1":
         raise StageFailed("b-seed1: a payoff is not finite")
     if stage.id == "bug-seed1":
@@ -74,23 +70,21 @@ def raise_in_b(
     return {}
 
 
-def die_in_b(stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt) -> dict[str, Any]:
+def die_in_b(stage: Stage, run: StageRun) -> dict[str, Any]:
     if stage.id == "b-seed1":
         os.kill(os.getpid(), signal.SIGSEGV)
     return {}
 
 
-def die_once(stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt) -> dict[str, Any]:
-    mark = context.folder / stage.id
+def die_once(stage: Stage, run: StageRun) -> dict[str, Any]:
+    mark = run.context.folder / stage.id
     if not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return {}
 
 
-def die_when_idle(
-    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
-) -> dict[str, Any]:
+def die_when_idle(stage: Stage, run: StageRun) -> dict[str, Any]:
     """Kill whoever else works for the same parent: it has nothing to do."""
     if stage.id == "a-seed1":
         time.sleep(0.5)  # until the other worker waits for its first stage
@@ -165,9 +159,7 @@ def test_run_stages__a_worker_that_dies_with_nothing_to_do_is_replaced(tmp_path:
     assert sorted(told(events, "done")) == ["a", "b", "c"]
 
 
-def need_too_much(
-    stage: Stage, context: RunContext, report: OnProgress, begin: OnStart, attempt: Attempt
-) -> dict[str, Any]:
+def need_too_much(stage: Stage, run: StageRun) -> dict[str, Any]:
     """Ask the system itself for more memory than it may give, by NumPy and by torch."""
     import resource
 

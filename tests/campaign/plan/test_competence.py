@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from harness.campaign.plan.competence import alone_bounds, bound_of
+from harness.campaign.plan.alone_bounds import alone_bounds, bound_of
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage

@@ -13,15 +13,15 @@ from harness.campaign.plan.plan import plan
 from harness.campaign.plan.planned_drivers import (
     BestOf,
     EquilibriumMixture,
-    Mixture,
-    PlannedDriver,
+    FixedMixture,
+    Side,
     Trained,
     TrainedBefore,
     description,
     members_of,
 )
 from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, Stage, TrainingStage
-from harness.campaign.plan.strategy_drivers import crossplay_name
+from harness.campaign.plan.strategy_stages import SeedStages, crossplay_name
 from harness.campaign.preflight import QUICK_RESPONSE_STEPS, open_campaign
 from harness.campaign.results.matchups import matchups_of
 from harness.drivers.policy_file import Policy, write_policy
@@ -57,8 +57,8 @@ def arm(stages: dict[str, Stage], name: str) -> AssessmentStage:
     return stage
 
 
-def names_of(driver: PlannedDriver | None) -> list[str]:
-    return [description(each).removesuffix("-seed1") for each in members_of(driver)]
+def names_of(side: Side) -> list[str]:
+    return [description(each).removesuffix("-seed1") for each in members_of(*side)]
 
 
 # --- rounds ---------------------------------------------------------------
@@ -66,8 +66,8 @@ def names_of(driver: PlannedDriver | None) -> list[str]:
 
 def test_plan__two_rounds_are_the_papers(tmp_path: Path, both: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=both)
-    campaign = open_campaign(tmp_path / "tiny.toml")
-    assert list(stages.values()) == plan_paper_rounds(campaign.document, ["anna", "bert"], 1)
+    of = SeedStages(campaign=open_campaign(tmp_path / "tiny.toml").document, seed=1)
+    assert list(stages.values()) == plan_paper_rounds(of, ["anna", "bert"])
 
 
 def test_plan__in_odd_rounds_the_non_ego_answers_and_in_even_ones_the_ego(tmp_path: Path, anna: list[str]) -> None:
@@ -105,16 +105,16 @@ def test_plan__a_player_answers_whom_the_campaign_says(
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 5, "against": against})
     opponents = [training(stages, name).opponent for name in ("anna_round3", "retrained_anna_round4", "anna_round5")]
     assert [names_of(each) for each in opponents] == [round3, round4, round5]
-    kinds = {"latest": Trained, "all": Mixture, "equilibrium": EquilibriumMixture}
-    for opponent in opponents:
+    kinds = {"latest": Trained, "all": FixedMixture, "equilibrium": EquilibriumMixture}
+    for (opponent,) in opponents:
         assert isinstance(opponent, kinds[against])
-        if isinstance(opponent, Mixture):
+        if isinstance(opponent, FixedMixture):
             assert opponent.shares == (1.0,) * len(opponent.members)
 
 
 def test_plan__an_equilibrium_is_of_all_strategies_before_the_round(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, rounds={"count": 4, "against": "equilibrium"})
-    opponent = training(stages, "retrained_anna_round4").opponent
+    (opponent,) = training(stages, "retrained_anna_round4").opponent
     assert isinstance(opponent, EquilibriumMixture)
     assert opponent.arms == (
         ("naive_vs_anna-seed1", "naive_vs_anna_round3-seed1"),
@@ -165,9 +165,10 @@ def test_plan__a_best_response_learns_from_its_own_policy_and_from_nothing(tmp_p
 def test_plan__the_best_of_the_starts_replaces_its_player(tmp_path: Path, anna: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=anna, best_response=RESPONSE)
     response = arm(stages, "retrained_vs_anna_non_ego_response")
-    assert isinstance(response.non_ego, BestOf)
+    (best,) = response.non_ego
+    assert isinstance(best, BestOf)
     assert names_of(response.non_ego) == [f"retrained_vs_anna_non_ego_response{k}" for k in (1, 2)]
-    assert response.non_ego.persona == "anna"
+    assert best.persona == "anna"
     assert names_of(response.ego) == ["retrained_anna"]
 
 
@@ -325,9 +326,9 @@ def test_plan__the_robust_ego_meets_those_it_never_met_as_well(tmp_path: Path, b
 def test_plan__a_population_is_met_as_a_persona_is(tmp_path: Path, both: list[str]) -> None:
     town = {"name": "town", "shares": {"anna": 1.0, "bert": 3.0}}
     stages, keys = planned(tmp_path, personas=both, population=[town])
-    opponent = training(stages, "retrained_town").opponent
-    assert isinstance(opponent, Mixture)
-    assert (names_of(opponent), opponent.shares) == (["anna", "bert"], (1.0, 3.0))
+    (opponent,) = training(stages, "retrained_town").opponent
+    assert isinstance(opponent, FixedMixture)
+    assert (names_of((opponent,)), opponent.shares) == (["anna", "bert"], (1.0, 3.0))
     assert "town-seed1" not in stages
     assert {"naive_vs_town-seed1", "retrained_vs_town-seed1", "retrained_alone_town-seed1"} <= set(stages)
     _, turned = planned(tmp_path, personas=both, population=[{**town, "shares": {"anna": 2.0, "bert": 2.0}}])

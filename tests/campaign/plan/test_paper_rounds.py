@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.planned_drivers import SumoDriven, Trained, description
-from harness.campaign.plan.stages import AssessmentStage, Stage, TrainingStage
+from harness.campaign.plan.stages import AssessmentStage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.drivers.policy_file import write_policy
 from harness.game.roles import EGO, NON_EGO
@@ -39,11 +38,11 @@ def test_plan__of_a_learned_ego(tmp_path: Path, personas: list[str]) -> None:
 def test_plan__pairings_of_a_learned_ego(tmp_path: Path, personas: list[str]) -> None:
     stages, _ = planned(tmp_path, personas=personas[:1])
 
-    def who(stage: Stage) -> tuple[Any, Any]:
-        assert isinstance(stage, AssessmentStage)
-        return tuple(driver and description(driver) for driver in stage.drivers)  # type: ignore[return-value]
-
-    assert {id: who(stage) for id, stage in stages.items() if isinstance(stage, AssessmentStage)} == {
+    assert {
+        name: tuple(description(side[0]) if side else None for side in stage.sides)
+        for name, stage in stages.items()
+        if isinstance(stage, AssessmentStage)
+    } == {
         "naive_alone-seed1": ("naive-seed1", None),
         "naive_vs_sumo-seed1": ("naive-seed1", "sumo"),
         "anna_alone-seed1": (None, "anna-seed1"),
@@ -63,11 +62,11 @@ def test_plan__trainings_of_a_learned_ego(tmp_path: Path, personas: list[str]) -
     assert isinstance(naive, TrainingStage)
     assert isinstance(anna, TrainingStage)
     assert isinstance(retrained, TrainingStage)
-    assert (naive.learner, naive.opponent, naive.initial, naive.alone_share) == (EGO, None, None, 1.0)
+    assert (naive.learner, naive.opponent, naive.initial, naive.alone_share) == (EGO, (), None, 1.0)
     assert (anna.learner, anna.initial, anna.alone_share) == (NON_EGO, None, 0.125)
-    assert anna.opponent == Trained(stage="naive-seed1")
+    assert anna.opponent == (Trained(stage="naive-seed1"),)
     assert (retrained.learner, retrained.initial, retrained.alone_share) == (EGO, Trained(stage="naive-seed1"), 0.5)
-    assert retrained.opponent == Trained(stage="anna-seed1", persona="anna")
+    assert retrained.opponent == (Trained(stage="anna-seed1", persona="anna"),)
 
 
 def test_plan__the_naive_ego_may_train_beside_sumos_driver(tmp_path: Path, personas: list[str]) -> None:
@@ -75,7 +74,7 @@ def test_plan__the_naive_ego_may_train_beside_sumos_driver(tmp_path: Path, perso
     beside, keys = planned(tmp_path, personas=personas[:1], naive_training={"alone_share": 0.25})
     naive = beside["naive-seed1"]
     assert isinstance(naive, TrainingStage)
-    assert (naive.opponent, naive.alone_share) == (SumoDriven(), 0.25)
+    assert (naive.opponent, naive.alone_share) == ((SumoDriven(),), 0.25)
     assert (naive.needs, list(beside)) == ((), list(stages))
     assert keys["naive-seed1"] != alone["naive-seed1"]
 

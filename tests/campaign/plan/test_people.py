@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.campaign.plan.budgets import training_settings
-from harness.campaign.plan.competence import alone_bounds
 from harness.campaign.plan.paper_rounds import questions
-from harness.campaign.plan.planned_drivers import Crowd, description
+from harness.campaign.plan.planned_drivers import FixedMixture, description, driver_in
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage
 from harness.campaign.preflight import open_campaign
 from harness.errors import UsageError
@@ -36,17 +36,28 @@ def test_plan__a_crowd_is_met_and_trained_against_like_a_persona(
     scene: str, personas: list[str], tmp_path: Path
 ) -> None:
     stages, _ = planned(tmp_path, scene=scene, personas=personas, crowd=[MIXED])
-    people = "together anna-seed1, bert-seed1, anna-seed1"
+    people = ["anna-seed1", "bert-seed1", "anna-seed1"]
     arms = {name: stage for name, stage in stages.items() if isinstance(stage, AssessmentStage) and "mixed" in name}
-    assert {name: [driver and description(driver) for driver in stage.drivers] for name, stage in arms.items()} == {
-        "naive_vs_mixed-seed1": ["naive-seed1", people],
-        "retrained_vs_mixed-seed1": ["retrained_mixed-seed1", people],
-        "retrained_alone_mixed-seed1": ["retrained_mixed-seed1", None],
+    assert {name: [*map(description, stage.drivers)] for name, stage in arms.items()} == {
+        "naive_vs_mixed-seed1": ["naive-seed1", *people],
+        "retrained_vs_mixed-seed1": ["retrained_mixed-seed1", *people],
+        "retrained_alone_mixed-seed1": ["retrained_mixed-seed1"],
     }
     training = stages["retrained_mixed-seed1"]
     assert isinstance(training, TrainingStage)
-    assert isinstance(training.opponent, Crowd)
+    assert [*map(description, training.opponent)] == people
     assert training.needs == ("anna-seed1", "bert-seed1")
+
+
+def test_plan__a_population_draws_a_persona_for_each_place(scene: str, personas: list[str], tmp_path: Path) -> None:
+    town = {"name": "town", "shares": {"anna": 1.0, "bert": 3.0}}
+    stages, _ = planned(tmp_path, scene=scene, personas=personas, population=[town])
+    arm = stages["naive_vs_town-seed1"]
+    assert isinstance(arm, AssessmentStage)
+    in_places = [driver_in(arm.non_ego, place) for place in range(3)]
+    assert in_places == [in_places[0]] * 3
+    assert isinstance(in_places[0], FixedMixture)
+    assert in_places[0].shares == (1.0, 3.0)
 
 
 def test_plan__questions_about_a_crowd_ask_each_of_its_personas_to_drive_alone(
@@ -82,7 +93,7 @@ def test_keys__of_a_crowd_depend_on_who_is_in_which_place(scene: str, personas: 
     [
         (
             {"crowd": [MIXED | {"personas": ["anna", "bert"]}]},
-            "crowd[0].personas: 2 personas, and the scene has 3 people",
+            "crowd[0].personas: 2 personas, and people of the scene: 3",
         ),
         ({"crowd": [MIXED | {"personas": ["anna", "bart", "anna"]}]}, "crowd[0].personas: there is no persona 'bart'"),
         ({"crowd": [MIXED | {"name": "anna"}]}, "crowd[0].name: 'anna' is the name of a persona"),
@@ -93,14 +104,10 @@ def test_keys__of_a_crowd_depend_on_who_is_in_which_place(scene: str, personas: 
         ({"crossplay": {}}, "crossplay: is about games of two players, and the scene has 3 people"),
         ({"rounds": {"count": 4}}, "rounds.count: is about games of two players, and the scene has 3 people"),
         (
-            {"population": [{"name": "town", "shares": {"anna": 1.0, "bert": 1.0}}]},
-            "population[0]: a population is one person for each game, and the scene has 3",
-        ),
-        (
             {"training": TRAINING | {"games": 2}},
             "training.games: 2 games at once, and a person learns in 3 places",
         ),
-        ({"scene": str(MERGE), "crowd": [MIXED]}, "crowd[0]: the scene has one person, and a crowd is of several"),
+        ({"scene": str(MERGE), "crowd": [MIXED]}, "crowd[0].personas: 3 personas, and people of the scene: 1"),
     ],
 )
 def test_campaign__what_does_not_fit_the_people_is_refused(

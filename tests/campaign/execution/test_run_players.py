@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.campaign.execution.policies_of_run import policies_of_run
+from harness.campaign.execution.run_players import policies_of_run
 
 WRITTEN = "../policies/mine"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from harness.campaign.execution.preventability import outcome_of
+from harness.campaign.execution.preventability_stage import outcome_of
 from harness.evaluation.manoeuvres.thresholds import WRONG_WAY_LEAST_S
 
 

@@ -19,14 +19,18 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.execution.crash_retries import Attempt, OnProgress, OnStart
+from harness.campaign.execution.player_factory import PlayerFactory
+from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
+from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES, name_manoeuvres
+from harness.campaign.storage.trace_tables import make_tables
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.environments.rollout import Arm, Game, assess
 from harness.errors import StageFailed
+from harness.evaluation.competence import goals_alone
 from harness.evaluation.people import columns_for
-from harness.evaluation.tables import PLAYED_COLUMNS, join_csv, typed, write_csv
+from harness.evaluation.tables import PLAYED_COLUMNS, join_csv, read_csv, typed, write_csv
 from harness.evaluation.trace_file import TraceWriter, join_traces
 from harness.evaluation.unplayed_games import reason_of
 from harness.files import make_folder
@@ -76,44 +80,54 @@ class Segment:
         return errors
 
 
+def carry_out_assessment(stage: AssessmentStage, inputs: StageInputs) -> Made:
+    """Play an arm. Raises as `PlayerFactory.arm` and `play_segments` do."""
+    run, folder = inputs.run, inputs.run.folder
+    players = PlayerFactory.of(inputs)
+    stage, choice = players.chosen(stage)
+    segments = segments_of(folder.segments(stage.id), run.context.document.assessment.episodes)
+    labels: dict[str, str | int] = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
+    errors = play_segments(players.arm(stage), segments, labels, run)
+    work = folder.work(stage.id)
+    files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
+    join_segments(segments, files, labels)
+    facts: dict[str, Any] = {"episodes": segments[-1].episodes.stop, "errors": errors}
+    facts |= {"versions": [versions_of_numbers()], **choice}
+    if not all(stage.sides):  # whether the training of the player that drives alone succeeded
+        facts |= goals_alone(read_csv(work / EPISODES), "ego" if stage.ego else "non_ego").record()
+    return Made(facts=facts, files=[*files, *make_tables(folder, stage.id, inputs.scene)])
+
+
 def segments_of(folder: Path, episodes: int) -> list[Segment]:
     """The segments of an arm with this number of games."""
     firsts = range(0, episodes, SEGMENT_EPISODES)
     return [Segment(folder, range(first, min(first + SEGMENT_EPISODES, episodes))) for first in firsts]
 
 
-def play_segments(
-    arm: Arm,
-    segments: Sequence[Segment],
-    labels: Mapping[str, Any],
-    attempt: Attempt,
-    on_start: OnStart,
-    on_progress: OnProgress,
-    keep_going: bool = False,
-) -> int:
+def play_segments(arm: Arm, segments: Sequence[Segment], labels: Mapping[str, Any], run: StageRun) -> int:
     """Play the games of an arm that are missing. Returns how many of all its games could not be played.
 
-    `labels` are the cells that all records share. `on_start` gets each episode number before that game is played,
-    `on_progress` the number of games played and their total. Raises as `assess` does, and StageFailed if the first ten
-    games can't be played for one reason, unless `keep_going`.
+    `labels` are the cells that all records share. The run is told of each episode before that game is played, and of
+    the games played and their total. Raises as `assess` does, and StageFailed if the first ten games can't be played
+    for one reason, unless the run keeps going.
     """
     make_folder(segments[0].folder)
     errors = {segment: segment.errors() for segment in segments}
-    missing = [each for each, found in errors.items() if found is None or (found and attempt.first)]
+    missing = [each for each, found in errors.items() if found is None or (found and run.attempt.first)]
     total = segments[-1].episodes.stop
     done = total - sum(len(segment.episodes) for segment in missing)
-    first = None if keep_going or done else list[str]()
+    first = None if run.context.keep_going or done else list[str]()
 
     def on_game(game: Game) -> None:
         nonlocal done
         done += 1
-        on_progress(done, total)
+        run.on_progress(done, total)
         if first is not None and done <= HOPELESS_GAMES:
             first.append(str(game.record["error"]))
             _check_hope(arm, first)
 
     episodes = chain.from_iterable(segment.episodes for segment in missing)
-    with closing(assess(arm, episodes, on_start, attempt.abandoned)) as games:  # type: ignore[type-var]
+    with closing(assess(arm, episodes, run.on_start, run.attempt.abandoned)) as games:  # type: ignore[type-var]
         for segment in missing:
             segment.file("json").unlink(missing_ok=True)
             errors[segment] = segment.play(games, labels, arm, on_game)
@@ -128,13 +142,11 @@ def _check_hope(arm: Arm, errors: Sequence[str]) -> None:
 
 
 def join_segments(
-    segments: Sequence[Segment],
-    episodes: Path,
-    manoeuvres: Path,
-    traces: Path,
-    labels: Mapping[str, str | int] = MappingProxyType({}),
+    segments: Sequence[Segment], files: Sequence[Path], labels: Mapping[str, str | int] = MappingProxyType({})
 ) -> None:
-    """Join the segments of an arm into its files. `labels` name the arm in the metadata of its traces."""
+    """Join the segments of an arm into its files: records, manoeuvres, traces. `labels` name the arm in the metadata of
+    its traces."""
+    episodes, manoeuvres, traces = files
     join_csv([segment.file(EPISODES) for segment in segments], episodes)
     join_csv([segment.file(MANOEUVRES) for segment in segments], manoeuvres)
     join_traces([segment.file(_TRACES) for segment in segments], traces, labels)

@@ -58,10 +58,9 @@ def _bounds(campaign: Campaign, strategy: Strategy) -> Iterator[AloneBound]:
         case SumoNonEgo() | OtherEgo() | BestResponse():
             return
         case PersonaNonEgo(persona=persona):
-            members = {each.name: list(each.shares) for each in campaign.population}
-            members |= {each.name: list(dict.fromkeys(each.personas)) for each in campaign.crowd}
-            non_egos = [PersonaNonEgo(persona=each) for each in members[persona]] if persona in members else [strategy]
-            for non_ego in non_egos:
+            mixed = campaign.mixed_people.get(persona, ())
+            members = [PersonaNonEgo(persona=each) for shares in mixed for each in shares]
+            for non_ego in dict.fromkeys(members or [strategy]):
                 arm, share = Arm(non_ego=non_ego).name, asked.non_ego_goal_share
                 yield AloneBound(player="non_ego", words=_non_ego_in_words(non_ego), arm=arm, goal_share=share)
         case _:

@@ -16,13 +16,16 @@ from typing import Any
 
 import pandas as pd
 
-from harness.campaign.execution.crash_retries import Attempt, OnProgress, OnStart
+from harness.campaign.execution.player_factory import PlayerFactory
+from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
+from harness.campaign.plan.planned_drivers import SumoDriven
 from harness.campaign.plan.stages import PreventabilityStage
 from harness.campaign.storage.checksums import read_checksums, write_checksums
 from harness.campaign.storage.manoeuvre_table import EPISODES
-from harness.campaign.storage.run_folder import JUDGED, RunFolder
+from harness.campaign.storage.run_folder import JUDGED
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.car import car_of
+from harness.drivers.mixture import mixture_of
 from harness.drivers.reference_drivers import REFERENCES, lane_width_of, reference_driver
 from harness.environments.conflict_replay import Chance, ConflictReplay, Takeover, collision_of
 from harness.environments.rollout import Arm, assess
@@ -37,28 +40,29 @@ _COLLISIONS_AT_ONCE = 100  # what the ego sees in each of their steps is kept in
 
 
 @dataclass(frozen=True, kw_only=True)
-class JudgedArm:
+class _JudgedArm:
     """An arm whose failures are judged."""
 
-    folder: RunFolder
     stage: PreventabilityStage
+    run: StageRun
     arm: Arm
-    """The arm with any driver in the ego's seat."""
-    attempt: Attempt
+    """The arm with SUMO's driver in the ego's seat, which the reference drivers take."""
 
 
-def judge_failures(work: JudgedArm, on_start: OnStart, on_progress: OnProgress) -> tuple[dict[str, Any], list[Path]]:
-    """Judge every failure of an arm. Returns facts for the manifest, and the file made.
+def carry_out_preventability(stage: PreventabilityStage, inputs: StageInputs) -> Made:
+    """Judge every failure of an arm.
 
-    `on_start` gets the episode before it is played, `on_progress` the games played and their number. Raises UsageError
-    for damaged files of the arm, SimulationError if SUMO can't load the scene.
+    The run is told of each episode before it is played, and of the games played and their number. Raises UsageError for
+    damaged files of the arm, SimulationError if SUMO can't load the scene.
     """
-    folder, of = work.folder, work.stage.of
-    episodes = read_csv(folder.work(of.id) / EPISODES)
+    run, of = inputs.run, stage.of
+    seatless = replace(of, ego=(SumoDriven(),))
+    work = _JudgedArm(stage=stage, run=run, arm=PlayerFactory.of(inputs).arm(seatless))
+    episodes = read_csv(run.folder.work(of.id) / EPISODES)
     failures = episodes[(episodes["error"] == "") & (episodes["ego_failed"] == 1)]
     numbers = [int(episode) for episode in failures["episode"]]
     conflicts, failed_s = _from_conflict(work, numbers)
-    starts = _from_start(work, numbers, on_start, on_progress)
+    starts = _from_start(work, numbers)
     rows = [
         _row(work, failure, name, starts[name][int(failure.episode)])
         | {"failed_s": failed_s[int(failure.episode)]}
@@ -66,14 +70,14 @@ def judge_failures(work: JudgedArm, on_start: OnStart, on_progress: OnProgress) 
         for failure in failures.itertuples()
         for name in REFERENCES
     ]
-    table = folder.work(work.stage.id) / JUDGED
+    table = run.folder.work(stage.id) / JUDGED
     write_csv(typed(pd.DataFrame(rows, columns=list(REFERENCE_COLUMNS))), table)
     errors = int((episodes["error"] != "").sum()) + sum(row["error"] != "" for row in rows)
     facts = {"episodes": len(numbers), "errors": errors, "versions": [versions_of_numbers()]}
-    return facts, [table]
+    return Made(facts=facts, files=[table])
 
 
-def _row(work: JudgedArm, failure: Any, name: str, outcome: Mapping[str, str]) -> dict[str, Any]:
+def _row(work: _JudgedArm, failure: Any, name: str, outcome: Mapping[str, str]) -> dict[str, Any]:
     played = not outcome["error"]
     return {
         "arm": failure.arm,
@@ -89,14 +93,14 @@ def _row(work: JudgedArm, failure: Any, name: str, outcome: Mapping[str, str]) -
 
 
 def _from_conflict(
-    work: JudgedArm, episodes: Sequence[int]
+    work: _JudgedArm, episodes: Sequence[int]
 ) -> tuple[dict[tuple[int, str], dict[str, Any]], dict[int, float]]:
     """The cells of the verdict from the conflict on, by episode and driver; and when each game failed."""
     scene, reader = work.arm.scene, TraceReader()
     step_s, ego = scene.world.step_s, scene.world.roles[EGO]
     collisions, failed_s = [], {}
     for episode in episodes:
-        trace = reader.read(work.folder.traces(work.stage.of.id), episode)
+        trace = reader.read(work.run.folder.traces(work.stage.of.id), episode)
         ended = trace.loc[(trace["player"] == ego) & (trace["outcome"] != ""), "step"]
         failed_s[episode] = float(ended.min()) * step_s
         if (collision := collision_of(trace, scene, episode)) is not None:
@@ -122,9 +126,7 @@ def _conflict_cells(takeover: Takeover, chance: Chance, step_s: float) -> dict[s
     return {**times, "prevented_from_conflict": int(takeover.prevented)}
 
 
-def _from_start(
-    work: JudgedArm, episodes: Sequence[int], on_start: OnStart, on_progress: OnProgress
-) -> dict[str, dict[int, dict[str, str]]]:
+def _from_start(work: _JudgedArm, episodes: Sequence[int]) -> dict[str, dict[int, dict[str, str]]]:
     """How each episode ends with each reference driver in the ego's seat: its outcome and its error."""
     total, done = len(episodes) * len(REFERENCES), 0
     found: dict[str, dict[int, dict[str, str]]] = {}
@@ -132,11 +134,11 @@ def _from_start(
     def on_game() -> None:
         nonlocal done
         done += 1
-        on_progress(done, total)
+        work.run.on_progress(done, total)
 
     for name in REFERENCES:
-        file = work.folder.segments(work.stage.id) / f"{name}.json"
-        found[name] = _stored(file, work.attempt.first) or _play(work, name, episodes, on_start, on_game)
+        file = work.run.folder.segments(work.stage.id) / f"{name}.json"
+        found[name] = _stored(file, work.run.attempt.first) or _play(work, name, episodes, on_game)
         done = len(found) * len(episodes)
         make_folder(file.parent)
         outcomes = {str(episode): outcome for episode, outcome in found[name].items()}
@@ -145,13 +147,14 @@ def _from_start(
 
 
 def _play(
-    work: JudgedArm, name: str, episodes: Sequence[int], on_start: OnStart, on_game: Callable[[], None]
+    work: _JudgedArm, name: str, episodes: Sequence[int], on_game: Callable[[], None]
 ) -> dict[int, dict[str, str]]:
     scene = work.arm.scene
     driver = reference_driver(name, car_of(scene.world, EGO), lane_width_of(scene.world))
-    arm = replace(work.arm, drivers=(driver, *work.arm.drivers[1:]))
+    persona = work.run.context.ego_persona
+    arm = replace(work.arm, drivers=(mixture_of(driver, persona), *work.arm.drivers[1:]))
     outcomes = {}
-    for game in assess(arm, episodes, on_start, work.attempt.abandoned):
+    for game in assess(arm, episodes, work.run.on_start, work.run.attempt.abandoned):
         record = game.record
         outcomes[int(record["episode"])] = {"outcome": outcome_of(record), "error": str(record["error"])}
         on_game()

@@ -6,13 +6,14 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-import harness.campaign.execution.arm_segments
-from harness.campaign.execution.arm_segments import Segment, join_segments, play_segments, segments_of
-from harness.campaign.execution.crash_retries import FIRST, Attempt
+import harness.campaign.execution.assessment_stage
+from harness.campaign.execution.assessment_stage import Segment, join_segments, play_segments, segments_of
+from harness.campaign.execution.stage_run import Attempt, StageRun
 from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm
 from harness.errors import StageFailed
@@ -20,17 +21,18 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_traces
 from harness.game.arrays import FloatArray, IntArray
 from harness.traffic.scene import OpenScene
+from tests.support.plans import empty_context
 from tests.support.repository import REPOSITORY
 from tests.support.rollouts import Steady, arm
 
 EPISODES = 7
 LABELS = {"arm": "naive_vs_sumo", "persona": "", "seed": 1}
-AGAIN = Attempt(first=False)
+FIRST, AGAIN = Attempt(), Attempt(first=False)
 
 
 @pytest.fixture(autouse=True)
 def three_games(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(harness.campaign.execution.arm_segments, "SEGMENT_EPISODES", 3)
+    monkeypatch.setattr(harness.campaign.execution.assessment_stage, "SEGMENT_EPISODES", 3)
 
 
 def play(
@@ -44,8 +46,9 @@ def play(
         played.append(episode)
 
     segments = segments_of(folder / "segments", EPISODES)
-    errors = play_segments(assessed, segments, LABELS, attempt, note, lambda done, total: None)
-    join_segments(segments, *(folder / name for name in ("episodes.csv", "manoeuvres.csv", "traces.parquet")))
+    run = StageRun(context=empty_context(folder), attempt=attempt, on_start=note)
+    errors = play_segments(assessed, segments, LABELS, run)
+    join_segments(segments, [folder / name for name in ("episodes.csv", "manoeuvres.csv", "traces.parquet")])
     return errors, played
 
 
@@ -62,7 +65,7 @@ def steady(merge: OpenScene) -> Arm:
 def whole(steady: Arm, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("whole")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(harness.campaign.execution.arm_segments, "SEGMENT_EPISODES", 3)
+        patch.setattr(harness.campaign.execution.assessment_stage, "SEGMENT_EPISODES", 3)
         assert play(steady, folder) == (0, list(range(EPISODES)))
     return folder
 
@@ -141,11 +144,10 @@ class NeverDecides(Steady):
         raise RuntimeError(f"out of ideas after {self.games * 1.5} s")
 
 
-def play_ten(driver: Steady, scene: OpenScene, folder: Path, **more: bool) -> int:
+def play_ten(driver: Steady, scene: OpenScene, folder: Path, keep_going: bool = False) -> int:
     segments = segments_of(folder / "segments", 12)
-    return play_segments(
-        arm(scene, driver, SumoDriver()), segments, LABELS, FIRST, lambda game: None, lambda done, total: None, **more
-    )
+    run = StageRun(context=replace(empty_context(folder), keep_going=keep_going))
+    return play_segments(arm(scene, driver, SumoDriver()), segments, LABELS, run)
 
 
 def test_arm__ends_if_its_first_ten_games_fail_for_one_reason(merge: OpenScene, tmp_path: Path) -> None:
@@ -170,7 +172,7 @@ def test_arm__segments_of_other_versions_are_played_again(
     steady: Arm, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
-    monkeypatch.setattr(harness.campaign.execution.arm_segments, "versions_of_numbers", lambda: {"numpy": "99"})
+    monkeypatch.setattr(harness.campaign.execution.assessment_stage, "versions_of_numbers", lambda: {"numpy": "99"})
     assert play(steady, tmp_path) == (0, list(range(EPISODES)))
 
 
@@ -178,9 +180,10 @@ STREAM = """
 import resource, sys
 from itertools import repeat
 from pathlib import Path
-from harness.campaign.execution import arm_segments as segments
+from harness.campaign.execution import assessment_stage as segments
 from harness.environments.rollout import Game
-from harness.campaign.execution.crash_retries import FIRST
+from harness.campaign.execution.stage_run import StageRun
+from tests.support.plans import empty_context
 from harness.evaluation.trace_file import SCHEMA
 folder, episodes = Path(sys.argv[1]), int(sys.argv[2])
 texts = {"player": "ego", "vehicle_type": "car", "outcome": "", "signals": ""}
@@ -195,8 +198,9 @@ from harness.evaluation.tables import MANOEUVRE_COLUMNS
 class Anyone:
     scene, drivers = None, (None, None)
 parts = segments.segments_of(folder / "segments", episodes)
-segments.play_segments(Anyone, parts, {"arm": "a", "persona": "", "seed": 1}, FIRST, None, lambda done, total: None)
-segments.join_segments(parts, folder / "e.csv", folder / "m.csv", folder / "t.parquet")
+run = StageRun(context=empty_context(folder))
+segments.play_segments(Anyone, parts, {"arm": "a", "persona": "", "seed": 1}, run)
+segments.join_segments(parts, [folder / "e.csv", folder / "m.csv", folder / "t.parquet"])
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 

@@ -1,0 +1,85 @@
+"""Carrying out a parameter search: its table, and the driver that it found, as a document for campaigns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from harness.campaign.execution.player_factory import DRIVER, PlayerFactory
+from harness.campaign.execution.stage_run import Made, StageInputs, versions_since
+from harness.campaign.plan.stages import SearchStage
+from harness.config.toml_writing import toml_of
+from harness.config.tunable import Tunable
+from harness.errors import StageFailed
+from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed, write_csv
+from harness.files import make_folder, write_atomically
+from harness.training.parameter_search import SearchSpec, Trial, best, run_search, version_of_search
+
+TABLE = "reconfiguration.csv"
+
+
+def carry_out_search(stage: SearchStage, inputs: StageInputs) -> Made:
+    """Carry out a search. Raises as `PlayerFactory.player` does, StageFailed where the ego can't play."""
+    run, spec = inputs.run, _spec(stage, inputs)
+    file = run.folder.work(stage.id) / "trials.json"
+    versions = versions_since(file, version_of_search())
+    try:
+        trials = run_search(spec, file, run.on_progress, run.on_start)
+    except StageFailed as error:
+        raise StageFailed(f"{stage.id}: {error}") from error
+    unplayed = sum(each.mean_payoff is None for each in trials)
+    facts = {"trials": len(trials), "trials_unplayed": unplayed, "chosen_trial": best(trials), "versions": versions}
+    found, table = run.folder.policy(stage.id), file.with_name(TABLE)
+    _write_driver(stage, spec, trials, found)
+    labels = {"stage": stage.name, "persona": stage.persona, "seed": stage.seed}
+    _write_table(trials, spec.driver.searched, labels, table)
+    return Made(facts=facts, files=[found / DRIVER, table])
+
+
+def _spec(stage: SearchStage, inputs: StageInputs) -> SearchSpec:
+    context = inputs.run.context
+    return SearchSpec(
+        scene=inputs.scene,
+        driver=context.external_driver(),
+        persona=context.ego_persona,
+        people=PlayerFactory.of(inputs).people(stage.opponent),
+        settings=context.document.reconfiguration,
+        parts=("reconfiguration", stage.seed, stage.name),
+    )
+
+
+def _write_driver(stage: SearchStage, spec: SearchSpec, trials: Sequence[Trial], folder: Path) -> None:
+    """Write the driver with the parameters of the best trial, as a document for campaigns."""
+    chosen = best(trials)
+    first, found = trials[0], trials[chosen]
+    comments = [
+        f"{spec.driver.in_words}, reconfigured against the persona {stage.persona}, seed {stage.seed}.",
+        f"Found in {len(trials)} trials of {spec.settings.games} games each, as trial {chosen}: mean payoff "
+        f"{found.mean_payoff:.4g} instead of {first.mean_payoff:.4g}.",
+        "A campaign takes this file as [ego] driver; paths in it are relative to its folder.",
+    ]
+    driver = spec.driver.tuned(found.values) if chosen else spec.driver
+    make_folder(folder)
+    write_atomically(folder / DRIVER, toml_of(driver.document_in(folder), comments).encode())
+
+
+def _write_table(trials: Sequence[Trial], searched: Sequence[Tunable], labels: Mapping[str, Any], file: Path) -> None:
+    """A row for each trial and parameter."""
+    chosen, best_payoff = best(trials), float("-inf")
+    rows = []
+    for number, trial in enumerate(trials):
+        best_payoff = max(best_payoff, best_payoff if trial.mean_payoff is None else trial.mean_payoff)
+        results = {
+            "mean_payoff": trial.mean_payoff,
+            "failure_rate": trial.failure_rate,
+            "best_payoff": best_payoff,
+            "chosen": number == chosen,
+            "error": trial.error,
+        }
+        for key, low, high in searched:
+            tried = {"trial": number, "parameter": key, "value": trial.values[key], "low": low, "high": high}
+            rows.append({**labels, **tried, **results})
+    write_csv(typed(pd.DataFrame(rows).reindex(columns=list(RECONFIGURATION_COLUMNS))), file)

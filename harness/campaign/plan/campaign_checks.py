@@ -1,0 +1,104 @@
+"""Checks of a campaign against what it names: personas, drivers of the cross-play, arms, people of its scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TypeAlias
+
+from harness.campaign.plan.plan import plan
+from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.plan.strategy_stages import crossplay_name
+from harness.config.campaign import LEARNED, SUMO, Campaign, Rounds
+from harness.config.toml_reading import nearest
+from harness.errors import Problem, UsageError
+from harness.evaluation.strategies import NaiveEgo, RobustEgo, strategy_name
+
+_TAKEN = (strategy_name(NaiveEgo()), strategy_name(RobustEgo()), SUMO)
+"""Names of egos that a driver of the cross-play can't have."""
+MOST_LETTERS = 40
+"""Of the name of a driver of the cross-play."""
+_Found: TypeAlias = Iterator[tuple[str, str, str]]
+"""Key, what is wrong, remedy."""
+
+
+def check_people(file: Path, document: Campaign, people: int) -> None:
+    """Raises UsageError for everything in a campaign that does not fit a scene with this number of people."""
+    _refuse(file, _people(document, people))
+
+
+def check_names(file: Path, document: Campaign, personas: Sequence[str], tunable: bool = False) -> None:
+    """Raises UsageError for every name that refers to nothing, or to two things; `tunable` as in `plan`."""
+    _refuse(file, (*_personas(document, personas), *_other_egos(document)))
+    _refuse(file, _arms(document, personas, tunable))
+
+
+def _refuse(file: Path, found: _Found | Sequence[tuple[str, str, str]]) -> None:
+    if problems := [Problem(str(file), *each) for each in found]:
+        raise UsageError(problems)
+
+
+def _people(document: Campaign, people: int) -> _Found:
+    for k, crowd in enumerate(document.crowd):
+        if len(crowd.personas) != people:
+            message = f"{len(crowd.personas)} personas, and people of the scene: {people}"
+            yield f"crowd[{k}].personas", message, f"name {people}; a name may repeat. [[population]] draws one"
+    of_two = {
+        "best_response": document.best_response is not None,
+        "crossplay": document.crossplay is not None,
+        "rounds.count": document.rounds.count > Rounds().count,
+    }
+    for key in (key for key, given in of_two.items() if given and people > 1):
+        message = f"is about games of two players, and the scene has {people} people"
+        yield key, message, "leave it out, or take a scene with one [[non_ego]]"
+    if document.policies is None and document.training.games < people:
+        message = f"{document.training.games} games at once, and a person learns in {people} places"
+        yield "training.games", message, f"give at least {people}"
+
+
+def _personas(document: Campaign, personas: Sequence[str]) -> _Found:
+    named = {f"population[{k}].shares": list(each.shares) for k, each in enumerate(document.population)}
+    named |= {f"crowd[{k}].personas": list(dict.fromkeys(each.personas)) for k, each in enumerate(document.crowd)}
+    named |= {"retraining.against": document.retraining.against, "rounds.personas": document.rounds.personas}
+    for key, names in named.items():
+        for name in names:
+            if name not in personas:
+                yield key, f"there is no persona {name!r}", nearest(name, personas)
+    taken = list(personas)
+    mixed = [(f"population[{k}]", each.name) for k, each in enumerate(document.population)]
+    mixed += [(f"crowd[{k}]", each.name) for k, each in enumerate(document.crowd)]
+    for table, name in mixed:
+        if name in taken:
+            message = f"{name!r} is the name of a persona, or of another population or crowd"
+            yield f"{table}.name", message, "give it another name"
+        taken.append(name)
+    if len(set(document.retraining.against)) < len(document.retraining.against):
+        yield "retraining.against", "a persona is named twice", "name each once"
+
+
+def _other_egos(document: Campaign) -> _Found:
+    written = document.crossplay.egos if document.crossplay is not None else []
+    names = [crossplay_name(each) for each in written]
+    for driver, name in zip(written, names, strict=True):
+        if driver == LEARNED:
+            yield "crossplay.egos", "the learned egos always take part", "leave it out"
+        elif driver == document.ego.driver:
+            yield "crossplay.egos", f"{driver!r} is the campaign's ego, which always takes part", "leave it out"
+        elif names.count(name) > 1:
+            yield "crossplay.egos", f"two drivers are called {name!r}", "rename a file, or leave one out"
+        elif len(name) > MOST_LETTERS:
+            message = f"{name[:MOST_LETTERS]!r}… is longer than {MOST_LETTERS} letters"
+            yield "crossplay.egos", message, "rename its file or folder"
+        elif driver != SUMO and name in _TAKEN:
+            yield "crossplay.egos", f"{driver!r} would be called {name!r}", "rename its file or folder"
+
+
+def _arms(document: Campaign, personas: Sequence[str], tunable: bool) -> _Found:
+    if document.best_response is None:
+        return
+    arms = {stage.name: stage for stage in plan(document, personas, tunable) if isinstance(stage, AssessmentStage)}
+    pairs = [name for name, stage in arms.items() if stage.is_pair]
+    for name in document.best_response.arms:
+        if name not in pairs:
+            message = f"{name!r} is no arm of an ego and a persona" if name in arms else f"there is no arm {name!r}"
+            yield "best_response.arms", message, nearest(name, pairs)

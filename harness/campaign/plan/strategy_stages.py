@@ -1,0 +1,121 @@
+"""The drivers that play a strategy in a campaign, and the trainings and assessments that follow from strategies."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import PurePath
+
+from harness.campaign.plan.planned_drivers import (
+    External,
+    FixedMixture,
+    PlannedDriver,
+    PlannedMember,
+    Reconfigured,
+    Side,
+    SumoDriven,
+    Trained,
+    TrainedBefore,
+)
+from harness.campaign.plan.stages import AssessmentStage, EquilibriumGate, TrainingStage, stage_id
+from harness.config.campaign import LEARNED, SUMO, Campaign
+from harness.config.training import ATTENTIVE_SHARE
+from harness.evaluation.strategies import (
+    Arm,
+    EgoStrategy,
+    NaiveEgo,
+    NonEgoStrategy,
+    OtherEgo,
+    PersonaNonEgo,
+    ReconfiguredEgo,
+    SumoNonEgo,
+    player_of,
+    strategy_name,
+)
+from harness.game.roles import NON_EGO
+
+
+def ego_learns(campaign: Campaign) -> bool:
+    """Whether the campaign's ego is a learned policy, trained in it or before."""
+    return campaign.ego.driver == LEARNED
+
+
+def crossplay_name(written: str) -> str:
+    """The name of a driver in arms, which are names of files too: that of its document or folder, with "_" for all but
+    letters and digits. `naive_seed1` for `policies/merge/naive-seed1`."""
+    name = PurePath(written).stem if written.endswith(".toml") else PurePath(written).name
+    plain = re.sub("[^A-Za-z0-9]+", "_", name)
+    return plain if plain[:1].isalpha() else f"ego_{plain}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeedStages:
+    """Makes the stages of one training seed of a campaign."""
+
+    campaign: Campaign
+    seed: int
+
+    def side(self, strategy: EgoStrategy | NonEgoStrategy | None) -> Side:
+        """The side that plays a strategy; no one for None."""
+        match strategy:
+            case None:
+                return ()
+            case PersonaNonEgo(persona=name) if name in self.campaign.mixed_people:
+                return tuple(self.mixture(shares) for shares in self.campaign.mixed_people[name])
+            case _:
+                return (self._driver(strategy),)
+
+    def mixture(self, shares: Mapping[str, float]) -> PlannedDriver:
+        """Personas by their shares, one of which is drawn for each game; of one persona, its driver."""
+        members = tuple(self._driver(PersonaNonEgo(persona=name)) for name in shares)
+        return members[0] if len(members) == 1 else FixedMixture(members=members, shares=tuple(shares.values()))
+
+    def assessment(self, arm: Arm, *, persona: str = "", gates: tuple[EquilibriumGate, ...] = ()) -> AssessmentStage:
+        """The assessment of an arm."""
+        ego, non_ego = self.side(arm.ego), self.side(arm.non_ego)
+        return AssessmentStage(seed=self.seed, persona=persona, arm=arm, ego=ego, non_ego=non_ego, gates=gates)
+
+    def training(
+        self,
+        strategy: EgoStrategy | PersonaNonEgo,
+        opponent: Side,
+        *,
+        persona: str = "",
+        gates: tuple[EquilibriumGate, ...] = (),
+    ) -> TrainingStage:
+        """The training of a person, or of an ego after the naive one."""
+        campaign, is_person = self.campaign, player_of(strategy) == NON_EGO
+        warm = campaign.retraining.warm_start and not is_person
+        return TrainingStage(
+            seed=self.seed,
+            persona=persona,
+            strategy=strategy,
+            opponent=opponent,
+            initial=self._learned(NaiveEgo()) if warm else None,
+            alone_share=campaign.non_ego_training.alone_share if is_person else campaign.retraining.alone_share,
+            attentive_share=ATTENTIVE_SHARE if is_person else 0.0,
+            gates=gates,
+        )
+
+    def _driver(self, strategy: EgoStrategy | NonEgoStrategy) -> PlannedMember:
+        match strategy:
+            case SumoNonEgo() | OtherEgo(driver="sumo"):
+                return SumoDriven()
+            case OtherEgo(driver=name):
+                return External(name=name)
+            case ReconfiguredEgo():
+                return Reconfigured(stage=stage_id(strategy_name(strategy), self.seed))
+            case NaiveEgo() if not ego_learns(self.campaign):
+                return SumoDriven() if self.campaign.ego.driver == SUMO else External()
+            case PersonaNonEgo(persona=persona):
+                return self._learned(strategy, persona)
+            case _:
+                return self._learned(strategy)
+
+    def _learned(self, strategy: EgoStrategy | NonEgoStrategy, persona: str = "") -> Trained | TrainedBefore:
+        """The policy of a training stage: made by this plan, or read from the campaign's folder of policies."""
+        stage = stage_id(strategy_name(strategy), self.seed)
+        if self.campaign.policies is None:
+            return Trained(stage=stage, persona=persona)
+        return TrainedBefore(stage=stage, persona=persona)
