@@ -16,30 +16,6 @@ PUBLISHED = REPOSITORY / "reports" / "merge-arms-race"
 figures = script("game/figures.py")
 
 
-def test_gaps__a_row_has_the_payoffs_the_gap_and_the_failures_of_the_ego() -> None:
-    row = {
-        "seed": 2,
-        "persona": "speedy",
-        "round": 2,
-        "role": "non_ego",
-        "ego": "retrained_speedy",
-        "non_ego": "speedy",
-        "payoff": 10.0,
-        "payoff_best_response": 10.5,
-        "gap": 0.5,
-        "ci_low": 0.25,
-        "ci_high": 0.75,
-        "gap_share": 0.05,
-        "p_holm": 0.002,
-        "ego_failure_rate": 0.0,
-        "ego_failure_rate_best_response": 0.03,
-    }
-    assert figures.gaps_table(pd.DataFrame([row])).splitlines()[-1] == (
-        "| `retrained_speedy` against `speedy`: speedy | 2 | 10.00 → 10.50 | +0.50 (+0.25 to +0.75) | +5.0% | 0.002 | "
-        "0% → 3% |"
-    )
-
-
 def test_failures__a_cell_is_the_mean_over_seeds_and_a_dash_without_games() -> None:
     rates = [("naive", "anna", 0.2), ("naive", "anna", 0.4), ("naive", "bert", 0.0), ("robust", "anna", 0.1)]
     table = pd.DataFrame(rates, columns=["ego", "non_ego", "failure_rate"])

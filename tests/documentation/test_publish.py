@@ -13,6 +13,7 @@ import pytest
 
 from tests.support.repository import REPOSITORY
 from tests.support.scripts import script
+from tests.support.tiny import write_campaign
 
 PAGE = """# A page
 
@@ -29,6 +30,11 @@ In between.
 """
 
 publish, output_blocks, cost = (script(f"publish/{name}.py") for name in ("publish", "output_blocks", "cost"))
+BLOCKS = {
+    command: output
+    for page in publish.DOCUMENTS
+    for command, output in output_blocks.blocks_in(page.read_text("utf-8")).items()
+}
 
 
 def test_blocks__are_found_by_their_command() -> None:
@@ -105,9 +111,7 @@ def test_steps__name_campaigns_and_scripts_that_exist() -> None:
 
 
 def test_documents__every_block_is_of_a_command_that_exists() -> None:
-    blocks = [command for page in publish.DOCUMENTS for command in output_blocks.blocks_in(page.read_text("utf-8"))]
-    assert len(blocks) >= 8
-    scripts = [command.split()[1] for command in blocks if not command.startswith("python -m ")]
+    scripts = [command.split()[1] for command in BLOCKS if not command.startswith("python -m ")]
     assert [name for name in scripts if not (REPOSITORY / name).is_file()] == []
 
 
@@ -116,18 +120,14 @@ def test_documents__show_what_the_stored_tables_hold(
 ) -> None:
     """Blocks of commands that read one file that is in the repository; run folders are not, or in parts."""
     monkeypatch.chdir(REPOSITORY)
-    blocks = {k: v for page in publish.DOCUMENTS for k, v in output_blocks.blocks_in(page.read_text("utf-8")).items()}
-    shown = {
-        k: v
-        for k, v in blocks.items()
-        if k.endswith((".csv", ".json")) and "--out" not in k and Path(k.split()[-1]).is_file()
-    }
+    shown = [each for each in BLOCKS if each.endswith((".csv", ".json")) and "--out" not in each]
+    shown = [each for each in shown if Path(each.split()[-1]).is_file()]
     assert len(shown) >= 4
-    for command, block in shown.items():
+    for command in shown:
         monkeypatch.setattr(sys, "argv", command.split()[1:])
         with contextlib.suppress(SystemExit):
             runpy.run_path(sys.argv[0], run_name="__main__")
-        assert capsys.readouterr().out.strip() == block, command
+        assert capsys.readouterr().out.strip() == BLOCKS[command], command
 
 
 def test_cost__counts_trainings_steps_and_arms_of_the_plan() -> None:
@@ -141,15 +141,8 @@ def test_cost__counts_trainings_steps_and_arms_of_the_plan() -> None:
 
 
 def test_cost__of_a_campaign_whose_policies_an_earlier_step_makes(tmp_path: Path) -> None:
-    shutil.copytree(REPOSITORY / "networks" / "merge", tmp_path / "networks" / "merge")
-    shutil.copytree(REPOSITORY / "personas", tmp_path / "personas")
-    demo = tmp_path / "campaigns" / "merge-demo.toml"
-    demo.parent.mkdir()
-    shutil.copyfile(REPOSITORY / "campaigns" / "merge-demo.toml", demo)
+    campaign = write_campaign(tmp_path, policies="policies/later", training=None)
     (tmp_path / "benchmarks").mkdir()
     shutil.copyfile(REPOSITORY / "benchmarks" / "results.json", tmp_path / "benchmarks" / "results.json")
-    not_made_yet = cost.cost_table([demo], tmp_path).splitlines()
-    cells = not_made_yet[2].split("|")
-    assert [cells[1].strip(), cells[4].strip()] == ["campaigns/merge-demo.toml", "10"]
-    (tmp_path / "policies" / "merge").mkdir(parents=True)  # empty: as those of an older version, left unread
-    assert cost.cost_table([demo], tmp_path).splitlines() == not_made_yet
+    row = cost.cost_table([campaign], tmp_path).splitlines()[2]
+    assert [cell.strip() for cell in row.split("|")][1:5] == ["tiny.toml", "0", "0.0 M", "6"]
