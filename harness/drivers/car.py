@@ -11,11 +11,8 @@ from harness.errors import DriverError
 from harness.game import bicycle
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import Actuators
-from harness.game.observation_layout import LAYOUT, in_units
+from harness.game.observation_layout import OWN, in_units
 from harness.game.world import World
-
-SPEED, _ROAD_STEERING = LAYOUT.index("speed_mps"), LAYOUT.index("road_steering_rad")
-
 
 LARGEST_MPS2, LARGEST_RAD, LARGEST_SCALED = 100.0, 2.0 * math.pi, 100.0
 """Requests beyond these are not those of a driver: tyres transmit about 10 m/s², and wheels turn by less than 1 rad.
@@ -59,9 +56,9 @@ class Car:
         check_plausible(acceleration_mps2, LARGEST_MPS2, "an acceleration", "m/s²")
         check_plausible(steering_rad, LARGEST_RAD, "a road wheel angle", "rad")
         seen = self.physical(observation)
-        speed, road_steering = seen[:, SPEED, None], seen[:, _ROAD_STEERING, None]
-        requested = (acceleration_mps2[:, None], steering_rad[:, None])
-        return bicycle.actions(*requested, speed, road_steering, self.actuators)[:, 0]
+        speed, road_steering = seen[:, OWN.speed_mps, None], seen[:, OWN.road_steering_rad, None]
+        requested, road = (acceleration_mps2[:, None], steering_rad[:, None]), road_steering
+        return bicycle.actions(*requested, speed_mps=speed, road_steering_rad=road, actuators=self.actuators)[:, 0]
 
 
 def car_of(world: World, player: int) -> Car:

@@ -30,7 +30,7 @@ from harness.environments.seats import Seat as Seat
 from harness.environments.seats import with_walkers
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.attention import release_controls
-from harness.game.bicycle import move, requests
+from harness.game.bicycle import Requested, move, requests
 from harness.game.human_limits import PlayersLimits
 from harness.game.initial_state import InitialState
 from harness.game.observation import observe
@@ -159,9 +159,10 @@ class Arena(LiveSimulation):
         drove = state.running
         acceleration, steering = self._decide(actions, drove)
         world = self.world
-        move(state, acceleration, steering, drove & self._on_wheels, world.actuators, world.step_s)
+        requested = Requested(acceleration, steering, drove & self._on_wheels)
+        move(state, requested, world.actuators, world.step_s)
         if world.on_foot:
-            walk(state, acceleration, steering, drove & world.walks, world.actuators, world.step_s)
+            walk(state, requested._replace(moving=drove & world.walks), world.actuators, world.step_s)
         reading = self.reading = self.simulation.step(state.x_m, state.y_m, state.heading_rad)
         if reading.signals is not None:
             state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, self.world.step_s)
@@ -178,7 +179,7 @@ class Arena(LiveSimulation):
             self._limits.look(state)
         self._terminations(quantities, drove)
         payoff = self._payoffs(quantities, drove)
-        check_step(before, quantities, drove=drove, payoff=payoff, slack=self._slack_m)
+        check_step(before, quantities, drove=drove, payoff=payoff, slack_m=self._slack_m)
         self._finish(quantities, drove)
         check_observation(self.observation, self._all_games, state.step)
         return Step(payoff=payoff, drove=drove, quantities=quantities)
@@ -203,15 +204,15 @@ class Arena(LiveSimulation):
                 if seat.driver.takes_over and len(games):
                     noise = self._noise[games, player, now[games]]
                     decided = seat.driver.decide(games, self.observation[games, player], noise)
-                    chosen[games, player] = checked_decisions(
-                        decided, seat.driver, role=self.world.roles[player], games=games, steps=state.step
-                    )
+                    of = f"{self.world.roles[player]}, {type(seat.driver).__name__},"
+                    chosen[games, player] = checked_decisions(decided, of, games, state.step)
         if self._limits.delays:
             chosen = self._limits.arriving(chosen, now)
         acceleration, steering = requests(chosen, state.speed_mps, self._road_steering_rad, self.world.actuators)
         if self._limits.spares:
             acceleration, steering = self._limits.within(acceleration, steering)
-        state.lapsed = release_controls(acceleration, steering, self._lapsed, self._lapsed_steering_rad, now, drove)
+        lapses = (self._lapsed, self._lapsed_steering_rad)
+        state.lapsed = release_controls((acceleration, steering), lapses, now, drove)
         return acceleration, steering
 
     def _locate(self) -> tuple[FloatArray, FloatArray]:
@@ -222,9 +223,9 @@ class Arena(LiveSimulation):
 
     def _terminations(self, quantities: Quantities, drove: BoolArray) -> None:
         state = self.state
-        clearances_m = (quantities.vehicle_clearance_m, quantities.rail_clearance_m)
+        distances_m = (quantities.goal_m, quantities.vehicle_clearance_m, quantities.rail_clearance_m)
         time_is_up = state.step >= self.world.steps
-        terminations(state.outcome, drove, self._taken_over, time_is_up, quantities.goal_m, *clearances_m)
+        terminations(state.outcome, drove, (self._taken_over, time_is_up), distances_m)
 
     def _payoffs(self, quantities: Quantities, drove: BoolArray) -> FloatArray:
         payoff = np.zeros(drove.shape)

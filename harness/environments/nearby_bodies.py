@@ -60,5 +60,5 @@ class NearbyBodies:
         if not self._obstacles.each:
             return bodies
         standing = (*np.moveaxis(self.poses[games], -1, 0), *(each[games] for each in self._at_rest))
-        columns = zip(vars(bodies).values(), standing, strict=True)
+        columns = zip(bodies, standing, strict=True)
         return Bodies(*(np.concatenate(pair, axis=1) for pair in columns))

@@ -60,8 +60,7 @@ class _Search:
 
     @cached_property
     def _places(self) -> Places:
-        bodies = self._q.bodies
-        return Places(*places(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.present, tuple(self._tables.streams)))
+        return Places(*places(tuple(self._q.bodies), tuple(self._tables.streams)))
 
     @cached_property
     def _front_m(self) -> FloatArray:
@@ -73,7 +72,8 @@ class _Search:
         conflicts, q = self._tables.conflicts, self._q
         speed_mps, offset_m = q.state.speed_mps[:, self._player], q.lateral_offset_m[:, self._player]
         for c in np.flatnonzero(conflicts.player == self._player).tolist():
-            own = own_passage(self._front_m, speed_mps, self._length_m, conflicts, c, self._step_s)
+            zone_m = (conflicts.begin_m[c], conflicts.end_m[c])
+            own = own_passage(self._front_m, speed_mps, zone_m, length_m=self._length_m, step_s=self._step_s)
             if own is None:
                 continue
             offset = offset_m[self._step_of(own)]
@@ -99,7 +99,8 @@ class _Search:
         steps, along_m, speed_mps = steps[on_stream], along_m[on_stream], speed_mps[on_stream]
         if not len(steps) or not self._follows(c, body, steps, along_m, speed_mps):
             return
-        other = other_passage(steps, along_m, speed_mps, length_m, conflicts, c, self._step_s)
+        zone_m = (conflicts.zone_m[c], conflicts.zone_m[c] + conflicts.length_m[c])
+        other = other_passage(steps, along_m, speed_mps, zone_m, length_m=length_m, step_s=self._step_s)
         gap_s = self._gap_s(own, other, steps, conflicts.zone_m[c] - along_m - 0.5 * length_m, speed_mps)
         if other is not None or gap_s < np.inf:
             own_signal = self._signal(
@@ -107,7 +108,7 @@ class _Search:
             )
             other_signal = self._signal(conflicts.other_link[c], along_m + 0.5 * length_m >= 0.0, steps)
             other_first = other is not None and other.enters_s <= own.enters_s
-            must_yield = has_duty(c, own_signal, other_signal, other_first, self._tables.streams.conflicts)
+            must_yield = has_duty(self._tables.streams.conflicts[c], own_signal, other_signal, other_first)
             yield Encounter(conflict=c, body=body, own=own, other=other, must_yield=bool(must_yield), gap_s=gap_s)
 
     def _follows(self, c: int, body: int, steps: IntArray, along_m: FloatArray, speed_mps: FloatArray) -> bool:

@@ -116,19 +116,15 @@ def draw_lapses(attention: Attention, steps: int, step_s: float, generator: np.r
 
 @compiled
 def release_controls(
-    acceleration_mps2: FloatArray,
-    steering_rad: FloatArray,
-    lapsed: BoolArray,
-    lapsed_steering_rad: FloatArray,
-    step: IntArray,
-    drove: BoolArray,
+    requested: tuple[FloatArray, FloatArray], lapses: tuple[BoolArray, FloatArray], step: IntArray, drove: BoolArray
 ) -> BoolArray:
     """Release pedals and wheel of the players whose attention lapses in this step.
 
-    acceleration_mps2, steering_rad [G, P] are changed in place: no acceleration, and the steering angle of the road.
-    lapsed, lapsed_steering_rad [G, P, T] are the lapses of the games, step [G] the current steps, drove [G, P] the
-    players that still drive. Returns [G, P]: the players with a lapse.
+    The requested accelerations and steering angles [G, P] are changed in place: no acceleration, and the steering angle
+    of the road. `lapses` are the lapses of the games and the steering angle in them [G, P, T], step [G] the current
+    steps, drove [G, P] the players that still drive. Returns [G, P]: the players with a lapse.
     """
+    (acceleration_mps2, steering_rad), (lapsed, lapsed_steering_rad) = requested, lapses
     inattentive = np.zeros(drove.shape, dtype=np.bool_)
     for g, p in np.ndindex(drove.shape):
         if drove[g, p] and lapsed[g, p, step[g]]:

@@ -11,7 +11,8 @@ acceleration of a two-wheeler is also limited by its lean.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -70,6 +71,7 @@ def requests(
 def actions(
     acceleration_mps2: FloatArray,
     steering_rad: FloatArray,
+    *,
     speed_mps: FloatArray,
     road_steering_rad: FloatArray,
     actuators: Actuators,
@@ -88,44 +90,49 @@ def actions(
     return np.clip(np.stack((acceleration_mps2 / strongest, wheel), axis=-1), -1.0, 1.0)
 
 
-def move(
-    state: State,
-    acceleration_mps2: FloatArray,
-    steering_rad: FloatArray,
-    moving: BoolArray,
-    actuators: Actuators,
-    step_s: float,
-) -> None:
-    """Move the players marked in `moving` [G, P] by one step, in place.
+class Motion(NamedTuple):
+    """The columns of `State` that motion changes, and the friction of the games."""
 
-    acceleration_mps2 and steering_rad [G, P] are requests. The steering angle follows its request at the rate of the
-    steering rack. The grip used by the curve is not available to the pedals (friction circle). If the grip is too
-    small for the curve, the car runs wide.
+    x_m: FloatArray
+    y_m: FloatArray
+    heading_rad: FloatArray
+    speed_mps: FloatArray
+    acceleration_mps2: FloatArray
+    steering_rad: FloatArray
+    friction: FloatArray
+
+
+class Requested(NamedTuple):
+    """Requests of the players, [G, P], and whose are carried out."""
+
+    acceleration_mps2: FloatArray
+    steering_rad: FloatArray
+    moving: BoolArray
+
+
+motion_of = attrgetter(*Motion._fields)
+"""The columns of `Motion` of a state."""
+
+
+def move(state: State, requested: Requested, actuators: Actuators, step_s: float) -> None:
+    """Move the players marked in `moving` by one step, in place.
+
+    The steering angle follows its request at the rate of the steering rack. The grip used by the curve is not available
+    to the pedals (friction circle). If the grip is too small for the curve, the car runs wide.
     """
-    motion = (state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad)
-    _move(*motion, acceleration_mps2, steering_rad, moving, state.friction, actuators, step_s)
+    _move(motion_of(state), tuple(requested), tuple(actuators), step_s)
 
 
 @compiled
-def _move(
-    x_m: FloatArray,
-    y_m: FloatArray,
-    heading_rad: FloatArray,
-    speed_mps: FloatArray,
-    acceleration_mps2: FloatArray,
-    steering_rad: FloatArray,
-    requested_acceleration_mps2: FloatArray,
-    requested_steering_rad: FloatArray,
-    moving: BoolArray,
-    friction: FloatArray,
-    actuators: Actuators,
-    step_s: float,
-) -> None:
+def _move(motion: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, ...], step_s: float) -> None:
+    x_m, y_m, heading_rad, speed_mps, acceleration_mps2, steering_rad, friction = motion
+    requested, actuators = Requested(*requests), Actuators(*limits)
+    moving = requested.moving
     for g, p in np.ndindex(moving.shape):
         if moving[g, p]:
             grip = friction[g] * GRAVITY_MPS2
             rack = actuators.max_steering_rate_radps[p] * step_s
-            turn = _clamped(requested_steering_rad[g, p] - steering_rad[g, p], rack)
+            turn = _clamped(requested.steering_rad[g, p] - steering_rad[g, p], rack)
             steering = _clamped(steering_rad[g, p] + turn, actuators.max_steering_rad[p])
             requested_curvature = curvature_per_m(steering, actuators.wheelbase_m[p])
 
@@ -133,7 +140,7 @@ def _move(
             pedal_grip = _remaining_grip(grip, requested_curvature * before**2)
             most_up = min(actuators.max_acceleration_mps2[p], pedal_grip)
             most_down = min(actuators.max_braking_mps2[p], pedal_grip)
-            acceleration = min(max(requested_acceleration_mps2[g, p], -most_down), most_up)
+            acceleration = min(max(requested.acceleration_mps2[g, p], -most_down), most_up)
             speed = min(max(before + acceleration * step_s, 0.0), actuators.max_speed_mps[p])
             acceleration = (speed - before) / step_s
 
@@ -156,23 +163,19 @@ def curvature_per_m(steering_rad: FloatArray, wheelbase_m: FloatArray) -> FloatA
 
 def lateral_acceleration_mps2(state: State, actuators: Actuators) -> FloatArray:
     """[G, P] lateral acceleration (m/s^2) at the state's steering and speed, bounded by the grip left by the pedals."""
-    motion = (state.steering_rad, state.speed_mps, state.acceleration_mps2)
-    wheels = (actuators.wheelbase_m, actuators.max_lateral_mps2)
-    return _lateral_acceleration_mps2(*motion, state.friction[:, None], *wheels)
+    return _lateral_acceleration_mps2(motion_of(state), tuple(actuators))
 
 
 @compiled
-def _lateral_acceleration_mps2(
-    steering_rad: FloatArray,
-    speed_mps: FloatArray,
-    acceleration_mps2: FloatArray,
-    friction: FloatArray,
-    wheelbase_m: FloatArray,
-    max_lateral_mps2: FloatArray,
-) -> FloatArray:
-    sideways = curvature_per_m(steering_rad, wheelbase_m) * speed_mps**2
-    grip = _remaining_grip(friction * GRAVITY_MPS2, acceleration_mps2)
-    return _clamped(sideways, np.minimum(grip, max_lateral_mps2))
+def _lateral_acceleration_mps2(columns: tuple[Any, ...], limits: tuple[Any, ...]) -> FloatArray:
+    motion, actuators = Motion(*columns), Actuators(*limits)
+    lateral = np.empty(motion.speed_mps.shape)
+    for g, p in np.ndindex(lateral.shape):
+        curvature = curvature_per_m(motion.steering_rad[g, p], actuators.wheelbase_m[p])
+        grip = _remaining_grip(motion.friction[g] * GRAVITY_MPS2, motion.acceleration_mps2[g, p])
+        sideways = min(grip, actuators.max_lateral_mps2[p])
+        lateral[g, p] = _clamped(curvature * motion.speed_mps[g, p] ** 2, sideways)
+    return lateral
 
 
 @compiled

@@ -110,12 +110,15 @@ def _reach(box: Box, cosine: float, sine: float) -> tuple[float, float]:
 @compiled
 def box_segment_distance(box: Box, segment: FloatArray) -> float:
     """Distance (m) of a box to a segment [2, 2] (start and end, x and y); 0 if they touch."""
-    return _box_segment_distance(box, cos(box.heading_rad), sin(box.heading_rad), segment, inf)
+    return _box_segment_distance(box, (cos(box.heading_rad), sin(box.heading_rad)), segment, inf)
 
 
 @compiled
-def _box_segment_distance(box: Box, cosine: float, sine: float, segment: FloatArray, limit_m: float) -> float:
-    """The distance if it is below the limit, else a value not below it; cosine and sine are those of the heading."""
+def _box_segment_distance(
+    box: Box, direction: tuple[float, float], segment: FloatArray, limit_m: float
+) -> float:
+    """The distance if it is below the limit, else a value not below it; `direction` is cosine and sine of the heading."""
+    cosine, sine = direction
     dx, dy = segment[0, 0] - box.x_m, segment[0, 1] - box.y_m
     u0, v0 = dx * cosine + dy * sine, dy * cosine - dx * sine
     dx, dy = segment[1, 0] - box.x_m, segment[1, 1] - box.y_m
@@ -165,9 +168,11 @@ def distance_to_nearest_box(own: Box, others: Box, among: BoolArray, limit_m: fl
 
 @compiled
 def time_to_first_contact(
-    own: Box, others: Box, own_speed_mps: FloatArray, speed_mps: FloatArray, among: BoolArray
+    own: Box, others: Box, speeds_mps: tuple[FloatArray, FloatArray], among: BoolArray
 ) -> FloatArray:
-    """[N, P] seconds until the first contact with a marked box at constant headings and speeds; inf if none."""
+    """[N, P] seconds until the first contact with a marked box at constant headings and speeds [N, P] and [N, B]; inf
+    if none."""
+    own_speed_mps, speed_mps = speeds_mps
     soonest_s = np.full(own.x_m.shape, inf)
     for n, p, b in np.ndindex(among.shape):
         if among[n, p, b]:
@@ -187,11 +192,11 @@ def distance_to_nearest_segment(own: Box, segments: FloatArray, rows: IntArray, 
     nearest_m = np.full(own.x_m.shape, limit_m)
     for n, p in np.ndindex(own.x_m.shape):
         box = _own(own, n, p)
-        cosine, sine = cos(box.heading_rad), sin(box.heading_rad)
+        direction = (cos(box.heading_rad), sin(box.heading_rad))
         for k in range(rows.shape[2]):
             if rows[n, p, k] < 0:
                 break
-            distance = _box_segment_distance(box, cosine, sine, segments[rows[n, p, k]], nearest_m[n, p])
+            distance = _box_segment_distance(box, direction, segments[rows[n, p, k]], nearest_m[n, p])
             nearest_m[n, p] = min(nearest_m[n, p], distance)
     return nearest_m
 

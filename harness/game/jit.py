@@ -112,3 +112,9 @@ def _folder(package: Path) -> str:
     sources = [each for folder in (Path(__file__).parent, package) for each in sorted(folder.glob("*.py"))]
     digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:24]
     return str(Path(platformdirs.user_cache_dir("harness")) / "compiled" / digest)
+
+
+def inlined(function: _Function) -> _Function:
+    """Copy a function into the compiled functions that call it: arrays that are passed to it cost no time."""
+    options: dict[str, Any] = {"inline": "always"}
+    return cast(_Function, numba.njit(**options)(function))

@@ -11,6 +11,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.right_of_way import CELL_M, Conflicts, Signal, Streams
 from harness.game.road import COMFORTABLE_MPS2
+from harness.game.state import Bodies
 
 STANDING_MPS = 0.1  # a body that is not faster does not arrive
 HORIZON_S = 5.0  # a zone that a player reaches later is not in its way yet: from 50 km/h it can stop in comfort
@@ -68,25 +69,36 @@ def entered_before_s(met: Meetings, advanced_m: FloatArray) -> FloatArray:
     return np.where(enters & met.must_yield, met.other_s, np.inf).min(-1, initial=np.inf)
 
 
+class _Body(NamedTuple):
+    """A body that a player regards: half its length, its speed, and the streams it drives in, [K]."""
+
+    half_m: float
+    speed_mps: float
+    in_streams: IntArray
+    along_m: FloatArray  # [S] its place along each stream
+
+
+class _Player(NamedTuple):
+    """A player whose conflicts are looked for."""
+
+    player: int
+    front_m: float  # stations of its bumpers
+    rear_m: float
+    length_m: float
+    offset_m: float
+    speed_mps: float
+
+
 @compiled
 def meetings(
-    station_m: FloatArray,
-    offset_m: FloatArray,
-    speed_mps: FloatArray,
-    length_m: FloatArray,
-    bodies: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
-    visible: BoolArray,
-    signals: IntArray,
-    table: tuple[Any, ...],
+    players: tuple[FloatArray, ...], bodies: tuple[Any, ...], signals: IntArray, table: tuple[Any, ...]
 ) -> tuple[IntArray, FloatArray, BoolArray]:
     """The columns of `Meetings`: the conflict, the numbers [5, G, P, B] in their order, and the duty to yield.
 
-    Players are given by station, lateral offset and speed [G, P] and length [P], bodies by x, y, heading, speed and
-    length [G, B], and which body each player regards by `visible` [G, P, B]. `signals` [G, L] are the states of links.
+    Players are given by station, lateral offset and speed [G, P], length [P], and the bodies that each regards
+    [G, P, B]. `signals` [G, L] are the states of links, `table` is that of the streams.
     """
-    streams = Streams(*table)
-    conflicts = streams.conflicts
-    x_m, y_m, heading_rad, body_speed_mps, body_length_m = bodies
+    (station_m, offset_m, speed_mps, length_m, visible), among, streams = players, Bodies(*bodies), Streams(*table)
     shape = visible.shape
     row, must_yield = np.full(shape, -1), np.zeros(shape, dtype=np.bool_)
     numbers = np.full((5, *shape), np.inf)
@@ -95,42 +107,59 @@ def meetings(
     for g in range(shape[0]):
         for b in range(shape[2]):
             count = -1  # the streams of the body are found once, for the first player that regards it
-            half_m = 0.5 * body_length_m[g, b]
             for p in range(shape[1]):
                 if not visible[g, p, b]:
                     continue
                 if count < 0:
-                    count = streams_at(x_m[g, b], y_m[g, b], heading_rad[g, b], streams, in_streams, along_m)
-                rear_m, places = station_m[g, p] - 0.5 * length_m[p], in_streams[:count]
-                found, other_m = _first_conflict(p, rear_m, offset_m[g, p], half_m, places, along_m, streams)
-                if found < 0:
-                    continue
-                front_m = station_m[g, p] + 0.5 * length_m[p]
-                own_m = conflicts[found, _BEGIN_M] - front_m
-                own_end_m = conflicts[found, _END_M] - front_m + length_m[p]
-                other_end_m = other_m + conflicts[found, _LENGTH_M] + 2.0 * half_m
-                own = _passage_s(own_m, own_end_m, speed_mps[g, p])
-                other = _passage_s(other_m, other_end_m, body_speed_mps[g, b])
-                other_along_m = conflicts[found, _ZONE_M] - other_m
-                gap_s = np.inf if _moves_up(found, own_m, speed_mps[g, p], conflicts) else _gap_s(own, other)
-                row[g, p, b] = found
-                for k, number in enumerate((own_m, other_m, own[0], other[0], gap_s)):
+                    pose = (among.x_m[g, b], among.y_m[g, b], among.heading_rad[g, b])
+                    count = streams_at(pose, streams, in_streams, along_m)
+                half_m = 0.5 * length_m[p]
+                ends_m = (station_m[g, p] + half_m, station_m[g, p] - half_m)
+                player = _Player(p, *ends_m, length_m[p], offset_m[g, p], speed_mps[g, p])
+                body = _Body(0.5 * among.length_m[g, b], among.speed_mps[g, b], in_streams[:count], along_m)
+                found, found_numbers, yields = _meeting(player, body, streams, signals[g])
+                row[g, p, b], must_yield[g, p, b] = found, yields
+                for k, number in enumerate(found_numbers):
                     numbers[k, g, p, b] = number
-                must_yield[g, p, b] = _must_yield(
-                    found, front_m, other_along_m, own[0], other[0], signals[g], conflicts
-                )
     return row, numbers, must_yield
 
 
 @compiled
+def _meeting(
+    player: _Player, body: _Body, streams: Streams, signals: IntArray
+) -> tuple[int, tuple[float, float, float, float, float], bool]:
+    """The conflict of a player with a body: its row, the numbers of `Meetings` in their order, and the duty to yield."""
+    conflicts = streams.conflicts
+    found, other_m = _first_conflict(player, body, streams)
+    if found < 0:
+        return found, (np.inf, np.inf, np.inf, np.inf, np.inf), False
+    own_m = conflicts[found, _BEGIN_M] - player.front_m
+    own_end_m = conflicts[found, _END_M] - player.front_m + player.length_m
+    other_end_m = other_m + conflicts[found, _LENGTH_M] + 2.0 * body.half_m
+    own = _passage_s(own_m, own_end_m, player.speed_mps)
+    other = _passage_s(other_m, other_end_m, body.speed_mps)
+    gap_s = np.inf if _moves_up(found, own_m, player.speed_mps, conflicts) else _gap_s(own, other)
+    # a signal counts for a side that has not passed its stop line
+    own_signal, other_signal = _OFF, _OFF
+    if conflicts[found, _OWN_LINK] >= 0 and player.front_m <= conflicts[found, _STOP_M] and len(signals):
+        own_signal = signals[int(conflicts[found, _OWN_LINK])]
+    if conflicts[found, _OTHER_LINK] >= 0 and conflicts[found, _ZONE_M] - other_m <= 0.0 and len(signals):
+        other_signal = signals[int(conflicts[found, _OTHER_LINK])]
+    yields = has_duty(conflicts[found], own_signal, other_signal, other[0] <= own[0])
+    return found, (own_m, other_m, own[0], other[0], gap_s), yields
+
+
+@compiled
 def streams_at(
-    x_m: float, y_m: float, heading_rad: float, streams: Streams, in_streams: IntArray, along_m: FloatArray
+    pose: tuple[float, float, float], streams: Streams, in_streams: IntArray, along_m: FloatArray
 ) -> int:
-    """The number of streams in which a body drives; written to `in_streams` in order, and its place to `along_m`.
+    """The number of streams in which a body with a pose (x, y, heading) drives; written to `in_streams` in order, and
+    its place to `along_m`.
 
     Streams that are farther beside the body than another one by more than `_BESIDE_M` are left out: inside a junction,
     it is on its way to leave them, or has only come near to their end.
     """
+    x_m, y_m, heading_rad = pose
     column = int((x_m - streams.origin_m[0]) // CELL_M)
     line = int((y_m - streams.origin_m[1]) // CELL_M)
     if column < 0 or line < 0 or column >= streams.first.shape[0] or line >= streams.first.shape[1] - 1:
@@ -162,31 +191,23 @@ def streams_at(
 
 
 @compiled
-def _first_conflict(
-    player: int,
-    rear_m: float,
-    offset_m: float,
-    half_m: float,
-    in_streams: IntArray,
-    along_m: FloatArray,
-    streams: Streams,
-) -> tuple[int, float]:
-    """The player's first conflict with a body in these streams that neither has passed, and the distance of the body's
-    front to the zone; -1 without one. `rear_m` is the station of the player's rear, `half_m` half the body's length."""
+def _first_conflict(player: _Player, body: _Body, streams: Streams) -> tuple[int, float]:
+    """The player's first conflict with a body that neither has passed, and the distance of the body's front to the
+    zone; -1 without one."""
     conflicts = streams.conflicts
     found, begin_m, other_m = -1, np.inf, np.inf
-    for s in in_streams:
-        for c in range(streams.first_conflict[player, s], streams.last_conflict[player, s]):
-            if rear_m > conflicts[c, _END_M] or conflicts[c, _BEGIN_M] >= begin_m:
+    for s in body.in_streams:
+        for c in range(streams.first_conflict[player.player, s], streams.last_conflict[player.player, s]):
+            if player.rear_m > conflicts[c, _END_M] or conflicts[c, _BEGIN_M] >= begin_m:
                 continue
-            if not conflicts[c, _RIGHT_M] <= offset_m <= conflicts[c, _LEFT_M]:
+            if not conflicts[c, _RIGHT_M] <= player.offset_m <= conflicts[c, _LEFT_M]:
                 continue
-            place = along_m[s]
+            place = body.along_m[s]
             if not conflicts[c, _FROM_M] <= place <= conflicts[c, _UNTIL_M]:
                 continue
-            if place - half_m > conflicts[c, _ZONE_M] + conflicts[c, _LENGTH_M]:
+            if place - body.half_m > conflicts[c, _ZONE_M] + conflicts[c, _LENGTH_M]:
                 continue
-            found, begin_m, other_m = c, conflicts[c, _BEGIN_M], conflicts[c, _ZONE_M] - place - half_m
+            found, begin_m, other_m = c, conflicts[c, _BEGIN_M], conflicts[c, _ZONE_M] - place - body.half_m
     return found, other_m
 
 
@@ -213,35 +234,16 @@ def _moves_up(c: int, own_m: float, speed_mps: float, conflicts: FloatArray) -> 
 
 
 @compiled
-def _must_yield(
-    c: int,
-    front_m: float,
-    other_along_m: float,
-    own_s: float,
-    other_s: float,
-    signals: IntArray,
-    conflicts: FloatArray,
-) -> bool:
-    """Whether the player must yield in conflict `c`. A signal counts for a side that has not passed its stop line."""
-    own, other = _OFF, _OFF
-    if conflicts[c, _OWN_LINK] >= 0 and front_m <= conflicts[c, _STOP_M] and len(signals):
-        own = signals[int(conflicts[c, _OWN_LINK])]
-    if conflicts[c, _OTHER_LINK] >= 0 and other_along_m <= 0.0 and len(signals):
-        other = signals[int(conflicts[c, _OTHER_LINK])]
-    return has_duty(c, own, other, other_s <= own_s, conflicts)
-
-
-@compiled
-def has_duty(c: int, own: int, other: int, other_first: bool, conflicts: FloatArray) -> bool:
-    """Whether the player must yield in conflict `c` of a table [C, 18], given the signals of both sides.
+def has_duty(conflict: FloatArray, own: int, other: int, other_first: bool) -> bool:
+    """Whether the player must yield in a conflict [18], a row of `Streams.conflicts`, given the signals of both sides.
 
     A stream on red has no priority, a player on red has none over a stream that is not, a player on 'G' yields to no
     stream, and any other player at these lights yields to a stream on 'G'. Otherwise the signs of the junction decide.
     """
     if other == _RED or own == _GREEN:
         return False
-    if own == _RED or (other == _GREEN and conflicts[c, _OWN_LINK] >= 0):
+    if own == _RED or (other == _GREEN and conflict[_OWN_LINK] >= 0):
         return True
-    if conflicts[c, _FIRST_COME] > 0.0:
+    if conflict[_FIRST_COME] > 0.0:
         return other_first
-    return conflicts[c, _YIELDS] > 0.0
+    return conflict[_YIELDS] > 0.0

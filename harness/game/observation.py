@@ -1,10 +1,10 @@
 """Observations of the players: own motion, the road ahead, signs and signals, and the other bodies that matter most.
 
 An observation is in the player's own frame and holds only what a driver can see: no intentions, personas, payoffs or
-plans. `harness.game.observation_layout` has its entries.
+plans. `harness.game.observation_layout` has its entries; here a function writes each group of them.
 
 An error of estimated distances scales the distance of other bodies in their true direction. An error of closing speeds
-adds a radial velocity to theirs (`game.human_limits`).
+adds a radial velocity to theirs (`game.human_factors`).
 
 The free width at a distance ahead ends at the nearest surface on either side, rail or vehicle (paper, section 4.3.2:
 the ego "seeks to maintain a large distance between itself and nearby objects").
@@ -15,164 +15,218 @@ distance.
 
 from __future__ import annotations
 
-from typing import Any
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.jit import compiled
+from harness.game.jit import compiled, inlined
 from harness.game.meetings import Meetings
-from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, LAYOUT, OTHERS, SCALE, SIZE
+from harness.game.observation_layout import (
+    BEHIND,
+    COMPRESSED,
+    ENTRIES,
+    FIRST_OTHER,
+    OTHER,
+    OTHERS,
+    OWN,
+    SCALE,
+    SIZE,
+)
 from harness.game.quantities import Quantities
 from harness.game.right_of_way import Control, Signal, StopLines
-from harness.game.road import AHEAD_M, Along, Routes, row_at
-from harness.game.route_coordinates import half_extents_m, place_along_route, row_ahead
+from harness.game.road import AHEAD_M, Along, Routes
+from harness.game.route_coordinates import OnRoute, half_extents_m, on_route, point_along_route, row_ahead
 from harness.game.sight import nothing_hidden
+from harness.game.state import Bodies
 
 _EDGES = np.concatenate(([-2.5], 0.5 * (AHEAD_M[1:] + AHEAD_M[:-1]), [60.0]))  # bins of road around AHEAD_M
 _COUNT = len(AHEAD_M)
-_PATH_LEFT, _STOP_LINE, _LEADER = (LAYOUT.index(name) for name in ("path_left_m", "stop_line_m", "leader_seen"))
-_TURNED, _BEND, _LEFT, _RIGHT = (
-    LAYOUT.index(f"{name}@0m") for name in ("path_turned_rad", "path_bend_per_m", "free_left_m", "free_right_m")
-)
-_FIRST_OTHER = LAYOUT.index("other0_seen")
 
 SEEN_M = 120.0  # bodies farther away are not in an observation
 _NEARNESS_MPS = 10.0  # a body at a distance matters like a conflict in the time to cover it at this speed
 _LEAST_MPS = 3.0  # a slower body may start to move
 
 
+class _Players(NamedTuple):
+    """Columns of `State`."""
+
+    x_m: FloatArray
+    y_m: FloatArray
+    heading_rad: FloatArray
+    speed_mps: FloatArray
+    acceleration_mps2: FloatArray
+    steering_rad: FloatArray
+    station_m: FloatArray
+    present: BoolArray
+    unseen_behind_m: FloatArray
+    sight_m: FloatArray
+    sight_cosine: FloatArray
+    distance_error: FloatArray
+    closing_error_per_s: FloatArray
+    signals: IntArray
+    signal_s: FloatArray
+
+
+class _Views(NamedTuple):
+    """What the road, the rules and the cars add to that."""
+
+    offset_m: FloatArray  # [G, P] from the route's line
+    next_line: IntArray  # [G, P] row of the next stop line
+    posted_mps: FloatArray  # [G, P]
+    hidden: BoolArray  # [G, P, B]
+    max_steering_rad: FloatArray  # [P]
+    length_m: FloatArray  # [P]
+    width_m: FloatArray  # [P]
+
+
+class _Eye(NamedTuple):
+    """The player `p` of game `g`, which observes."""
+
+    g: int
+    p: int
+    place: OnRoute
+    x_m: float
+    y_m: float
+    heading_rad: float
+    cosine: float  # of the heading
+    sine: float
+    speed_mps: float
+    acceleration_mps2: float
+    steering_rad: float
+    max_steering_rad: float
+    posted_mps: float
+    next_line: int
+    length_m: float
+    width_m: float
+    unseen_behind_m: float
+    sight_m: float
+    sight_cosine: float
+    distance_error: float
+    closing_error_per_s: float
+
+
+class _Body(NamedTuple):
+    """Another body, and the player's conflict with it."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    speed_mps: float
+    length_m: float
+    width_m: float
+    meets: bool
+    own_m: float  # to the conflict
+    other_m: float
+    must_yield: bool
+
+
+_columns = attrgetter(*_Players._fields)  # plain tuples: numba takes them apart three times as fast as records
+
+
 def observe(q: Quantities) -> FloatArray:
     """[G, P, SIZE] float32 in [-1, 1]: the players' observations; zeros for players that are not present."""
-    state, bodies, actuators = q.state, q.bodies, q.world.actuators
-    return _observe(
-        *(state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad),
-        *(state.station_m, q.lateral_offset_m, state.present),
-        (state.unseen_behind_m, state.sight_m, state.sight_cosine, state.distance_error, state.closing_error_per_s),
-        *(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m, bodies.width_m),
-        bodies.present,
-        q.hidden if q.world.hiding.anything else nothing_hidden((*state.present.shape, bodies.present.shape[1])),
-        *(actuators.max_steering_rad, q.world.length_m, q.world.width_m, state.signal_s),
-        *(q.rules.next_line, q.rules.posted_mps, state.signals),
-        (tuple(q.world.road.routes), tuple(q.along), tuple(q.world.right_of_way.stop_lines), tuple(q.meetings)),
+    world, shape = q.world, (*q.state.present.shape, q.bodies.present.shape[1])
+    views = (  # the columns of `_Views`
+        *(q.lateral_offset_m, q.rules.next_line, q.rules.posted_mps),
+        q.hidden if world.hiding.anything else nothing_hidden(shape),
+        *(world.actuators.max_steering_rad, world.length_m, world.width_m),
     )
+    road = (tuple(world.road.routes), tuple(q.along), tuple(world.right_of_way.stop_lines), tuple(q.meetings))
+    return _observe((_columns(q.state), views, tuple(q.bodies), *road))
 
 
 @compiled
-def _observe(
-    x_m: FloatArray,
-    y_m: FloatArray,
-    heading_rad: FloatArray,
-    speed_mps: FloatArray,
-    acceleration_mps2: FloatArray,
-    steering_rad: FloatArray,
-    station_m: FloatArray,
-    offset_m: FloatArray,
-    present: BoolArray,
-    sight: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
-    body_x_m: FloatArray,
-    body_y_m: FloatArray,
-    body_heading_rad: FloatArray,
-    body_speed_mps: FloatArray,
-    body_length_m: FloatArray,
-    body_width_m: FloatArray,
-    body_present: BoolArray,
-    hidden: BoolArray,
-    max_steering_rad: FloatArray,
-    length_m: FloatArray,
-    width_m: FloatArray,
-    signal_s: FloatArray,
-    next_line: IntArray,
-    posted_mps: FloatArray,
-    signals: IntArray,
-    tables: tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]],
-) -> FloatArray:
-    """One compiled pass: for the few games of a reset, several calls would cost more than their work."""
-    routes, here = Routes(*tables[0]), Along(*tables[1])
-    stop_lines, meetings = StopLines(*tables[2]), Meetings(*tables[3])
-    unseen_behind_m, sight_m, sight_cosine, distance_error, closing_error_per_s = sight
-    observation = np.zeros((*present.shape, SIZE), dtype=np.float32)
-    view = np.empty(SIZE)
-    bodies = body_present.shape[1]
-    seen, urgency_s = np.empty(bodies, dtype=np.bool_), np.empty(bodies)
-    ahead_m, left_m = np.empty(bodies), np.empty(bodies)
-    for g, p in np.ndindex(present.shape):
-        if present[g, p]:
-            first, last = routes.first_row[p], routes.last_row[p]
-            station, offset, heading, speed = station_m[g, p], offset_m[g, p], heading_rad[g, p], speed_mps[g, p]
-            row = row_at(station, first, last)
+def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
+    """One compiled pass over the columns of players, views, bodies, routes, the road at the players, stop lines and
+    meetings: for the few games of a reset, several calls would cost more than their work.
+
+    Each array that is passed to a function with a loop costs time at every call: the loops are here.
+    """
+    players, views, bodies, routes = _Players(*tables[0]), _Views(*tables[1]), Bodies(*tables[2]), Routes(*tables[3])
+    along, stop_lines, meetings = Along(*tables[4]), StopLines(*tables[5]), Meetings(*tables[6])
+    observation, view = np.zeros((*players.present.shape, SIZE), dtype=np.float32), np.empty(SIZE)
+    count = bodies.present.shape[1]
+    seen, urgency_s = np.empty(count, dtype=np.bool_), np.empty(count)
+    for g, p in np.ndindex(players.present.shape):
+        if players.present[g, p]:
+            place = on_route(players.station_m[g, p], views.offset_m[g, p], p, routes)
+            eye = _eye(players, views, place, (g, p))
             view[:] = 0.0
-            view[0], view[1] = speed, here.speed_limit_mps[g, p]
-            view[2] = speed / here.speed_limit_mps[g, p] - 1.0
-            view[3], view[4] = speed - posted_mps[g, p], acceleration_mps2[g, p]
-            view[5] = steering_rad[g, p] / max_steering_rad[p]
-            view[6] = here.road_steering_rad[g, p] / max_steering_rad[p]
-            view[7], view[8] = here.lane_end_m[g, p], here.goal_m[g, p]
-            view[9], view[10] = routes.own_left_m[row] - offset, routes.own_right_m[row] - offset
-            view[_PATH_LEFT] = -offset
+            _see_own_motion(view, eye, along)
+            _see_own_side(view, eye, routes)
             for k in range(_COUNT):
-                ahead = row_ahead(row, BEHIND + k, first, last)
-                turned = routes.heading_rad[ahead] - heading
-                view[_TURNED + k] = (turned + np.pi) % (2.0 * np.pi) - np.pi
-                view[_BEND + k] = routes.bend_ahead_per_m[row, k]
-                view[_LEFT + k] = routes.left_edge_m[ahead] - offset
-                view[_RIGHT + k] = routes.right_edge_m[ahead] - offset
-            front_m = station + 0.5 * length_m[p]
-            _see_stop_line(view, next_line[g, p], front_m, stop_lines, signals[g], signal_s[g])
+                _see_road(view, k, eye, routes)
+            _see_stop_line(view, eye, stop_lines, (players.signals, players.signal_s))
             leader_m, leader_mps = np.inf, 0.0
-            cosine, sine = np.cos(heading), np.sin(heading)
-            for b in range(bodies):
-                dx, dy = body_x_m[g, b] - x_m[g, p], body_y_m[g, b] - y_m[g, p]
-                ahead_m[b], left_m[b] = dx * cosine + dy * sine, dy * cosine - dx * sine
-                distance = np.hypot(dx, dy)
-                in_view = ahead_m[b] >= unseen_behind_m[g, p] and distance <= min(sight_m[g, p], SEEN_M)
-                in_view = in_view and ahead_m[b] >= sight_cosine[g, p] * distance and not hidden[g, p, b]
-                seen[b] = body_present[g, b] and b != p and in_view
-                urgency_s[b] = distance / _NEARNESS_MPS
+            for b in range(count):
+                body = _body(bodies, meetings, (g, p, b))
+                in_view, urgency_s[b] = _look(eye, body)
+                seen[b] = bodies.present[g, b] and b != p and in_view and not views.hidden[g, p, b]
                 if seen[b]:
-                    error = distance_error[g, p]
-                    seen_at = (body_x_m[g, b] + error * dx, body_y_m[g, b] + error * dy)
-                    along, beside, frame = place_along_route(row, station, offset, p, routes, *seen_at)
-                    length, width = body_length_m[g, b], body_width_m[g, b]
-                    extent = 0.5 * (length + width)  # at least the half extents, which take longer to compute
-                    if along + extent > _EDGES[0] and along - extent < _EDGES[-1]:
-                        turned = body_heading_rad[g, b] - routes.heading_rad[frame]
-                        half_length, half_width = half_extents_m(turned, length, width)
-                        _narrow(view, along, beside, half_length, half_width)
-                        gap = along - half_length - 0.5 * length_m[p]
-                        if along > 0.0 and gap < leader_m and abs(beside) < half_width + 0.5 * width_m[p]:
-                            closing = closing_error_per_s[g, p] * along
-                            leader_m, leader_mps = gap, body_speed_mps[g, b] * np.cos(turned) - speed + closing
-                    if meetings.conflict[g, p, b] >= 0:
-                        own_s = max(meetings.own_m[g, p, b], 0.0) / max(speed, _LEAST_MPS)
-                        other_s = max(meetings.other_m[g, p, b], 0.0) / max(body_speed_mps[g, b], _LEAST_MPS)
-                        urgency_s[b] = min(urgency_s[b], max(own_s, other_s))
+                    gap_m, relative_mps = _see_on_path(view, eye, body, routes)
+                    if gap_m < leader_m:
+                        leader_m, leader_mps = gap_m, relative_mps
             if leader_m < np.inf:  # else zeros: a learner that is always alone must not learn from its absence
-                view[_LEADER], view[_LEADER + 1], view[_LEADER + 2] = 1.0, max(leader_m, 0.0), leader_mps
-            last_seen, last_s = -1, -1.0  # the body of the previous entry
+                _see_leader(view, leader_m, leader_mps)
+            last, last_s = -1, -1.0  # the body of the previous entry
             for k in range(OTHERS):  # the most urgent first; missing bodies stay zeros
-                b = _next_urgent(seen, urgency_s, last_seen, last_s)
+                b = _next_urgent(seen, urgency_s, last, last_s)
                 if b < 0:
                     break
-                last_seen, last_s = b, urgency_s[b]
-                error, closing = distance_error[g, p], closing_error_per_s[g, p]
-                turned = body_heading_rad[g, b] - heading
-                entry = view[_FIRST_OTHER + k * ENTRIES :]
-                entry[0] = 1.0
-                entry[1], entry[2] = (1.0 + error) * ahead_m[b], (1.0 + error) * left_m[b]
-                entry[3] = body_speed_mps[g, b] * np.cos(turned) - speed + closing * ahead_m[b]
-                entry[4] = body_speed_mps[g, b] * np.sin(turned) + closing * left_m[b]
-                entry[5], entry[6] = np.sin(turned), np.cos(turned)
-                entry[7], entry[8] = body_length_m[g, b], body_width_m[g, b]
-                if meetings.conflict[g, p, b] >= 0:
-                    other = (1.0 + error) * meetings.other_m[g, p, b]
-                    entry[9], entry[10] = meetings.own_m[g, p, b], other
-                    own_s = max(meetings.own_m[g, p, b], 0.0) / max(speed, 0.1)
-                    entry[11] = max(other, 0.0) / max(body_speed_mps[g, b], 0.1) - own_s
-                    entry[12] = 1.0 if meetings.must_yield[g, p, b] else -1.0
+                last, last_s = b, urgency_s[b]
+                _see_other(view[FIRST_OTHER + k * ENTRIES :], eye, _body(bodies, meetings, (g, p, b)))
             for k in range(SIZE):
                 observation[g, p, k] = _scaled(view[k], SCALE[k], COMPRESSED[k])
     return observation
+
+
+@inlined
+def _eye(players: _Players, views: _Views, place: OnRoute, who: tuple[int, int]) -> _Eye:
+    g, p = who
+    heading_rad = players.heading_rad[g, p]
+    return _Eye(
+        g,
+        p,
+        place,
+        players.x_m[g, p],
+        players.y_m[g, p],
+        heading_rad,
+        np.cos(heading_rad),
+        np.sin(heading_rad),
+        players.speed_mps[g, p],
+        players.acceleration_mps2[g, p],
+        players.steering_rad[g, p],
+        views.max_steering_rad[p],
+        views.posted_mps[g, p],
+        views.next_line[g, p],
+        views.length_m[p],
+        views.width_m[p],
+        players.unseen_behind_m[g, p],
+        min(players.sight_m[g, p], SEEN_M),
+        players.sight_cosine[g, p],
+        players.distance_error[g, p],
+        players.closing_error_per_s[g, p],
+    )
+
+
+@inlined
+def _body(bodies: Bodies, met: Meetings, which: tuple[int, int, int]) -> _Body:
+    """A body, given by the indices of game, player and body."""
+    g, p, b = which
+    return _Body(
+        bodies.x_m[g, b],
+        bodies.y_m[g, b],
+        bodies.heading_rad[g, b],
+        bodies.speed_mps[g, b],
+        bodies.length_m[g, b],
+        bodies.width_m[g, b],
+        met.conflict[g, p, b] >= 0,
+        met.own_m[g, p, b],
+        met.other_m[g, p, b],
+        met.must_yield[g, p, b],
+    )
 
 
 @compiled
@@ -182,35 +236,126 @@ def _scaled(value: float, scale: float, compressed: bool) -> float:
     return min(max(value / scale, -1.0), 1.0)
 
 
-@compiled
-def _see_stop_line(
-    view: FloatArray, line: int, front_m: float, stop_lines: StopLines, signals: IntArray, signal_s: FloatArray
-) -> None:
-    """Write the entries of the next stop line; -1 for none."""
-    view[_STOP_LINE] = np.inf
-    if line < 0:
+@inlined
+def _see_own_motion(view: FloatArray, eye: _Eye, along: Along) -> None:
+    """Write the entries of the own motion and of the road at the player."""
+    g, p = eye.g, eye.p
+    view[OWN.speed_mps] = eye.speed_mps
+    view[OWN.speed_limit_mps] = along.speed_limit_mps[g, p]
+    view[OWN.speed_over_limit] = eye.speed_mps / along.speed_limit_mps[g, p] - 1.0
+    view[OWN.over_posted_mps] = eye.speed_mps - eye.posted_mps
+    view[OWN.acceleration_mps2] = eye.acceleration_mps2
+    view[OWN.steering_rad] = eye.steering_rad / eye.max_steering_rad
+    view[OWN.road_steering_rad] = along.road_steering_rad[g, p] / eye.max_steering_rad
+    view[OWN.lane_end_m], view[OWN.goal_m] = along.lane_end_m[g, p], along.goal_m[g, p]
+
+
+@inlined
+def _see_own_side(view: FloatArray, eye: _Eye, routes: Routes) -> None:
+    """Write the entries of the path and of the own side of the road beside the player."""
+    row, offset_m = eye.place.row, eye.place.offset_m
+    view[OWN.own_side_left_m] = routes.own_left_m[row] - offset_m
+    view[OWN.own_side_right_m] = routes.own_right_m[row] - offset_m
+    view[OWN.path_left_m] = -offset_m
+
+
+@inlined
+def _see_road(view: FloatArray, k: int, eye: _Eye, routes: Routes) -> None:
+    """Write the entries of the path at the distance `AHEAD_M[k]`: its direction, bends and edges."""
+    ahead = row_ahead(eye.place, BEHIND + k)
+    turned = routes.heading_rad[ahead] - eye.heading_rad
+    view[OWN.path_turned_rad + k] = (turned + np.pi) % (2.0 * np.pi) - np.pi
+    view[OWN.path_bend_per_m + k] = routes.bend_ahead_per_m[eye.place.row, k]
+    view[OWN.free_left_m + k] = routes.left_edge_m[ahead] - eye.place.offset_m
+    view[OWN.free_right_m + k] = routes.right_edge_m[ahead] - eye.place.offset_m
+
+
+@inlined
+def _see_stop_line(view: FloatArray, eye: _Eye, lines: StopLines, links: tuple[IntArray, FloatArray]) -> None:
+    """Write the entries of the next stop line, with the signals of links and the seconds since they changed [G, L]."""
+    if eye.next_line < 0:
+        view[OWN.stop_line_m] = np.inf
         return
-    view[_STOP_LINE] = stop_lines.station_m[line] - front_m
-    control, link = stop_lines.control[line], stop_lines.link[line]
-    view[_STOP_LINE + 1] = 1.0 if control == Control.GIVE_WAY else 0.0
-    view[_STOP_LINE + 2] = 1.0 if control in (Control.STOP, Control.ALL_WAY_STOP) else 0.0
+    control, link = lines.control[eye.next_line], lines.link[eye.next_line]
+    view[OWN.stop_line_m] = lines.station_m[eye.next_line] - (eye.place.station_m + 0.5 * eye.length_m)
+    view[OWN.give_way] = 1.0 if control == Control.GIVE_WAY else 0.0
+    view[OWN.stop_sign] = 1.0 if control in (Control.STOP, Control.ALL_WAY_STOP) else 0.0
     if link >= 0:
-        view[_STOP_LINE + 3] = 1.0 if signals[link] in (Signal.GREEN, Signal.GREEN_YIELDING) else 0.0
-        view[_STOP_LINE + 4] = 1.0 if signals[link] == Signal.YELLOW else 0.0
-        view[_STOP_LINE + 5] = 1.0 if signals[link] == Signal.RED else 0.0
-        view[_STOP_LINE + 6] = signal_s[link]
+        signal = links[0][eye.g, link]
+        view[OWN.signal_green] = 1.0 if signal in (Signal.GREEN, Signal.GREEN_YIELDING) else 0.0
+        view[OWN.signal_yellow] = 1.0 if signal == Signal.YELLOW else 0.0
+        view[OWN.signal_red] = 1.0 if signal == Signal.RED else 0.0
+        view[OWN.signal_s] = links[1][eye.g, link]
 
 
 @compiled
-def _narrow(view: FloatArray, ahead_m: float, left_m: float, half_length_m: float, half_width_m: float) -> None:
-    """Reduce the free widths in `view` by a body, given in route coordinates."""
-    near, far = ahead_m - half_length_m, ahead_m + half_length_m
+def _look(eye: _Eye, body: _Body) -> tuple[bool, float]:
+    """Whether a body is where the player looks, and how soon the player may meet it (s)."""
+    dx, dy = body.x_m - eye.x_m, body.y_m - eye.y_m
+    ahead_m, distance_m = dx * eye.cosine + dy * eye.sine, np.hypot(dx, dy)
+    in_view = ahead_m >= eye.unseen_behind_m and distance_m <= eye.sight_m
+    urgency_s = distance_m / _NEARNESS_MPS
+    if body.meets:
+        own_s = max(body.own_m, 0.0) / max(eye.speed_mps, _LEAST_MPS)
+        other_s = max(body.other_m, 0.0) / max(body.speed_mps, _LEAST_MPS)
+        urgency_s = min(urgency_s, max(own_s, other_s))
+    return in_view and ahead_m >= eye.sight_cosine * distance_m, urgency_s
+
+
+@inlined
+def _see_on_path(view: FloatArray, eye: _Eye, body: _Body, routes: Routes) -> tuple[float, float]:
+    """Reduce the free widths by a body. If it is ahead in the player's way: the gap to it and its relative speed, else
+    an infinite gap."""
+    error = eye.distance_error
+    seen_x_m, seen_y_m = body.x_m + error * (body.x_m - eye.x_m), body.y_m + error * (body.y_m - eye.y_m)
+    along, beside, frame = point_along_route(eye.place, routes, seen_x_m, seen_y_m)
+    extent = 0.5 * (body.length_m + body.width_m)  # at least the half extents, which take longer to compute
+    if along + extent <= _EDGES[0] or along - extent >= _EDGES[-1]:
+        return np.inf, 0.0
+    turned = body.heading_rad - routes.heading_rad[frame]
+    half_length, half_width = half_extents_m(turned, body.length_m, body.width_m)
+    _narrow(view, (along - half_length, along + half_length), beside, half_width)
+    if along <= 0.0 or abs(beside) >= half_width + 0.5 * eye.width_m:
+        return np.inf, 0.0
+    closing = eye.closing_error_per_s * along
+    return along - half_length - 0.5 * eye.length_m, body.speed_mps * np.cos(turned) - eye.speed_mps + closing
+
+
+@compiled
+def _narrow(view: FloatArray, ends_m: tuple[float, float], left_m: float, half_width_m: float) -> None:
+    """Reduce the free widths by a body between two distances along the route, at an offset to the left."""
+    near, far = ends_m
     for k in range(_COUNT):
         if far > _EDGES[k] and near < _EDGES[k + 1]:
             if left_m > 0.0:
-                view[_LEFT + k] = min(view[_LEFT + k], left_m - half_width_m)
+                view[OWN.free_left_m + k] = min(view[OWN.free_left_m + k], left_m - half_width_m)
             else:
-                view[_RIGHT + k] = max(view[_RIGHT + k], left_m + half_width_m)
+                view[OWN.free_right_m + k] = max(view[OWN.free_right_m + k], left_m + half_width_m)
+
+
+@compiled
+def _see_leader(view: FloatArray, gap_m: float, relative_mps: float) -> None:
+    """Write the entries of the leader."""
+    view[OWN.leader_seen], view[OWN.leader_gap_m], view[OWN.leader_mps] = 1.0, max(gap_m, 0.0), relative_mps
+
+
+@compiled
+def _see_other(entry: FloatArray, eye: _Eye, body: _Body) -> None:
+    """Write the entries of one other body."""
+    dx, dy, further = body.x_m - eye.x_m, body.y_m - eye.y_m, 1.0 + eye.distance_error
+    ahead_m, left_m = dx * eye.cosine + dy * eye.sine, dy * eye.cosine - dx * eye.sine
+    turned, closing = body.heading_rad - eye.heading_rad, eye.closing_error_per_s
+    entry[OTHER.seen] = 1.0
+    entry[OTHER.ahead_m], entry[OTHER.left_m] = further * ahead_m, further * left_m
+    entry[OTHER.ahead_mps] = body.speed_mps * np.cos(turned) - eye.speed_mps + closing * ahead_m
+    entry[OTHER.left_mps] = body.speed_mps * np.sin(turned) + closing * left_m
+    entry[OTHER.turned_sin], entry[OTHER.turned_cos] = np.sin(turned), np.cos(turned)
+    entry[OTHER.length_m], entry[OTHER.width_m] = body.length_m, body.width_m
+    if body.meets:
+        other_m, own_s = further * body.other_m, max(body.own_m, 0.0) / max(eye.speed_mps, 0.1)
+        entry[OTHER.own_to_conflict_m], entry[OTHER.other_to_conflict_m] = body.own_m, other_m
+        entry[OTHER.arrives_later_s] = max(other_m, 0.0) / max(body.speed_mps, 0.1) - own_s
+        entry[OTHER.has_priority] = 1.0 if body.must_yield else -1.0
 
 
 @compiled

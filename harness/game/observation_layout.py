@@ -7,8 +7,9 @@ coarsely, and none is clipped. `LAYOUT` is stored with every policy; a policy wi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -80,14 +81,24 @@ SCALES: Mapping[str, Scale] = _OWN | {
 LAYOUT: tuple[str, ...] = tuple(SCALES)
 """The names of the entries in their order. A name ends with the unit."""
 SIZE = len(LAYOUT)
-ENTRIES = len(_OTHER)
-"""Number of entries of each other body."""
+FIRST_OTHER, ENTRIES = len(_OWN), len(_OTHER)
+"""The place of the first other body's entries, and the number of entries of each."""
+
+
+def _places(names: Sequence[str]) -> Any:
+    """The place of each entry under its name without the distance; of entries at `AHEAD_M`, that of the first."""
+    places = {name.partition("@")[0]: k for k, name in reversed(list(enumerate(names)))}
+    return namedtuple("Places", places)(**places)
+
+
+OWN, OTHER = _places(list(_OWN)), _places(list(_OTHER))
+"""Places by name: in an observation, and among the entries of another body."""
 OF_OTHERS = np.array([name.startswith(("other", "leader")) for name in LAYOUT])
 """[SIZE] the entries about other road users."""
 SCALE = np.array([each.scale for each in SCALES.values()])
 COMPRESSED = np.array([each.compressed for each in SCALES.values()])
 
-_LOCK = [LAYOUT.index(name) for name in ("steering_rad", "road_steering_rad")]
+_LOCK = [OWN.steering_rad, OWN.road_steering_rad]
 _NEAR_BOUND = 1.0 - 2.0**-20  # of a compressed entry: rounding to 32 bits must not make it infinite
 
 

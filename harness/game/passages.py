@@ -6,10 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
 from harness.game.meetings import STANDING_MPS, streams_at
-from harness.game.right_of_way import Conflicts, Streams
+from harness.game.right_of_way import Streams
+from harness.game.state import Bodies
 
 
 class Places(NamedTuple):
@@ -29,17 +30,16 @@ class Passage(NamedTuple):
 
 
 @compiled
-def places(
-    x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray, present: BoolArray, table: tuple[Any, ...]
-) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
-    """The columns of `Places`, of bodies [T, B]."""
-    streams = Streams(*table)
+def places(bodies: tuple[Any, ...], table: tuple[Any, ...]) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+    """The columns of `Places`, of bodies [T, B] in the table of streams."""
+    those, streams = Bodies(*bodies), Streams(*table)
     along_m = np.empty(streams.first_conflict.shape[1])
     in_streams = np.empty(len(along_m), dtype=np.int64)
     steps, bodies, found, along = [0], [0], [0], [0.0]  # numba infers the types of lists from their entries
-    for t, b in np.ndindex(present.shape):
-        if present[t, b]:
-            count = streams_at(x_m[t, b], y_m[t, b], heading_rad[t, b], streams, in_streams, along_m)
+    for t, b in np.ndindex(those.present.shape):
+        if those.present[t, b]:
+            pose = (those.x_m[t, b], those.y_m[t, b], those.heading_rad[t, b])
+            count = streams_at(pose, streams, in_streams, along_m)
             for k in range(count):
                 steps.append(t)
                 bodies.append(b)
@@ -49,11 +49,11 @@ def places(
 
 
 def own_passage(
-    front_m: FloatArray, speed_mps: FloatArray, length_m: float, conflicts: Conflicts, c: int, step_s: float
+    front_m: FloatArray, speed_mps: FloatArray, zone_m: tuple[float, float], *, length_m: float, step_s: float
 ) -> Passage | None:
-    """A player's passage of the zone of conflict `c`, from the station of its front and its speed [T]; None if it does
-    not enter."""
-    begin_m, end_m = conflicts.begin_m[c], conflicts.end_m[c]
+    """A player's passage of a zone, given by the stations of its ends, from the station of the player's front and its
+    speed [T]; None if it does not enter."""
+    begin_m, end_m = zone_m
     inside = np.flatnonzero((front_m >= begin_m) & (front_m - length_m <= end_m))
     if not len(inside):
         return None
@@ -69,25 +69,25 @@ def other_passage(
     at: IntArray,
     along_m: FloatArray,
     speed_mps: FloatArray,
+    zone_m: tuple[float, float],
+    *,
     length_m: float,
-    conflicts: Conflicts,
-    c: int,
     step_s: float,
 ) -> Passage | None:
-    """A body's passage of the zone of conflict `c`, from its places along the stream and its speed in the steps `at`
-    [N]; None if it does not enter.
+    """A body's passage of a zone, given by its ends along the stream, from the body's places along the stream and its
+    speed in the steps `at` [N]; None if it does not enter.
 
     A body that joins the player's way leaves the stream inside the zone: the rest of the zone counts at its last speed.
     """
     front_m, rear_m = along_m + 0.5 * length_m, along_m - 0.5 * length_m
-    zone_m, end_m = conflicts.zone_m[c], conflicts.zone_m[c] + conflicts.length_m[c]
-    inside = np.flatnonzero((front_m >= zone_m) & (rear_m <= end_m))
+    begin_m, end_m = zone_m
+    inside = np.flatnonzero((front_m >= begin_m) & (rear_m <= end_m))
     if not len(inside):
         return None
     first, last = inside[0], inside[-1]
     moves = speed_mps[last] > STANDING_MPS
     leaves_s = at[last] * step_s + (end_m - rear_m[last]) / speed_mps[last] if moves else np.inf
-    return Passage(_reached_s(at[first], front_m[first] - zone_m, speed_mps[first], step_s), float(leaves_s))
+    return Passage(_reached_s(at[first], front_m[first] - begin_m, speed_mps[first], step_s), float(leaves_s))
 
 
 def _reached_s(step: int, beyond_m: float, speed_mps: float, step_s: float) -> float:

@@ -60,7 +60,7 @@ class Payoff:
         quantities = np.empty((len(self._quantities), len(q.state.step)))
         for row, quantity in enumerate(self._quantities):
             quantities[row] = quantity(q)[:, player]
-        return _term_values(quantities, *self._weights, q.world.step_s)
+        return _term_values(quantities, self._weights, q.world.step_s)
 
     def _fuzzy_values(self, q: Quantities, player: int) -> Iterator[FloatArray]:
         """[G] weighted value of each fuzzy term."""
@@ -94,15 +94,13 @@ class Payoff:
 
 @compiled
 def _term_values(
-    quantities: FloatArray,
-    row: IntArray,
-    form: IntArray,
-    parameter: FloatArray,
-    weight: FloatArray,
-    per_second: BoolArray,
-    step_s: float,
+    quantities: FloatArray, terms: tuple[IntArray, IntArray, FloatArray, FloatArray, BoolArray], step_s: float
 ) -> FloatArray:
-    """[T + 1, G] weighted values of T terms of quantities [Q, G], and their sum, added in the order of the terms."""
+    """[T + 1, G] weighted values of T terms of quantities [Q, G], and their sum, added in the order of the terms.
+
+    `terms` are the columns of `Payoff._weights`.
+    """
+    row, form, parameter, weight, per_second = terms
     values = np.zeros((len(form) + 1, quantities.shape[1]))
     for term in range(len(form)):
         scale = weight[term] * (step_s if per_second[term] else 1.0)

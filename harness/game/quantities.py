@@ -7,32 +7,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import lateral_acceleration_mps2
 from harness.game.geometry import Box, distance_to_nearest_box, time_to_first_contact
 from harness.game.jit import compiled
 from harness.game.meetings import STANDING_MPS, Meetings, entered_before_s, least_gap_s, meetings
-from harness.game.road import Along
-from harness.game.route_coordinates import PATH_M, OnPath, on_path, row_ahead
+from harness.game.road import SPACING_M, Along
+from harness.game.route_coordinates import PATH_M, OnPath, on_path
 from harness.game.sight import hidden, nothing_hidden
 from harness.game.state import Bodies, State
-from harness.game.traffic_rules import Rules, rules
+from harness.game.traffic_rules import TrafficRules, rules
 from harness.game.world import World
 
 SIGHT_M = 60.0  # a body farther ahead than this is not a leader
 REACH_M = 10.0  # largest clearance that is computed
-
-
-class Path(NamedTuple):
-    """The route at the distances `PATH_M` ahead of each player, [G, P, K]; edges are offsets from the route's line."""
-
-    heading_rad: FloatArray
-    left_edge_m: FloatArray
-    right_edge_m: FloatArray
 
 
 @dataclass
@@ -48,15 +39,11 @@ class Quantities:
     # --- the route ahead ---------------------------------------------------------------------------------------
 
     @cached_property
-    def path_rows(self) -> IntArray:
-        """[G, P, K] rows of the table of routes at `PATH_M`."""
+    def path_heading_rad(self) -> FloatArray:
+        """Headings of the route at `PATH_M`."""
         routes = self.world.road.routes
-        return _path_rows(routes.rows(self.state.station_m), routes.first_row, routes.last_row)
-
-    @cached_property
-    def path(self) -> Path:
-        """The route at `PATH_M`."""
-        return Path(*(getattr(self.world.road.routes, name)[self.path_rows] for name in Path._fields))
+        rows = routes.rows(self.state.station_m)[..., None] + np.rint(PATH_M / SPACING_M).astype(np.int64)
+        return routes.heading_rad[np.clip(rows, routes.first_row[:, None], routes.last_row[:, None])]
 
     @property
     def speed_mps(self) -> FloatArray:
@@ -116,15 +103,13 @@ class Quantities:
         return self.state.station_m + 0.5 * self.world.length_m
 
     @cached_property
-    def rules(self) -> Rules:
+    def rules(self) -> TrafficRules:
         """What signals, signs and right of way ask of the players, and what they did."""
         state, tables = self.state, self.world.right_of_way
-        next_line, numbers = rules(
-            *(state.station_m, self.advanced_m, state.speed_mps, self.along.approach_mps, self.world.length_m),
-            *(state.signals, state.signal_s),
-            (tuple(tables.stop_lines), tuple(tables.conflicts), tuple(self.meetings)),
-        )
-        return Rules(next_line, *numbers)
+        players = (state.station_m, self.advanced_m, state.speed_mps, self.along.approach_mps, self.world.length_m)
+        records = (tables.stop_lines, tables.conflicts, self.meetings)
+        next_line, numbers = rules(players, (state.signals, state.signal_s), tuple(map(tuple, records)))
+        return TrafficRules(next_line, *numbers)
 
     @property
     def passed_red_s(self) -> FloatArray:
@@ -171,15 +156,14 @@ class Quantities:
         state, bodies, hiding = self.state, self.bodies, self.world.hiding
         if not hiding.anything:
             return nothing_hidden((*state.present.shape, bodies.present.shape[1]))
-        of_bodies = (self._boxes, bodies.present)
-        return hidden(state.x_m, state.y_m, state.present, *of_bodies, hiding.obstacles, hiding.walls, hiding.vehicles)
+        of_players = (state.x_m, state.y_m, state.present)
+        return hidden(of_players, tuple(bodies), (hiding.obstacles, hiding.walls), hiding.vehicles)
 
     @cached_property
     def on_path(self) -> OnPath:
         """Bodies in route coordinates, each in the nearest frame of the route at `PATH_M`."""
-        bodies = self.bodies
-        boxes = (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
-        return OnPath(*on_path(self.state.station_m, self.lateral_offset_m, tuple(self.world.road.routes), *boxes))
+        routes, boxes = tuple(self.world.road.routes), tuple(self._boxes)
+        return OnPath(*on_path(self.state.station_m, self.lateral_offset_m, routes, boxes))
 
     @cached_property
     def leader_gap_m(self) -> FloatArray:
@@ -202,11 +186,8 @@ class Quantities:
         state, bodies, tables = self.state, self.bodies, self.world.right_of_way
         if not len(tables.conflicts.player):
             return Meetings.none((*state.present.shape, bodies.present.shape[1]))
-        columns = meetings(
-            *(state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m),
-            (bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.speed_mps, bodies.length_m),
-            *(self.visible, state.signals, tuple(tables.streams)),
-        )
+        players = (state.station_m, self.lateral_offset_m, state.speed_mps, self.world.length_m, self.visible)
+        columns = meetings(players, tuple(bodies), state.signals, tuple(tables.streams))
         return Meetings.of(*columns)
 
     @cached_property
@@ -232,8 +213,7 @@ class Quantities:
     @cached_property
     def _boxes(self) -> Box:
         """The bodies' boxes, [G, B]."""
-        bodies = self.bodies
-        return Box(bodies.x_m, bodies.y_m, bodies.heading_rad, bodies.length_m, bodies.width_m)
+        return self.bodies.boxes
 
     @cached_property
     def vehicle_clearance_m(self) -> FloatArray:
@@ -266,16 +246,8 @@ class Quantities:
     @cached_property
     def time_to_collision_s(self) -> FloatArray:
         """Seconds until contact with another body at constant headings and speeds; inf without a contact."""
-        return time_to_first_contact(self._cars, self._boxes, self.state.speed_mps, self.bodies.speed_mps, self.visible)
-
-
-@compiled
-def _path_rows(rows: IntArray, first_row: IntArray, last_row: IntArray) -> IntArray:
-    path_rows = np.empty((*rows.shape, len(PATH_M)), dtype=rows.dtype)
-    for g, p in np.ndindex(rows.shape):
-        for k in range(len(PATH_M)):
-            path_rows[g, p, k] = row_ahead(rows[g, p], k, first_row[p], last_row[p])
-    return path_rows
+        speeds_mps = (self.state.speed_mps, self.bodies.speed_mps)
+        return time_to_first_contact(self._cars, self._boxes, speeds_mps, self.visible)
 
 
 @compiled

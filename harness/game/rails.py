@@ -1,4 +1,4 @@
-"""The rails of a road: the edges of its drivable area as line segments, with a grid for spatial look-up."""
+"""The rails of a road and the parts of its surface, with grids for spatial look-up."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from harness.game.arrays import FloatArray, IntArray
+from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.geometry import Box, distance_to_nearest_segment
 from harness.game.jit import compiled
 
-_CELL_M = 20.0
+_CELL_M = 20.0  # of the grid of rails
+RASTER_M = 0.25  # of a part of the ground
 _FAR_AWAY_M = 1e6
 
 
@@ -51,12 +52,7 @@ class Rails:
 
         `limit_m` must be within the reach of the rails.
         """
-        return _distance_m(cars, self.segments, self.origin_m, self.cells, limit_m)
-
-
-@compiled
-def _distance_m(cars: Box, segments: FloatArray, origin_m: FloatArray, cells: IntArray, limit_m: float) -> FloatArray:
-    return distance_to_nearest_segment(cars, segments, _cells_at(cars.x_m, cars.y_m, origin_m, cells), limit_m)
+        return distance_to_nearest_segment(cars, self.segments, self.near(cars.x_m, cars.y_m), limit_m)
 
 
 @compiled
@@ -73,3 +69,19 @@ def _cells_at(x_m: FloatArray, y_m: FloatArray, origin_m: FloatArray, cells: Int
 def _cell(place_m: float, cells: int) -> int:
     """The cell at a place, clamped to the grid; the first cell for NaN."""
     return int(min(place_m / _CELL_M, cells - 1.0)) if place_m > 0.0 else 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Raster:
+    """The cells of a part of the ground."""
+
+    origin_m: FloatArray  # [2] corner of the first cell
+    cells: BoolArray  # [X, Y] whether the centre of the cell belongs to the part
+
+    def at(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+        """[G, P] 1 for points within the part, 0 for others and outside of the grid."""
+        u, v = (x_m - self.origin_m[0]) / RASTER_M, (y_m - self.origin_m[1]) / RASTER_M
+        inside = (u >= 0.0) & (u < self.cells.shape[0]) & (v >= 0.0) & (v < self.cells.shape[1])
+        found: FloatArray = np.zeros(x_m.shape)
+        found[inside] = self.cells[u[inside].astype(int), v[inside].astype(int)]
+        return found

@@ -11,8 +11,7 @@ import numpy as np
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.game.rails import Rails
-from harness.game.raster import Raster
+from harness.game.rails import Rails, Raster
 
 SPACING_M = 0.5  # between stations of a route
 MARGIN_M = 100.0  # straight extension of a route's table before its start and beyond its end
@@ -57,6 +56,9 @@ class Along(NamedTuple):
     goal_m: FloatArray  # distance to the goal; 0 or less after it
     wrong_way: FloatArray  # 1 for a centre among oncoming lanes, else 0
     road_steering_rad: FloatArray  # the steering angle that follows the route
+
+
+_ALONG = len(Along._fields)
 
 
 class Routes(NamedTuple):
@@ -123,8 +125,7 @@ class Routes(NamedTuple):
 
     def locate(self, x_m: FloatArray, y_m: FloatArray, station_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Stations and lateral offsets (m, left positive) [G, P] of points [G, P], given their previous stations."""
-        lines = (self.x_m, self.y_m, self.cos, self.sin, self.curvature_per_m)
-        stations, offsets = _locate(x_m, y_m, station_m, *lines, self.first_row, self.last_row)
+        stations, offsets = _locate(x_m, y_m, station_m, tuple(self))
         return stations, offsets
 
     def along(
@@ -138,7 +139,7 @@ class Routes(NamedTuple):
     ) -> Along:
         """The routes at players with stations, lateral offsets and speeds [G, P], factors on the speed limits [G] and
         wheelbases [P]."""
-        return Along(*_along(station_m, offset_m, speed_mps, limit_share, wheelbase_m, tuple(self)))
+        return Along(*_along((station_m, offset_m, speed_mps), limit_share, wheelbase_m, tuple(self)))
 
 
 @compiled
@@ -164,52 +165,39 @@ def steering_of_bend_rad(bend_per_m: float, wheelbase_m: float) -> float:
 
 
 @compiled
-def _locate(
-    x_m: FloatArray,
-    y_m: FloatArray,
-    station_m: FloatArray,
-    line_x_m: FloatArray,
-    line_y_m: FloatArray,
-    line_cos: FloatArray,
-    line_sin: FloatArray,
-    curvature_per_m: FloatArray,
-    first_row: IntArray,
-    last_row: IntArray,
-) -> FloatArray:
+def _locate(x_m: FloatArray, y_m: FloatArray, station_m: FloatArray, table: tuple[Any, ...]) -> FloatArray:
     """[2, G, P] stations and lateral offsets, by Newton's method on the distance to the line.
 
     A metre of travel on the inside of a curve is more than a metre of the line, on the outside less.
     """
-    places = np.empty((2, *station_m.shape))
+    routes, places = Routes(*table), np.empty((2, *station_m.shape))
     for g, p in np.ndindex(x_m.shape):
         station, offset = station_m[g, p], 0.0
         for _ in range(3):
-            row = row_at(station, first_row[p], last_row[p])
-            dx, dy = x_m[g, p] - line_x_m[row], y_m[g, p] - line_y_m[row]
-            offset = dy * line_cos[row] - dx * line_sin[row]
-            stretch = max(1.0 - curvature_per_m[row] * offset, _LEAST_STRETCH)
-            along = (dx * line_cos[row] + dy * line_sin[row]) / stretch
-            station = (row - first_row[p]) * SPACING_M - MARGIN_M + along
+            row = row_at(station, routes.first_row[p], routes.last_row[p])
+            dx, dy, cosine, sine = x_m[g, p] - routes.x_m[row], y_m[g, p] - routes.y_m[row], routes.cos[row], routes.sin[row]
+            offset = dy * cosine - dx * sine
+            stretch = max(1.0 - routes.curvature_per_m[row] * offset, _LEAST_STRETCH)
+            along = (dx * cosine + dy * sine) / stretch
+            station = (row - routes.first_row[p]) * SPACING_M - MARGIN_M + along
         places[0, g, p], places[1, g, p] = station, offset
     return places
 
 
 @compiled
 def _along(
-    station_m: FloatArray,
-    offset_m: FloatArray,
-    speed_mps: FloatArray,
+    players: tuple[FloatArray, FloatArray, FloatArray],
     limit_share: FloatArray,
     wheelbase_m: FloatArray,
     table: tuple[Any, ...],
 ) -> FloatArray:
-    """[7, G, P] the columns of `Along`.
+    """[7, G, P] the columns of `Along`, of players with stations, offsets and speeds.
 
     A car follows the road by the bend at its rear axle, which has no slip, in `PREVIEW_S`. With the bend at the centre,
     it would leave a quarter circle by two metres.
     """
-    routes = Routes(*table)
-    along = np.empty((7, *station_m.shape))
+    routes, (station_m, offset_m, speed_mps) = Routes(*table), players
+    along = np.empty((_ALONG, *station_m.shape))
     for g, p in np.ndindex(station_m.shape):
         station, offset, first, last = station_m[g, p], offset_m[g, p], routes.first_row[p], routes.last_row[p]
         row = row_at(station, first, last)

@@ -19,6 +19,7 @@ training data.
 
 from __future__ import annotations
 
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,7 @@ from harness.game.jit import compiled
 from harness.game.observation_layout import LAYOUT
 from harness.game.quantities import Quantities
 from harness.game.roles import roles_of
-from harness.game.state import State
+from harness.game.state import Bodies, State
 
 ROUNDING_M = 1e-3  # rounding of positions in network coordinates, which may be millions of metres
 LANE_CHANGE_M = 6.0  # width of a wide lane, plus the swing of a car's centre
@@ -45,13 +46,10 @@ def slack_m(taken_over: BoolArray) -> FloatArray:
     return np.where(taken_over, ROUNDING_M, LANE_CHANGE_M)
 
 
-def checked_decisions(decided: Any, driver: object, role: str, games: IntArray, steps: IntArray) -> FloatArray:
-    """The decisions of the driver of a player, named `role`, for games [N], as an array [N, 2].
-
-    `steps` [G] are the steps played so far.
-    Raises ImpossibleNumber unless the decisions are N pairs of numbers from -1 to 1.
-    """
-    subject = f"the driver of {role}, {type(driver).__name__},"
+def checked_decisions(decided: Any, driver: str, games: IntArray, steps: IntArray) -> FloatArray:
+    """The decisions of a driver for games [N], as an array [N, 2]. `driver` names it, `steps` [G] are the steps played
+    so far. Raises ImpossibleNumber unless the decisions are N pairs of numbers from -1 to 1."""
+    subject = f"the driver of {driver}"
     try:
         actions = np.asarray(decided, dtype=float)
     except (TypeError, ValueError):
@@ -67,22 +65,14 @@ def checked_decisions(decided: Any, driver: object, role: str, games: IntArray, 
     return actions
 
 
-def check_step(before: State, q: Quantities, drove: BoolArray, payoff: FloatArray, slack: FloatArray) -> None:
+def check_step(before: State, q: Quantities, *, drove: BoolArray, payoff: FloatArray, slack_m: FloatArray) -> None:
     """Check the result of a step: the players that drove [G, P], payoffs [G, P], and the bodies near them.
 
-    `slack` [P] is the result of `slack_m`. Raises ImpossibleNumber for the first fault.
+    `slack_m` [P] is the result of `slack_m`. Raises ImpossibleNumber for the first fault.
     """
     now, bodies, world = q.state, q.bodies, q.world
     fault, game, player = _first_fault(
-        (before.x_m, before.y_m, before.speed_mps),
-        (now.x_m, now.y_m, now.speed_mps, now.heading_rad, now.acceleration_mps2, now.steering_rad, now.station_m),
-        (bodies.x_m, bodies.y_m, bodies.speed_mps, bodies.heading_rad),
-        bodies.present,
-        drove,
-        payoff,
-        slack,
-        world.actuators.max_speed_mps,
-        world.step_s,
+        (_moves(before), _moves(now)), tuple(bodies), (drove, payoff, slack_m, world.actuators.max_speed_mps), world.step_s
     )
     if fault == _NO_FAULT:
         return
@@ -126,22 +116,23 @@ def _outside(values: FloatArray) -> int:
     return count
 
 
+_moves = attrgetter(
+    "x_m", "y_m", "speed_mps", "heading_rad", "acceleration_mps2", "steering_rad", "station_m"
+)  # the motion of players, of a state
+
+
 @compiled
 def _first_fault(
-    before: tuple[FloatArray, ...],
-    now: tuple[FloatArray, ...],
-    bodies: tuple[FloatArray, ...],
-    present: BoolArray,
-    drove: BoolArray,
-    payoff: FloatArray,
-    slack: FloatArray,
-    max_speed_mps: FloatArray,
+    motions: tuple[tuple[FloatArray, ...], tuple[FloatArray, ...]],
+    bodies: tuple[Any, ...],
+    step: tuple[BoolArray, FloatArray, FloatArray, FloatArray],
     step_s: float,
 ) -> tuple[int, int, int]:
-    """The first fault, its game and its player."""
+    """The first fault, its game and its player: the motion before and after the step, the bodies, and who drove, the
+    payoffs, the tolerance and the top speeds."""
+    (before, now), among, (drove, payoff, slack, max_speed_mps) = motions, Bodies(*bodies), step
     x_m, y_m, speed_mps = now[0], now[1], now[2]
     players = drove.shape[1]
-    body_x_m, body_y_m, body_speed_mps, body_heading_rad = bodies
     for g, p in np.ndindex(drove.shape):
         if drove[g, p]:
             for values in now:
@@ -151,10 +142,10 @@ def _first_fault(
             if not np.hypot(x_m[g, p] - before[0][g, p], y_m[g, p] - before[1][g, p]) <= speed * step_s + slack[p]:
                 return _MOVED, g, p
         if p == 0:  # the players of a game have the same bodies
-            for b in range(players, present.shape[1]):
-                finite = np.isfinite(body_x_m[g, b]) and np.isfinite(body_y_m[g, b])
-                finite = finite and np.isfinite(body_speed_mps[g, b]) and np.isfinite(body_heading_rad[g, b])
-                if present[g, b] and not finite:
+            for b in range(players, among.present.shape[1]):
+                finite = np.isfinite(among.x_m[g, b]) and np.isfinite(among.y_m[g, b])
+                finite = finite and np.isfinite(among.speed_mps[g, b]) and np.isfinite(among.heading_rad[g, b])
+                if among.present[g, b] and not finite:
                     return _BACKGROUND, g, p
         if not abs(payoff[g, p]) <= _LARGEST:
             return _PAYOFF, g, p

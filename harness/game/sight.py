@@ -16,12 +16,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from math import cos, hypot, inf, sin
+from typing import Any
 
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.geometry import Box, in_frame, other_box
 from harness.game.jit import compiled
+from harness.game.state import Bodies
 
 TALL_WIDTH_M = 2.1
 """A vehicle of at least this width hides what is behind it: SUMO's narrowest class of tall vehicles, `delivery`, is
@@ -58,66 +60,66 @@ def nothing_hidden(shape: tuple[int, ...]) -> BoolArray:
 
 @compiled
 def hidden(
-    x_m: FloatArray,
-    y_m: FloatArray,
-    present: BoolArray,
-    bodies: Box,
-    bodies_present: BoolArray,
-    obstacles: BoolArray,
-    walls: FloatArray,
+    players: tuple[FloatArray, FloatArray, BoolArray],
+    bodies: tuple[Any, ...],
+    standing: tuple[BoolArray, FloatArray],
     vehicles: bool,
 ) -> BoolArray:
     """[G, P, B] bodies that players do not see because their lines of sight are cut.
 
-    Players are given by their centres and whether they are present [G, P], bodies by boxes and presence [G, B].
-    `obstacles` [O], `walls` [S, 2, 2] and `vehicles` are those of `Hiding`.
+    Players are given by their centres and whether they are present [G, P]. `standing` are the obstacles [O] and walls
+    [S, 2, 2] of `Hiding`, and `vehicles` is its.
     """
-    games, count = bodies_present.shape
+    (x_m, y_m, present), those, (obstacles, walls) = players, Bodies(*bodies), standing
+    games, count = those.present.shape
+    boxes = Box(those.x_m, those.y_m, those.heading_rad, those.length_m, those.width_m)
     result = np.zeros((games, present.shape[1], count), dtype=np.bool_)
     hides = np.empty(count, dtype=np.bool_)
     first_obstacle = count - len(obstacles)
     for g in range(games):
         for b in range(count):
             if b < first_obstacle:
-                hides[b] = bodies_present[g, b] and vehicles and bodies.width_m[g, b] >= TALL_WIDTH_M
+                hides[b] = those.present[g, b] and vehicles and those.width_m[g, b] >= TALL_WIDTH_M
             else:
-                hides[b] = bodies_present[g, b] and obstacles[b - first_obstacle]
+                hides[b] = those.present[g, b] and obstacles[b - first_obstacle]
         for p in range(present.shape[1]):
             for b in range(count):
-                if present[g, p] and bodies_present[g, b] and b != p:
-                    result[g, p, b] = _is_hidden(x_m[g, p], y_m[g, p], g, p, b, bodies, hides, walls)
+                if present[g, p] and those.present[g, b] and b != p:
+                    eye = (x_m[g, p], y_m[g, p])
+                    result[g, p, b] = _is_hidden(eye, (g, p, b), boxes, (hides, walls))
     return result
 
 
 @compiled
 def _is_hidden(
-    eye_x_m: float, eye_y_m: float, g: int, p: int, b: int, bodies: Box, hides: BoolArray, walls: FloatArray
+    eye: tuple[float, float], who: tuple[int, int, int], bodies: Box, barriers: tuple[BoolArray, FloatArray]
 ) -> bool:
-    """Whether all lines from an eye of player p to body b of game g are cut."""
+    """Whether all lines from an eye of a player to a body are cut, given the indices of game, player and body, which
+    bodies hide others [B], and the walls."""
+    (eye_x_m, eye_y_m), (g, p, b), (hides, walls) = eye, who, barriers
     body = other_box(bodies, g, b)
     if hypot(body.x_m - eye_x_m, body.y_m - eye_y_m) > SIGHT_LINE_M:
         return False
     along_x, along_y = 0.5 * body.length_m * cos(body.heading_rad), 0.5 * body.length_m * sin(body.heading_rad)
     across_x, across_y = -0.5 * body.width_m * sin(body.heading_rad), 0.5 * body.width_m * cos(body.heading_rad)
     for along, across in ((0.0, 0.0), (1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
-        x_m = body.x_m + along * along_x + across * across_x
-        y_m = body.y_m + along * along_y + across * across_y
+        to = (body.x_m + along * along_x + across * across_x, body.y_m + along * along_y + across * across_y)
         free = True
         for other in range(len(hides)):
             may_cut = hides[other] and other != b and other != p
-            if may_cut and box_cuts(other_box(bodies, g, other), eye_x_m, eye_y_m, x_m, y_m):
+            if may_cut and box_cuts(other_box(bodies, g, other), eye, to):
                 free = False
                 break
-        if free and not _is_walled_off(eye_x_m, eye_y_m, x_m, y_m, walls):
+        if free and not _is_walled_off(eye, to, walls):
             return False
     return True
 
 
 @compiled
-def box_cuts(box: Box, from_x_m: float, from_y_m: float, to_x_m: float, to_y_m: float) -> bool:
+def box_cuts(box: Box, start_m: tuple[float, float], end_m: tuple[float, float]) -> bool:
     """Whether a straight line passes through the inside of a box; a line along its edge does not."""
-    u, v = in_frame(box, from_x_m, from_y_m)
-    to_u, to_v = in_frame(box, to_x_m, to_y_m)
+    u, v = in_frame(box, start_m[0], start_m[1])
+    to_u, to_v = in_frame(box, end_m[0], end_m[1])
     enters, leaves = 0.0, 1.0
     for start, way, half in ((u, to_u - u, 0.5 * box.length_m), (v, to_v - v, 0.5 * box.width_m)):
         first, last = -inf, inf
@@ -131,9 +133,10 @@ def box_cuts(box: Box, from_x_m: float, from_y_m: float, to_x_m: float, to_y_m: 
 
 
 @compiled
-def _is_walled_off(from_x_m: float, from_y_m: float, to_x_m: float, to_y_m: float, walls: FloatArray) -> bool:
+def _is_walled_off(start_m: tuple[float, float], end_m: tuple[float, float], walls: FloatArray) -> bool:
     """Whether a wall crosses a straight line."""
-    way_x, way_y = to_x_m - from_x_m, to_y_m - from_y_m
+    from_x_m, from_y_m = start_m
+    way_x, way_y = end_m[0] - from_x_m, end_m[1] - from_y_m
     for s in range(len(walls)):
         wall_x, wall_y = walls[s, 1, 0] - walls[s, 0, 0], walls[s, 1, 1] - walls[s, 0, 1]
         start_x, start_y = walls[s, 0, 0] - from_x_m, walls[s, 0, 1] - from_y_m

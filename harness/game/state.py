@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.geometry import Box
 from harness.game.jit import compiled
 from harness.game.outcome import Outcome
 
@@ -86,8 +87,7 @@ class State:
         return State(**{name: array.take(games, axis=0) for name, array in vars(self).items()})
 
 
-@dataclass
-class Bodies:
+class Bodies(NamedTuple):
     """All bodies of G games: the players first, then the nearest background vehicles. Arrays are [G, B]."""
 
     x_m: FloatArray
@@ -98,44 +98,42 @@ class Bodies:
     width_m: FloatArray
     present: BoolArray
 
+    @property
+    def boxes(self) -> Box:
+        """Their boxes, [G, B]."""
+        return Box(self.x_m, self.y_m, self.heading_rad, self.length_m, self.width_m)
+
     def with_nearest(self, background: Bodies, most: int, within_m: float) -> Bodies:
         """These bodies (the players), followed by the nearest background vehicles.
 
         At most `most` vehicles are added, sorted by distance to the nearest player. A vehicle farther than `within_m`
         from every player is not present.
         """
-        players, vehicles = (
-            (each.x_m, each.y_m, each.heading_rad, each.speed_mps, each.length_m, each.width_m)
-            for each in (self, background)
-        )
-        columns, present = _with_nearest(players, self.present, vehicles, background.present, most, within_m)
-        x_m, y_m, heading_rad, speed_mps, length_m, width_m = columns
-        return Bodies(x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
+        columns, present = _with_nearest(tuple(self), tuple(background), most, within_m)
+        return Bodies(*columns, present)
 
 
 @compiled
 def _with_nearest(
-    players: tuple[Any, ...],
-    players_present: BoolArray,
-    vehicles: tuple[Any, ...],
-    vehicles_present: BoolArray,
-    most: int,
-    within_m: float,
+    players: tuple[Any, ...], vehicles: tuple[Any, ...], most: int, within_m: float
 ) -> tuple[FloatArray, BoolArray]:
-    """[C, G, B] the columns of players and added vehicles, and [G, B] which are present."""
-    games, player_count = players_present.shape
-    added = min(most, vehicles_present.shape[1])
-    columns = np.empty((len(players), games, player_count + added))
+    """[C, G, B] the columns of players and added vehicles but the last, and [G, B] which are present."""
+    among, background = Bodies(*players), Bodies(*vehicles)
+    of_players, of_vehicles = players[:-1], vehicles[:-1]
+    games, player_count = among.present.shape
+    added = min(most, background.present.shape[1])
+    columns = np.empty((len(players) - 1, games, player_count + added))
     present = np.empty((games, player_count + added), dtype=np.bool_)
     nearest, nearest_m = np.empty(most + 1, dtype=np.int64), np.empty(most + 1)
     for g in range(games):
         count = 0
-        for vehicle in range(vehicles_present.shape[1]):
+        for vehicle in range(background.present.shape[1]):
             distance_m = np.inf
-            if vehicles_present[g, vehicle]:
+            if background.present[g, vehicle]:
                 for p in range(player_count):
-                    if players_present[g, p]:
-                        dx, dy = vehicles[0][g, vehicle] - players[0][g, p], vehicles[1][g, vehicle] - players[1][g, p]
+                    if among.present[g, p]:
+                        dx = background.x_m[g, vehicle] - among.x_m[g, p]
+                        dy = background.y_m[g, vehicle] - among.y_m[g, p]
                         distance_m = min(distance_m, np.hypot(dx, dy))
             place = count  # after vehicles at the same distance
             while place > 0 and distance_m < nearest_m[place - 1]:
@@ -143,11 +141,11 @@ def _with_nearest(
                 place -= 1
             nearest[place], nearest_m[place] = vehicle, distance_m
             count = min(count + 1, most)
-        present[g, :player_count] = players_present[g]
+        present[g, :player_count] = among.present[g]
         for k in range(added):
             present[g, player_count + k] = nearest_m[k] <= within_m
-        for column in range(len(players)):
-            columns[column, g, :player_count] = players[column][g]
+        for column in range(len(of_players)):
+            columns[column, g, :player_count] = of_players[column][g]
             for k in range(added):
-                columns[column, g, player_count + k] = vehicles[column][g, nearest[k]]
+                columns[column, g, player_count + k] = of_vehicles[column][g, nearest[k]]
     return columns, present

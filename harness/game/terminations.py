@@ -13,14 +13,15 @@ from harness.game.outcome import Outcome
 def terminations(
     outcome: IntArray,
     drove: BoolArray,
-    taken_over: BoolArray,
-    time_is_up: BoolArray,
-    goal_m: FloatArray,
-    vehicle_clearance_m: FloatArray,
-    rail_clearance_m: FloatArray,
+    ends: tuple[BoolArray, BoolArray],
+    distances_m: tuple[FloatArray, FloatArray, FloatArray],
 ) -> None:
-    """Set the outcomes [G, P] of the players that drove [G, P], in place: contact before goal, goal before timeout
-    (time_is_up [G]). Contact with a rail counts only for players that the harness drives (taken_over [P])."""
+    """Set the outcomes [G, P] of the players that drove [G, P], in place: contact before goal, goal before timeout.
+
+    `ends` are the players that the harness drives [P], for which alone contact with a rail counts, and the games whose
+    time is up [G]; `distances_m` are those to the goal, to vehicles and to rails [G, P].
+    """
+    (taken_over, time_is_up), (goal_m, vehicle_clearance_m, rail_clearance_m) = ends, distances_m
     for g, p in np.ndindex(outcome.shape):
         if drove[g, p]:
             if vehicle_clearance_m[g, p] <= 0.0:

@@ -25,7 +25,7 @@ _OFF, _YELLOW, _RED = int(Signal.OFF), int(Signal.YELLOW), int(Signal.RED)
 _STOP, _ALL_WAY_STOP = int(Control.STOP), int(Control.ALL_WAY_STOP)
 
 
-class Rules(NamedTuple):
+class TrafficRules(NamedTuple):
     """The rules at the players, [G, P]."""
 
     next_line: IntArray  # row of the next stop line; -1 without one
@@ -38,20 +38,16 @@ class Rules(NamedTuple):
 
 @compiled
 def rules(
-    station_m: FloatArray,
-    advanced_m: FloatArray,
-    speed_mps: FloatArray,
-    approach_mps: FloatArray,
-    length_m: FloatArray,
-    signals: IntArray,
-    signal_s: FloatArray,
+    players: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
+    links: tuple[IntArray, FloatArray],
     tables: tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]],
 ) -> tuple[IntArray, FloatArray]:
-    """The columns of `Rules`: the next line [G, P], and the numbers [5, G, P] in their order.
+    """The columns of `TrafficRules`: the next line [G, P], and the numbers [5, G, P] in their order.
 
-    Players are given by station, way in this step, speed and speed for the limits ahead [G, P], and length [P];
-    `signals` and `signal_s` [G, L] are the states of links. `tables` are stop lines, conflicts and meetings.
+    Players are given by station, way in this step, speed and speed for the limits ahead [G, P], and length [P]; links
+    [G, L] by their states and the seconds since they changed. `tables` are stop lines, conflicts and meetings.
     """
+    (station_m, advanced_m, speed_mps, approach_mps, length_m), (signals, signal_s) = players, links
     lines, conflicts, meetings = StopLines(*tables[0]), Conflicts(*tables[1]), Meetings(*tables[2])
     next_line, numbers = np.full(station_m.shape, -1), np.full((5, *station_m.shape), -1.0)
     for g, p in np.ndindex(station_m.shape):

@@ -14,10 +14,11 @@ lapses and payoffs mean the same for every player. Integration is that of `game.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from harness.game.arrays import BoolArray, FloatArray
-from harness.game.bicycle import Actuators, curvature_per_m
+from harness.game.bicycle import Actuators, Requested, curvature_per_m, motion_of
 from harness.game.jit import compiled
 from harness.game.state import State
 
@@ -27,45 +28,25 @@ MAX_TURN_RADPS = np.pi  # half a turn in a second
 TURNS_AS_AT_MPS = 1.0
 
 
-def walk(
-    state: State,
-    acceleration_mps2: FloatArray,
-    steering_rad: FloatArray,
-    moving: BoolArray,
-    actuators: Actuators,
-    step_s: float,
-) -> None:
-    """Move the walkers marked in `moving` [G, P] by one step, in place.
-
-    acceleration_mps2 and steering_rad [G, P] are requests, as for `game.bicycle.move`.
-    """
-    motion = (state.x_m, state.y_m, state.heading_rad, state.speed_mps, state.acceleration_mps2, state.steering_rad)
-    _walk(*motion, acceleration_mps2, steering_rad, moving, actuators, step_s)
+def walk(state: State, requested: Requested, actuators: Actuators, step_s: float) -> None:
+    """Move the walkers marked in `moving` by one step, in place."""
+    _walk(motion_of(state), tuple(requested), tuple(actuators), step_s)
 
 
 @compiled
-def _walk(
-    x_m: FloatArray,
-    y_m: FloatArray,
-    heading_rad: FloatArray,
-    speed_mps: FloatArray,
-    acceleration_mps2: FloatArray,
-    steering_rad: FloatArray,
-    requested_acceleration_mps2: FloatArray,
-    requested_steering_rad: FloatArray,
-    moving: BoolArray,
-    actuators: Actuators,
-    step_s: float,
-) -> None:
+def _walk(motion: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, ...], step_s: float) -> None:
+    x_m, y_m, heading_rad, speed_mps, acceleration_mps2, steering_rad, _ = motion
+    asked, actuators = Requested(*requests), Actuators(*limits)
+    moving = asked.moving
     for g, p in np.ndindex(moving.shape):
         if moving[g, p]:
             before = speed_mps[g, p]
             most_up, most_down = actuators.max_acceleration_mps2[p], actuators.max_braking_mps2[p]
-            requested = min(max(requested_acceleration_mps2[g, p], -most_down), most_up)
-            speed = _next_speed_mps(before, requested, most_up, most_down, step_s)
+            requested = min(max(asked.acceleration_mps2[g, p], -most_down), most_up)
+            speed = _next_speed_mps(before, requested, (most_up, most_down), step_s)
             speed = min(speed, actuators.max_speed_mps[p])
             lock = actuators.max_steering_rad[p]
-            steering = min(max(requested_steering_rad[g, p], -lock), lock)
+            steering = min(max(asked.steering_rad[g, p], -lock), lock)
             rate = curvature_per_m(steering, actuators.wheelbase_m[p]) * max(abs(speed), TURNS_AS_AT_MPS)
             fastest = min(MAX_TURN_RADPS, actuators.max_lateral_mps2[p] / max(abs(speed), 0.1))
             turned = min(max(rate, -fastest), fastest) * step_s
@@ -78,8 +59,10 @@ def _walk(
 
 
 @compiled
-def _next_speed_mps(before_mps: float, requested_mps2: float, most_up: float, most_down: float, step_s: float) -> float:
-    """The speed after a step in which an acceleration is requested: forward, standing or backward."""
+def _next_speed_mps(before_mps: float, requested_mps2: float, most_mps2: tuple[float, float], step_s: float) -> float:
+    """The speed after a step in which an acceleration is requested: forward, standing or backward. `most_mps2` are the
+    largest acceleration and braking."""
+    most_up, most_down = most_mps2
     if before_mps > 0.0:
         return max(before_mps + requested_mps2 * step_s, 0.0)
     if requested_mps2 > 0.0:

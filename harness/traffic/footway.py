@@ -15,7 +15,7 @@ from harness.config.road_user import WALKER_LENGTH_M, WALKER_WIDTH_M, WALKING_MP
 from harness.config.scene import Scene
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.raster import CELL_M, Raster
+from harness.game.rails import RASTER_M, Raster
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic import surface
 from harness.traffic.network import lane_line
@@ -46,9 +46,9 @@ class Ground:
     @cached_property
     def raster(self) -> Raster:
         """The carriageway's cells around the ways."""
-        low, high = self.near_m[:2] - CELL_M, self.near_m[2:] + CELL_M
-        counts = np.ceil((high - low) / CELL_M).astype(int)
-        x_m, y_m = (low[k] + CELL_M * (np.arange(counts[k]) + 0.5) for k in range(2))
+        low, high = self.near_m[:2] - RASTER_M, self.near_m[2:] + RASTER_M
+        counts = np.ceil((high - low) / RASTER_M).astype(int)
+        x_m, y_m = (low[k] + RASTER_M * (np.arange(counts[k]) + 0.5) for k in range(2))
         cells = shapely.contains_xy(self.carriageway, *np.meshgrid(x_m, y_m, indexing="ij"))
         return Raster(origin_m=low, cells=cells)
 

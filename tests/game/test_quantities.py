@@ -241,7 +241,7 @@ def test_speed_over_limit__is_a_share_of_it(moment: Moment, world: World) -> Non
 def test_path__looks_along_the_bend(moment: Moment, bend: World) -> None:
     q = moment(bend, [car(0.0, 0.0), car(5.0, 0.0)])
     # 0, 5, 10, 20 m ahead are straight; 30 m ahead is 10 m into a bend of 15 m radius; 50 m ahead is beyond it
-    assert q.path.heading_rad[0, 0, 2:] == pytest.approx([0.0, 0.0, 0.0, 0.0, 10.0 / 15.0, np.pi / 2], abs=0.02)
+    assert q.path_heading_rad[0, 0, 2:] == pytest.approx([0.0, 0.0, 0.0, 0.0, 10.0 / 15.0, np.pi / 2], abs=0.02)
 
 
 def test_games__are_independent(moment: Moment, world: World) -> None:

@@ -266,7 +266,7 @@ def _reaction(game: _Game, begin: int) -> tuple[str, float]:
     steps = slice(max(begin - game.steps(at.BEFORE_S), 1), game.last + 1)
     braking = max(0.0, float((-game.q.state.acceleration_mps2[steps, EGO]).max(initial=0.0)))
     sideways = float(np.abs(game.q.lateral_acceleration_mps2[steps, EGO]).max(initial=0.0))
-    turned = game.q.state.heading_rad[steps, EGO] - game.q.path.heading_rad[steps, EGO, _HERE]
+    turned = game.q.state.heading_rad[steps, EGO] - game.q.path_heading_rad[steps, EGO, _HERE]
     swerves = sideways >= at.SWERVES_MPS2 and float(np.cos(turned).min(initial=1.0)) <= math.cos(at.SWERVES_RAD)
     did = [word for word, done in (("brakes", braking >= at.BRAKES_MPS2), ("swerves", swerves)) if done]
     return " and ".join(did) or NO_REACTION, braking

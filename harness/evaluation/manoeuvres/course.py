@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -49,7 +49,7 @@ class Course:
         """From one game's trace. `sizes_m` are length and width of vehicle types, by default those of SUMO."""
         quantities = quantities_of(trace, world, sizes_by_name(trace, sizes_m))
         players = len(world.roles)
-        bodies = Bodies(*(getattr(quantities.bodies, each.name)[:, :players].copy() for each in fields(Bodies)))
+        bodies = Bodies(*(column[:, :players].copy() for column in quantities.bodies))
         between = Quantities(world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m)
         drove = drove_in(trace, world.roles)
         if drove[:, EGO].any():
@@ -62,7 +62,7 @@ class Course:
         if bodies.present.shape[1] == 2:
             return self
         alone = np.isin(np.arange(bodies.present.shape[1]), (player, other))
-        of_both = replace(bodies, present=bodies.present & alone)
+        of_both = bodies._replace(present=bodies.present & alone)
         q = self.quantities
         between = Quantities(q.world, q.state, of_both, q.advanced_m, q.lateral_offset_m)
         return replace(self, between=between)
@@ -118,7 +118,7 @@ class Course:
     @cached_property
     def turned_rad(self) -> FloatArray:
         """[T, P] heading to the left of the road's."""
-        turned = self.quantities.state.heading_rad - self.quantities.path.heading_rad[..., _HERE]
+        turned = self.quantities.state.heading_rad - self.quantities.path_heading_rad[..., _HERE]
         return (turned + np.pi) % (2.0 * np.pi) - np.pi
 
     def swerving_mps2(self, player: int, side: float) -> FloatArray:
@@ -127,7 +127,7 @@ class Course:
         Roads are polylines: their curvature is measured over lengths of 5 m and more.
         """
         near = np.flatnonzero(np.abs(PATH_M) <= _NEARBY_M)
-        headings = np.unwrap(self.quantities.path.heading_rad[:, player, near], axis=-1)
+        headings = np.unwrap(self.quantities.path_heading_rad[:, player, near], axis=-1)
         curve = (side * np.diff(headings, axis=-1) / np.diff(PATH_M[near])).max(-1)
         own = side * self.quantities.lateral_acceleration_mps2[:, player]
         return own - np.maximum(curve, 0.0) * self.quantities.speed_mps[:, player] ** 2
