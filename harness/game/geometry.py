@@ -114,10 +114,8 @@ def box_segment_distance(box: Box, segment: FloatArray) -> float:
 
 
 @compiled
-def _box_segment_distance(
-    box: Box, direction: tuple[float, float], segment: FloatArray, limit_m: float
-) -> float:
-    """The distance if it is below the limit, else a value not below it; `direction` is cosine and sine of the heading."""
+def _box_segment_distance(box: Box, direction: tuple[float, float], segment: FloatArray, limit_m: float) -> float:
+    """The distance if it is below the limit, else a value not below it; `direction` is that of the heading."""
     cosine, sine = direction
     dx, dy = segment[0, 0] - box.x_m, segment[0, 1] - box.y_m
     u0, v0 = dx * cosine + dy * sine, dy * cosine - dx * sine

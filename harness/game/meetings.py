@@ -91,7 +91,7 @@ class _Player(NamedTuple):
 
 @compiled
 def meetings(
-    players: tuple[FloatArray, ...], bodies: tuple[Any, ...], signals: IntArray, table: tuple[Any, ...]
+    players: tuple[Any, ...], bodies: tuple[Any, ...], signals: IntArray, table: tuple[Any, ...]
 ) -> tuple[IntArray, FloatArray, BoolArray]:
     """The columns of `Meetings`: the conflict, the numbers [5, G, P, B] in their order, and the duty to yield.
 
@@ -128,7 +128,7 @@ def meetings(
 def _meeting(
     player: _Player, body: _Body, streams: Streams, signals: IntArray
 ) -> tuple[int, tuple[float, float, float, float, float], bool]:
-    """The conflict of a player with a body: its row, the numbers of `Meetings` in their order, and the duty to yield."""
+    """The conflict of a player with a body: its row, the numbers of `Meetings`, and the duty to yield."""
     conflicts = streams.conflicts
     found, other_m = _first_conflict(player, body, streams)
     if found < 0:
@@ -150,9 +150,7 @@ def _meeting(
 
 
 @compiled
-def streams_at(
-    pose: tuple[float, float, float], streams: Streams, in_streams: IntArray, along_m: FloatArray
-) -> int:
+def streams_at(pose: tuple[float, float, float], streams: Streams, in_streams: IntArray, along_m: FloatArray) -> int:
     """The number of streams in which a body with a pose (x, y, heading) drives; written to `in_streams` in order, and
     its place to `along_m`.
 

@@ -30,15 +30,15 @@ class Passage(NamedTuple):
 
 
 @compiled
-def places(bodies: tuple[Any, ...], table: tuple[Any, ...]) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
+def places(columns: tuple[Any, ...], table: tuple[Any, ...]) -> tuple[IntArray, IntArray, IntArray, FloatArray]:
     """The columns of `Places`, of bodies [T, B] in the table of streams."""
-    those, streams = Bodies(*bodies), Streams(*table)
+    among, streams = Bodies(*columns), Streams(*table)
     along_m = np.empty(streams.first_conflict.shape[1])
     in_streams = np.empty(len(along_m), dtype=np.int64)
     steps, bodies, found, along = [0], [0], [0], [0.0]  # numba infers the types of lists from their entries
-    for t, b in np.ndindex(those.present.shape):
-        if those.present[t, b]:
-            pose = (those.x_m[t, b], those.y_m[t, b], those.heading_rad[t, b])
+    for t, b in np.ndindex(among.present.shape):
+        if among.present[t, b]:
+            pose = (among.x_m[t, b], among.y_m[t, b], among.heading_rad[t, b])
             count = streams_at(pose, streams, in_streams, along_m)
             for k in range(count):
                 steps.append(t)

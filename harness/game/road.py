@@ -175,7 +175,12 @@ def _locate(x_m: FloatArray, y_m: FloatArray, station_m: FloatArray, table: tupl
         station, offset = station_m[g, p], 0.0
         for _ in range(3):
             row = row_at(station, routes.first_row[p], routes.last_row[p])
-            dx, dy, cosine, sine = x_m[g, p] - routes.x_m[row], y_m[g, p] - routes.y_m[row], routes.cos[row], routes.sin[row]
+            dx, dy, cosine, sine = (
+                x_m[g, p] - routes.x_m[row],
+                y_m[g, p] - routes.y_m[row],
+                routes.cos[row],
+                routes.sin[row],
+            )
             offset = dy * cosine - dx * sine
             stretch = max(1.0 - routes.curvature_per_m[row] * offset, _LEAST_STRETCH)
             along = (dx * cosine + dy * sine) / stretch

@@ -72,7 +72,10 @@ def check_step(before: State, q: Quantities, *, drove: BoolArray, payoff: FloatA
     """
     now, bodies, world = q.state, q.bodies, q.world
     fault, game, player = _first_fault(
-        (_moves(before), _moves(now)), tuple(bodies), (drove, payoff, slack_m, world.actuators.max_speed_mps), world.step_s
+        (_moves(before), _moves(now)),
+        tuple(bodies),
+        (drove, payoff, slack_m, world.actuators.max_speed_mps),
+        world.step_s,
     )
     if fault == _NO_FAULT:
         return

@@ -110,7 +110,7 @@ class Bodies(NamedTuple):
         from every player is not present.
         """
         columns, present = _with_nearest(tuple(self), tuple(background), most, within_m)
-        return Bodies(*columns, present)
+        return Bodies._make((*columns, present))
 
 
 @compiled

@@ -40,7 +40,7 @@ class TrafficRules(NamedTuple):
 def rules(
     players: tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray],
     links: tuple[IntArray, FloatArray],
-    tables: tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]],
+    tables: tuple[tuple[Any, ...], ...],
 ) -> tuple[IntArray, FloatArray]:
     """The columns of `TrafficRules`: the next line [G, P], and the numbers [5, G, P] in their order.
 

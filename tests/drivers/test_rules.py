@@ -26,7 +26,7 @@ from harness.drivers.rules import RulesDriver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
-from harness.game.bicycle import lateral_acceleration_mps2, move, requests
+from harness.game.bicycle import Requested, lateral_acceleration_mps2, move, requests
 from harness.game.observation_layout import LAYOUT
 from harness.game.road import AHEAD_M
 from harness.game.roles import EGO
@@ -305,7 +305,7 @@ def test_steering__brings_the_car_onto_its_path_within_limits(car: Car, speed_mp
         seen, _ = perceive(car, view)
         action = car.actions(np.zeros(1), steering_rad(seen, law=law, wheelbase_m=2.7, step_s=car.step_s), view)
         acceleration, steering = requests(action[:, None], state.speed_mps, np.zeros((1, 1)), actuators)
-        move(state, acceleration, steering, np.ones((1, 1), dtype=bool), actuators, car.step_s)
+        move(state, Requested(acceleration, steering, np.ones((1, 1), dtype=bool)), actuators, car.step_s)
         offsets.append(float(state.y_m[0, 0]))
         lateral.append(float(lateral_acceleration_mps2(state, actuators)[0, 0]))
     assert max(abs(each) for each in offsets[-50:]) < 0.05

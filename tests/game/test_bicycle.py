@@ -11,6 +11,7 @@ from harness.game.arrays import FloatArray
 from harness.game.bicycle import (
     GRAVITY_MPS2,
     Actuators,
+    Requested,
     actions,
     curvature_per_m,
     lateral_acceleration_mps2,
@@ -96,7 +97,7 @@ def test_drive__on_ice_the_grip_is_that_of_the_game() -> None:
     # 0.1 * 9.81 = 0.981 m/s2 for the brakes, in one game; the other has the friction of a dry road
     state = State.empty(2, 1)
     state.speed_mps[:], state.friction[:] = 10.0, [0.1, 0.8]
-    move(state, np.full((2, 1), -8.0), np.zeros((2, 1)), np.ones((2, 1), dtype=bool), actuators(), STEP_S)
+    move(state, Requested(np.full((2, 1), -8.0), np.zeros((2, 1)), np.ones((2, 1), dtype=bool)), actuators(), STEP_S)
     assert state.acceleration_mps2[:, 0] == pytest.approx([-0.981, -7.848])
 
 
@@ -115,7 +116,7 @@ def test_drive__players_that_do_not_move_are_untouched() -> None:
     two = Actuators(
         **{name: value if name == "friction" else np.repeat(value, 2) for name, value in actuators()._asdict().items()}
     )
-    move(state, np.full((1, 2), 2.0), np.full((1, 2), 0.1), np.array([[True, False]]), two, STEP_S)
+    move(state, Requested(np.full((1, 2), 2.0), np.full((1, 2), 0.1), np.array([[True, False]])), two, STEP_S)
     for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"):
         assert getattr(state, name)[0, 1] == getattr(before, name)[0, 1]
         assert getattr(state, name)[0, 0] != getattr(before, name)[0, 0]
@@ -226,7 +227,7 @@ def test_requests__the_wheel_is_relative_to_the_bend_of_the_road(wheel: float, r
 def test_actions__are_the_inverse_of_requests_in_a_bend(pedals: float, wheel: float, speed: float, road: float) -> None:
     speeds, roads, car = np.array([[speed]]), np.array([[road]]), actuators(max_steering_rad=1.2)
     asked = requests(np.array([[(pedals, wheel)]]), speeds, roads, car)
-    found = actions(*asked, speeds, roads, car)
+    found = actions(*asked, speed_mps=speeds, road_steering_rad=roads, actuators=car)
     # not beyond the lock of 1.2 rad: what the lock cuts off can't be found again
     assume(abs(asked[1][0, 0]) < 1.2)
     assert found[0, 0] == pytest.approx([pedals, wheel], abs=1e-6)
@@ -234,5 +235,7 @@ def test_actions__are_the_inverse_of_requests_in_a_bend(pedals: float, wheel: fl
 
 def test_actions__of_the_bend_itself_leave_the_wheel_at_0() -> None:
     bend = np.array([[0.12]])
-    found = actions(np.array([[-2.0]]), bend, np.array([[10.0]]), bend, actuators())
+    found = actions(
+        np.array([[-2.0]]), bend, speed_mps=np.array([[10.0]]), road_steering_rad=bend, actuators=actuators()
+    )
     assert found[0, 0] == pytest.approx([-0.25, 0.0])  # 2 of 8 m/s2

@@ -125,7 +125,7 @@ def test_first_contact__is_the_soonest_of_those_marked() -> None:
     others = columns(box(24.6, 0), box(-14.6, 0), box(1, 0))
     speeds = np.array([[10.0]]), np.array([[5.0, 15.0, 10.0]])
     for among, seconds in (([True, True, False], 2.0), ([True, False, False], 4.0), ([False] * 3, np.inf)):
-        found = time_to_first_contact(players(box(0, 0)), others, *speeds, np.array([[among]]))
+        found = time_to_first_contact(players(box(0, 0)), others, speeds, np.array([[among]]))
         assert found[0, 0] == pytest.approx(seconds)
 
 

@@ -249,7 +249,7 @@ def test_games__are_independent(moment: Moment, world: World) -> None:
     state, bodies = one.state.copy(), one.bodies
     for name, values in vars(state).items():
         setattr(state, name, np.concatenate((values, getattr(two.state, name))))
-    both = type(bodies)(*(np.concatenate((getattr(bodies, n), getattr(two.bodies, n))) for n in vars(bodies)))
+    both = type(bodies)._make(map(np.concatenate, zip(bodies, two.bodies, strict=True)))
     offset = np.concatenate((one.lateral_offset_m, two.lateral_offset_m))
     q = Quantities(world, state, both, np.zeros((2, 2)), offset)
     for name in ("leader_gap_m", "time_to_collision_s", "clearance_m", "lane_offset_m", "goal_m", "time_gap_s"):

@@ -455,7 +455,7 @@ def test_checks__cost_less_than_a_hundredth_of_a_step_of_64_games(merge: OpenSce
         slack, games = slack_m(np.array([True, True])), np.arange(64)
 
         def checks() -> None:
-            check_step(before, step.quantities, step.drove, step.payoff, slack)
+            check_step(before, step.quantities, drove=step.drove, payoff=step.payoff, slack_m=slack)
             check_observation(arena.observation, games, before.step)
 
         checks()

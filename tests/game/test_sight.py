@@ -59,14 +59,14 @@ def at(x_m: float, y_m: float, **more: Any) -> dict[str, Any]:
     ],
 )
 def test_line__is_cut_by_the_inside_of_a_box(line: tuple[float, float, float, float], cut: bool) -> None:
-    assert box_cuts(Box(5.0, 0.0, 0.0, 2.0, 2.0), *line) == cut
+    assert box_cuts(Box(5.0, 0.0, 0.0, 2.0, 2.0), line[:2], line[2:]) == cut
 
 
 def test_line__is_cut_by_a_turned_box() -> None:
     """A square of 2 m on its corner reaches 1.414 m from its centre."""
     box = Box(5.0, 0.0, np.pi / 4, 2.0, 2.0)
-    assert box_cuts(box, 0.0, 1.40, 10.0, 1.40)
-    assert not box_cuts(box, 0.0, 1.42, 10.0, 1.42)
+    assert box_cuts(box, (0.0, 1.40), (10.0, 1.40))
+    assert not box_cuts(box, (0.0, 1.42), (10.0, 1.42))
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.config.road_user import DEFAULTS
-from harness.game.bicycle import Actuators, curvature_per_m, move
+from harness.game.bicycle import Actuators, Requested, curvature_per_m, move
 from harness.game.state import State
 from harness.game.walking import MAX_BACKWARD_MPS, MAX_TURN_RADPS, walk
 from tests.support.bicycle import actuators, state_of
@@ -24,7 +24,7 @@ def walker(**changes: float) -> Actuators:
 def step_on(state: State, acceleration_mps2: float, steering_rad: float = 0.0, steps: int = 1) -> State:
     for _ in range(steps):
         request = (np.array([[acceleration_mps2]]), np.array([[steering_rad]]))
-        walk(state, *request, np.array([[True]]), walker(), STEP_S)
+        walk(state, Requested(*request, np.array([[True]])), walker(), STEP_S)
     return state
 
 
@@ -78,7 +78,7 @@ def test_walk__turns_by_the_curvature_of_its_steering() -> None:
 
 def test_walk__players_that_do_not_move_are_untouched() -> None:
     state = state_of(1.0)
-    walk(state, np.array([[1.0]]), np.array([[0.5]]), np.array([[False]]), walker(), STEP_S)
+    walk(state, Requested(np.array([[1.0]]), np.array([[0.5]]), np.array([[False]])), walker(), STEP_S)
     assert (state.x_m[0, 0], state.speed_mps[0, 0], state.steering_rad[0, 0]) == (0.0, 1.0, 0.0)
 
 
@@ -87,11 +87,11 @@ def test_bicycle__turns_no_sharper_than_it_leans() -> None:
     bicycle = actuators(**{**limits, "max_speed_mps": 8.0})
     assert limits["max_lateral_mps2"] == pytest.approx(9.81 * tan(radians(20.0)), abs=0.05)
     state = state_of(6.0, steering_rad=0.8)
-    move(state, np.zeros((1, 1)), np.array([[0.8]]), np.array([[True]]), bicycle, STEP_S)
+    move(state, Requested(np.zeros((1, 1)), np.array([[0.8]]), np.array([[True]])), bicycle, STEP_S)
     assert state.heading_rad[0, 0] == pytest.approx(0.1 * 3.6 / 6.0)  # 3.6 m/s2 at 6 m/s
     car = actuators(**{**limits, "max_speed_mps": 8.0, "max_lateral_mps2": 15.0})
     state = state_of(6.0, steering_rad=0.8)
-    move(state, np.zeros((1, 1)), np.array([[0.8]]), np.array([[True]]), car, STEP_S)
+    move(state, Requested(np.zeros((1, 1)), np.array([[0.8]]), np.array([[True]])), car, STEP_S)
     # without the limit, the tightest curve at the lock, cos(atan(tan(0.8) / 2)) tan(0.8) / 1.05 = 0.872 per metre,
     # needs 31 m/s2, and the tyres have 0.8 g
     assert state.heading_rad[0, 0] == pytest.approx(0.1 * 0.8 * 9.81 / 6.0)

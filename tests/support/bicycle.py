@@ -6,6 +6,7 @@ import numpy as np
 
 from harness.game.bicycle import (
     Actuators,
+    Requested,
     move,
 )
 from harness.game.state import State
@@ -38,4 +39,5 @@ def state_of(speed_mps: float, heading_rad: float = 0.0, steering_rad: float = 0
 def advance(state: State, acceleration_mps2: float, steering_rad: float, car: Actuators | None = None) -> None:
     car = car or actuators()
     state.friction[:] = car.friction
-    move(state, np.array([[acceleration_mps2]]), np.array([[steering_rad]]), np.array([[True]]), car, STEP_S)
+    requested = Requested(np.array([[acceleration_mps2]]), np.array([[steering_rad]]), np.array([[True]]))
+    move(state, requested, car, STEP_S)

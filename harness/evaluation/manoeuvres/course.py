@@ -49,7 +49,7 @@ class Course:
         """From one game's trace. `sizes_m` are length and width of vehicle types, by default those of SUMO."""
         quantities = quantities_of(trace, world, sizes_by_name(trace, sizes_m))
         players = len(world.roles)
-        bodies = Bodies(*(column[:, :players].copy() for column in quantities.bodies))
+        bodies = Bodies._make(column[:, :players].copy() for column in quantities.bodies)
         between = Quantities(world, quantities.state, bodies, quantities.advanced_m, quantities.lateral_offset_m)
         drove = drove_in(trace, world.roles)
         if drove[:, EGO].any():
