@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import io
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from harness.cli import wording
-from harness.cli.output import AsJson, output, print_json
+from harness.cli import messages
+from harness.cli.output import AllowCode, AsJson, console_of_any_encoding, output, print_json, print_plain
 from harness.cli.scenes import check_scene, folder_of_scene
-from harness.cli.terminal import print_plain
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
@@ -20,14 +17,13 @@ if TYPE_CHECKING:
 
 NOT_CONFORMANT = 1
 
-AllowCode = Annotated[
-    bool,
-    typer.Option(
-        "--allow-code",
-        help="Permit drivers that run code from a file: a program, an FMU, or a file of Stable-Baselines3. Such code "
-        "can do everything that you can: use this only for files that you trust.",
+PersonaFile = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
     ),
 ]
+policy_app = typer.Typer(no_args_is_help=True, help="Export policies.")
 persona_app = typer.Typer(
     no_args_is_help=True, help="Create the document of a persona, and show what a persona's document means."
 )
@@ -47,41 +43,32 @@ def new_persona(
     from harness.cli.persona_template import create_persona
 
     file = create_persona(name, out)
-    print(wording.persona_created(file))
+    show, check = f"harness persona show {file}", f"harness persona check {file}"
+    print(f"{file}: a valid persona, a careful driver. To see what it means: {show}; what is left to write: {check}")
 
 
 @persona_app.command("check")
 def check_persona(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
-        ),
-    ],
+    file: PersonaFile,
 ) -> None:
     """Check a persona: its document, and that its sources are evidence and not the text of the template."""
-    from harness.cli import persona_check
+    from harness.cli import persona_template
 
     file = document_at(file, "personas")
-    print(wording.persona_in_order(file, persona_check.check_persona(file)))
+    persona = persona_template.check_persona(file)
+    sources = f"{len(persona.sources)} source{'' if len(persona.sources) == 1 else 's'}"
+    print(f"{file} is in order: {persona.name}, {sources}. To see what it means: harness persona show {file}")
 
 
 @persona_app.command("show")
 def show_persona(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
-        ),
-    ],
+    file: PersonaFile,
     html: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Also write an HTML page that opens offline.", show_default=False),
     ] = None,
 ) -> None:
     """Show the profile of a persona: the value of each term, membership functions, and a sample of its lapses."""
-    from rich.console import Console
-
     from harness.config.persona import Persona
     from harness.config.toml_reading import read_document
     from harness.reports.persona.persona_terminal import show
@@ -93,12 +80,10 @@ def show_persona(
         from harness.reports.persona.persona_page import write_profile
 
         write_profile(profile, html)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # the terminal may not have every character
-    console = Console()
+    console = console_of_any_encoding()
     show(profile, console)
     if html is not None:
-        console.print(wording.page_written(html), highlight=False, markup=False, soft_wrap=True)
+        print_plain([f"Page: {html}"], console)
 
 
 def new(
@@ -109,7 +94,8 @@ def new(
 
     from harness.cli.project import create_project
 
-    print_plain(wording.project_created(folder, create_project(folder)), Console())
+    written = [f"wrote {file}" for file in create_project(folder)]
+    print_plain([*written, f"Next: cd {folder} && harness campaign campaign.toml --quick"], Console())
 
 
 def check(
@@ -146,14 +132,14 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     varying = varying_drivers(opened)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
     notes = opened.ego_driver.notes if opened.ego_driver is not None else ()
-    ego = [] if opened.document.ego.driver == LEARNED else [wording.ego(opened), *notes]
+    ego = [] if opened.document.ego.driver == LEARNED else [messages.ego(opened), *notes]
     ego = [plain(each) for each in (*ego, *(f"{driver}: {told}" for driver, told in varying.items()))]
     remarks = [*opened.scene.warnings, *opened.persona_remarks, *ego]
-    print_plain([wording.in_order(file), *remarks], console)
-    print_plain([wording.work(opened, stages), *wording.stage_lines(stages)], console)
+    print_plain([messages.in_order(file), *remarks], console)
+    print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)
     if as_json:
         checked = {"campaign": opened.document.name, "file": str(file), "in_order": True}
-        print_json({**checked, "remarks": remarks, "stages": wording.stage_records(stages)})
+        print_json({**checked, "remarks": remarks, "stages": messages.stage_records(stages)})
 
 
 def schema(
@@ -172,8 +158,7 @@ def schema(
 ) -> None:
     """Print the JSON Schema of a kind of document, or write one or all schemas. Editors use them to complete and check
     TOML files."""
-    from harness.cli.schema_files import write_schemas
-    from harness.config.json_schema import DOCUMENTS, schema_text
+    from harness.config.json_schema import DOCUMENTS, schema_text, write_schemas
     from harness.errors import UsageError
 
     if out is not None:
@@ -182,7 +167,8 @@ def schema(
     elif document is not None:
         print(schema_text(document), end="")
     else:
-        raise UsageError.of("harness schema", "DOCUMENT", *wording.no_document_kind(tuple(DOCUMENTS)))
+        remedy = f"name one of {', '.join(DOCUMENTS)}, or write all of them with --out DIR"
+        raise UsageError.of("harness schema", "DOCUMENT", "is missing", remedy)
 
 
 def columns(
@@ -227,8 +213,41 @@ def check_driver(
     from harness.environments.conformance import check_named
 
     findings = check_named(driver, document_at(scene, "networks"), games, allow_code=allow_code)
-    console = Console()
-    for line in findings.lines():
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    print_plain(findings.lines(), Console())
     if findings.violations:
         raise typer.Exit(NOT_CONFORMANT)
+
+
+@policy_app.command("export")
+def export_policy(
+    driver: Annotated[
+        str,
+        typer.Argument(
+            metavar="DRIVER",
+            help="A policy's folder, or a driver document of kind stable_baselines3.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Argument(metavar="FILE", help="The new file: .onnx, or .pt for TorchScript.", show_default=False)
+    ],
+    allow_code: AllowCode = False,
+) -> None:
+    """Write a policy as one network, which drives without the library that trained it.
+
+    The file and a driver document for it are written; what exists is not overwritten.
+    """
+    from harness.drivers.external import find_driver
+    from harness.drivers.network_export import KINDS, export_network
+    from harness.errors import UsageError
+    from harness.files import write_atomically
+
+    document = out.with_suffix(".toml")
+    for file in (out, document):
+        if file.exists():
+            raise UsageError.of(file, "", "exists", "name another file")
+    difference = export_network(find_driver(driver, Path("DRIVER"), key="", allow_code=allow_code), out)
+    write_atomically(document, f'kind = "{KINDS[out.suffix.lower()]}"\nfile = "{out.name}"\n'.encode())
+    print(
+        f"{out}: decides as the policy does, within {difference:.1g} over random observations. As a driver: {document}"
+    )

@@ -10,18 +10,13 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from harness.cli import wording
-from harness.cli.comparison import compare
-from harness.cli.documents import AllowCode, check, check_driver, columns, new, persona_app, schema
-from harness.cli.exports import export
-from harness.cli.output import AsJson, Quiet, Verbose, output
-from harness.cli.pinned_games import minimise, regression
-from harness.cli.policies import policy_app
-from harness.cli.replays import replay
-from harness.cli.results import exit_as, show_result
+from harness.cli import messages
+from harness.cli.documents import check, check_driver, columns, new, persona_app, policy_app, schema
+from harness.cli.ending import exit_as, show_result
+from harness.cli.output import AllowCode, AsJson, Quiet, RunPath, Verbose, output, print_plain, print_version
+from harness.cli.pinning import minimise, regression
+from harness.cli.runs import compare, export, replay, serve
 from harness.cli.scenes import scene_app
-from harness.cli.serving import serve
-from harness.cli.terminal import print_plain, print_version
 from harness.cli.workers import Ray, started_on
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
 from harness.shipped_documents import document_at
@@ -63,9 +58,6 @@ CampaignFile = Annotated[
     typer.Argument(
         metavar="FILE", help="The TOML file of the campaign, or the name of a shipped campaign.", show_default=False
     ),
-]
-RunPath = Annotated[
-    Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
 ]
 QuickRun = Annotated[
     bool,
@@ -124,7 +116,7 @@ def campaign(
     """
     with output(as_json, quiet, verbose) as console:
         file = document_at(file, "campaigns")
-        with console.status(wording.reading(file)):  # shown before what takes time to import
+        with console.status(messages.reading(file)):  # shown before what takes time to import
             from harness.campaign.execution.run_campaign import run_campaign
             from harness.campaign.preflight import open_campaign
             from harness.campaign.storage.run_folder import RunFolder
@@ -134,13 +126,13 @@ def campaign(
             opened = open_campaign(file, quick, allow_code)
         folder = RunFolder(out or Path("reports") / opened.run_name)
         if quick and not opened.quick:
-            console.print(wording.NOTHING_TO_SHORTEN)
+            console.print(messages.NOTHING_TO_SHORTEN)
         _handle_termination_signals()
         try:
             with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
                 outcome = run_campaign(opened, folder, start_workers, console, keep_going)
         except KeyboardInterrupt as interrupt:
-            console.print(wording.INTERRUPTED)
+            console.print(messages.INTERRUPTED)
             raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
         show_result(outcome, folder.path, console, as_json)
         exit_as(outcome, console)
@@ -226,10 +218,10 @@ def main() -> None:
         _fail(f"{type(error).__name__}: {error}", FAILED)
     except Exception as error:
         if is_of_memory(error):
-            _fail(wording.out_of_memory(error), FAILED)
+            _fail(messages.out_of_memory(error), FAILED)
         if not isinstance(error, OSError) or error.errno not in MACHINE_ERRORS:
             raise
-        _fail(wording.machine_error(error), FAILED)
+        _fail(messages.machine_error(error), FAILED)
 
 
 if __name__ == "__main__":

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import sys
 import tempfile
 from collections import Counter
 from collections.abc import Sequence
@@ -12,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from harness.cli import wording
-from harness.cli.terminal import print_plain
+from harness.cli import messages
+from harness.cli.output import console_of_any_encoding, print_plain
 from harness.errors import FAILED, UsageError, plain
 
 if TYPE_CHECKING:
@@ -23,7 +21,6 @@ if TYPE_CHECKING:
     from harness.traffic.maps.plans import GamePlan
 
 _ROWS = 40
-_SKETCH_ROWS = 24
 
 
 def new_scene(
@@ -78,20 +75,16 @@ def new_scene(
     Lists these conflicts with their numbers, and writes a scene of one of them, or of each: the net, the players'
     routes, starts from which they meet, goals, and a campaign.
     """
-    from rich.console import Console
-
     from harness.cli.scene_writing import check_new
     from harness.traffic.maps.open_map import open_map
 
     if conflict is not None and every:
-        raise UsageError.of("harness scene new", "--all", *wording.ONE_OR_ALL)
+        raise UsageError.of("harness scene new", "--all", "--conflict and --all exclude each other", "give one of them")
     if not only_list:
         check_new(name, [] if every else [name], out)
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # the terminal may not have every character
-    console = Console()
+    console = console_of_any_encoding()
     with tempfile.TemporaryDirectory(prefix="harness-map-") as folder:
-        with console.status(wording.reading(source)):
+        with console.status(messages.reading(source)):
             opened = open_map(source, Path(folder), left_hand=left_hand)
         plans = _wanted(opened, kind, near, within)
         chosen = {name: _numbered(opened, conflict) if conflict is not None else _first(plans)}
@@ -100,10 +93,10 @@ def new_scene(
             check_new(name, [] if only_list else list(chosen), out)
         _show(opened, plans[:rows], console)
         if len(plans) > rows:
-            print_plain([wording.rows_left_out(len(plans) - rows, "conflicts")], console)
+            print_plain([messages.rows_left_out(len(plans) - rows, "conflicts")], console)
         if html is not None:
             _write_page(opened, plans, html)
-            print_plain([wording.page_written(html)], console)
+            print_plain([f"Page: {html}"], console)
         if not only_list:
             _write(opened, chosen, out, console)
 
@@ -111,18 +104,19 @@ def new_scene(
 def _wanted(opened: OpenMap, kind: str | None, near: str | None, within_m: float) -> list[GamePlan]:
     plans = opened.near(near, within_m)
     if near is not None and not plans:
-        raise UsageError.of("--near", near, *wording.NO_CONFLICT_NEAR)
+        raise UsageError.of("--near", near, "there is no conflict near this edge", "give a larger --within")
     if kind is None:
         return plans
     kinds = list(dict.fromkeys(plan.candidate.kind.value for plan in plans))
     if kind not in kinds:
-        raise UsageError.of("--kind", kind, *wording.no_kind_of_conflict(kinds))
+        raise UsageError.of("--kind", kind, "is no kind of conflict of this map", f"its kinds are {', '.join(kinds)}")
     return [plan for plan in plans if plan.candidate.kind.value == kind]
 
 
 def _numbered(opened: OpenMap, number: int) -> GamePlan:
     if not 1 <= number <= len(opened.plans):
-        raise UsageError.of("--conflict", str(number), *wording.no_such_conflict(len(opened.plans)))
+        remedy = f"choose one from 1 to {len(opened.plans)}: --list lists them"
+        raise UsageError.of("--conflict", str(number), "there is no conflict of this number", remedy)
     return opened.plans[number - 1]
 
 
@@ -132,17 +126,13 @@ def _first(plans: Sequence[GamePlan]) -> GamePlan:
 
 
 def _show(opened: OpenMap, plans: Sequence[GamePlan], console: Console) -> None:
-    """The sketch, the table and the numbers of a map's conflicts."""
-    from harness.cli.map_sketch import sketch
+    """The table and the numbers of a map's conflicts."""
     from harness.cli.net_tables import plan_table
 
-    marks = [(plan.number, plan.candidate.place) for plan in plans]
-    braille = (console.encoding or "").lower().startswith("utf")
-    columns = max(min(console.width - 2, 120), 20)
-    print_plain(sketch(opened.roads(), marks, columns=columns, rows=_SKETCH_ROWS, braille=braille), console)
     console.print(plan_table([(plan, opened.place_of(plan)) for plan in plans]), highlight=False)
     counts = Counter(plan.candidate.kind.value for plan in opened.plans)
-    print_plain(wording.conflicts_found(counts.items(), opened.left_out), console)
+    print_plain(["in all: " + ", ".join(f"{count} {kind}" for kind, count in counts.items())], console)
+    print_plain([f"left out: {count} ({reason})" for reason, count in sorted(opened.left_out.items())], console)
 
 
 def _write_page(opened: OpenMap, plans: Sequence[GamePlan], file: Path) -> None:
@@ -161,12 +151,12 @@ def _write_page(opened: OpenMap, plans: Sequence[GamePlan], file: Path) -> None:
 def _write(opened: OpenMap, chosen: dict[str, GamePlan], out: Path, console: Console) -> None:
     from harness.cli.scene_writing import files_of, write_scenes
 
-    with console.status(wording.MAKING_SCENES):
+    with console.status("making and checking scenes"):
         written, problems = write_scenes(opened, chosen, out)
     for each in written:
-        plan = chosen[each]
-        print_plain([wording.scene_made(plan.number, plain(opened.place_of(plan)), *files_of(each, out))], console)
+        (scene, campaign), plan = files_of(each, out), chosen[each]
+        print_plain([f"conflict {plan.number}, {plain(opened.place_of(plan))}: wrote {scene} and {campaign}"], console)
     print_plain([str(problem) for problem in problems], console)
-    print_plain([wording.run_campaign_next(files_of(written[0], out)[1])], console)
+    print_plain([f"Next: harness campaign {files_of(written[0], out)[1]} --quick"], console)
     if problems:
         raise typer.Exit(FAILED)

@@ -2,19 +2,34 @@
 
 from __future__ import annotations
 
+import io
 import json
 import logging
-from collections.abc import Iterator
+import sys
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from harness.errors import USAGE_ERROR, UsageError
+from harness.version import __version__
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+RunPath = Annotated[
+    Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
+]
+AllowCode = Annotated[
+    bool,
+    typer.Option(
+        "--allow-code",
+        help="Permit drivers that run code from a file: a program, an FMU, or a file of Stable-Baselines3. Such code "
+        "can do everything that you can: use this only for files that you trust.",
+    ),
+]
 AsJson = Annotated[
     bool,
     typer.Option("--json", help="Print the result as one JSON object; what else there is to say goes to stderr."),
@@ -39,6 +54,28 @@ def output(as_json: bool, quiet: bool = False, verbose: bool = False) -> Iterato
         if quiet and verbose:
             raise UsageError.of("--quiet", "--verbose", "are opposites", "leave one of them out")
         yield console
+
+
+def console_of_any_encoding() -> Console:
+    """A console that replaces what the terminal has no character for."""
+    from rich.console import Console
+
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="replace")
+    return Console()
+
+
+def print_plain(lines: Iterable[str], console: Console, style: str | None = None) -> None:
+    """Print lines as they are: without markup, highlights or line breaks."""
+    for line in lines:
+        console.print(line, style=style, highlight=False, markup=False, soft_wrap=True)
+
+
+def print_version(wanted: bool) -> None:
+    """Print the version of the package and end the command."""
+    if wanted:
+        print(f"harness {__version__}")
+        raise typer.Exit
 
 
 def print_json(content: Any) -> None:

@@ -1,12 +1,14 @@
-"""The template of a persona: a valid document with every key and its description from the schema."""
+"""The template of a persona, a valid document with every key and its description from the schema; and the check
+whether the evidence of a persona is more than that of the template."""
 
 from __future__ import annotations
 
 import json
 import os
 import re
+import sys
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +16,18 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import TypeAdapter, ValidationError
 
 from harness.campaign.plan.plan import plan
-from harness.cli import wording
 from harness.config.campaign import Campaign
 from harness.config.json_schema import file_of, schema_of, term_in_words, unit_of
+from harness.config.persona import Persona, Source
 from harness.config.scene import Name
-from harness.errors import UsageError
+from harness.config.toml_reading import read_document
+from harness.errors import Problem, UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, TERMS
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:  # pragma: no cover
+    import tomli as tomllib
 
 FOLDER = "personas"
 """The default folder of a new persona."""
@@ -30,6 +38,7 @@ _WEIGHT, _LIMIT = 1.0, 1.0  # of a term that is commented out
 _WIDTH = 112
 _PATTERNS = {r"^[A-Za-z][A-Za-z0-9_]*$": "Letters, digits and _, a letter first;"}
 _NO_VALUE = object()
+_NOT_WRITTEN = re.compile(r"\W*(todo|tbd|fixme|xxx+|placeholder|lorem ipsum|unknown|none|n/?a|example)\b|\W*$", re.I)
 
 
 def create_persona(name: str, out: Path | None = None) -> Path:
@@ -40,17 +49,19 @@ def create_persona(name: str, out: Path | None = None) -> Path:
     _check_name(name)
     path = out if out is not None else Path(FOLDER) / f"{name}.toml"
     if path.suffix != ".toml":
-        raise UsageError.of(path, "", *wording.NOT_A_TOML_FILE)
+        raise UsageError.of(path, "", "is not the name of a TOML file", "the name must end with .toml")
     if out is None:
         path.parent.mkdir(exist_ok=True)
     elif not path.parent.is_dir():
-        raise UsageError.of(path, "", *wording.no_folder(path.parent))
+        raise UsageError.of(path, "", f"there is no folder {path.parent}", "create it, or name another file")
     text = persona_template(name, _schema_from(path))
     try:
         with path.open("x", encoding="utf-8", newline="\n") as file:
             file.write(text)
     except FileExistsError:
-        raise UsageError.of(path, "", *wording.FILE_EXISTS) from None
+        raise UsageError.of(
+            path, "", "already exists", "no file is overwritten: name another file with --out"
+        ) from None
     return path
 
 
@@ -89,16 +100,47 @@ def persona_template(name: str, schema: str | None = None) -> str:
     )
 
 
+def check_persona(file: Path) -> Persona:
+    """The persona in a file.
+
+    Raises UsageError with every mistake, and with every source that is no evidence: the text of the template, or a
+    word that stands for a text to come.
+    """
+    persona = read_document(file, Persona)
+    template = Persona.model_validate(tomllib.loads(persona_template("any")))
+    (placeholder,) = template.sources
+    problems = []
+    for number, source in enumerate(persona.sources):
+        for key, message, remedy in _mistakes(source, placeholder):
+            problems.append(Problem(str(file), f"sources[{number}].{key}", message, remedy))
+    if persona.description == template.description:
+        problems.append(Problem(str(file), "description", "is the text of the template", "describe this driver"))
+    if problems:
+        raise UsageError(problems)
+    return persona
+
+
+def _mistakes(source: Source, placeholder: Source) -> Iterator[tuple[str, str, str]]:
+    """Key, message and remedy of what makes a source no evidence."""
+    if source.statistic == placeholder.statistic or _NOT_WRITTEN.match(source.statistic):
+        yield "statistic", "is a placeholder", "say what was counted or measured of such drivers, with the figure"
+    if source.citation == placeholder.citation or _NOT_WRITTEN.match(source.citation):
+        yield "citation", "is a placeholder", "name author, publication and year"
+
+
 def _check_name(name: str) -> None:
     """Raise UsageError if a persona can't have the name: names have a pattern, and some are names of stages."""
     try:
         TypeAdapter(Name).validate_python(name)
     except ValidationError:
         suggestion = re.sub(r"^[^A-Za-z]+", "", re.sub(r"[^A-Za-z0-9]+", "_", name)).strip("_")[:40]
-        raise UsageError.of("harness persona new", "NAME", *wording.bad_persona_name(name, suggestion)) from None
+        message = f"{name!r} can't be the name of a persona: use letters, digits and _, a letter first, at most 40"
+        remedy = f"did you mean {suggestion!r}?" if suggestion else "for instance 'late_merger'"
+        raise UsageError.of("harness persona new", "NAME", message, remedy) from None
     stages = [stage.id for stage in plan(Campaign(name="any", scene="any", personas=["any"]), [name])]
     if len(set(stages)) < len(stages):
-        raise UsageError.of("harness persona new", "NAME", *wording.reserved_persona_name(name))
+        message = f"{name!r} can't be the name of a persona: stages and arms of every campaign have this name"
+        raise UsageError.of("harness persona new", "NAME", message, f"for instance '{name}_driver'")
 
 
 def _schema_from(path: Path) -> str | None:

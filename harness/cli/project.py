@@ -8,7 +8,7 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import TypeAdapter, ValidationError
 
-from harness.cli import wording
+from harness.cli import messages
 from harness.cli.persona_template import create_persona
 from harness.config.campaign import CampaignName
 from harness.errors import UsageError
@@ -30,11 +30,12 @@ def create_project(folder: Path) -> list[Path]:
     try:
         TypeAdapter(CampaignName).validate_python(name)
     except ValidationError:
-        raise UsageError.of(folder, "", *wording.BAD_PROJECT_NAME) from None
+        message = "the folder's name is that of the campaign, too: letters, digits, _ and -, a letter first, at most 40"
+        raise UsageError.of(folder, "", message, "name another folder") from None
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise UsageError.of(folder, "", *wording.FOLDER_NOT_EMPTY)
+        raise UsageError.of(folder, "", "is there already, and not empty", "name a new folder")
     if not folder.absolute().parent.is_dir():
-        raise UsageError.of(folder, "", *wording.no_folder(folder.absolute().parent))
+        raise UsageError.of(folder, "", *messages.no_folder(folder.absolute().parent))
     try:
         (folder / "personas").mkdir(parents=True)
         shutil.copytree(shipped("networks") / SCENE, folder / "networks" / SCENE)
@@ -46,5 +47,5 @@ def create_project(folder: Path) -> list[Path]:
             text = environment.get_template(template).render(folder=name, persona=PERSONA, scene=SCENE)
             write_atomically(folder / file, text.encode())
     except OSError as error:
-        raise UsageError.of(folder, "", *wording.cannot_write(error)) from None
+        raise UsageError.of(folder, "", *messages.cannot_write(error)) from None
     return [folder / "campaign.toml", folder / "networks" / SCENE / "scene.toml", persona, folder / "README.md"]

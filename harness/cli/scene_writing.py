@@ -1,27 +1,48 @@
-"""Writing scenes and campaigns on a map: each is checked, and complete before it gets its name."""
+"""Writing scenes and campaigns on a map: scene.toml, the route file and a campaign of each. Each is checked, and
+complete before it gets its name."""
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from pydantic import TypeAdapter, ValidationError
 
-from harness.cli import wording
-from harness.cli.scene_texts import campaign_text, scene_files
+from harness.cli import messages
 from harness.config.scene import Name
-from harness.errors import Problem, UsageError
+from harness.errors import Problem, UsageError, plain
 from harness.files import make_folder, write_atomically
 from harness.traffic.load_check import check_loads
+from harness.traffic.maps.candidates import CandidateKind
 from harness.traffic.maps.net_part import write_part
 from harness.traffic.maps.open_map import OpenMap
 from harness.traffic.maps.plans import GamePlan
+from harness.traffic.network import KEPT_M
 from harness.traffic.scene import open_scene
 
 _SCRATCH = ".part"
+_ON_ROADS = ("speedy", "distracted")
+_PERSONAS = {
+    CandidateKind.MERGE: _ON_ROADS,
+    CandidateKind.LANE_END: _ON_ROADS,
+    CandidateKind.FOLLOWING: _ON_ROADS,
+    CandidateKind.ZEBRA: ("jaywalker", "phone_walker"),
+}
+_EGO_WAITS = (CandidateKind.ZEBRA, CandidateKind.FOLLOWING)  # for the non-ego, which is before it or has priority
+_MEANINGS = {
+    CandidateKind.TURN_ACROSS: "the non-ego comes towards the ego and turns across its way",
+    CandidateKind.CROSSING: "the non-ego crosses the ego's way",
+    CandidateKind.ROUNDABOUT: "the non-ego enters a roundabout in front of the ego",
+    CandidateKind.MERGE: "the non-ego joins the ego's road",
+    CandidateKind.LANE_END: "the non-ego's lane ends beside the ego's",
+    CandidateKind.ZEBRA: "the non-ego, on foot, crosses the ego's road on a marked crossing",
+    CandidateKind.FOLLOWING: "the non-ego is ahead of the ego",
+}
 
 
 def check_new(name: str, names: Sequence[str], out: Path) -> None:
@@ -29,12 +50,18 @@ def check_new(name: str, names: Sequence[str], out: Path) -> None:
     try:
         TypeAdapter(Name).validate_python(name)
     except ValidationError:
-        raise UsageError.of("NAME", name, *wording.BAD_SCENE_NAME) from None
+        raise UsageError.of(
+            "NAME", name, "can't be the name of a scene", "use letters, digits and _, a letter first, at most 40"
+        ) from None
     if not out.is_dir():
-        raise UsageError.of("--out", str(out), *wording.no_folder(out))
+        raise UsageError.of("--out", str(out), *messages.no_folder(out))
     taken = [path for each in names for path in files_of(each, out) if os.path.lexists(path)]
     if taken:
-        raise UsageError([Problem(str(path), "", *wording.SCENE_EXISTS) for path in taken])
+        message, remedy = (
+            "is there already, and nothing is overwritten",
+            "choose another NAME, or another folder with --out",
+        )
+        raise UsageError(Problem(str(path), "", message, remedy) for path in taken)
 
 
 def files_of(name: str, out: Path) -> tuple[Path, Path]:
@@ -63,7 +90,7 @@ def write_scenes(opened: OpenMap, chosen: dict[str, GamePlan], out: Path) -> tup
         try:
             _put(opened, {name: (path, chosen[name]) for name, path in ready.items()}, out)
         except OSError as error:
-            raise UsageError.of(out, "", *wording.cannot_write(error)) from None
+            raise UsageError.of(out, "", *messages.cannot_write(error)) from None
     return list(ready), problems
 
 
@@ -72,7 +99,7 @@ def _checked(opened: OpenMap, name: str, plan: GamePlan, folder: Path) -> Path:
     scene = folder / name
     scene.mkdir()
     is_part = write_part(opened.net, opened.net_file, plan.edges, scene / f"{name}.net.xml")
-    for file, text in scene_files(name, plan, opened, is_part=is_part).items():
+    for file, text in _scene_files(name, plan, opened, is_part=is_part).items():
         (scene / file).write_text(text, encoding="utf-8")
     check_loads(open_scene(scene))
     return scene
@@ -91,7 +118,7 @@ def _put(opened: OpenMap, ready: dict[str, tuple[Path, GamePlan]], out: Path) ->
             folder, campaign = files_of(name, out)
             os.rename(scratch[name], folder)
             done.append(folder)
-            write_atomically(campaign, campaign_text(name, plan).encode())
+            write_atomically(campaign, _campaign_text(name, plan).encode())
             done.append(campaign)
     except BaseException:
         for each in done:
@@ -100,3 +127,60 @@ def _put(opened: OpenMap, ready: dict[str, tuple[Path, GamePlan]], out: Path) ->
     finally:
         for each in scratch.values():
             shutil.rmtree(each, ignore_errors=True)
+
+
+def _scene_files(name: str, plan: GamePlan, opened: OpenMap, *, is_part: bool) -> dict[str, str]:
+    """The texts of scene.toml and of the route file of a plan of a map, by the files' names. `is_part`: the scene's net
+    is a part of the map."""
+    values = {
+        "name": name,
+        "plan": plan,
+        "part_m": KEPT_M if is_part else None,
+        "time_limit_s": plan.time_limit_s(opened.reds_s),
+        "source": plain(opened.source.name),
+        "place": plain(opened.place_of(plan)),
+        "meaning": _MEANINGS[plan.candidate.kind],
+    }
+    return {
+        "scene.toml": _rendered("new_scene.toml.jinja", values),
+        f"{name}.rou.xml": _rendered("new_scene.rou.xml.jinja", values, in_xml=True),
+    }
+
+
+def _campaign_text(name: str, plan: GamePlan) -> str:
+    """A campaign on a scene with the shipped personas that suit its kind."""
+    kind = plan.candidate.kind
+    values = {
+        "name": name,
+        "personas": _personas_for(plan),
+        "meaning": _MEANINGS[kind],
+        "ego_waits": kind in _EGO_WAITS,
+    }
+    return _rendered("new_scene_campaign.toml.jinja", values)
+
+
+def _personas_for(plan: GamePlan) -> Sequence[str]:
+    """The shipped personas that suit a game."""
+    signals = plan.candidate.kind is CandidateKind.CROSSING and plan.candidate.with_signals
+    return ("red_light_runner",) if signals else _PERSONAS.get(plan.candidate.kind, ("impatient",))
+
+
+def _rendered(template: str, values: Mapping[str, object], *, in_xml: bool = False) -> str:
+    environment = Environment(
+        loader=PackageLoader("harness", "cli"),
+        undefined=StrictUndefined,
+        keep_trailing_newline=True,
+        autoescape=in_xml,
+        trim_blocks=True,
+    )
+    environment.filters["toml"] = _toml
+    return environment.get_template(template).render(values)
+
+
+def _toml(value: object) -> str:
+    """A value in TOML: a string, a number, or a list of them."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(float(str(value)))

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import io
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from harness.cli import wording
+from harness.cli import messages
 from harness.cli.new_scene import new_scene
+from harness.cli.output import console_of_any_encoding, print_plain
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
@@ -53,8 +52,6 @@ def show_scene(
     The page shows junctions, signals and the numbers of conflicts, too, and for a scene the players' routes, starts and
     goals.
     """
-    from rich.console import Console
-
     from harness.cli.net_tables import conflict_table, lane_table
     from harness.traffic.net_conflicts import listed_conflicts
     from harness.traffic.net_file import check_net
@@ -70,24 +67,21 @@ def show_scene(
     edges = edges_near(net, net_file, near, within)
     lanes, junctions = listed_lanes(edges), listed_junctions(edges)
     conflicts = listed_conflicts(net, [junction.name for junction in junctions])
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # the terminal may not have every character
-    console = Console()
+    console = console_of_any_encoding()
     console.print(lane_table(lanes[:rows]), markup=False, highlight=False)
     if conflicts:
         console.print()
         console.print(conflict_table(conflicts[:rows]), markup=False, highlight=False)
     for what, count in (("lanes", len(lanes)), ("conflicts", len(conflicts))):
         if count > rows:
-            left_out = wording.rows_left_out(count - rows, what)
-            console.print(left_out, markup=False, highlight=False, soft_wrap=True)
+            print_plain([messages.rows_left_out(count - rows, what)], console)
     if html is not None:
         from harness.cli.net_drawing import drawing_of
         from harness.reports.net_page import write_net_page
 
         title = scene.document.name if scene is not None else path.name
         write_net_page(drawing_of(title, lanes, junctions, conflicts, scene, starts=_STARTS), html)
-        console.print(wording.page_written(html), highlight=False, markup=False, soft_wrap=True)
+        print_plain([f"Page: {html}"], console)
 
 
 def check_scene(folder: Path) -> list[str]:
@@ -97,7 +91,7 @@ def check_scene(folder: Path) -> list[str]:
 
     scene = open_scene(folder)
     check_loads(scene)
-    return [wording.in_order(folder), *wording.scene_lines(scene), *scene.warnings]
+    return [messages.in_order(folder), *messages.scene_lines(scene), *scene.warnings]
 
 
 def folder_of_scene(path: Path) -> Path | None:

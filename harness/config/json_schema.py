@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
+from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter
@@ -20,6 +21,7 @@ from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError
+from harness.files import write_atomically
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS, Term
 
 DOCUMENTS: Mapping[str, Any] = {"campaign": Campaign, "persona": Persona, "scene": Scene, "driver": DriverDocument}
@@ -54,6 +56,20 @@ def schema_text(document: str) -> str:
             "harness schema", "", f"there is no kind of document {document!r}", nearest(document, DOCUMENTS)
         )
     return json.dumps(schema_of(document), indent=2, ensure_ascii=False) + "\n"
+
+
+def write_schemas(folder: Path, document: str | None = None) -> list[Path]:
+    """Write one schema, or all, into a folder, and return the files. The folder is created if it does not exist.
+
+    Raises UsageError if there is no such kind of document, or the path is not a folder.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise UsageError.of("--out", str(folder), "is not a folder", "name a folder")
+    texts = {folder / file_of(each): schema_text(each) for each in ([document] if document is not None else DOCUMENTS)}
+    folder.mkdir(parents=True, exist_ok=True)
+    for file, text in texts.items():
+        write_atomically(file, text.encode())
+    return list(texts)
 
 
 def file_of(document: str) -> str:

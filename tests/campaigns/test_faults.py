@@ -26,7 +26,7 @@ from harness.campaign.plan.stages import Stage
 from harness.campaign.preflight import open_campaign
 from harness.campaign.results.results import RunResult
 from harness.campaign.storage.run_folder import RunFolder
-from harness.cli import wording
+from harness.cli import messages
 from harness.evaluation.tables import read_csv
 from tests.support.tiny import (
     BY_SUMO,
@@ -126,7 +126,7 @@ def test_request_to_end__is_like_ctrl_c(number: signal.Signals, code: int, tmp_p
     process.send_signal(number)
     printed = process.communicate(timeout=PATIENCE_S)[0]
     assert process.returncode == code
-    assert printed.splitlines()[-1] == wording.INTERRUPTED
+    assert printed.splitlines()[-1] == messages.INTERRUPTED
     assert "Traceback" not in printed
     wait_for(lambda: not in_session(process.pid), "no process of it is left")
 

@@ -17,7 +17,7 @@ from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.preflight import open_campaign
-from harness.cli import wording
+from harness.cli import messages
 from harness.config.campaign import Campaign
 from harness.drivers.policy_file import write_policy
 from harness.environments.gymnasium_env import ParallelDrivingEnv
@@ -327,7 +327,7 @@ def played() -> Path:
         shutil.copytree(learned_run() / "policies", folder / "policies")
         done = harness("campaign", write_played(folder), "--out", folder / "run", "--quick")
         assert done.returncode == 0, done.stdout + done.stderr
-        assert wording.NOTHING_TO_SHORTEN in done.stdout
+        assert messages.NOTHING_TO_SHORTEN in done.stdout
         assert "started  naive-seed1" not in done.stdout
 
     return built_once("played", build) / "run"

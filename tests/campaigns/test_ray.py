@@ -20,7 +20,7 @@ from harness.campaign.execution.stage_events import Event
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.run_folder import RunFolder
-from harness.cli.wording import INTERRUPTED
+from harness.cli.messages import INTERRUPTED
 from tests.support.plans import empty_context, training_of
 from tests.support.ray_nodes import add_node, busy_process, cluster_of, pull_the_plug
 from tests.support.tiny import (

@@ -16,7 +16,7 @@ from junitparser import Failure, JUnitXml
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.cli import main as cli
-from harness.cli import wording
+from harness.cli import messages
 from harness.cli.main import INTERRUPTED, app
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR, SimulationError
 from harness.evaluation.tables import read_csv
@@ -79,11 +79,8 @@ def words_of(text: str) -> str:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("option", ["--help", "-h"])
-def test_help__describes_the_command_and_its_parameters(
-    command: str, option: str, run_command: Callable[..., Result]
-) -> None:
-    result = run_command(*command.split(), option)
+def test_help__describes_the_command_and_its_parameters(command: str, run_command: Callable[..., Result]) -> None:
+    result = run_command(*command.split(), "--help")
     shown, described = words_of(result.out), COMMANDS[command]
     assert result.code == 0
     assert words_of(str(described.help)) in shown
@@ -133,30 +130,15 @@ def persona(folder: Path, old: str, new: str) -> dict[str, Any]:
     return {"personas": ["anna.toml"]}
 
 
-def no_route(text: str) -> str:
-    return text.replace('edges="approach exit"', 'edges="approach"')
-
-
-def beyond_the_lane(text: str) -> str:
-    return re.sub(r"position_m = \[.*?\]", "position_m = [30.0, 4500.0]", text, count=1)
-
-
 # mistake -> changes to the campaign; the file in the message, and words of the message
 BAD: dict[str, tuple[Callable[[Path], dict[str, Any]], str, list[str]]] = {
-    "unknown key": (lambda folder: {"epsiodes": 3}, "tiny.toml", ["epsiodes", "unknown key"]),
     "misspelt key": (lambda f: {"assessment": {"epsiodes": 3}}, "tiny.toml", ["assessment.epsiodes", "'episodes'"]),
     "missing key": (lambda folder: {"personas": None}, "tiny.toml", ["personas", "is missing"]),
-    "no persona": (lambda folder: {"personas": []}, "tiny.toml", ["personas"]),
-    "number out of range": (lambda f: {"assessment": {"significance": 1.5}}, "tiny.toml", ["significance", "1.5"]),
-    "float for an integer": (lambda f: {"assessment": {"episodes": 2.5}}, "tiny.toml", ["episodes"]),
-    "text for a number": (lambda f: {"assessment": {"episodes": "many"}}, "tiny.toml", ["episodes", "many"]),
     "path as a name": (lambda f: {"name": "../tiny"}, "tiny.toml", ["name"]),
-    "seed twice": (lambda folder: {"seeds": [1, 1]}, "tiny.toml", ["seeds", "twice"]),
     "buffer and games": (lambda f: {"training": {"buffer": 1000, "games": 64}}, "tiny.toml", ["buffer", "multiple"]),
     "unknown persona": (lambda folder: {"personas": ["speedy.toml"]}, "speedy.toml", ["there is no such file"]),
     "unknown driver": (lambda f: {"ego": {"driver": "lerned"}}, "tiny.toml", ["ego.driver", "learned"]),
     "persona with an unknown term": (lambda f: persona(f, "progress", "progres"), "anna.toml", ["'progress'"]),
-    "persona without sources": (lambda f: persona(f, "[[sources]]", "[[surces]]"), "anna.toml", ["sources"]),
     "persona that is not TOML": (lambda f: persona(f, "name =", "name"), "anna.toml", ["not valid TOML", "line 1"]),
     "missing scene": (lambda folder: {"scene": "mrege"}, "tiny.toml", ["scene", "there is no scene", "'merge'"]),
     "unknown lane": (
@@ -164,31 +146,7 @@ BAD: dict[str, tuple[Callable[[Path], dict[str, Any]], str, list[str]]] = {
         "scene.toml",
         ["ego.lane", "'approach_1'"],
     ),
-    "unknown vehicle": (
-        lambda folder: edited(folder, "scene.toml", lambda text: text.replace('"non_ego"', '"non_eggo"')),
-        "scene.toml",
-        ["non_ego.vehicle", "'non_ego'"],
-    ),
-    "start beyond the lane": (
-        lambda folder: edited(folder, "scene.toml", beyond_the_lane),
-        "scene.toml",
-        ["ego.position_m", "4500"],
-    ),
-    "missing net": (
-        lambda folder: edited(folder, "scene.toml", lambda text: text.replace("merge.net.xml", "merg.net.xml")),
-        "merg.net.xml",
-        [],
-    ),
     "net that is not XML": (lambda f: edited(f, "merge.net.xml", lambda text: text[:900]), "merge.net.xml", []),
-    "empty net": (lambda f: edited(f, "merge.net.xml", lambda text: ""), "merge.net.xml", []),
-    "net that is a route file": (lambda f: edited(f, "merge.net.xml", lambda text: "<routes/>"), "merge.net.xml", []),
-    "routes that are not XML": (lambda f: edited(f, "merge.rou.xml", lambda text: text[:-20]), "merge.rou.xml", []),
-    "empty routes": (lambda f: edited(f, "merge.rou.xml", lambda text: "<routes/>"), "scene.toml", []),
-    "route that does not reach the goal": (
-        lambda folder: edited(folder, "merge.rou.xml", no_route),
-        "merge.rou.xml",
-        ["goal"],
-    ),
     "route over an unknown edge": (
         lambda folder: edited(folder, "merge.rou.xml", lambda text: text.replace("approach exit", "aproach exit")),
         "merge.rou.xml",
@@ -233,17 +191,6 @@ def test_bad_input__a_file_that_is_no_campaign(
     assert "Traceback" not in result.err
 
 
-@pytest.mark.parametrize(
-    "changes", [{"scene": "a\0b"}, {"personas": ["\0"]}, {"ego": {"driver": "x" * 400}}, {"scene": "x" * 400}]
-)
-def test_bad_input__impossible_paths(
-    changes: dict[str, Any], tmp_path: Path, run_command: Callable[..., Result]
-) -> None:
-    result = run_command("check", write_campaign(tmp_path, **changes))
-    assert result.code == 2
-    assert str(tmp_path) in result.err
-
-
 def test_bad_input__missing_files(tmp_path: Path, run_command: Callable[..., Result]) -> None:
     write_campaign(tmp_path)
     for command in ("check", "campaign"):
@@ -277,21 +224,13 @@ def test_campaign__the_folder_of_another_campaign_is_unchanged(
     assert tables(run) == before
 
 
-def test_campaign__a_folder_of_other_files_is_unchanged(tmp_path: Path, run_command: Callable[..., Result]) -> None:
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "thesis.tex").write_text("x")
-    result = run_command("campaign", write_campaign(tmp_path), "--out", tmp_path / "out")
-    assert result.code == 2
-    assert [each.name for each in (tmp_path / "out").iterdir()] == ["thesis.tex"]
-
-
 def test_check__lists_the_stages_and_writes_nothing(tmp_path: Path, run_command: Callable[..., Result]) -> None:
     campaign = write_campaign(tmp_path)
     result = run_command("check", campaign)
     assert result.code == 0
     opened = open_campaign(campaign)
     stages = plan(opened.document, [persona.name for persona in opened.personas], opened.tunable)
-    lines = [wording.in_order(campaign), wording.work(opened, stages), *wording.stage_lines(stages)]
+    lines = [messages.in_order(campaign), messages.work(opened, stages), *messages.stage_lines(stages)]
     assert result.out.splitlines() == lines
     assert lines[1] == "3 trainings of up to 2,048 steps, 6 arms of 4 episodes:"
     assert "  assess naive_vs_speedy-seed1  after naive-seed1, speedy-seed1" in lines
@@ -306,7 +245,7 @@ def test_report__needs_only_the_folder_even_after_a_move(tmp_path: Path, run_com
     (moved / "report.html").unlink()
     result = run_command("report", moved)
     assert result.code == 0, result.err
-    assert wording.report_written(moved) in result.out
+    assert str(moved / "report.html") in result.out
     assert tables(moved) == tables(learned_run())
     assert (moved / "training.csv").read_bytes() == (learned_run() / "training.csv").read_bytes()
     assert (moved / "report.html").read_bytes() == (learned_run() / "report.html").read_bytes()
@@ -387,13 +326,6 @@ def test_replay__lists_a_page_of_the_games_of_an_outcome(run_command: Callable[.
     assert (wrong.code, "did you mean 'collision'?" in wrong.err) == (2, True)
 
 
-def test_replay__arms_are_not_cut_off_in_a_narrow_terminal(
-    run_command: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("COLUMNS", "80")
-    assert "retrained_alone_speedy" in run_command("replay", learned_run(), "--list").out
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -424,7 +356,7 @@ def test_main__a_full_disk_is_one_message(run_command: Callable[..., Result], mo
     monkeypatch.setattr("harness.campaign.results.results.write_results", full)
     result = run_command("report", learned_run())
     assert result.code == FAILED
-    assert result.err.strip() == wording.machine_error(error)
+    assert result.err.strip() == messages.machine_error(error)
     assert str(error.filename) in result.err
 
 

@@ -61,10 +61,6 @@ def test_campaign__json_is_the_result_and_nothing_else_is_on_stdout(tmp_path: Pa
     assert "Report: " in done.stderr
 
 
-def test_report__json_is_the_result(run: Path) -> None:
-    assert as_json("report", run)["verdicts"] == json.loads((run / "result.json").read_text())["verdicts"]
-
-
 def test_replay__json_lists_the_games_that_the_table_lists(run: Path) -> None:
     listed = as_json("replay", run, "--list", "--rows", 3)
     assert listed["number"] == len(read_csv(run / "episodes.csv")) > 3
@@ -119,11 +115,3 @@ def test_log__tells_of_each_stage() -> None:
         assert sum(f"started  {stage}" in line for line in lines) == 1
         assert sum(f"done     {stage}:" in line for line in lines) == 1
     assert "ended after" in lines[-1]
-
-
-def test_log__a_name_that_is_taken_is_refused(run: Path) -> None:
-    (run / LOG).unlink()
-    (run / LOG).mkdir()
-    done = harness("report", run)
-    assert done.returncode == 2
-    assert "is not a file" in done.stderr

@@ -13,9 +13,7 @@ import pytest
 from jsonschema import Draft202012Validator
 from pydantic import TypeAdapter, ValidationError
 
-from harness.cli import wording
-from harness.cli.schema_files import write_schemas
-from harness.config.json_schema import DIALECT, DOCUMENTS, UNITS, file_of, schema_of, schema_text
+from harness.config.json_schema import DIALECT, DOCUMENTS, UNITS, file_of, schema_of, schema_text, write_schemas
 from harness.config.training import Training
 from harness.errors import UsageError
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, TERMS
@@ -110,7 +108,7 @@ def test_write_schemas__unknown_kind_names_the_nearest_and_writes_nothing(tmp_pa
 
 def test_write_schemas__refuses_a_file_as_folder(tmp_path: Path) -> None:
     (tmp_path / "notes").write_text("mine")
-    with pytest.raises(UsageError, match=wording.NOT_A_FOLDER[0]):
+    with pytest.raises(UsageError, match="is not a folder"):
         write_schemas(tmp_path / "notes")
     assert (tmp_path / "notes").read_text() == "mine"
 

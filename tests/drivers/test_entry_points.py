@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from harness.cli import wording
+from harness.cli import messages
 from harness.config.campaign import LEARNED
 from harness.drivers.car import Car, car_of
 from harness.drivers.external import ExternalDriver, find_driver
@@ -132,4 +132,4 @@ def test_installed__the_command_checks_it_and_a_campaign_takes_it(tmp_path: Path
     )
     checked = harness("check", campaign, env=environment)
     assert checked.returncode == 0, checked.stdout + checked.stderr
-    assert wording.NOTHING_TO_TUNE in checked.stdout
+    assert messages.NOTHING_TO_TUNE in checked.stdout

@@ -17,7 +17,7 @@ from harness.campaign.execution.stage_events import Event
 from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.execution.worker_pool import WorkerPool
 from harness.campaign.plan.stages import Stage
-from harness.cli.wording import INTERRUPTED
+from harness.cli.messages import INTERRUPTED
 from harness.errors import StageFailed
 from tests.support.plans import empty_context
 from tests.support.plans import training_of as stage

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from harness.cli import wording
-from harness.cli.output import print_json
-from harness.cli.terminal import print_plain
+from harness.cli.output import print_json, print_plain
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -23,7 +21,7 @@ _STYLES = {"harm": "red", "mended": "green", "open": "yellow"}
 def show_result(outcome: RunResult, run: Path, console: Console, as_json: bool = False) -> None:
     """Say what has come out. As JSON: the content of `result.json`, the run folder and the report."""
     for training in outcome.did_not_learn:
-        console.print(wording.did_not_learn(training), style="bold yellow", highlight=False, markup=False)
+        console.print(_did_not_learn(training), style="bold yellow", highlight=False, markup=False)
     for verdict in outcome.verdicts:
         label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
         console.print(label, style=f"bold {_STYLES[verdict.tone]}", highlight=False, markup=False)
@@ -31,9 +29,8 @@ def show_result(outcome: RunResult, run: Path, console: Console, as_json: bool =
             if sentence:
                 console.print(f"  {sentence}", highlight=False, markup=False)
     for bound in outcome.acceptance:
-        style = "green" if bound.passed else "bold red"
-        console.print(bound.text, style=style, highlight=False, markup=False, soft_wrap=True)
-    print_plain([wording.report_written(run)], console)
+        print_plain([bound.text], console, "green" if bound.passed else "bold red")
+    print_plain([f"Report: {run / 'report.html'}"], console)
     if as_json:
         from harness.campaign.results.acceptance import RESULT
 
@@ -45,12 +42,16 @@ def exit_as(outcome: RunResult, console: Console) -> None:
     """Say what failed, also where the console is quiet, and end the command with the exit code of the run."""
     if console.quiet:
         console.quiet = False
-        print_plain(map(wording.did_not_learn, outcome.did_not_learn), console)
+        print_plain(map(_did_not_learn, outcome.did_not_learn), console)
         print_plain((bound.text for bound in outcome.acceptance if not bound.passed), console)
     if outcome.failed_stages:
-        console.print(wording.failed_stages(outcome.failed_stages), style="red", highlight=False)
+        print_plain([f"Not finished: {', '.join(outcome.failed_stages)}"], console, "red")
     if outcome.error_games:
-        for line in wording.error_games(outcome.error_games, outcome.error_reasons):
-            console.print(line, style="red", highlight=False, markup=False, soft_wrap=True)
+        count = f"{outcome.error_games} games could not be played; their pairs are left out"
+        print_plain([count, *(f"  {each}" for each in outcome.error_reasons)], console, "red")
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
+
+
+def _did_not_learn(training: str) -> str:
+    return f"Did not learn: {training}"

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
-from harness.cli import pinned_wording, wording
-from harness.cli.documents import AllowCode
-from harness.errors import FAILED, NOT_ACCEPTED, UsageError
+from harness.cli import messages
+from harness.cli.output import AllowCode, RunPath, print_plain
+from harness.errors import FAILED, NOT_ACCEPTED, UsageError, plain
+from harness.game.roles import roles_of
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
+    from harness.campaign.execution.pinned_games import Pinned
     from harness.campaign.execution.regression import PlayedAgain
+    from harness.config.pinned_game import PinnedGame
+    from harness.reports.junit import JUnitCase
+
+_LEAST_SHOWN = 0.005
 
 
 def minimise(
-    run: Annotated[Path, typer.Argument(metavar="RUN", help="A run folder.", show_default=False)],
+    run: RunPath,
     arm: Annotated[
         str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.", show_default=False)
     ] = None,
@@ -61,9 +67,11 @@ def minimise(
     from harness.campaign.storage.run_folder import RunFolder
 
     if not all_failures and (arm is None or episode is None):
-        raise UsageError.of("minimise", str(run), *pinned_wording.NAMES_NO_FAILURE)
+        raise UsageError.of(
+            "minimise", str(run), "names no game", "name ARM and EPISODE, or pin all kinds of failures with --all"
+        )
     if all_failures and episode is not None:
-        raise UsageError.of("--all", str(episode), *pinned_wording.ALL_AND_ONE)
+        raise UsageError.of("--all", str(episode), "names one game beside --all", "leave out EPISODE or --all")
     console, folder = Console(), RunFolder(run)
     found = None if policies is None else document_at(policies, "policies")
     pinning = PinnedGames(folder, RunPlayers(folder, found, ego, allow_code), out or run / "pinned")
@@ -75,11 +83,11 @@ def minimise(
         first_seed = int(folder.manifest()["seeds"][0])
         chosen = [pinning.failure(arm, first_seed if seed is None else seed, episode)]
     if not chosen:
-        _print(console, pinned_wording.NO_FAILURES)
+        print_plain(["Nothing to pin: the ego fails in no game."], console)
     for failure in chosen:
-        with console.status(pinned_wording.minimising(failure.arm, failure.episode)):
+        with console.status(f"minimising {escape(failure.arm)}, game {failure.episode}"):
             pinned = pinning.pin(failure)
-        _print(console, *pinned_wording.pinned(pinned))
+        print_plain(_found(pinned), console)
 
 
 def regression(
@@ -107,22 +115,66 @@ def regression(
     from harness.reports.junit import write_junit
 
     console = Console()
-    with console.status(wording.reading(folder)):
+    with console.status(messages.reading(folder)):
         games = Regression(folder, ego, allow_code)
     played: list[PlayedAgain] = []
     for each in games.play():
         played.append(each)
-        style = "green" if each.passed else "red"
-        console.print(pinned_wording.played_again(each), style=style, highlight=False, markup=False, soft_wrap=True)
+        print_plain([_played_again(each)], console, "green" if each.passed else "red")
     if junit is not None:
-        write_junit(junit, "regression", [pinned_wording.check_of(each) for each in played], {"ego": ego})
-    _print(console, pinned_wording.regression_result(played))
+        write_junit(junit, "regression", [_case_of(each) for each in played], {"ego": ego})
+    passed = sum(each.passed for each in played)
+    print_plain([f"{passed} of {len(played)} pinned games pass."], console)
     if any(each.error for each in played):
         raise typer.Exit(FAILED)
     if not all(each.passed for each in played):
         raise typer.Exit(NOT_ACCEPTED)
 
 
-def _print(console: Console, *lines: str) -> None:
-    for line in lines:
-        console.print(line, highlight=False, markup=False, soft_wrap=True)
+def _found(found: Pinned) -> Iterator[str]:
+    """What was found, and where it was written."""
+    game = found.game
+    alike = f", stands for {game.alike} alike" if game.alike > 1 else ""
+    yield f"{plain(game.arm)}, seed {game.seed}, game {game.episode}: {game.outcome}{alike}"
+    if game.no_failure_from is None:
+        yield "  no start was found from which the ego does not fail; the start is the game's own"
+    else:
+        changes = "; ".join(_changes(game))
+        yield f"  the ego no longer fails after this change of the start: {changes}  ({found.games} games played)"
+    yield f"  {plain(str(found.file))}"
+
+
+def _played_again(played: PlayedAgain) -> str:
+    """One game and its outcome."""
+    word = "PASS" if played.passed else "ERROR" if played.error else "FAIL"
+    why = f": {plain(played.error)}" if played.error else "" if played.passed else f": {played.outcome}"
+    return f"{word}  {plain(played.name)}{why}  ({played.seconds:.1f} s)"
+
+
+def _case_of(played: PlayedAgain) -> JUnitCase:
+    """The game as a case of a JUnit file."""
+    from harness.reports.junit import JUnitCase
+
+    game = played.game
+    failure = "" if played.passed or played.error else f"the ego fails: {played.outcome}"
+    details = f"arm {game.arm}, seed {game.seed}, game {game.episode}; {game.found_with} failed by {game.outcome}"
+    return JUnitCase(
+        name=played.name,
+        group=f"regression.{game.arm}",
+        failure=failure,
+        error=played.error,
+        details=details,
+        seconds=played.seconds,
+    )
+
+
+def _changes(game: PinnedGame) -> Iterator[str]:
+    """The change from the campaign's start to the one that does not fail, for each player that changes."""
+    assert game.no_failure_from is not None
+    for player, role in enumerate(roles_of(len(game.start.position_m))):
+        name = role.replace("non_ego", "non-ego").replace("_", " ")
+        moved_m = game.no_failure_from.position_m[player] - game.drawn_start.position_m[player]
+        faster_mps = game.no_failure_from.speed_mps[player] - game.drawn_start.speed_mps[player]
+        changes = ((moved_m, "m"), (faster_mps, "m/s"))
+        if text := ", ".join(f"{change:+.2f} {unit}" for change, unit in changes if abs(change) > _LEAST_SHOWN):
+            yield f"{name} {text}"

@@ -1,0 +1,118 @@
+"""The sentences that several commands print, or that are made of many parts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+if TYPE_CHECKING:
+    from harness.campaign.plan.stages import Stage
+    from harness.campaign.preflight import OpenCampaign
+    from harness.traffic.scene import OpenScene
+
+NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
+INTERRUPTED = "Interrupted. Finished work is kept: run the same command again to continue."
+NOTHING_TO_TUNE = "It has nothing to train or to tune: the campaign has rounds 0 and 1 only."
+_KEPT = "finished work is kept"
+
+
+def reading(file: Path) -> str:
+    return f"reading {escape(str(file))}"
+
+
+def cannot_write(error: OSError) -> tuple[str, str]:
+    return f"can't be written: {error.strerror}", "name a folder that you may write"
+
+
+def no_folder(folder: Path) -> tuple[str, str]:
+    return f"there is no folder {folder}", "create it, or name another file"
+
+
+def out_of_memory(error: BaseException) -> str:
+    return f"the machine is short of memory: {error or 'none is left'}; {_KEPT}"
+
+
+def machine_error(error: OSError) -> str:
+    return f"{error.filename or 'the run folder'}: {error.strerror}; {_KEPT}"
+
+
+def rows_left_out(number: int, what: str) -> str:
+    return f"{number} more {what} are not listed: choose some with --near EDGE and --within M, or give a larger --rows"
+
+
+def in_order(file: Path) -> str:
+    return f"{file} is in order."
+
+
+def scene_lines(scene: OpenScene) -> Iterator[str]:
+    """What a checked scene is: its players with their routes, and whether there is other traffic."""
+    for role, player, edges in zip(scene.world.roles, scene.document.players, scene.edges, strict=True):
+        if player.way is not None:
+            length_m = scene.world.road.routes.goal_m[scene.world.roles.index(role)]
+            yield f"{role}: on foot, {length_m:.1f} m to its goal"
+            continue
+        goal = scene.document.goal_of(player)[1]
+        yield f"{role}: vehicle {player.vehicle}, {len(edges)} edges, goal {goal.position_m:g} m along {goal.edge}"
+    yield "with background traffic" if scene.has_background_traffic else "without background traffic"
+
+
+def ego(campaign: OpenCampaign) -> str:
+    """The external driver of the ego, and its round 2."""
+    if campaign.ego_driver is None:
+        return f"The ego: SUMO's own models. {NOTHING_TO_TUNE}"
+    if not campaign.tunable:
+        return f"The ego: {campaign.ego_driver.in_words}. {NOTHING_TO_TUNE}"
+    search = campaign.document.reconfiguration
+    ranges = ", ".join(f"{key} from {low:g} to {high:g}" for key, low, high in campaign.ego_driver.searched)
+    round_2 = f"Round 2 searches its parameters in {search.trials} trials of {search.games} games: {ranges}."
+    return f"The ego: {campaign.ego_driver.in_words}. {round_2}"
+
+
+def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:
+    """How many trainings and arms there are."""
+    from harness.campaign.plan.stages import AssessmentStage, TrainingStage
+
+    document = campaign.document
+    trainings = [stage for stage in stages if isinstance(stage, TrainingStage)]
+    responses = sum(stage.is_best_response for stage in trainings)
+    arms = sum(isinstance(stage, AssessmentStage) for stage in stages)
+    if campaign.policies is None:
+        parts = [f"{_counted(len(trainings) - responses, 'training')} of up to {document.training.steps:,} steps"]
+    else:
+        parts = [f"Trained players are read from {campaign.policies}: nothing is trained"]
+    if document.best_response is not None:
+        budget = f"of up to {document.best_response.steps:,} steps"
+        parts.append(f"{_counted(responses, 'training')} of best responses {budget}")
+    return ", ".join([*parts, f"{_counted(arms, 'arm')} of {_counted(document.assessment.episodes, 'episode')}:"])
+
+
+def _counted(number: int, noun: str) -> str:
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def stage_lines(stages: Sequence[Stage]) -> Iterator[str]:
+    """A line for each stage: its kind, its name, the stages before it, and the policies that it reads."""
+    from harness.campaign.plan.stages import TrainingStage
+
+    for stage in stages:
+        reads = () if isinstance(stage, TrainingStage) else stage.reads
+        after = f"  after {', '.join(stage.needs)}" if stage.needs else ""
+        yield f"  {stage.verb:6s} {stage.id}{after}" + (f"  with {', '.join(reads)}" if reads else "")
+
+
+def stage_records(stages: Sequence[Stage]) -> list[dict[str, object]]:
+    """A record for each stage, as `stage_lines` tells it."""
+    return [
+        {
+            "stage": stage.id,
+            "kind": stage.kind,
+            "persona": stage.persona,
+            "seed": stage.seed,
+            "after": list(stage.needs),
+            "reads": list(stage.reads),
+        }
+        for stage in stages
+    ]

@@ -1,0 +1,194 @@
+"""The commands for a run that has ended: `harness replay`, `export`, `serve` and `compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from harness.cli import messages
+from harness.cli.output import AsJson, RunPath, output, print_json, print_plain
+from harness.errors import UsageError
+
+_STYLES = {"harm": "red", "mended": "green", "open": "default"}
+
+
+def replay(
+    run: RunPath,
+    arm: Annotated[
+        str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.", show_default=False)
+    ] = None,
+    episode: Annotated[
+        int | None, typer.Argument(metavar="EPISODE", help="The number of the episode.", show_default=False)
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="The training seed.  [default: the first of the campaign]", show_default=False)
+    ] = None,
+    list_games: Annotated[bool, typer.Option("--list", help="List the recorded games, worst first.")] = False,
+    outcome: Annotated[
+        str | None,
+        typer.Option(
+            metavar="OUTCOME",
+            help="List only games of this outcome of the ego: collision, rail, timeout, goal, or failure for the "
+            "first three.",
+            show_default=False,
+        ),
+    ] = None,
+    rows: Annotated[int, typer.Option(min=1, metavar="N", help="The most games to list.")] = 40,
+    page: Annotated[int, typer.Option(min=1, metavar="N", help="Which N rows of the list to show.")] = 1,
+    film_file: Annotated[
+        Path | None,
+        typer.Option(
+            "--film",
+            metavar="FILE",
+            help="Write the game as a .gif or .mp4 film instead; this needs no screen.",
+            show_default=False,
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Watch a recorded game in SUMO-GUI. Without ARM or EPISODE, list the recorded games."""
+    with output(as_json) as console:
+        from harness.campaign.results.replay_game import GameList, film, found_game, game_records, game_table, watch
+
+        listing = list_games or arm is None or episode is None
+        if film_file is not None and listing:
+            raise UsageError.of(
+                "--film", str(film_file), "shows one game", "name the game: harness replay RUN ARM EPISODE"
+            )
+        if as_json and not listing:
+            raise UsageError.of("--json", "", "lists games", "leave out the episode, or add --list")
+        if arm is None or episode is None or list_games:
+            chosen = GameList(arm=arm, outcome=outcome, seed=seed, rows=rows, page=page)
+            if as_json:
+                print_json(game_records(run, chosen))
+            else:
+                console.print(game_table(run, chosen))
+            return
+        with found_game(run, arm, episode, seed) as game:
+            if film_file is None:
+                watch(game, console)
+            else:
+                film(game, film_file, console)
+
+
+def export(
+    run: RunPath,
+    rest: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="ARM EPISODE DIR",
+            help="The arm, the number of the episode, and a new folder for the files. With --failures, ARM may be left "
+            "out, and there is no EPISODE.",
+            show_default=False,
+        ),
+    ],
+    failures: Annotated[bool, typer.Option("--failures", help="Export every game that is a failure.")] = False,
+    openscenario: Annotated[
+        bool, typer.Option("--openscenario", help="Write OpenSCENARIO 1.2: a NAME.xosc for each game.")
+    ] = False,
+    opendrive: Annotated[
+        bool, typer.Option("--opendrive", help="Write OpenDRIVE 1.4: the scene's net as scene.xodr.")
+    ] = False,
+    csv: Annotated[
+        bool, typer.Option("--csv", help="Write tables in the layout of highD: NN_tracks.csv and two more.")
+    ] = False,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            help="The training seed.  [default: the first of the campaign; with --failures, all]", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Export recorded games for other programs. Without a format, OpenSCENARIO and OpenDRIVE are written.
+
+    `harness export reports/merge naive_vs_speedy 3 --openscenario --opendrive game` writes one game,
+    `harness export reports/merge --failures failures` all failures.
+    """
+    from rich.console import Console
+
+    from harness.campaign.results.export_games import Failures, export_failures, export_game
+    from harness.export import Formats
+
+    if not (openscenario or opendrive or csv):
+        openscenario = opendrive = True
+    formats = Formats(openscenario=openscenario, opendrive=opendrive, csv=csv)
+    console, folder = Console(), Path(rest[-1])
+    if failures:
+        if len(rest) > 2:
+            message, remedy = "is more than an arm and a new folder", "harness export RUN [ARM] --failures DIR"
+            raise UsageError.of("--failures", " ".join(rest), message, remedy)
+        chosen = Failures(arm=rest[0] if len(rest) == 2 else None, seed=seed)
+        count = export_failures(run, chosen, folder, formats, console)
+    else:
+        if len(rest) != 3:
+            remedy = "harness export RUN ARM EPISODE DIR, or harness export RUN --failures DIR"
+            raise UsageError.of("harness export", " ".join(rest), "is not an arm, an episode and a new folder", remedy)
+        export_game(run, rest[0], _episode(rest[1]), seed, folder, formats)
+        count = 1
+    print_plain([f"Wrote {count} {'game' if count == 1 else 'games'} to {folder}: games.csv lists them"], console)
+
+
+def _episode(text: str) -> int:
+    if not (text.isascii() and text.isdecimal()):
+        raise UsageError.of("EPISODE", text, "is not the number of an episode", "harness replay RUN --list shows them")
+    return int(text)
+
+
+def serve(
+    run: RunPath,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="The port; 0 takes a free one.")] = 8000,
+    open_browser: Annotated[bool, typer.Option("--open", help="Open the page in the default browser.")] = False,
+) -> None:
+    """Show the report of a run with all of its recorded games, also those that its file has no room for.
+
+    The page is at http://127.0.0.1:8000 for this machine alone, until Ctrl-C.
+    """
+    import webbrowser
+
+    from rich.console import Console
+
+    from harness.campaign.results.served_report import ServedReport, server_of
+    from harness.campaign.storage.run_folder import RunFolder
+
+    console = Console()
+    with console.status(messages.reading(run)):
+        report = ServedReport(RunFolder(run))
+    try:
+        server = server_of(report, port)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise UsageError.of("--port", str(port), f"can't be opened: {reason}", "another port, or 0") from error
+    with server:
+        address = f"http://127.0.0.1:{server.server_port}/"
+        console.print(f"The report is at {address} until Ctrl-C.", highlight=False, soft_wrap=True)
+        if open_browser:
+            webbrowser.open(address)
+        server.serve_forever()
+
+
+def compare(
+    before: Annotated[
+        Path, typer.Argument(metavar="BEFORE", help="The run folder before the change.", show_default=False)
+    ],
+    after: Annotated[
+        Path, typer.Argument(metavar="AFTER", help="The run folder after the change.", show_default=False)
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="The page.  [default: compare.html in the second folder]", show_default=False
+        ),
+    ] = None,
+) -> None:
+    """Compare two runs, game by game: failures, near misses and average speed of every arm that both have."""
+    from rich.console import Console
+
+    from harness.campaign.results.compare_runs import compare_runs
+
+    console = Console()
+    found = compare_runs(before, after, out or after / "compare.html")
+    for row in found.rows:
+        print_plain([f"{row.sentence}, seed {row.seed}"], console, _STYLES[row.tone])
+    print_plain([found.headline, f"Comparison: {found.page}"], console)
