@@ -21,7 +21,7 @@ from benchmarks.bare_sumo import Placement, place_and_step, record_placements
 from benchmarks.games import GAMES, CoastingGames
 from benchmarks.traffic import write_scene
 from harness.game.arrays import FloatArray
-from harness.game.neighbours import NOTICED_M, Search
+from harness.game.near_players import NOTICED_M, NearSearch
 from harness.traffic.scene import open_scene
 from harness.traffic.vehicle_reads import DIRECT, read_near, string_record
 
@@ -49,7 +49,7 @@ def _read_as_arena(direct: bool) -> Callable[[list[str]], object]:
             record = np.array([[string_record(text) for text in texts]], dtype=np.uint64)
             shape, no_player = (1, len(names)), np.zeros((1, 1))
             numbers = (np.zeros(shape, dtype=np.int64), np.ones(shape), np.ones(shape), np.zeros(1))
-            search = Search(*numbers, no_player, no_player, no_player > 0.0, 1.0, 0, 1.0, 1, True)
+            search = NearSearch(*numbers, no_player, no_player, no_player > 0.0, 1.0, 0, 1.0, 1, True)
             named, due = np.array([names], dtype=object), np.arange(len(names))
             prepared.append(partial(read_near, search, named, record, due, direct))
         return prepared[0]()

@@ -28,7 +28,7 @@ from harness.drivers.policy_file import ACTIONS
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.environments.auto_reset import AutoReset
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.seeding import generator_of
 from harness.traffic.scene import OpenScene, open_scene
 

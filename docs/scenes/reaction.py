@@ -17,7 +17,7 @@ from harness.drivers.ordinary_walker import OrdinaryWalker
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT
 from harness.game.outcome import Outcome

@@ -8,7 +8,7 @@ import numpy as np
 
 from harness.cli.net_tables import conflict_words
 from harness.game.arrays import FloatArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.reports.net_page import Drawing, DrawnShape
 from harness.traffic.net_conflicts import ListedConflict

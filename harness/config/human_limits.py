@@ -2,18 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
 from pydantic import Field, field_validator, model_validator
 
 from harness.config.toml_reading import Document, Interval
-from harness.game.attention import Attention, NoBlindSpotCheck
-from harness.game.human_limits import (
-    ALL_NOTICED,
-    ActuatorShares,
-    LookedButFailedToSee,
-    Reaction,
-    Sight,
-)
 
 LONGEST_DELAY_S = 5.0
 
@@ -38,16 +29,6 @@ class AttentionLapses(Document):
             raise ValueError("a lapse must last longer than 0 s")
         return lapse_s
 
-    @property
-    def attention(self) -> Attention:
-        """The lapses as the game uses them."""
-        return Attention(
-            mean_attentive_s=self.mean_attentive_s,
-            lapse_s=self.lapse_s,
-            crown_rad=self.crown_steering_rad,
-            bumps_rad=self.bump_steering_sd_rad,
-        )
-
 
 class ReactionTime(Document):
     """How late decisions reach pedals and wheel, in the training of the person as well."""
@@ -62,11 +43,6 @@ class ReactionTime(Document):
         if not 0.0 <= delay_s[0] <= delay_s[1] <= LONGEST_DELAY_S:
             raise ValueError(f"the delay must be between 0 and {LONGEST_DELAY_S:g} s")
         return delay_s
-
-    @property
-    def reaction(self) -> Reaction:
-        """The delay as the game uses it."""
-        return Reaction(delay_s=self.delay_s)
 
 
 class Perception(Document):
@@ -105,28 +81,6 @@ class Perception(Document):
             )
         return self
 
-    @property
-    def no_blind_spot_check(self) -> NoBlindSpotCheck:
-        """The missing blind-spot check as the game uses it."""
-        return NoBlindSpotCheck(share=self.no_blind_spot_check_share, ahead_m=self.unseen_behind_m)
-
-    @property
-    def looked_but_failed_to_see(self) -> LookedButFailedToSee:
-        """Looking but failing to see, as the game uses it."""
-        if self.noticed_within_m is None:
-            return ALL_NOTICED
-        return LookedButFailedToSee(share=self.looked_but_failed_to_see_share, within_m=self.noticed_within_m)
-
-    @property
-    def sight(self) -> Sight:
-        """How far and how exactly the person sees, as the game uses it."""
-        return Sight(
-            range_m=np.inf if self.range_m is None else self.range_m,
-            opening_rad=np.inf if self.opening_deg is None else np.deg2rad(self.opening_deg),
-            distance_error=self.distance_error,
-            closing_error_per_s=self.closing_error_per_s,
-        )
-
 
 class CarUse(Document):
     """Shares of what the car can do that the person uses with pedals and wheel at their limit, in the training of the
@@ -138,8 +92,3 @@ class CarUse(Document):
     """Share of the car's braking."""
     steering_share: float = Field(1.0, gt=0.0, le=1.0)
     """Share of the useful steering angle at the current speed."""
-
-    @property
-    def uses(self) -> ActuatorShares:
-        """The shares as the game uses them."""
-        return ActuatorShares(throttle=self.throttle_share, braking=self.braking_share, steering=self.steering_share)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, field_validator, model_validator
@@ -11,9 +11,8 @@ from pydantic import Discriminator, Field, Tag, field_validator, model_validator
 from harness.config.human_limits import AttentionLapses, CarUse, Perception, ReactionTime
 from harness.config.scene import Name
 from harness.config.toml_reading import NUMBER, TABLE, Document, Mistakes, nearest
-from harness.game.attention import HumanFactors
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
-from harness.game.human_limits import ALL_NOTICED, EXACT_SIGHT, FULL_SHARES, NO_DELAY
+from harness.game.human_factors import ActuatorShares, Attention, HumanFactors, Reaction, Sight
 from harness.game.payoff import Payoff, Weighted
 from harness.game.payoff_terms import FUZZY_QUANTITIES, GROUPS, NEARNESS, TERMS
 
@@ -215,12 +214,14 @@ class Persona(Document):
     @property
     def human_factors(self) -> HumanFactors:
         """The human limits as the game uses them."""
-        perception = self.perception
         return HumanFactors(
-            attention=self.attention.attention if self.attention else None,
-            no_blind_spot_check=perception.no_blind_spot_check if perception else HumanFactors.no_blind_spot_check,
-            looked_but_failed_to_see=perception.looked_but_failed_to_see if perception else ALL_NOTICED,
-            reaction=self.reaction.reaction if self.reaction else NO_DELAY,
-            sight=perception.sight if perception else EXACT_SIGHT,
-            actuator_shares=self.actuators.uses if self.actuators else FULL_SHARES,
+            attention=Attention(**_given(self.attention)) if self.attention else None,
+            sight=Sight(**_given(self.perception)),
+            reaction=Reaction(**_given(self.reaction)),
+            actuator_shares=ActuatorShares(**_given(self.actuators)),
         )
+
+
+def _given(table: Document | None) -> dict[str, Any]:
+    """The keys of a table that have a value: the game's records have the same names, and the rest by default."""
+    return {} if table is None else table.model_dump(exclude_none=True)

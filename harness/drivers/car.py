@@ -10,7 +10,7 @@ import numpy as np
 from harness.errors import DriverError
 from harness.game import bicycle
 from harness.game.arrays import FloatArray
-from harness.game.bicycle import Actuators
+from harness.game.bicycle import ActuatorLimits
 from harness.game.observation_layout import OWN, in_units
 from harness.game.world import World
 
@@ -36,7 +36,7 @@ class Car:
     """Time between two decisions."""
     length_m: float
     width_m: float
-    actuators: Actuators
+    actuators: ActuatorLimits
     """Of this car alone: its arrays are [1]."""
 
     @property

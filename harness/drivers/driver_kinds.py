@@ -16,7 +16,7 @@ from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.process import ProcessDriver
 from harness.drivers.protocol import Driver
-from harness.drivers.rules import RulesDriver
+from harness.drivers.rules_driver import RulesDriver
 from harness.drivers.sumo import SumoDriver
 
 

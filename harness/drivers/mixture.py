@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from harness.config.persona import Persona
 from harness.drivers.protocol import Driver
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,8 +15,8 @@ from harness.config.road_user import WALKING_MPS
 from harness.drivers.car import car_of
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.junctions import KERB_M
 from harness.game.observation_layout import LAYOUT
-from harness.game.right_of_way import KERB_M
 from harness.game.walking import TURNS_AS_AT_MPS
 from harness.game.world import World
 

@@ -23,7 +23,7 @@ from harness.config.rule_driver import CarefulAndCompetent, Cruise, FuzzySafety,
 from harness.drivers.car import Car
 from harness.drivers.perception import perceive
 from harness.drivers.protocol import Driver
-from harness.drivers.rules import RulesDriver
+from harness.drivers.rules_driver import RulesDriver
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.roles import EGO
 from harness.game.world import World

@@ -3,7 +3,7 @@
 | order | part of a step | module |
 | --- | --- | --- |
 | 1 | drivers decide from the observations of the step before; learners' actions are an argument | `drivers` |
-| 2 | reaction delay, limits of the controls and lapses of attention | `game.human_limits`, `game.attention` |
+| 2 | reaction delay, limits of the controls and lapses of attention | `game.human_factors` |
 | 3 | the players move, on wheels or on foot | `game.bicycle`, `game.walking` |
 | 4 | their poses are sent to SUMO, SUMO moves the other vehicles, their state is read | `traffic.simulation` |
 | 5 | contact, goal and time limit determine outcomes | `game.quantities` |
@@ -29,9 +29,8 @@ from harness.environments.nearby_bodies import NearbyBodies
 from harness.environments.seats import Seat as Seat
 from harness.environments.seats import with_walkers
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.attention import release_controls
 from harness.game.bicycle import Requested, move, requests
-from harness.game.human_limits import PlayersLimits
+from harness.game.human_factors import PlayersLimits, release_controls
 from harness.game.initial_state import InitialState
 from harness.game.observation import observe
 from harness.game.observation_layout import SIZE

@@ -24,7 +24,7 @@ from harness.environments.arena import Arena, Seat
 from harness.environments.recorded_courses import CourseReplay, RecordedCourse, RecordedCourses, course_of, start_of
 from harness.environments.rollout import parts_of
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
 from harness.game.outcome import Outcome

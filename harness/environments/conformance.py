@@ -28,7 +28,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.errors import SimulationError, UsageError
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO

@@ -14,7 +14,7 @@ from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.seats import Seat
 from harness.errors import UsageError
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution
 from harness.game.roles import ROLES
 from harness.game.world import World

@@ -12,7 +12,7 @@ from harness.drivers.policy_file import ACTIONS
 from harness.environments.arena import Arena, Seat, Step
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation import observe
 from harness.game.outcome import Outcome

@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.junctions import Signal
 from harness.game.meetings import STANDING_MPS, has_duty
 from harness.game.passages import Passage, Places, other_passage, own_passage, places
 from harness.game.quantities import Quantities
-from harness.game.right_of_way import Signal
 
 
 @dataclass(frozen=True, kw_only=True)

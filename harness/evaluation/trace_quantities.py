@@ -15,8 +15,8 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.junctions import SIGNALS, Signal
 from harness.game.quantities import Quantities
-from harness.game.right_of_way import SIGNALS, Signal
 from harness.game.road import MARGIN_M, SPACING_M, Routes
 from harness.game.state import Bodies, State
 from harness.game.world import World

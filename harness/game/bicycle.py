@@ -24,7 +24,7 @@ GRAVITY_MPS2 = 9.81
 WHEEL_CENTRE = 0.25  # gain of the wheel near its centre; at full deflection the gain is 1
 
 
-class Actuators(NamedTuple):
+class ActuatorLimits(NamedTuple):
     """Limits of the players' cars. Arrays are [P]; `friction` is the usual friction coefficient of the road. That of a
     game is in its state; drivers know the usual one."""
 
@@ -39,7 +39,7 @@ class Actuators(NamedTuple):
 
 
 @compiled
-def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArray:
+def steering_range_rad(speed_mps: FloatArray, actuators: ActuatorLimits) -> FloatArray:
     """[G, P] largest useful steering angle at a speed [G, P]: the lock, or the angle at which the tyres lose grip."""
     grip = np.minimum(actuators.friction * GRAVITY_MPS2, actuators.max_lateral_mps2)
     return np.minimum(
@@ -50,7 +50,7 @@ def steering_range_rad(speed_mps: FloatArray, actuators: Actuators) -> FloatArra
 
 @compiled
 def requests(
-    action: FloatArray, speed_mps: FloatArray, road_steering_rad: FloatArray, actuators: Actuators
+    action: FloatArray, speed_mps: FloatArray, road_steering_rad: FloatArray, actuators: ActuatorLimits
 ) -> FloatArray:
     """[2, G, P] the accelerations (m/s^2) and steering angles (rad) that actions request of the cars.
 
@@ -74,7 +74,7 @@ def actions(
     *,
     speed_mps: FloatArray,
     road_steering_rad: FloatArray,
-    actuators: Actuators,
+    actuators: ActuatorLimits,
 ) -> FloatArray:
     """[..., P, 2] actions in [-1, 1]: the inverse of `requests`.
 
@@ -114,7 +114,7 @@ motion_of = attrgetter(*Motion._fields)
 """The columns of `Motion` of a state."""
 
 
-def move(state: State, requested: Requested, actuators: Actuators, step_s: float) -> None:
+def move(state: State, requested: Requested, actuators: ActuatorLimits, step_s: float) -> None:
     """Move the players marked in `moving` by one step, in place.
 
     The steering angle follows its request at the rate of the steering rack. The grip used by the curve is not available
@@ -126,7 +126,7 @@ def move(state: State, requested: Requested, actuators: Actuators, step_s: float
 @compiled
 def _move(motion: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, ...], step_s: float) -> None:
     x_m, y_m, heading_rad, speed_mps, acceleration_mps2, steering_rad, friction = motion
-    requested, actuators = Requested(*requests), Actuators(*limits)
+    requested, actuators = Requested(*requests), ActuatorLimits(*limits)
     moving = requested.moving
     for g, p in np.ndindex(moving.shape):
         if moving[g, p]:
@@ -161,14 +161,14 @@ def curvature_per_m(steering_rad: FloatArray, wheelbase_m: FloatArray) -> FloatA
     return np.cos(np.arctan(0.5 * np.tan(steering_rad))) * np.tan(steering_rad) / wheelbase_m
 
 
-def lateral_acceleration_mps2(state: State, actuators: Actuators) -> FloatArray:
+def lateral_acceleration_mps2(state: State, actuators: ActuatorLimits) -> FloatArray:
     """[G, P] lateral acceleration (m/s^2) at the state's steering and speed, bounded by the grip left by the pedals."""
     return _lateral_acceleration_mps2(motion_of(state), tuple(actuators))
 
 
 @compiled
 def _lateral_acceleration_mps2(columns: tuple[Any, ...], limits: tuple[Any, ...]) -> FloatArray:
-    motion, actuators = Motion(*columns), Actuators(*limits)
+    motion, actuators = Motion(*columns), ActuatorLimits(*limits)
     lateral = np.empty(motion.speed_mps.shape)
     for g, p in np.ndindex(lateral.shape):
         curvature = curvature_per_m(motion.steering_rad[g, p], actuators.wheelbase_m[p])

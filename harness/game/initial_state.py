@@ -13,25 +13,28 @@ from functools import cached_property
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.attention import Attention, HumanFactors, Lapses, draw_lapses, unseen_behind_m
-from harness.game.human_limits import (
-    ALL_NOTICED,
-    EXACT_SIGHT,
-    FULL_SHARES,
-    NO_DELAY,
+from harness.game.human_factors import (
     NO_LIMITS,
+    ActuatorShares,
+    Attention,
+    HumanFactors,
+    Lapses,
     Limits,
+    Reaction,
+    Sight,
     draw_delay_steps,
     draw_estimation_errors,
+    draw_lapses,
     draw_noticed_m,
+    unseen_behind_m,
 )
-from harness.game.obstacles import NO_OBSTACLES, Obstacles
+from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
 from harness.game.route_starts import draw_along_route
 from harness.game.seeding import between, generator_of, seed_of
 from harness.game.start_range import StartRange
 
-_UNLIMITED = (ALL_NOTICED, NO_DELAY, EXACT_SIGHT, FULL_SHARES)
+_UNLIMITED = (Reaction(), Sight(), ActuatorShares())
 
 
 class LazyNoise:
@@ -133,7 +136,7 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
         for player, shares in enumerate(start_distribution.shares)
     ]
     human_factors = [start_distribution.human_factors[player][member[player]] for player in players]
-    unseen = [unseen_behind_m(each.no_blind_spot_check, next(draws)) for each in human_factors]
+    unseen = [unseen_behind_m(each.sight, next(draws)) for each in human_factors]
     limits = [_limits(each, start_distribution, player, *parts) for player, each in enumerate(human_factors)]
     lapses = [
         _lapses(human_factors[player].attention, start_distribution, player, limits[player].delay_steps, *parts)
@@ -212,9 +215,8 @@ def _limits(
     human_factors: HumanFactors, start_distribution: StartDistribution, player: int, *parts: str | int
 ) -> Limits:
     """The limits of a player. Each limit has its own generator, which is made only if the limit exists."""
-    failure, reaction = human_factors.looked_but_failed_to_see, human_factors.reaction
-    sight, shares = human_factors.sight, human_factors.actuator_shares
-    if (failure, reaction, sight, shares) == _UNLIMITED:  # common, and much faster than the rest
+    reaction, sight, shares = human_factors.reaction, human_factors.sight, human_factors.actuator_shares
+    if (reaction, sight, shares) == _UNLIMITED:  # common, and much faster than the rest
         return NO_LIMITS
 
     def generator(name: str) -> np.random.Generator:
@@ -222,14 +224,14 @@ def _limits(
 
     step_s = start_distribution.step_s
     delay_steps = draw_delay_steps(reaction, step_s, generator("reaction")) if any(reaction.delay_s) else 0
-    noticed_m = draw_noticed_m(failure, generator("missing")) if failure.share else np.inf
+    noticed_m = draw_noticed_m(sight, generator("missing")) if sight.looked_but_failed_to_see_share else np.inf
     exact = sight.distance_error == sight.closing_error_per_s == 0.0
     return Limits(
         delay_steps=delay_steps,
         sight_m=min(sight.range_m, noticed_m),
-        opening_rad=sight.opening_rad,
+        opening_rad=float(np.deg2rad(sight.opening_deg)),
         estimation_errors=(
             None if exact else draw_estimation_errors(sight, start_distribution.steps, step_s, generator("sight"))
         ),
-        actuator_shares=(shares.throttle, shares.braking, shares.steering),
+        actuator_shares=(shares.throttle_share, shares.braking_share, shares.steering_share),
     )

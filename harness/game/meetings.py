@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.game.right_of_way import CELL_M, Conflicts, Signal, Streams
+from harness.game.junctions import CELL_M, Conflicts, Signal, Streams
 from harness.game.road import COMFORTABLE_MPS2
 from harness.game.state import Bodies
 

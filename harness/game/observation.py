@@ -22,6 +22,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled, inlined
+from harness.game.junctions import Control, Signal, StopLines
 from harness.game.meetings import Meetings
 from harness.game.observation_layout import (
     BEHIND,
@@ -35,7 +36,6 @@ from harness.game.observation_layout import (
     SIZE,
 )
 from harness.game.quantities import Quantities
-from harness.game.right_of_way import Control, Signal, StopLines
 from harness.game.road import AHEAD_M, Along, Routes
 from harness.game.route_coordinates import OnRoute, half_extents_m, on_route, point_along_route, row_ahead
 from harness.game.sight import nothing_hidden

@@ -8,8 +8,8 @@ import numpy as np
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
+from harness.game.junctions import Streams
 from harness.game.meetings import STANDING_MPS, streams_at
-from harness.game.right_of_way import Streams
 from harness.game.state import Bodies
 
 

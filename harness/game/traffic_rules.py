@@ -11,8 +11,8 @@ import numpy as np
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
+from harness.game.junctions import Conflicts, Control, Signal, StopLines
 from harness.game.meetings import Meetings
-from harness.game.right_of_way import Conflicts, Control, Signal, StopLines
 from harness.game.road import COMFORTABLE_MPS2
 
 AMBER_MPS2 = 3.0  # yellow means stop, unless it takes more braking than this (ITE: 10 ft/s2)

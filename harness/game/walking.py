@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.game.bicycle import Actuators, Requested, curvature_per_m, motion_of
+from harness.game.bicycle import ActuatorLimits, Requested, curvature_per_m, motion_of
 from harness.game.jit import compiled
 from harness.game.state import State
 
@@ -28,7 +28,7 @@ MAX_TURN_RADPS = np.pi  # half a turn in a second
 TURNS_AS_AT_MPS = 1.0
 
 
-def walk(state: State, requested: Requested, actuators: Actuators, step_s: float) -> None:
+def walk(state: State, requested: Requested, actuators: ActuatorLimits, step_s: float) -> None:
     """Move the walkers marked in `moving` by one step, in place."""
     _walk(motion_of(state), tuple(requested), tuple(actuators), step_s)
 
@@ -36,7 +36,7 @@ def walk(state: State, requested: Requested, actuators: Actuators, step_s: float
 @compiled
 def _walk(motion: tuple[Any, ...], requests: tuple[Any, ...], limits: tuple[Any, ...], step_s: float) -> None:
     x_m, y_m, heading_rad, speed_mps, acceleration_mps2, steering_rad, _ = motion
-    asked, actuators = Requested(*requests), Actuators(*limits)
+    asked, actuators = Requested(*requests), ActuatorLimits(*limits)
     moving = asked.moving
     for g, p in np.ndindex(moving.shape):
         if moving[g, p]:

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray
-from harness.game.bicycle import Actuators
-from harness.game.right_of_way import NO_JUNCTIONS, RightOfWay
+from harness.game.bicycle import ActuatorLimits
+from harness.game.junctions import NO_JUNCTIONS, RightOfWay
 from harness.game.road import Road
 from harness.game.roles import roles_of
 from harness.game.sight import NOTHING_HIDES, Hiding
@@ -20,7 +20,7 @@ class World:
     """The constants of a game: road, right of way, cars, step length, time limit. Sizes are [P]."""
 
     road: Road
-    actuators: Actuators
+    actuators: ActuatorLimits
     length_m: FloatArray
     width_m: FloatArray
     step_s: float

@@ -20,7 +20,7 @@ from xml.etree import ElementTree
 import pandas as pd
 
 from harness.game.arrays import FloatArray
-from harness.game.obstacles import NO_OBSTACLES, Obstacles
+from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.replay.contact import Contact, contacts
 from harness.replay.floating_car_data import shown_at, write_recording, write_xml
 from harness.replay.gui_settings import WINDOW_PX, Viewport, choose_view, view_settings

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from harness.game.arrays import FloatArray
-from harness.game.obstacles import Obstacles
+from harness.game.placed_obstacles import Obstacles
 from harness.replay.contact import box_of
 from harness.replay.vehicles import OBSTACLE_COLOUR, DrawnVehicle
 

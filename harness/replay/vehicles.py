@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from harness.game.obstacles import NO_OBSTACLES, Obstacle, Obstacles
+from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles, PlacedObstacle
 from harness.traffic.route_file import CAR_SIZE_M, SIZES_M
 from harness.traffic.walker_vehicle import WALKER_ATTRIBUTES, WALKER_TYPE
 from harness.traffic.xml_file import parse_xml
@@ -116,7 +116,7 @@ def _defined_types(route_file: Path, modified_ns: int) -> dict[str, dict[str, st
     return {str(element.get("id")): dict(element.attrib) for element in root.iter("vType")}
 
 
-def _standing(obstacle: Obstacle) -> DrawnVehicle:
+def _standing(obstacle: PlacedObstacle) -> DrawnVehicle:
     return DrawnVehicle(
         name=obstacle.vehicle_type,
         length_m=obstacle.length_m,

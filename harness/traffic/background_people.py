@@ -14,7 +14,7 @@ import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.neighbours import NOTICED_M
+from harness.game.near_players import NOTICED_M
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.levels import on_players_level
 from harness.traffic.route_file import EDGE_SHARE, Departure

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from harness.errors import SimulationError
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.neighbours import Search, rows_by_game
+from harness.game.near_players import NearSearch, rows_by_game
 from harness.traffic.angles import heading_rad_of
 from harness.traffic.background_people import BackgroundPeople
 from harness.traffic.insertion import Insertion, put_beside
@@ -157,7 +157,7 @@ class BackgroundTraffic:
         due = np.flatnonzero(table.due == self._step)  # by game, then by departure
         if not len(due):
             return self._empty_reading
-        search = Search(
+        search = NearSearch(
             *(table.due, table.length_m, table.max_speed_mps, self._offsets_m),
             *(players_x_m, players_y_m, players_present, self._fastest_player_mps),
             *(self._step, self._step_s, 1 if self._recorded else _LONGEST_WAIT, self._recorded),

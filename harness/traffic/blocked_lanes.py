@@ -17,7 +17,7 @@ from sumolib.net.lane import Lane
 
 from harness.game.arrays import FloatArray
 from harness.game.geometry import Box
-from harness.game.obstacles import Obstacles
+from harness.game.placed_obstacles import Obstacles
 from harness.traffic import network
 from harness.traffic.obstacles import polygon_of, reach_of
 

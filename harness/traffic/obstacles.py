@@ -20,8 +20,8 @@ from harness.config.scene import Scene
 from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
 from harness.game.geometry import Box, box_distance
-from harness.game.neighbours import NOTICED_M
-from harness.game.obstacles import AtPoint, Obstacle, Obstacles, OnLane
+from harness.game.near_players import NOTICED_M
+from harness.game.placed_obstacles import AtPoint, Obstacles, OnLane, PlacedObstacle
 from harness.game.road import Route
 from harness.game.sight import TALL_WIDTH_M, Hiding
 from harness.traffic import network
@@ -42,7 +42,7 @@ def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route])
     file, routes = files.file, files.routes
     problems: list[Problem] = []
     lines = shapely.union_all([shapely.LineString(np.stack((way.x_m, way.y_m), axis=1)) for way in ways])
-    found: list[Obstacle] = []
+    found: list[PlacedObstacle] = []
     outlines: list[FloatArray] = []
     for number, each in enumerate(files.document.obstacle, start=1):
         name = f"obstacle_{number}"
@@ -91,14 +91,14 @@ def polygon_of(box: Box) -> shapely.Polygon:
     return shapely.Polygon([centre + u * along + v * across for u, v in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
 
 
-def reach_of(obstacle: Obstacle) -> BaseGeometry:
+def reach_of(obstacle: PlacedObstacle) -> BaseGeometry:
     """About the area in which an obstacle may stand."""
     poses = [obstacle.place.pose(shares) for shares in product(_SHARES, _SHARES, _SHARES)]
     boxes = [Box(x, y, heading, obstacle.length_m, obstacle.width_m) for x, y, heading in poses]
     return shapely.union_all([polygon_of(box) for box in boxes])
 
 
-def _obstacle(file: Path, name: str, document: written.Obstacle, net: Net) -> Obstacle:
+def _obstacle(file: Path, name: str, document: written.Obstacle, net: Net) -> PlacedObstacle:
     length_m, width_m = written.USUAL_SIZE_M.get(document.kind, (0.0, 0.0))
     length_m, width_m = document.length_m or length_m, document.width_m or width_m
     place: OnLane | AtPoint
@@ -113,7 +113,7 @@ def _obstacle(file: Path, name: str, document: written.Obstacle, net: Net) -> Ob
         assert document.heading_deg is not None, "x_m, y_m and heading_deg are given together"
         low_deg, high_deg = document.heading_deg
         place = AtPoint(x_m=document.x_m, y_m=document.y_m, heading_rad=(radians(low_deg), radians(high_deg)))
-    return Obstacle(
+    return PlacedObstacle(
         name=name, kind=document.kind, length_m=length_m, width_m=width_m, hides=document.is_hiding, place=place
     )
 

@@ -15,7 +15,7 @@ from sumolib.net.edge import Edge
 from sumolib.net.lane import Lane
 
 from harness.game.arrays import FloatArray
-from harness.game.right_of_way import Conflicts, Control, RightOfWay, StopLines, Streams
+from harness.game.junctions import Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.traffic.network import car_lanes, lane_line
 from harness.traffic.oncoming_lanes import LanesOf
 from harness.traffic.route_table import JunctionOnRoute, junctions_on_route

@@ -12,9 +12,9 @@ import shapely
 
 from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import Conditions, StartDistribution
-from harness.game.obstacles import NO_OBSTACLES, Obstacles
+from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.seeding import between
 from harness.game.start_range import StartRange
 from harness.game.world import World

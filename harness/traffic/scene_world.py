@@ -12,10 +12,10 @@ from sumolib.net.edge import Edge
 
 from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
-from harness.game.bicycle import Actuators
-from harness.game.obstacles import Obstacles
+from harness.game.bicycle import ActuatorLimits
+from harness.game.junctions import RightOfWay
+from harness.game.placed_obstacles import Obstacles
 from harness.game.quantities import REACH_M
-from harness.game.right_of_way import RightOfWay
 from harness.game.road import Road, Routes
 from harness.game.start_range import StartRange
 from harness.game.world import World
@@ -134,7 +134,7 @@ def _world(
     walking = tuple(player.on_foot for player in document.players)
     return World(
         road=road,
-        actuators=Actuators(
+        actuators=ActuatorLimits(
             max_acceleration_mps2=np.array([each.max_acceleration_mps2 for each in limits]),
             max_braking_mps2=np.array([each.max_braking_mps2 for each in limits]),
             max_speed_mps=np.array([each.max_speed_mps for each in types]),

@@ -10,7 +10,7 @@ import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
 
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.right_of_way import SIGNALS, Signal
+from harness.game.junctions import SIGNALS, Signal
 from harness.traffic.simulation import AtReset
 
 _CODE = np.full(256, int(Signal.OFF), dtype=np.int8)  # by character; 'o' and 'O' are off

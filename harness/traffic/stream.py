@@ -122,7 +122,7 @@ class Stream:
 
     @cached_property
     def samples(self) -> FloatArray:
-        """[N, 7] samples of the stream, with the first columns of `game.right_of_way.Streams`."""
+        """[N, 7] samples of the stream, with the first columns of `game.junctions.Streams`."""
         pieces = [Piece(0.0, shapely.get_coordinates(self.onward), self.width_m)]
         pieces += self._feeders.approaches(self.link.getFromLane())
         return np.concatenate([samples_on(piece) for piece in pieces])

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.jit import compiled
-from harness.game.neighbours import Search, is_near, near_players
+from harness.game.near_players import NearSearch, is_near, near_players
 
 _STRING = "RKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEE"  # const std::string&
 _SYMBOLS = {
@@ -65,7 +65,7 @@ def string_record(text: bytes) -> tuple[int, int, int, int]:
 
 
 def read_near(
-    search: Search, names: NDArray[np.object_], records: NDArray[np.uint64], due: IntArray, direct: bool
+    search: NearSearch, names: NDArray[np.object_], records: NDArray[np.uint64], due: IntArray, direct: bool
 ) -> tuple[IntArray, FloatArray]:
     """The vehicles near a player among those at flat places `due` [n] of a table [G, N]: their places [m] and motion.
 
@@ -88,7 +88,7 @@ def read_near(
 
 
 @compiled
-def _read_near(search: Search, records: NDArray[np.uint64], due: IntArray) -> tuple[IntArray, FloatArray]:
+def _read_near(search: NearSearch, records: NDArray[np.uint64], due: IntArray) -> tuple[IntArray, FloatArray]:
     """One pass, so that a vehicle is still in the processor's caches when its angle and speed are read."""
     places, motion, count = np.empty(len(due), dtype=np.int64), np.empty((4, len(due))), 0
     position = np.empty(_ROOM)

@@ -18,7 +18,7 @@ from sumolib.net import Net
 from harness.config.road_user import WALKER_WIDTH_M
 from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
-from harness.game.right_of_way import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
+from harness.game.junctions import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.game.road import MARGIN_M, SPACING_M, Route
 from harness.traffic.network import lane_line
 from harness.traffic.route_table import line_over_junction

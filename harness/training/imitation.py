@@ -17,7 +17,7 @@ from stable_baselines3 import PPO
 
 from harness.config.rule_driver import Cruise, LaneKeeping, Rules
 from harness.drivers.car import car_of
-from harness.drivers.rules import RulesDriver
+from harness.drivers.rules_driver import RulesDriver
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
 

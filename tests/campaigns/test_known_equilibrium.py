@@ -41,7 +41,7 @@ from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, Ga
 from harness.evaluation.game_theory.records import Response
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO, ROLES

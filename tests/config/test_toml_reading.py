@@ -13,7 +13,7 @@ from harness.config.persona import Persona
 from harness.config.scene import Scene
 from harness.config.toml_reading import Document, nearest, read_document
 from harness.errors import Problem, UsageError
-from harness.game.human_limits import ActuatorShares, Reaction, Sight
+from harness.game.human_factors import ActuatorShares, Reaction, Sight
 
 Write = Callable[[str], Path]
 
@@ -255,11 +255,7 @@ def test_persona__limits_survive_a_round_trip(write: Write) -> None:
     assert Persona.model_validate(written, strict=False) == person
     assert person.human_factors.sight == Sight(range_m=50.0, distance_error=0.1)
     assert person.human_factors.reaction == Reaction(delay_s=(0.2, 0.3))
-    assert person.human_factors.actuator_shares == ActuatorShares(braking=0.5)
-    assert (
-        person.human_factors.looked_but_failed_to_see
-        is read_document(write(PERSONA), Persona).human_factors.looked_but_failed_to_see
-    )
+    assert person.human_factors.actuator_shares == ActuatorShares(braking_share=0.5)
 
 
 def test_from_record__refuses_what_is_no_persona() -> None:

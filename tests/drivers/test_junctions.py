@@ -13,7 +13,7 @@ from harness.config.rule_driver import Cruise, Rules
 from harness.drivers.adaptive_cruise import cruise_mps2, waiting_gap_m
 from harness.drivers.car import Car, car_of
 from harness.drivers.perception import perceive
-from harness.drivers.rules import RulesDriver
+from harness.drivers.rules_driver import RulesDriver
 from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray
 from harness.game.outcome import Outcome

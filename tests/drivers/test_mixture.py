@@ -18,11 +18,11 @@ from harness.environments.arena import Arena, Seat
 from harness.environments.rollout import Arm, Game, assess
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.attention import Attention, HumanFactors
+from harness.game.human_factors import Attention, HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.traffic.scene import OpenScene, open_scene
 
-TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_rad=0.02))
+TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02))
 
 
 class Steady:

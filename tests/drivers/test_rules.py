@@ -22,7 +22,7 @@ from harness.drivers.external import find_driver
 from harness.drivers.lane_keeping import steering_rad
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.drivers.protocol import Driver
-from harness.drivers.rules import RulesDriver
+from harness.drivers.rules_driver import RulesDriver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from harness.environments.arena import Arena, Seat
 from harness.environments.auto_reset import AutoReset
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.seeding import generator_of
 from harness.traffic.route_file import Departure

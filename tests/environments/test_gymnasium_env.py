@@ -34,7 +34,7 @@ from harness import (
 from harness.config.persona import Persona
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.sumo import SumoDriver
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.observation_layout import LAYOUT
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene

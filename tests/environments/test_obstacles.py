@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from harness.environments.arena import Arena, Seat
-from harness.game.attention import HumanFactors
 from harness.game.geometry import Box, box_distance
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT
 from harness.game.outcome import Outcome

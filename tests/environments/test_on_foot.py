@@ -11,7 +11,7 @@ import pytest
 from harness.drivers.ordinary_walker import OrdinaryWalker
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import NON_EGO

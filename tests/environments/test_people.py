@@ -20,7 +20,7 @@ from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.evaluation.people import COLLIDED_WITH, columns_for
 from harness.evaluation.tables import EPISODE_COLUMNS, typed
 from harness.game.arrays import FloatArray, IntArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.rollouts import play, seated, trace

@@ -27,7 +27,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.seeding import generator_of

@@ -19,8 +19,8 @@ from harness.evaluation.manoeuvres import Manoeuvre, find_manoeuvres
 from harness.evaluation.metrics import PlayerSeries, accepted_gap_s, min_pet_s, pet_priority
 from harness.evaluation.trace_quantities import drove_in, quantities_of
 from harness.game.arrays import FloatArray
+from harness.game.junctions import Control
 from harness.game.outcome import Outcome
-from harness.game.right_of_way import Control
 from harness.game.roles import ROLES
 from harness.game.world import World
 from harness.traffic.scene import OpenScene

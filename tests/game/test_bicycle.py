@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from harness.game.arrays import FloatArray
 from harness.game.bicycle import (
     GRAVITY_MPS2,
-    Actuators,
+    ActuatorLimits,
     Requested,
     actions,
     curvature_per_m,
@@ -113,7 +113,7 @@ def test_drive__players_that_do_not_move_are_untouched() -> None:
     state = State.empty(1, 2)
     state.speed_mps[:], state.heading_rad[:], state.steering_rad[:], state.friction[:] = 10.0, 1.0, 0.05, 0.8
     before = state.copy()
-    two = Actuators(
+    two = ActuatorLimits(
         **{name: value if name == "friction" else np.repeat(value, 2) for name, value in actuators()._asdict().items()}
     )
     move(state, Requested(np.full((1, 2), 2.0), np.full((1, 2), 0.1), np.array([[True, False]])), two, STEP_S)
@@ -141,7 +141,7 @@ CARS = st.builds(
     request_list=st.lists(st.tuples(st.floats(-20.0, 20.0), st.floats(-1.5, 1.5)), min_size=1, max_size=8),
 )
 def test_drive__the_tyre_force_stays_within_the_friction_circle(
-    car: Actuators, speed: float, steering: float, request_list: list[tuple[float, float]]
+    car: ActuatorLimits, speed: float, steering: float, request_list: list[tuple[float, float]]
 ) -> None:
     lock = float(car.max_steering_rad[0])
     state = state_of(speed, steering_rad=float(np.clip(steering, -lock, lock)))

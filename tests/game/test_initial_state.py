@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.game.attention import Attention, HumanFactors
+from harness.game.human_factors import Attention, HumanFactors
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of, seed_of
 from harness.game.start_range import OnLine, StartRange
 from harness.traffic.scene import OpenScene
 
-TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_rad=0.02))
+TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02))
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from harness.game.junctions import Signal
 from harness.game.meetings import Meetings
 from harness.game.quantities import Quantities
-from harness.game.right_of_way import Signal
 from harness.game.world import World
 from harness.traffic.scene import OpenScene
 from tests.support.conflicts import CROSSING, with_conflicts

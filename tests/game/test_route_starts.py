@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from harness.game.arrays import FloatArray
-from harness.game.attention import Attention, HumanFactors
-from harness.game.human_limits import Reaction
+from harness.game.human_factors import Attention, HumanFactors, Reaction
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.road import Routes
 from harness.game.route_starts import draw_along_route
@@ -95,7 +94,8 @@ def test_starts__along_the_route_are_a_share_of_the_games(share: float) -> None:
 # --- in the initial states of a scene --------------------------------------------------------------------------------
 
 TEXTING = HumanFactors(
-    attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_rad=0.02), reaction=Reaction((0.2, 0.9))
+    attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02),
+    reaction=Reaction(delay_s=(0.2, 0.9)),
 )
 
 

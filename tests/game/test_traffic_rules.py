@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.game.junctions import NO_JUNCTIONS, Conflicts, Control, RightOfWay, Signal, StopLines, Streams
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.payoff import Payoff, Weighted
 from harness.game.payoff_terms import GROUPS
 from harness.game.quantities import Quantities
-from harness.game.right_of_way import NO_JUNCTIONS, Conflicts, Control, RightOfWay, Signal, StopLines, Streams
 from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
 from harness.traffic.scene import OpenScene

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from harness.config.road_user import DEFAULTS
-from harness.game.bicycle import Actuators, Requested, curvature_per_m, move
+from harness.game.bicycle import ActuatorLimits, Requested, curvature_per_m, move
 from harness.game.state import State
 from harness.game.walking import MAX_BACKWARD_MPS, MAX_TURN_RADPS, walk
 from tests.support.bicycle import actuators, state_of
@@ -16,7 +16,7 @@ from tests.support.bicycle import actuators, state_of
 STEP_S = 0.1
 
 
-def walker(**changes: float) -> Actuators:
+def walker(**changes: float) -> ActuatorLimits:
     limits = DEFAULTS["pedestrian"].model_dump()
     return actuators(**{**limits, "max_speed_mps": 4.0, **changes})
 

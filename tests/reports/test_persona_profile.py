@@ -13,7 +13,7 @@ from rich.console import Console
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.errors import UsageError
-from harness.game.attention import Attention, draw_lapses
+from harness.game.human_factors import Attention, draw_lapses
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.reports.persona.drives import DRIFT_SPEED_MPS, drift_m, free_share, lapsed_share, lapses_per_minute
 from harness.reports.persona.persona_page import render_profile, write_profile
@@ -44,7 +44,7 @@ from tests.support.bicycle import advance, state_of
 from tests.support.chromium import launched, opener
 from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY, harness
 
-TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), crown_rad=0.005, bumps_rad=0.001)
+TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), crown_steering_rad=0.005, bump_steering_sd_rad=0.001)
 
 
 def profile_of(file: Path) -> PersonaProfile:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from harness.game.bicycle import (
-    Actuators,
+    ActuatorLimits,
     Requested,
     move,
 )
@@ -14,7 +14,7 @@ from harness.game.state import State
 STEP_S = 0.1
 
 
-def actuators(**changes: float) -> Actuators:
+def actuators(**changes: float) -> ActuatorLimits:
     values = {
         "max_acceleration_mps2": 3.0,
         "max_braking_mps2": 8.0,
@@ -26,7 +26,7 @@ def actuators(**changes: float) -> Actuators:
         **{name: value for name, value in changes.items() if name != "friction"},
     }
     arrays = {name: np.array([value]) for name, value in values.items()}
-    return Actuators(**arrays, friction=changes.get("friction", 0.8))
+    return ActuatorLimits(**arrays, friction=changes.get("friction", 0.8))
 
 
 def state_of(speed_mps: float, heading_rad: float = 0.0, steering_rad: float = 0.0) -> State:
@@ -36,7 +36,7 @@ def state_of(speed_mps: float, heading_rad: float = 0.0, steering_rad: float = 0
     return state
 
 
-def advance(state: State, acceleration_mps2: float, steering_rad: float, car: Actuators | None = None) -> None:
+def advance(state: State, acceleration_mps2: float, steering_rad: float, car: ActuatorLimits | None = None) -> None:
     car = car or actuators()
     state.friction[:] = car.friction
     requested = Requested(np.array([[acceleration_mps2]]), np.array([[steering_rad]]), np.array([[True]]))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from harness.game.right_of_way import Conflicts, Control, RightOfWay, StopLines, Streams
+from harness.game.junctions import Conflicts, Control, RightOfWay, StopLines, Streams
 from harness.game.world import World
 
 CROSSING: Mapping[str, Any] = {

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import sumo
 
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.stations import nearest_station_m

@@ -11,7 +11,7 @@ import pytest
 
 from harness.config.road_user import WALKING_MPS
 from harness.errors import UsageError
-from harness.game.right_of_way import Control
+from harness.game.junctions import Control
 from harness.traffic.network import read_net
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY

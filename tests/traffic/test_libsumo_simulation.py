@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from harness.errors import SimulationError
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.route_file import Departure

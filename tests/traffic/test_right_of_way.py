@@ -16,7 +16,7 @@ import shapely
 from sumolib.net import Net
 
 from harness.game.geometry import Box, box_distance
-from harness.game.right_of_way import SAMPLE, Conflicts, Control, RightOfWay
+from harness.game.junctions import SAMPLE, Conflicts, Control, RightOfWay
 from harness.traffic import network
 from harness.traffic.right_of_way import right_of_way
 from harness.traffic.scene import OpenScene

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
-from harness.game.right_of_way import Control
+from harness.game.junctions import Control
 from harness.game.roles import EGO, NON_EGO
 from harness.traffic.scene import open_scene
 from tests.support.repository import REPOSITORY

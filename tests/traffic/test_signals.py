@@ -16,7 +16,7 @@ import pytest
 from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
-from harness.game.right_of_way import Signal
+from harness.game.junctions import Signal
 from harness.game.roles import EGO, NON_EGO
 from harness.traffic.libsumo_simulation import LibsumoSimulation
 from harness.traffic.scene import OpenScene

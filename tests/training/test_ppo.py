@@ -281,12 +281,12 @@ def test_train__the_learner_checks_its_blind_spot_and_the_opponent_does_not(
     sample_from = ArenaVecEnv.sample_from
 
     def recording(environment: ArenaVecEnv, start_distribution: StartDistribution, *parts: str | int) -> None:
-        seen.append([each.no_blind_spot_check.share for (each,) in start_distribution.human_factors])
+        seen.append([each.sight.no_blind_spot_check_share for (each,) in start_distribution.human_factors])
         sample_from(environment, start_distribution, *parts)
 
     monkeypatch.setattr(ArenaVecEnv, "sample_from", recording)
     speedy = read_document(SPEEDY, Persona)
-    share = speedy.human_factors.no_blind_spot_check.share
+    share = speedy.human_factors.sight.no_blind_spot_check_share
     assert share > 0.0
     in_one_go(beside(alone, learner, mixture_of(SumoDriver(), speedy), persona=speedy), tmp_path)
     assert seen

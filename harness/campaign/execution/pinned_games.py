@@ -34,7 +34,7 @@ from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import worst_first
 from harness.files import make_folder, write_atomically
 from harness.game.arrays import FloatArray
-from harness.game.attention import HumanFactors
+from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 
 TOLERANCE_M, TOLERANCE_MPS = 0.05, 0.05

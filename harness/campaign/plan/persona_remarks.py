@@ -8,7 +8,7 @@ from math import inf
 import numpy as np
 
 from harness.config.persona import Parametrised, Persona
-from harness.game.right_of_way import Control
+from harness.game.junctions import Control
 from harness.game.roles import NON_EGO
 from harness.game.world import World
 

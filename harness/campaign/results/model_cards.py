@@ -25,6 +25,7 @@ from harness.config.training import ATTENTIVE_SHARE
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
+from harness.game.human_factors import PERSISTENCE_S
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.roles import EGO, NON_EGO, ROLES
 from harness.reports.learning import stopped
@@ -175,7 +176,7 @@ def _sight(perception: Perception) -> Iterator[tuple[str, str]]:
     if perception.distance_error or perception.closing_error_per_s:
         distances = f"distances by {percent(perception.distance_error)}"
         closing = f"closing speeds by {perception.closing_error_per_s:g} of the distance per second"
-        yield "errors of perception", f"{distances}, {closing}, for {perception.sight.error_s:g} s"
+        yield "errors of perception", f"{distances}, {closing}, for {PERSISTENCE_S:g} s"
 
 
 def _given(manifest: Mapping[str, Any], campaign: Campaign) -> str:

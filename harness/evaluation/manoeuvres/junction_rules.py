@@ -12,7 +12,7 @@ from harness.evaluation.manoeuvres import thresholds as least
 from harness.evaluation.manoeuvres.course import Course, runs
 from harness.evaluation.manoeuvres.spans import SLACK, Span, span_of
 from harness.game.arrays import BoolArray
-from harness.game.right_of_way import Control, Signal
+from harness.game.junctions import Control, Signal
 
 
 def fails_to_yield(course: Course, player: int, other: int) -> Iterator[Span]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from harness.config.persona import Persona
 from harness.config.road_user import Actuators
-from harness.game.attention import Attention, Lapses, draw_lapses, unseen_behind_m
+from harness.game.human_factors import Attention, Lapses, draw_lapses, unseen_behind_m
 from harness.game.seeding import generator_of
 
 DRIVES, DRIVE_S, STEP_S = 8, 60.0, 0.1
@@ -42,9 +42,7 @@ def sample(persona: Persona) -> list[SampleDrive]:
             lapses = draw_lapses(
                 human_factors.attention, steps, STEP_S, generator_of("portrait", persona.name, "attention", k)
             )
-        ahead_m = unseen_behind_m(
-            human_factors.no_blind_spot_check, generator_of("portrait", persona.name, "start", k).random()
-        )
+        ahead_m = unseen_behind_m(human_factors.sight, generator_of("portrait", persona.name, "start", k).random())
         changes = np.flatnonzero(np.diff(np.concatenate(([0], lapses.lapsed.astype(int), [0])))).reshape(-1, 2) * STEP_S
         spans = tuple((float(begin), float(end)) for begin, end in changes)
         drives.append(SampleDrive(lapses=spans, no_blind_spot_check=math.isfinite(ahead_m)))

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from harness.config.persona import Persona
+from harness.game.human_factors import PERSISTENCE_S
 from harness.game.payoff_terms import GROUPS
 from harness.reports.persona.drives import (
     DRIFT_SPEED_MPS,
@@ -144,7 +145,7 @@ def attends(profile: PersonaProfile) -> Iterator[str]:
         f"{percent(free_share(attention))} have no lapse."
     )
     yield "In a lapse the person releases pedals and wheel. " + _drifts(
-        attention.crown_rad, attention.bumps_rad, lapse_s
+        attention.crown_steering_rad, attention.bump_steering_sd_rad, lapse_s
     )
 
 
@@ -162,15 +163,15 @@ def _drifts(crown_rad: float, bumps_rad: float, lapse_s: float) -> str:
 
 def sees(profile: PersonaProfile) -> Iterator[str]:
     """The vehicles that the person does not see without a blind-spot check, and how often."""
-    check = profile.persona.human_factors.no_blind_spot_check
-    if check.share == 0.0:
+    sight = profile.persona.human_factors.sight
+    if sight.no_blind_spot_check_share == 0.0:
         yield ALWAYS_CHECKS
         return
-    ahead_m = check.ahead_m
+    ahead_m = sight.unseen_behind_m
     where = f"is not at least {ahead_m:g} m ahead of" if ahead_m >= 0.0 else f"is more than {-ahead_m:g} m behind"
     count = sum(each.no_blind_spot_check for each in profile.drives)
     yield (
-        f"No blind-spot check in {percent(check.share)} of the drives "
+        f"No blind-spot check in {percent(sight.no_blind_spot_check_share)} of the drives "
         f"({count} of the {len(profile.drives)} sample drives): "
         f"a vehicle is not seen when its centre {where} the person's own."
     )
@@ -179,11 +180,11 @@ def sees(profile: PersonaProfile) -> Iterator[str]:
 def body(profile: PersonaProfile) -> Iterator[str]:
     """How far and how exactly the person sees, its reaction time, and how much of the car it uses."""
     human_factors = profile.persona.human_factors
-    sight, failed_to_see = human_factors.sight, human_factors.looked_but_failed_to_see
-    if failed_to_see.share:
+    sight = human_factors.sight
+    if sight.looked_but_failed_to_see_share:
         yield (
-            f"In {percent(failed_to_see.share)} of the drives the person looks but fails to see: a vehicle is noticed "
-            f"within {failed_to_see.within_m:g} m only."
+            f"In {percent(sight.looked_but_failed_to_see_share)} of the drives the person looks but fails to see: "
+            f"a vehicle is noticed within {sight.noticed_within_m:g} m only."
         )
     if math.isfinite(sight.range_m):
         yield f"Vehicles more than {sight.range_m:g} m away are never seen."
@@ -194,13 +195,13 @@ def body(profile: PersonaProfile) -> Iterator[str]:
         error_mps = NEAR_M * sight.closing_error_per_s
         yield f"At {NEAR_M:g} m, the error of closing speeds is {error_mps:.2g} m/s (standard deviation)."
     if sight.distance_error or sight.closing_error_per_s:
-        yield f"An error of perception lasts for about {sight.error_s:g} s."
+        yield f"An error of perception lasts for about {PERSISTENCE_S:g} s."
     yield from _reaction(human_factors.reaction.delay_s, human_factors.attention is not None)
     uses = human_factors.actuator_shares
-    shares = {"acceleration": uses.throttle, "braking": uses.braking, "steering": uses.steering}
+    shares = {"acceleration": uses.throttle_share, "braking": uses.braking_share, "steering": uses.steering_share}
     if used := [f"{percent(share)} of the {name}" for name, share in shares.items() if share < 1.0]:
         yield f"The person uses {', '.join(used)} of the car."
-    if human_factors.looked_but_failed_to_see.share or human_factors.no_blind_spot_check.share:
+    if human_factors.with_open_eyes != human_factors:
         yield UNIMPAIRED_IN_TRAINING
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from xml.etree import ElementTree
 
-from harness.game.right_of_way import SIGNALS, Signal
+from harness.game.junctions import SIGNALS, Signal
 from harness.traffic.xml_file import number_of, parse_xml
 
 _STOPS = {letter for letter, signal in SIGNALS.items() if signal in (Signal.YELLOW, Signal.RED)}

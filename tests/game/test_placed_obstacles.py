@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from harness.game.obstacles import AtPoint, Obstacle, Obstacles, OnLane
+from harness.game.placed_obstacles import AtPoint, Obstacles, OnLane, PlacedObstacle
 
 L_SHAPED = np.array([[0.0, 0.0], [10.0, 0.0], [10.0, 10.0]])
 STILL = (0.0, 0.0)
 
 
-def obstacle(place: OnLane | AtPoint) -> Obstacle:
-    return Obstacle(name="obstacle_1", kind="van", length_m=6.5, width_m=2.16, hides=True, place=place)
+def obstacle(place: OnLane | AtPoint) -> PlacedObstacle:
+    return PlacedObstacle(name="obstacle_1", kind="van", length_m=6.5, width_m=2.16, hides=True, place=place)
 
 
 def on_lane(position_m: float, offset_m: float = 0.0, turned_rad: float = 0.0, scale: float = 1.0) -> OnLane:

@@ -12,7 +12,7 @@ from harness.game.jit import compiled
 NOTICED_M = 120.0  # a vehicle farther than this from every player does not affect the game
 
 
-class Search(NamedTuple):
+class NearSearch(NamedTuple):
     """What decides which vehicles are near a player, and when to read the others again."""
 
     due_in: IntArray
@@ -40,7 +40,7 @@ class Search(NamedTuple):
 
 
 @compiled
-def is_near(search: Search, place: int, front_x_m: float, front_y_m: float) -> bool:
+def is_near(search: NearSearch, place: int, front_x_m: float, front_y_m: float) -> bool:
     """Whether a vehicle may be near a player of its game. `place` is its flat position in the table [G, N].
 
     The front bumper is in the coordinates of the game, without the offset of its tile. In place: `due_in` becomes the
@@ -62,7 +62,7 @@ def is_near(search: Search, place: int, front_x_m: float, front_y_m: float) -> b
 
 
 @compiled
-def near_players(search: Search, due: IntArray, fronts_m: FloatArray) -> IntArray:
+def near_players(search: NearSearch, due: IntArray, fronts_m: FloatArray) -> IntArray:
     """[m] indices into `due` of the vehicles that are near a player of their game.
 
     due [n] are flat positions in the table [G, N], fronts_m [n, 2] the vehicles' front bumpers. In place: the y of

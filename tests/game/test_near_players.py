@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from harness.game.neighbours import NOTICED_M, Search, near_players, rows_by_game
+from harness.game.near_players import NOTICED_M, NearSearch, near_players, rows_by_game
 
 STEP_S, FASTEST_MPS = 0.1, 40.0
 
@@ -27,7 +27,7 @@ def look(
     due_in = np.full((2, count), 100)
     table = (np.full((2, count), length_m), np.full((2, count), speed_mps), np.array([0.0, 500.0]))
     players = (np.zeros((2, 2)), np.zeros((2, 2)), np.array([[True, True], [present, False]]))
-    search = Search(due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, all_vehicles)
+    search = NearSearch(due_in, *table, *players, FASTEST_MPS, 100, STEP_S, 50, all_vehicles)
     near = near_players(search, np.arange(count, 2 * count), fronts)
     assert (fronts[:, 1] == 0.0).all()  # without the offset of the tile
     assert (due_in[0] == 100).all()  # the other game is unchanged

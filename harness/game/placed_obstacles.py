@@ -58,7 +58,7 @@ class AtPoint:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Obstacle:
+class PlacedObstacle:
     """A body that stands in one place for a whole game."""
 
     name: str
@@ -85,7 +85,7 @@ class Obstacle:
 class Obstacles:
     """The obstacles of a scene, and the walls of its buildings."""
 
-    each: tuple[Obstacle, ...] = ()
+    each: tuple[PlacedObstacle, ...] = ()
     outlines: tuple[FloatArray, ...] = ()
     """[n, 2] corners of the buildings, which hide and stand off the road."""
 

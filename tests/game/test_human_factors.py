@@ -1,4 +1,4 @@
-"""Limits of the human body by hand: late decisions, estimation errors, limited sight, partial use of the car."""
+"""Human factors by hand: late decisions, inexact and limited sight, partial use of the car, lapses of attention."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from harness.environments.arena import Arena, Seat
-from harness.game.arrays import FloatArray
-from harness.game.attention import Attention, HumanFactors, Lapses, NoBlindSpotCheck, draw_lapses
-from harness.game.human_limits import (
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.human_factors import (
     NO_LIMITS,
     ActuatorShares,
+    Attention,
+    HumanFactors,
+    Lapses,
     Limits,
-    LookedButFailedToSee,
     PlayersLimits,
     Reaction,
     Sight,
     draw_delay_steps,
     draw_estimation_errors,
+    draw_lapses,
     draw_noticed_m,
+    unseen_behind_m,
 )
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.observation import observe
@@ -88,16 +91,6 @@ def test_delay__decisions_arrive_late_and_until_then_the_car_coasts() -> None:
         assert (arriving[1] == decided[1]).all()
 
 
-def test_delay__a_reset_discards_earlier_decisions() -> None:
-    limits = PlayersLimits(games=1, players=1, steps=10)
-    state = State.empty(1, 1)
-    for _ in range(2):
-        limits.reset(0, 0, Limits(delay_steps=3), state)
-        for step in range(5):
-            arriving = limits.arriving(np.full((1, 1, 2), 0.5), np.array([step]))
-            assert (arriving == (0.5 if step >= 3 else 0.0)).all()
-
-
 def test_delay__the_car_follows_earlier_decisions(arena: Arena, straight: OpenScene) -> None:
     start = drawn(straight, 1)
     actions = np.random.default_rng(0).uniform(-0.3, 0.3, (12, 2, 2, 2))
@@ -127,7 +120,7 @@ def test_delay__after_a_lapse_the_controls_are_released_until_the_first_decision
 @given(seed=st.integers(0, 2**32), delay=st.integers(0, 30))
 def test_delay__extends_lapses_and_starts_none_earlier(seed: int, delay: int) -> None:
     lapses = draw_lapses(
-        Attention(mean_attentive_s=3.0, lapse_s=(0.5, 2.0), crown_rad=0.005, bumps_rad=0.001),
+        Attention(mean_attentive_s=3.0, lapse_s=(0.5, 2.0), crown_steering_rad=0.005, bump_steering_sd_rad=0.001),
         200,
         0.1,
         np.random.default_rng(seed),
@@ -142,7 +135,7 @@ def test_delay__extends_lapses_and_starts_none_earlier(seed: int, delay: int) ->
 
 
 def test_delay__is_drawn_from_its_range() -> None:
-    drawn = [draw_delay_steps(Reaction((0.3, 0.8)), 0.1, np.random.default_rng(seed)) for seed in range(500)]
+    drawn = [draw_delay_steps(Reaction(delay_s=(0.3, 0.8)), 0.1, np.random.default_rng(seed)) for seed in range(500)]
     assert set(drawn) == {3, 4, 5, 6, 7, 8}
     assert np.mean(drawn) == pytest.approx(5.5, abs=0.3)  # 4 standard errors of 1.44 / sqrt(500)
 
@@ -189,30 +182,17 @@ def test_errors__of_closing_speed_grow_with_the_distance(moment: Moment, world: 
         assert entries["leader_mps"] == pytest.approx(7.0 - 10.0 + 0.05 * ahead_m, abs=1e-5)
 
 
-def test_errors__of_zero_are_exact_sight(moment: Moment, world: World) -> None:
-    players = [car(50.3), car(61.7, -4.1, heading_rad=0.1)]
-    plain = observe(moment(world, players, [car(80.1)]))
-    exact = [{**each, "distance_error": 0.0, "closing_error_per_s": 0.0, "sight_m": np.inf} for each in players]
-    assert observe(moment(world, exact, [car(80.1)])).tobytes() == plain.tobytes()
-
-
 def test_errors__have_their_deviation_and_correlation_time() -> None:
-    sight = Sight(distance_error=0.2, closing_error_per_s=0.03, error_s=2.0)
-    errors = np.array([draw_estimation_errors(sight, 200, 0.1, np.random.default_rng(seed)) for seed in range(400)])
+    sight = Sight(distance_error=0.2, closing_error_per_s=0.03)
+    errors = np.array([draw_estimation_errors(sight, 200, 1.0, np.random.default_rng(seed)) for seed in range(400)])
     logarithm, closing = np.log1p(errors[..., 0]), errors[..., 1]
     for step in (0, 100, 199):  # stationary; standard error 1 / sqrt(800)
         assert logarithm[:, step].std() == pytest.approx(0.2, rel=0.15)
         assert closing[:, step].std() == pytest.approx(0.03, rel=0.15)
-    for process in (logarithm, closing):  # after 2 s the correlation is 1/e
+    for process in (logarithm, closing):  # after 20 s the correlation is 1/e
         assert np.corrcoef(process[:, 50], process[:, 70])[0, 1] == pytest.approx(np.exp(-1.0), abs=0.2)
         assert np.corrcoef(process[:, 50], process[:, 51])[0, 1] > 0.9
     assert abs(np.corrcoef(logarithm[:, 50], closing[:, 50])[0, 1]) < 0.2
-
-
-def test_errors__of_a_longer_game_start_like_those_of_a_shorter_one() -> None:
-    sight = Sight(distance_error=0.2, closing_error_per_s=0.03)
-    short, long = (draw_estimation_errors(sight, steps, 0.1, np.random.default_rng(3)) for steps in (50, 120))
-    assert (short == long[:50]).all()
 
 
 def test_errors__an_arena_applies_the_error_of_each_step(arena: Arena, straight: OpenScene) -> None:
@@ -229,33 +209,21 @@ def test_errors__an_arena_applies_the_error_of_each_step(arena: Arena, straight:
 
 
 def test_failure_to_see__occurs_in_its_share_of_the_games() -> None:
-    failure = LookedButFailedToSee(share=0.25, within_m=8.0)
+    failure = Sight(looked_but_failed_to_see_share=0.25, noticed_within_m=8.0)
     drawn = [draw_noticed_m(failure, np.random.default_rng(seed)) for seed in range(2000)]
     assert set(drawn) == {8.0, np.inf}
     assert np.mean(np.isfinite(drawn)) == pytest.approx(0.25, abs=4 * 0.0097)
 
 
 def test_open_eyes__remove_failures_to_see_and_keep_the_limits_of_the_body() -> None:
-    person = HumanFactors(
-        no_blind_spot_check=NoBlindSpotCheck(share=0.5, ahead_m=1.0),
-        looked_but_failed_to_see=LookedButFailedToSee(share=0.5, within_m=5.0),
-        reaction=Reaction((0.2, 0.4)),
-        sight=Sight(range_m=60.0),
-    )
-    assert person.with_open_eyes == HumanFactors(reaction=Reaction((0.2, 0.4)), sight=Sight(range_m=60.0))
+    failures = {"no_blind_spot_check_share": 0.5, "unseen_behind_m": 1.0}
+    failures |= {"looked_but_failed_to_see_share": 0.5, "noticed_within_m": 5.0}
+    late = Reaction(delay_s=(0.2, 0.4))
+    person = HumanFactors(reaction=late, sight=Sight(range_m=60.0, **failures))
+    assert person.with_open_eyes == HumanFactors(reaction=late, sight=Sight(range_m=60.0))
 
 
 # --- actuator shares --------------------------------------------------------------------------------------------------
-
-
-def test_actuator_shares__scale_throttle_brake_and_wheel() -> None:
-    limits = PlayersLimits(games=1, players=3, steps=5)
-    state = State.empty(1, 3)
-    for player in range(2):
-        limits.reset(0, player, Limits(actuator_shares=(0.5, 0.25, 0.1)), state)
-    acceleration, steering = limits.within(np.array([[2.0, -4.0, 2.0]]), np.array([[0.2, -0.2, 0.2]]))
-    assert acceleration.tolist() == [[1.0, -1.0, 2.0]]
-    assert steering[0] == pytest.approx([0.02, -0.02, 0.2])
 
 
 def test_actuator_shares__limit_the_car(arena: Arena, straight: OpenScene) -> None:
@@ -270,10 +238,15 @@ def test_actuator_shares__limit_the_car(arena: Arena, straight: OpenScene) -> No
 # --- independent draws ------------------------------------------------------------------------------------------------
 
 BODY = HumanFactors(
-    looked_but_failed_to_see=LookedButFailedToSee(share=0.5, within_m=8.0),
-    reaction=Reaction((0.2, 0.9)),
-    sight=Sight(range_m=60.0, distance_error=0.1, closing_error_per_s=0.01, error_s=5.0),
-    actuator_shares=ActuatorShares(throttle=0.8, braking=0.7, steering=0.6),
+    reaction=Reaction(delay_s=(0.2, 0.9)),
+    sight=Sight(
+        looked_but_failed_to_see_share=0.5,
+        noticed_within_m=8.0,
+        range_m=60.0,
+        distance_error=0.1,
+        closing_error_per_s=0.01,
+    ),
+    actuator_shares=ActuatorShares(throttle_share=0.8, braking_share=0.7, steering_share=0.6),
 )
 
 
@@ -286,9 +259,9 @@ def test_start__without_limits_has_none(straight: OpenScene) -> None:
 
 
 def test_start__limits_of_another_player_do_not_change_the_draws(straight: OpenScene) -> None:
-    texting = Attention(mean_attentive_s=4.0, lapse_s=(1.0, 2.0), crown_rad=0.005, bumps_rad=0.001)
+    texting = Attention(mean_attentive_s=4.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.005, bump_steering_sd_rad=0.001)
     own = HumanFactors(
-        attention=texting, no_blind_spot_check=NoBlindSpotCheck(share=0.5, ahead_m=1.0), sight=Sight(distance_error=0.1)
+        attention=texting, sight=Sight(no_blind_spot_check_share=0.5, unseen_behind_m=1.0, distance_error=0.1)
     )
     for episode in range(5):
         plain, beside = (
@@ -336,3 +309,81 @@ def test_arena__limits_without_effect_equal_no_limits(arena: Arena, seed: int) -
         assert (acceleration[0] == acceleration[1]).all()
         assert (steering[0] == steering[1]).all()
         assert (observation[0] == observation[1]).all()
+
+
+# --- lapses of attention ----------------------------------------------------------------------------------------------
+
+TEXTING = Attention(mean_attentive_s=10.0, lapse_s=(4.0, 6.0), bump_steering_sd_rad=0.01)
+
+
+def runs(lapsed: BoolArray) -> list[tuple[int, int]]:
+    """First step and length of every lapse."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], lapsed.astype(int), [0]))))
+    return [(int(first), int(end - first)) for first, end in edges.reshape(-1, 2)]
+
+
+def test_lapses__last_within_their_range() -> None:
+    lapses = draw_lapses(TEXTING, 100_000, 0.1, np.random.default_rng(1))
+    lengths = np.array([length for first, length in runs(lapses.lapsed) if 0 < first < 100_000 - length])
+    assert len(lengths) > 300
+    assert lengths.min() >= 40
+    assert lengths.max() <= 60
+    # uniform over 4..6 s: 50 steps on average, standard error 5.8 / sqrt(n) < 0.35
+    assert lengths.mean() == pytest.approx(50.0, abs=5 * 0.35)
+
+
+def test_lapses__occur_at_the_mean_rate() -> None:
+    # an attentive stretch of 10 s on average and a lapse of 5 s: a third of the time, one lapse in 15 s
+    lapses = draw_lapses(TEXTING, 200_000, 0.1, np.random.default_rng(2))
+    assert lapses.lapsed.mean() == pytest.approx(1.0 / 3.0, abs=0.03)
+    assert len(runs(lapses.lapsed)) == pytest.approx(20_000.0 / 15.0, rel=0.1)
+
+
+def test_lapses__the_first_may_occur_at_any_time_of_a_game() -> None:
+    first = []
+    for seed in range(400):
+        lapsed = draw_lapses(TEXTING, 250, 0.1, np.random.default_rng(seed)).lapsed
+        first.append(lapsed.argmax() * 0.1 if lapsed.any() else np.inf)
+    # a third of the games starts within a lapse (5 s of every 15 s); of the others, whose first lapse is exponential
+    # with mean 10 s, a share of 1 - 1/e = 0.632 has lapsed by 10 s: 0.333 + 0.667 * 0.632 = 0.755, standard error 0.024
+    assert np.mean(np.array(first) == 0.0) == pytest.approx(1.0 / 3.0, abs=4 * 0.024)
+    assert np.mean(np.array(first) <= 10.0) == pytest.approx(0.755, abs=4 * 0.022)
+
+
+def test_lapses__each_has_one_steering_angle() -> None:
+    lapses = draw_lapses(TEXTING, 50_000, 0.1, np.random.default_rng(3))
+    angles = []
+    for first, length in runs(lapses.lapsed):
+        within = lapses.steering_rad[first : first + length]
+        assert (within == within[0]).all()
+        angles.append(within[0])
+    assert not lapses.steering_rad[~lapses.lapsed].any()
+    assert np.std(angles) == pytest.approx(0.01, rel=0.15)
+    assert np.mean(angles) == pytest.approx(0.0, abs=0.003)
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    mean=st.floats(0.11, 50.0),
+    shortest=st.floats(0.01, 3.0),
+    more=st.floats(0.0, 3.0),
+    step=st.sampled_from([0.02, 0.1, 0.5]),
+    seed=st.integers(0, 2**32),
+)
+def test_lapses__are_apart_and_within_the_range(
+    mean: float, shortest: float, more: float, step: float, seed: int
+) -> None:
+    attention = Attention(mean_attentive_s=mean, lapse_s=(shortest, shortest + more))
+    lapses = draw_lapses(attention, 400, step, np.random.default_rng(seed))
+    for first, length in runs(lapses.lapsed):
+        assert length <= max((shortest + more) / step + 0.5 + 1e-9, 1)
+        if 0 < first < 400 - length:  # not cut off by the start or the end of the game
+            assert length >= max(shortest / step - 0.5 - 1e-9, 1)
+
+
+def test_blind_spot_check__is_missing_in_its_share_of_the_games() -> None:
+    factor = Sight(no_blind_spot_check_share=0.75, unseen_behind_m=1.0)
+    drawn = [unseen_behind_m(factor, draw) for draw in np.random.default_rng(1).random(2000)]
+    assert set(drawn) == {1.0, -np.inf}
+    # standard error sqrt(0.75 * 0.25 / 2000) = 0.0097
+    assert np.mean(np.isfinite(drawn)) == pytest.approx(0.75, abs=4 * 0.0097)
