@@ -23,21 +23,17 @@ def glossary(arms: Sequence[str], records: Mapping[str, Arm], found: RunFindings
 
 def _in_words(arm: Arm, found: RunFindings) -> str:
     """What an arm pairs."""
-    several = "s" if found.people > 1 else ""
     if arm.best_response_of is not None:
         player = ("the ego", "the non-ego")[arm.best_response_of]
         return f"{arm.pair.name}, {player} replaced by its best response"
     match arm:
         case Arm(ego=None, non_ego=non_ego) if non_ego is not None:
-            name = strategy_name(non_ego)
-            return f"{f'one {name} driver at a time' if several else f'the non-ego {name}'} without the ego"
+            return f"the non-ego {strategy_name(non_ego)} without the ego"
         case Arm(ego=NaiveEgo(), non_ego=None):
-            return f"the {found.naive} on the road without the non-ego{several}"
+            return f"the {found.naive} on the road without the non-ego"
         case Arm(ego=ego, non_ego=None) if ego is not None:
-            return f"{_ego_in_words(ego, found.naive)}, without the non-ego{several}"
+            return f"{_ego_in_words(ego, found.naive)}, without the non-ego"
         case Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()):
-            if several:
-                return f"the {found.naive} with ordinary law-abiding SUMO drivers in the non-egos' places"
             return f"the {found.naive} with an ordinary law-abiding SUMO driver in the non-ego's place"
         case Arm(ego=RetrainedEgo(against=against) | ReconfiguredEgo(against=against) as ego, non_ego=non_ego) if (
             non_ego is not None and against == strategy_name(non_ego)

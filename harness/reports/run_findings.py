@@ -10,7 +10,6 @@ import pandas as pd
 
 from harness.config.campaign import LEARNED, ego_called
 from harness.evaluation.causes.sentences import cause_lines
-from harness.evaluation.people import people_in
 from harness.evaluation.preventability import Preventability, preventability_of
 from harness.evaluation.strategies import Arm, ReconfiguredEgo
 from harness.reports import verdict_wording
@@ -38,7 +37,6 @@ class RunFindings:
     """Whether round 2 searches the parameters of an external ego."""
     naive: str
     """The ego before round 2 in sentences, after "the"."""
-    people: int
     """Non-egos of the scene."""
     non_ego_drives: bool
     """Whether they are drivers."""
@@ -100,8 +98,6 @@ class RunFindings:
         """What the ego meets, if it is not one driver with a persona; else empty."""
         if persona in self.crowds:
             return f"the crowd {persona}"
-        if self.people > 1:
-            return f"the group of {self.people} {persona} {'drivers' if self.non_ego_drives else 'players'}"
         return "" if self.non_ego_drives else f"the {persona}"
 
     def _rows(self, question: str, persona: str) -> list[Row]:
@@ -122,7 +118,6 @@ def results(tables: RunTables) -> RunFindings:
         significance=manifest.get("campaign", {}).get("assessment", {}).get("significance"),
         planned=tables.stages,
         is_reconfigured=any(isinstance(arm.ego, ReconfiguredEgo) for arm in tables.arms.values()),
-        people=len(people_in(tables.episodes.columns)),
         non_ego_drives=tables.non_ego_drives,
         crowds={each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())},
         preventability={

@@ -22,8 +22,6 @@ from stable_baselines3 import PPO
 from harness.drivers.policy_file import Policy
 from harness.files import write_atomically
 
-_OPTIMIZER_ENTRIES = {"step", "exp_avg", "exp_avg_sq"}  # the state of Adam per parameter
-
 
 @dataclass(frozen=True, kw_only=True)
 class CurvePoint:
@@ -54,15 +52,6 @@ class Progress:
     """Steps after which the curve had converged; None: it had not."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Content:
-    """The content of a checkpoint's file."""
-
-    progress: Progress
-    policy: Mapping[str, torch.Tensor]
-    optimizer: Mapping[int, Mapping[str, torch.Tensor]]
-
-
 def write_checkpoint(model: PPO, progress: Progress, key: str, path: Path) -> None:
     """Write a learner's checkpoint; `key` identifies the inputs of the training."""
     tensors = {f"policy/{name}": value for name, value in model.policy.state_dict().items()}
@@ -70,106 +59,36 @@ def write_checkpoint(model: PPO, progress: Progress, key: str, path: Path) -> No
         for name, value in state.items():
             tensors[f"optimizer/{index}/{name}"] = torch.as_tensor(value)
     metadata = {"progress": json.dumps(asdict(progress)), "key": key}
-    write_atomically(path, save(tensors, metadata={**metadata, "digest": _digest(tensors, metadata["progress"])}))
+    write_atomically(path, save(tensors, metadata={**metadata, "digest": _digest(tensors, metadata)}))
 
 
 def read_checkpoint(model: PPO, key: str, path: Path) -> Progress | None:
-    """Load a checkpoint into a new learner. Returns None, and leaves the learner unchanged, if there is no usable
-    checkpoint: the file is missing or damaged, has another `key`, or its tensors are not those of this learner."""
-    if not path.is_file():
-        return None
+    """Load a checkpoint into a new learner of the same inputs. Returns None, and leaves the learner unchanged, if there
+    is none: the file is missing or damaged, or has another `key`."""
     try:
-        content = _read(path, key)
-    # Raised for damaged files, wrong metadata, invalid names of tensors, and number types that NumPy or PyTorch lacks.
-    except (SafetensorError, OSError, LookupError, TypeError, ValueError, AttributeError, RecursionError):
-        return None
-    if content is None or not _fits(model, content):
-        return None
-    model.policy.load_state_dict(content.policy)
-    optimizer = model.policy.optimizer
-    optimizer.load_state_dict({**optimizer.state_dict(), "state": content.optimizer})
-    return content.progress
-
-
-def _read(path: Path, key: str) -> _Content | None:
-    """The content of a checkpoint; None: it has another key, or its digest does not match.
-
-    Raises ValueError or another of the exceptions that `read_checkpoint` catches if the content is malformed.
-    """
-    with safe_open(path, framework="pt") as file:
-        metadata = file.metadata() or {}
-        if metadata.get("key") != key:
+        with safe_open(path, framework="pt") as file:
+            metadata = file.metadata() or {}
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
+        if metadata.get("key") != key or metadata.get("digest") != _digest(tensors, metadata):
             return None
-        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
-    digest = metadata.get("digest")  # files of the first versions have none
-    if digest is not None and digest != _digest(tensors, metadata["progress"]):
+    # Raised for missing and damaged files, and for number types that NumPy or PyTorch lacks.
+    except (SafetensorError, OSError, LookupError, TypeError, ValueError, AttributeError):
         return None
-    policy: dict[str, torch.Tensor] = {}
-    optimizer: dict[int, dict[str, torch.Tensor]] = {}
-    for name, value in tensors.items():
-        part, _, rest = name.partition("/")
-        if part == "policy":
-            policy[rest] = value
-        elif part == "optimizer":
-            index, _, entry = rest.partition("/")
-            optimizer.setdefault(int(index), {})[entry] = value
-        else:
-            raise ValueError(f"unknown tensor {name!r}")
-    return _Content(progress=_progress(metadata["progress"]), policy=policy, optimizer=optimizer)
+    parts = {name: value for name, value in tensors.items() if name.startswith("policy/")}
+    model.policy.load_state_dict({name.removeprefix("policy/"): value for name, value in parts.items()})
+    moments: dict[int, dict[str, torch.Tensor]] = {}
+    for name in tensors.keys() - parts.keys():
+        _, index, entry = name.split("/")
+        moments.setdefault(int(index), {})[entry] = tensors[name]
+    optimizer = model.policy.optimizer
+    optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
+    stored = json.loads(metadata["progress"])
+    return Progress(**{**stored, "curve": [CurvePoint(**window) for window in stored["curve"]]})
 
 
-def _progress(text: str) -> Progress:
-    """Raises ValueError, TypeError, LookupError or RecursionError if the text is malformed."""
-    stored = json.loads(text)
-    curve = [CurvePoint(**window) for window in stored["curve"]]
-    progress = Progress(
-        segments=stored["segments"],
-        steps=stored["steps"],
-        segment_payoffs=stored["segment_payoffs"],
-        curve=curve,
-        alone_games=stored["alone_games"],
-        alone_failures=stored["alone_failures"],
-        converged_at=stored["converged_at"],
-    )
-    counts = [progress.segments, progress.steps, *(count for each in curve for count in (each.steps, each.games))]
-    counts += [*progress.alone_games, *progress.alone_failures, progress.converged_at or 0]
-    numbers = [
-        *progress.segment_payoffs,
-        *(number for each in curve for number in (each.mean_payoff, each.failure_rate, each.mean_duration_s)),
-    ]
-    if not all(type(each) is int and each >= 0 for each in counts) or not all(type(each) is float for each in numbers):
-        raise ValueError("a count or a number of the progress has another type")
-    for series in (progress.segment_payoffs, progress.alone_games, progress.alone_failures):
-        if not isinstance(series, list) or len(series) != progress.segments:
-            raise ValueError("the progress does not have a list with an entry for each segment")
-    return progress
-
-
-def _fits(model: PPO, content: _Content) -> bool:
-    """Whether the tensors of a checkpoint have the names, shapes and number types of this learner's."""
-    own = model.policy.state_dict()
-    parameters = dict(enumerate(model.policy.parameters()))
-    if content.policy.keys() != own.keys() or content.optimizer.keys() != parameters.keys():
-        return False
-    return all(
-        _alike(value, own[name]) and bool(torch.isfinite(value).all()) for name, value in content.policy.items()
-    ) and all(
-        state.keys() == _OPTIMIZER_ENTRIES
-        and state["step"].shape == ()
-        and state["step"].dtype == torch.float32
-        and _alike(state["exp_avg"], parameters[index])
-        and _alike(state["exp_avg_sq"], parameters[index])
-        for index, state in content.optimizer.items()
-    )
-
-
-def _alike(one: torch.Tensor, other: torch.Tensor) -> bool:
-    return one.shape == other.shape and one.dtype == other.dtype
-
-
-def _digest(tensors: Mapping[str, torch.Tensor], progress: str) -> str:
+def _digest(tensors: Mapping[str, torch.Tensor], metadata: Mapping[str, str]) -> str:
     """SHA-256 of the content. It detects a file of the right length that a power failure has left incomplete."""
-    digest = hashlib.sha256(progress.encode())
+    digest = hashlib.sha256(f"{metadata['key']}\n{metadata['progress']}".encode())
     for name, tensor in sorted(tensors.items()):
         digest.update(f"\n{name} {tensor.dtype} {tuple(tensor.shape)}\n".encode())
         digest.update(tensor.detach().contiguous().numpy().tobytes())

@@ -6,7 +6,6 @@ but for rounding.
 
 from __future__ import annotations
 
-import warnings
 from contextlib import AbstractContextManager
 from functools import cache
 from typing import Any, cast
@@ -25,7 +24,7 @@ from threadpoolctl import ThreadpoolController
 
 from harness.game.arrays import FloatArray
 from harness.training.actor_critic_kernel import forward, log_probabilities, workspace_of
-from harness.training.policy_arrays import networks_of, obstacle, parameter_order, put_vector, vector_of
+from harness.training.policy_arrays import networks_of, parameter_order, put_vector, vector_of
 from harness.training.ppo_kernel import (
     APPROXIMATE_KL,
     CLIP_FRACTION,
@@ -41,16 +40,8 @@ from harness.training.ppo_kernel import (
 
 
 class CompiledPPO(PPO):
-    """PPO for a diagonal Gaussian policy whose actor and critic have hidden layers of tanh units and share none.
-
-    With any other policy, optimiser or value clipping it warns once, and its update is Stable-Baselines3's own.
-    """
-
-    def _setup_model(self) -> None:
-        super()._setup_model()
-        self._obstacle = obstacle(self)
-        if self._obstacle:
-            warnings.warn(f"{self._obstacle}: the update is Stable-Baselines3's own, which is slower", stacklevel=3)
+    """PPO for the policy that the harness trains: a diagonal Gaussian whose actor and critic have hidden layers of tanh
+    units of the same sizes and share none, in float32 on the CPU, by Adam and without clipping of values."""
 
     def collect_rollouts(
         self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
@@ -59,8 +50,6 @@ class CompiledPPO(PPO):
 
         Returns whether to go on: false if a callback ended the rollout.
         """
-        if self._obstacle:
-            return super().collect_rollouts(env, callback, rollout_buffer, n_rollout_steps)
         with _one_thread():
             return self._collect(env, callback, rollout_buffer, n_rollout_steps)
 
@@ -106,9 +95,6 @@ class CompiledPPO(PPO):
 
         Raises FloatingPointError if a loss is not finite.
         """
-        if self._obstacle:
-            super().train()
-            return
         self.policy.set_training_mode(True)
         self._update_learning_rate(self.policy.optimizer)
         with _one_thread():

@@ -26,9 +26,8 @@ from harness.game.seeding import seed_of
 from harness.training.callbacks import CurveRecorder, DeviationBound
 from harness.training.checkpoint import Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
-from harness.training.early_stopping import has_converged, still_fails
+from harness.training.early_stopping import Narrowing, has_converged, still_fails
 from harness.training.imitation import imitate
-from harness.training.narrowing import Narrowing
 from harness.training.torch_without_compiler import leave_out_compiler
 from harness.training.training_games import TrainingSpec, attentive_steps, open_games, sample
 

@@ -70,7 +70,7 @@ def test_plan__of_an_ego_with_something_to_tune(tmp_path: Path) -> None:
             stage = trained[f"reconfigured_{arm}-seed{seed}"]
             assert isinstance(stage, AssessmentStage)
             assert search.id in stage.needs
-            assert stage.ego == Reconfigured(stage=search.id)
+            assert stage.ego == (Reconfigured(stage=search.id),)
     assert not [id for id in trained if "retrained" in id]
 
     before, _ = planned(write(tmp_path))

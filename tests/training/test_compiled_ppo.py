@@ -339,32 +339,6 @@ def test_epoch__takes_every_sample_once_and_the_rest_in_a_smaller_minibatch() ->
     assert losses == pytest.approx(np.array(parts))
 
 
-# --- other policies ---
-
-
-OTHER_POLICIES: dict[str, tuple[dict[str, Any], str]] = {
-    "ReLU": ({"policy_kwargs": {"activation_fn": torch.nn.ReLU}}, "tanh"),
-    "two sizes": ({"policy_kwargs": {"net_arch": {"pi": [8], "vf": [4]}}}, "different sizes"),
-    "no hidden layer": ({"policy_kwargs": {"net_arch": []}}, "tanh"),
-    "state-dependent noise": ({"use_sde": True}, "Gaussian"),
-    "weight decay": ({"policy_kwargs": {"optimizer_kwargs": {"weight_decay": 0.1}}}, "Adam"),
-    "value clipping": ({"clip_range_vf": 0.2}, "clip_range_vf"),
-}
-
-
-@pytest.mark.parametrize("case", OTHER_POLICIES)
-def test_learn__another_policy_is_updated_by_stable_baselines3_and_says_so(case: str) -> None:
-    changes, said = OTHER_POLICIES[case]
-    with pytest.warns(UserWarning, match=said):
-        compiled = learner(CompiledPPO, **changes)
-    models = [learner(PPO, **changes), compiled]
-    for model in models:
-        set_random_seed(2)
-        model.env.seed(7)
-        model.learn(2 * 64)
-    assert models[0]._n_updates == models[1]._n_updates > 0
-
-
 @pytest.fixture(autouse=True)
 def _one_thread() -> Iterator[None]:
     threads = torch.get_num_threads()

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 
 import harness.training.ppo
@@ -135,45 +134,6 @@ def test_train__ignores_a_damaged_checkpoint_or_one_with_another_key(
     short = replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive"))
     train(short, checkpoint=checkpoint, key="another key", card={})
     damage(checkpoint)
-    assert same(in_one_go(alone, tmp_path), trained, tmp_path)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda tensors, metadata: tensors.pop("policy/log_std"),
-        lambda tensors, metadata: tensors.update({"policy/action_net.weight": np.zeros((3, 3), np.float32)}),
-        lambda tensors, metadata: tensors.update({"policy/more": np.zeros(1, np.float32)}),
-        lambda tensors, metadata: tensors.update({"optimizer/0/exp_avg": np.zeros(7, np.float32)}),
-        lambda tensors, metadata: tensors.update({"optimizer/99/step": np.zeros((), np.float32)}),
-        lambda tensors, metadata: metadata.update(progress="[1, 2]"),
-        lambda tensors, metadata: metadata.update(progress="{"),
-        lambda tensors, metadata: metadata.update(progress='{"segments": 1, "steps": 1024, "segment_payoffs": []}'),
-    ],
-    ids=[
-        "parameter missing",
-        "shape",
-        "unknown parameter",
-        "moments",
-        "moments of no parameter",
-        "list",
-        "incomplete",
-        "no curve",
-    ],
-)
-def test_train__ignores_a_checkpoint_of_another_learner(
-    change: Callable[[dict[str, Any], dict[str, str]], object],
-    alone: TrainingSpec,
-    trained: TrainingResult,
-    tmp_path: Path,
-) -> None:
-    checkpoint = tmp_path / "checkpoint.safetensors"
-    in_one_go(replace(alone, settings=settings(steps=1024), parts=("training", 9, "naive")), tmp_path)
-    with safe_open(checkpoint, framework="np") as file:
-        metadata = {name: text for name, text in file.metadata().items() if name != "digest"}
-    tensors = load_file(checkpoint)
-    change(tensors, metadata)
-    save_file(tensors, checkpoint, metadata)
     assert same(in_one_go(alone, tmp_path), trained, tmp_path)
 
 

@@ -27,7 +27,7 @@ from harness.evaluation.strategies import NaiveEgo, strategy_name
 from harness.files import write_atomically
 from harness.game.human_factors import PERSISTENCE_S
 from harness.game.payoff_terms import GROUPS, TERMS
-from harness.game.roles import EGO, NON_EGO, ROLES
+from harness.game.roles import NON_EGO, ROLES
 from harness.reports.learning import stopped
 from harness.reports.numbers import interval, number, percent
 
@@ -120,8 +120,7 @@ def _facts(
     partner = {None: "no other player", "sumo": "SUMO's own driver", "given": _given(manifest, campaign)}
     yield "against", partner.get(against, f"`{against}`")
     if isinstance(people := policy.get("people"), int) and against is not None:
-        learns = "it learned in each place, beside SUMO's own driver in the others"
-        yield "people in a game", f"{people}" if policy["player"] == ROLES[EGO] else f"{people}; {learns}"
+        yield "people in a game", str(people)
     if against is not None:
         yield "games without the other player", percent(_alone_share(entry, campaign))
     yield "initial policy", f"`{policy['began_from']}`" if policy["began_from"] else _beginning(policy["training"])
@@ -227,8 +226,8 @@ def _figures(
     for arm in plan(campaign, manifest["personas"], is_tuned(manifest)):
         if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.name not in rows:
             continue
-        player = arm.ego if is_ego else arm.non_ego
-        if isinstance(player, Trained) and player.stage == stage:
+        side = arm.ego if is_ego else arm.non_ego
+        if [each.stage for each in side if isinstance(each, Trained)] == [stage]:
             yield arm.name, _of_ego(rows[arm.name]) if is_ego else _of_non_ego(rows[arm.name])
 
 
