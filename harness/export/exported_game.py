@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 import shapely
 
-from harness.export.kinds import BUILDING, PERSON, Kind, kind_of_shape
+from harness.export.kinds import BUILDING, PERSON, ExportedKind, kind_of_shape
 from harness.game.arrays import FloatArray
-from harness.replay.signals import changes_of_signals
+from harness.replay.scenery import changes_of_signals
 from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
 from harness.traffic.scene import OpenScene
 
@@ -34,7 +34,7 @@ class Body:
     """Unique in the game; without characters that have a meaning in OpenSCENARIO."""
     original: str
     """The name in the trace."""
-    kind: Kind
+    kind: ExportedKind
     length_m: float
     width_m: float
     wheelbase_m: float

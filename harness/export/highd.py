@@ -15,8 +15,43 @@ import pandas as pd
 from harness.export.exported_game import Body, ExportedGame
 from harness.export.kinds import BUS, PERSON, THING, TRAM, TRUCK
 from harness.export.lane_courses import NONE, LaneCourses
-from harness.export.neighbours import neighbours_of
 from harness.game.arrays import FloatArray, IntArray
+
+
+def neighbours_of(tracks: pd.DataFrame, stations: FloatArray, beside: IntArray) -> dict[str, IntArray]:
+    """The rows [N] of the nearest road users of each row in the same frame, by highD's columns; NONE without one.
+
+    `tracks` has `frame` and `width`, the body's length; `stations` [N, C] are places along each course, `beside` [N, 3]
+    the courses of the own lane and of those to the left and right. A body that overlaps lengthwise in another lane is
+    alongside.
+    """
+    count, length_m = len(tracks), tracks["width"].to_numpy()
+    names = [
+        ("precedingId", None, "followingId"),
+        ("leftPrecedingId", "leftAlongsideId", "leftFollowingId"),
+        ("rightPrecedingId", "rightAlongsideId", "rightFollowingId"),
+    ]
+    found: dict[str, IntArray] = {name: np.full(count, NONE) for row in names for name in row if name is not None}
+    for frame in tracks.groupby("frame", sort=False).indices.values():
+        for row in frame:
+            for lane, (ahead, alongside, behind) in enumerate(names):
+                course = beside[row, lane]
+                others = frame[(frame != row) & (beside[frame, 0] == course)] if course != NONE else frame[:0]
+                if not len(others):
+                    continue
+                away_m = stations[others, course] - stations[row, course]
+                overlaps = np.abs(away_m) < 0.5 * (length_m[others] + length_m[row])
+                if alongside is not None:
+                    found[alongside][row] = _nearest(others[overlaps], away_m[overlaps])
+                    others, away_m = others[~overlaps], away_m[~overlaps]
+                found[ahead][row] = _nearest(others[away_m > 0.0], away_m[away_m > 0.0])
+                found[behind][row] = _nearest(others[away_m <= 0.0], away_m[away_m <= 0.0])
+    return found
+
+
+def _nearest(rows: IntArray, away_m: FloatArray) -> int:
+    return int(rows[np.argmin(np.abs(away_m))]) if len(rows) else NONE
+
 
 FIRST_LANE = 2
 """highD counts the area beside the road as lane 1."""
@@ -139,7 +174,7 @@ def _least(values: pd.Series) -> float:
 def _of_recording(game: ExportedGame, number: int, meta: pd.DataFrame, courses: LaneCourses) -> dict[str, object]:
     """Games have no date: it is that of other exported files, 1 January 1970."""
     top_m = courses.bounds_m[3]
-    upper, lower = (";".join(_marking(top_m, y_m) for y_m in each) or NO_MARKINGS for each in courses.markings_y_m)
+    upper, lower = (";".join(f"{top_m - y_m:.2f}" for y_m in each) or NO_MARKINGS for each in courses.markings_y_m)
     return {
         "id": number,
         "frameRate": round(1.0 / game.step_s),
@@ -157,7 +192,3 @@ def _of_recording(game: ExportedGame, number: int, meta: pd.DataFrame, courses: 
         "upperLaneMarkings": upper,
         "lowerLaneMarkings": lower,
     }
-
-
-def _marking(top_m: float, y_m: float) -> str:
-    return f"{top_m - y_m:.2f}"

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from harness.game.arrays import FloatArray, IntArray
-from harness.replay.lanes import Lanes
+from harness.replay.floating_car_data import Lanes
 from harness.traffic.xml_file import parse_xml
 
 NONE = -1

@@ -11,6 +11,7 @@ those of the net for every program.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,9 +19,21 @@ from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
 from harness.errors import HarnessError
-from harness.export.xml_text import xml_text
 from harness.traffic.sumo_program import run_program
 from harness.traffic.xml_file import parse_xml
+
+_NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def xml_text(root: ElementTree.Element) -> bytes:
+    """A document, indented; the same content gives the same bytes. Characters that XML can't contain become `?`."""
+    for element in root.iter():
+        for name, value in element.attrib.items():
+            element.set(name, _NOT_XML.sub("?", value))
+    ElementTree.indent(root)
+    text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"
+
 
 ROAD_FILE = "scene.xodr"
 NO_DATE = "1970-01-01T00:00:00"

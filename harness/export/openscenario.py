@@ -18,10 +18,42 @@ from scenariogeneration import xosc
 
 from harness.export.exported_game import Body, ExportedGame
 from harness.export.kinds import PERSON, THING
-from harness.export.opendrive import NO_DATE, ROAD_FILE, RoadFile
-from harness.export.signal_states import lamps, signal_phases
-from harness.export.xml_text import xml_text
+from harness.export.opendrive import NO_DATE, ROAD_FILE, RoadFile, xml_text
 from harness.game.arrays import FloatArray
+
+AFTER_THE_GAME_S = 3600.0
+"""Duration of the last phase: phases start again when they have ended."""
+_LAMPS = {
+    "r": "on;off;off",
+    "u": "on;on;off",
+    "y": "off;on;off",
+    "Y": "off;on;off",
+    "g": "off;off;on",
+    "G": "off;off;on",
+    "s": "on;off;off",
+    "o": "off;flashing;off",
+    "O": "off;off;off",
+}
+
+
+def lamps(state: str) -> str:
+    """The modes of a signal's red, yellow and green lamps, by a link's state in SUMO."""
+    return _LAMPS.get(state, "off;off;off")
+
+
+def signal_phases(game: ExportedGame) -> dict[str, list[tuple[float, str]]]:
+    """Durations (s) and states of the phases of each light; the last phase lasts beyond the game."""
+    changes: dict[str, list[tuple[float, str]]] = {}
+    for change in game.signals:
+        changes.setdefault(change.light, []).append((change.time_s, change.state))
+    return {
+        light: [
+            (of_light[place + 1][0] - time_s if place + 1 < len(of_light) else AFTER_THE_GAME_S, state)
+            for place, (time_s, state) in enumerate(of_light)
+        ]
+        for light, of_light in changes.items()
+    }
+
 
 MINOR_VERSION = 2
 AUTHOR = "harness"
@@ -31,7 +63,6 @@ _FOR_ESMINI = {"plineInterpolation": "segment"}
 """Property of every entity: esmini turns it evenly between two samples. By default it turns it around corners only, and
 does not show the heading of a sample at its time."""
 _WHEEL_M, _MAX_STEER_RAD = 0.6, 0.8
-_THINGS = {"obstacle": "obstacle", "building": "building"}
 
 
 def scenario_file(game: ExportedGame, road: RoadFile | None) -> bytes:
@@ -86,7 +117,7 @@ def _entity(body: Body) -> xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject:
         category = xosc.PedestrianCategory.pedestrian
         entity: Any = xosc.Pedestrian(name, kind.mass_kg, category, box, model=kind.word)
     elif kind.group == THING:
-        entity = xosc.MiscObject(name, kind.mass_kg, getattr(xosc.MiscObjectCategory, _THINGS[kind.word]), box)
+        entity = xosc.MiscObject(name, kind.mass_kg, getattr(xosc.MiscObjectCategory, kind.word), box)
     else:
         track_m = 0.0 if kind.two_wheeled else 0.85 * body.width_m
         front, rear = (

@@ -9,7 +9,6 @@ view.xml           zoom, speed, and the halts at contacts and at the end
 
 from __future__ import annotations
 
-import math
 import os
 import shutil
 from collections.abc import Mapping, Sequence
@@ -21,16 +20,12 @@ import pandas as pd
 
 from harness.game.arrays import FloatArray
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
-from harness.replay.contact import Contact, contacts
-from harness.replay.floating_car_data import shown_at, write_recording, write_xml
-from harness.replay.gui_settings import WINDOW_PX, Viewport, choose_view, view_settings
-from harness.replay.lanes import Lanes
-from harness.replay.obstacles import painted, shapes_of
-from harness.replay.signals import programmes
-from harness.replay.vehicles import DrawnVehicle, legend, types_of_vehicles
+from harness.replay.contacts import contacts
+from harness.replay.floating_car_data import Lanes, shown_at, write_recording, write_xml
+from harness.replay.gui_settings import WINDOW_PX, choose_view, view_settings
+from harness.replay.scenery import painted, programmes, scenery, shapes_of
+from harness.replay.vehicles import legend, types_of_vehicles
 from harness.traffic.xml_file import xml_bytes
-
-_RING_RADIUS_M = 4.0
 
 
 def write_replay(
@@ -69,11 +64,9 @@ def write_replay(
     try:
         (partial / "scene.net.xml").write_bytes(xml_bytes(net_file))
         shown_title = f"{title}   {legend(trace, names)}"
-        scenery = _scenery(types=types, rails=rails, touches=touches, view=view, title=shown_title)
-        scenery.extend(painted(stripes))
-        scenery.extend(shapes_of(trace, types, obstacles))
-        scenery.extend(programmes(trace, step_length_s))
-        write_xml(scenery, partial / "scene.add.xml")
+        added = scenery(types=types, rails=rails, touches=touches, view=view, title=shown_title)
+        added.extend((*painted(stripes), *shapes_of(trace, types, obstacles), *programmes(trace, step_length_s)))
+        write_xml(added, partial / "scene.add.xml")
         write_recording(
             trace=trace[[bool(types[name].shape) for name in trace["player"]]],
             types=types,
@@ -120,55 +113,6 @@ def _configuration(title: str, end_s: float, step_length_s: float) -> ElementTre
         for option, value in options.items():
             ElementTree.SubElement(parent, option, value=value)
     return root
-
-
-def _scenery(
-    *,
-    types: Mapping[str, DrawnVehicle],
-    rails: Sequence[FloatArray],
-    touches: Sequence[Contact],
-    view: Viewport,
-    title: str,
-) -> ElementTree.Element:
-    root = ElementTree.Element("additional")
-    for _, drawn in sorted({drawn.name: drawn for drawn in types.values() if drawn.shape}.items()):
-        ElementTree.SubElement(root, "vType", drawn.attributes())
-    for number, rail in enumerate(rails):
-        _line(root, f"rail_{number}", rail, colour="24,26,32", width_m=0.4, layer=5)
-    for number, contact in enumerate(touches):
-        ring = [
-            (contact.x_m + _RING_RADIUS_M * math.cos(a), contact.y_m + _RING_RADIUS_M * math.sin(a))
-            for a in (2 * math.pi * k / 36 for k in range(37))
-        ]
-        _line(root, f"contact_{number}", ring, colour="220,20,20", width_m=0.24, layer=6)
-        side = -1 if number % 2 else 1  # the labels of two near contacts do not overlap
-        _text(root, f"contact_{number}_label", contact.label, contact.x_m, contact.y_m + side * 2.0 * _RING_RADIUS_M)
-    _text(root, "title", title, view.x_m, view.y_m + 0.4 * view.height_m)
-    return root
-
-
-def _line(
-    root: ElementTree.Element,
-    name: str,
-    points: Sequence | FloatArray,
-    *,
-    colour: str,
-    width_m: float,
-    layer: int,
-) -> None:
-    """A line; SUMO's `lineWidth` is half of what it draws."""
-    shape = " ".join(f"{x:.3f},{y:.3f}" for x, y in points)
-    look = {"color": colour, "layer": str(layer), "lineWidth": f"{0.5 * width_m:g}"}
-    ElementTree.SubElement(root, "poly", {"id": name, "shape": shape} | look)
-
-
-def _text(root: ElementTree.Element, name: str, text: str, x_m: float, y_m: float) -> None:
-    """SUMO-GUI has no text element, but it shows the type of an (invisible) point of interest.
-
-    The point is small: SUMO-GUI cuts its circle out of the road, also where the colour is transparent.
-    """
-    place = {"x": f"{x_m:.2f}", "y": f"{y_m:.2f}", "layer": "200", "width": "0.02", "height": "0.02"}
-    ElementTree.SubElement(root, "poi", {"id": name, "type": text, "color": "0,0,0,0"} | place)
 
 
 def _has_signals(trace: pd.DataFrame) -> bool:

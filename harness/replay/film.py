@@ -21,11 +21,9 @@ from PIL import Image
 
 from harness.errors import HarnessError, Problem, UsageError
 from harness.game.arrays import FloatArray
-from harness.replay.encoding import FORMATS, encode, encoding_problem
-from harness.replay.labels import captioned, labels_at
-from harness.replay.sumo_gui import find_sumo_gui, home_of, screen_problem
+from harness.replay.pictures import FORMATS, captioned, encode, encoding_problem, labels_at
+from harness.replay.sumo_gui import NO_SUMO_GUI, find_sumo_gui, find_xvfb, home_of, screen_problem, virtual_screen
 from harness.replay.vehicles import PLAYER_COLOURS, legend
-from harness.replay.virtual_screen import find_xvfb, virtual_screen
 from harness.traffic.gui import WindowClosed, gui_environment, steered_gui
 from harness.traffic.xml_file import parse_xml
 
@@ -48,8 +46,7 @@ def film_problems(file: Path) -> list[Problem]:
     if not file.parent.is_dir():
         problems.append(Problem(str(file.parent), "", "is not a folder", "create it first"))
     if find_sumo_gui() is None:
-        remedy = "pip install eclipse-sumo, or put SUMO's bin folder on PATH"
-        problems.append(Problem("sumo-gui", "", "is not installed", remedy))
+        problems.append(NO_SUMO_GUI)
     if find_xvfb() is None and screen_problem("") is not None:
         remedy = "apt-get install xvfb libgl1 libgl1-mesa-dri libglu1-mesa libegl1, or film on a computer with a screen"
         problems.append(Problem("Xvfb", "", "is not installed, and there is no other screen", remedy))

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pandas as pd
 
-from harness.replay.contact import Contact
-from harness.replay.lanes import Lanes
+from harness.replay.contacts import Contact
+from harness.replay.floating_car_data import Lanes
 from harness.replay.vehicles import PLAYER_COLOURS
 
 WINDOW_PX = (1280, 640)

@@ -1,20 +1,25 @@
-"""Opening a replay in SUMO-GUI."""
+"""Opening a replay in SUMO-GUI, on the screen or on a virtual one (Xvfb)."""
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import re
+import select
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from harness.errors import Problem, UsageError
+from harness.errors import HarnessError, Problem, UsageError
+from harness.traffic.gui import end_process
 
 FOLLOWED_M = (80.0, 40.0)  # of road around the ego: a car of 4.6 m is then 73 pixels long
 _EGO = "ego"
+NO_SUMO_GUI = Problem("sumo-gui", "", "is not installed", "pip install eclipse-sumo, or put SUMO's bin folder on PATH")
 _END = re.compile(r'<(end|step-length) value="([0-9.]+)"')
 
 
@@ -63,23 +68,10 @@ def _gui_for(folder: Path) -> Path:
     program = find_sumo_gui()
     problems = []
     if not configuration.is_file():
-        problems.append(
-            Problem(
-                str(folder),
-                "",
-                "is not a replay: it has no scene.sumocfg",
-                "`harness replay RUN --list` lists the games",
-            )
-        )
+        remedy = "`harness replay RUN --list` lists the games"
+        problems.append(Problem(str(folder), "", "is not a replay: it has no scene.sumocfg", remedy))
     if program is None:
-        problems.append(
-            Problem(
-                "sumo-gui",
-                "",
-                "is not installed",
-                "pip install eclipse-sumo, or put SUMO's bin folder on PATH",
-            )
-        )
+        problems.append(NO_SUMO_GUI)
     remedy = f"film it: --film game.gif; or on a computer with a desktop and SUMO: sumo-gui -c {configuration}"
     if no_screen := screen_problem(remedy):
         problems.append(no_screen)
@@ -110,3 +102,36 @@ def home_of(program: Path) -> Path:
     """SUMO's folder with its data: the parent of `bin`, or another one in the layout of a Linux distribution."""
     home = program.resolve().parent.parent
     return home if (home / "data").is_dir() else Path(os.environ.get("SUMO_HOME", "/usr/share/sumo"))
+
+
+_STARTS_WITHIN_S = 30.0
+
+
+def find_xvfb() -> Path | None:
+    """The path of Xvfb, the X server without a screen; None if it is not installed."""
+    found = shutil.which("Xvfb")
+    return Path(found) if found else None
+
+
+@contextlib.contextmanager
+def virtual_screen(program: Path, size_px: tuple[int, int]) -> Iterator[str]:
+    """The name of a new screen, such as ":1". Raises HarnessError with Xvfb's message if it can't start."""
+    read, write = os.pipe()
+    screen = f"{size_px[0]}x{size_px[1]}x24"
+    # Xvfb chooses a free number and writes it when it is ready
+    command = [str(program), "-displayfd", str(write), "-screen", "0", screen, "-nolisten", "tcp", "+extension", "GLX"]
+    with tempfile.TemporaryFile() as log:
+        try:
+            server = subprocess.Popen(command, pass_fds=(write,), stdout=log, stderr=log)
+        finally:
+            os.close(write)
+        try:
+            ready, _, _ = select.select([read], [], [], _STARTS_WITHIN_S)
+            number = os.read(read, 16).decode().strip() if ready else ""
+            if not number:
+                log.seek(0)
+                raise HarnessError(f"{program} can't start: {log.read().decode(errors='replace').strip()}")
+            yield f":{number}"
+        finally:
+            os.close(read)
+            end_process(server)

@@ -18,8 +18,8 @@ from gymnasium.wrappers import RenderCollection
 from harness import DrivingEnv, ParallelDrivingEnv, UsageError, VectorDrivingEnv
 from harness.environments.scene_picture import SIZE_PX, WIDTH_M
 from harness.game.initial_state import draw_initial_state
+from harness.replay.sumo_gui import find_xvfb, virtual_screen
 from harness.replay.vehicles import PLAYER_COLOURS
-from harness.replay.virtual_screen import find_xvfb, virtual_screen
 from harness.traffic.scene import open_scene
 from tests.support.repository import REPOSITORY
 

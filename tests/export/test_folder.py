@@ -35,14 +35,6 @@ def test_folder__has_a_file_per_game_and_a_list(merge: OpenScene, tmp_path: Path
     assert sorted(tmp_path.iterdir()) == [tmp_path / "out"]
 
 
-@pytest.mark.parametrize("name", ["../../out", "/tmp/out", "..", "a/b"])
-def test_folder__nothing_is_written_beside_it(name: str, merge: OpenScene, tmp_path: Path) -> None:
-    """Names of arms come from tables that may come from another machine."""
-    write_games(iter([exported(clean_game(), merge, name)]), merge, tmp_path / "out", BOTH, title="one game")
-    assert len(list((tmp_path / "out").glob("*.xosc"))) == 1
-    assert sorted(tmp_path.iterdir()) == [tmp_path / "out"]
-
-
 def test_folder__that_is_empty_is_used(merge: OpenScene, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     assert write_games(games(merge), merge, tmp_path / "out", BOTH, title="two games") == 2
@@ -54,19 +46,6 @@ def test_folder__that_holds_something_stays(merge: OpenScene, tmp_path: Path) ->
     with pytest.raises(UsageError, match="not empty"):
         write_games(games(merge), merge, tmp_path / "out", BOTH, title="two games")
     assert [file.name for file in (tmp_path / "out").iterdir()] == ["mine.txt"]
-
-
-def test_folder__a_file_in_its_place_stays(merge: OpenScene, tmp_path: Path) -> None:
-    (tmp_path / "out").write_text("mine")
-    with pytest.raises(UsageError, match="is a file"):
-        write_games(games(merge), merge, tmp_path / "out", BOTH, title="two games")
-    assert (tmp_path / "out").read_text() == "mine"
-
-
-def test_folder__in_no_folder_is_refused(merge: OpenScene, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="there is no folder"):
-        write_games(games(merge), merge, tmp_path / "no" / "out", BOTH, title="two games")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_folder__nothing_is_left_of_an_export_that_fails(merge: OpenScene, tmp_path: Path) -> None:

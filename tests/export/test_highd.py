@@ -15,7 +15,7 @@ import pytest
 from harness.export.highd import highd_tables
 from harness.export.lane_courses import LaneCourses
 from harness.traffic.scene import OpenScene
-from tests.support.exports import exported, signals_game, walker_game
+from tests.support.exports import exported, signals_game
 from tests.support.replays import drive, game, straight
 
 FORMAT = {
@@ -103,8 +103,3 @@ def test_recording__has_markings_and_sums(merge: OpenScene) -> None:
 def test_lanes__stay_the_same_through_a_junction() -> None:
     meta = tables_of(*signals_game())["tracksMeta"].set_index("name")
     assert meta.loc["non_ego", "numLaneChanges"] == 0
-
-
-def test_classes__name_people_on_foot() -> None:
-    meta = tables_of(*walker_game())["tracksMeta"].set_index("name")
-    assert meta["class"].to_dict() == {"ego": "Car", "non_ego": "Pedestrian"}

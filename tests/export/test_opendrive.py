@@ -12,7 +12,6 @@ import pytest
 import sumolib
 import xmlschema
 
-from harness.errors import HarnessError
 from harness.export.opendrive import road_file
 from tests.support.repository import REPOSITORY
 
@@ -67,12 +66,6 @@ def test_road__of_a_geographic_net_keeps_its_coordinates(build_net: Callable[...
     assert "+proj=utm" in str(kept["geoReference"])
     assert {child.tag for child in header} == {"userData"}
     assert mistakes_of(root) == []
-
-
-def test_road__of_no_net_is_an_error(tmp_path: Path) -> None:
-    (tmp_path / "bad.net.xml").write_text("<net/")
-    with pytest.raises(HarnessError, match=r"bad\.net\.xml"):
-        road_file(tmp_path / "bad.net.xml", "bad")
 
 
 @pytest.mark.parametrize("name", ["merge", "crossing", "red_light"])

@@ -64,12 +64,6 @@ def test_scenario__is_valid(name: str, scene: OpenScene, mistakes: Valid) -> Non
     assert mistakes(scenario_file(exported(GAMES[name](), scene), ROAD)) == []
 
 
-@pytest.mark.parametrize("version", ["1.1.1", "1.3.0"])
-def test_scenario__is_valid_in_the_versions_beside(version: str, scene: OpenScene) -> None:
-    document = io.BytesIO(scenario_file(exported(busy_game(), scene), ROAD))
-    assert [str(error) for error in schema(version).iter_errors(document)] == []
-
-
 @pytest.mark.parametrize("drawn", [walker_game, bicycle_game, signals_game])
 def test_scenario__of_other_road_users_is_valid(
     drawn: Callable[[], tuple[pd.DataFrame, OpenScene]], mistakes: Valid
@@ -133,12 +127,6 @@ def test_entities__are_of_their_kinds(scene: OpenScene) -> None:
     assert kinds(exported(*bicycle_game()))["non_ego"] == "bicycle"
 
 
-def test_players__have_controllers_and_others_none(scene: OpenScene) -> None:
-    root = root_of(scenario_file(exported(game(busy_game(), drive("non_ego", straight(20, -4.8, 9, 60))), scene), None))
-    controlled = [each.get("name") for each in root.iter("ScenarioObject") if each.find("ObjectController") is not None]
-    assert controlled == ["ego", "non_ego"]
-
-
 def test_names__are_no_parameters_and_occur_once(scene: OpenScene, mistakes: Valid) -> None:
     trace = game(
         drive("ego", straight(30, -1.6, 9, 30)),
@@ -177,12 +165,6 @@ def test_signals__change_when_they_did() -> None:
     assert [state for _, state in changes["1"]] == [red, red, green]
     phases = [(float(phase.get("duration", "nan")), phase[3].get("state")) for phase in root.iter("Phase")]
     assert phases == [(pytest.approx(2.0), green), (pytest.approx(3.0), yellow), (3600.0, red)]
-
-
-def test_signals__are_left_out_without_a_road() -> None:
-    document = scenario_file(exported(*signals_game()), None)
-    assert b"TrafficSignal" not in document
-    assert b"LogicFile" not in document
 
 
 def test_scenario__twice_gives_the_same_bytes(scene: OpenScene) -> None:

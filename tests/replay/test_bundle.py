@@ -10,13 +10,12 @@ import pandas as pd
 import pytest
 from defusedxml import ElementTree
 
-from harness.errors import UsageError
 from harness.evaluation.worst_first import worst_first
-from harness.replay import choose_games, names_in_pictures, open_in_sumo_gui, replay_name
+from harness.replay import choose_games, names_in_pictures, open_in_sumo_gui
 from harness.replay import sumo_gui as sumo_gui_module
-from harness.replay.contact import contacts
+from harness.replay.contacts import contacts
+from harness.replay.floating_car_data import Lanes
 from harness.replay.gui_settings import choose_view
-from harness.replay.lanes import Lanes
 from harness.replay.selection import MOST_FAILURES_PER_ARM
 from harness.replay.vehicles import types_of_vehicles
 from tests.support.replays import (
@@ -90,12 +89,6 @@ def test_replay__is_of_one_game(merge_net: Path, tmp_path: Path) -> None:
         write(pd.concat([clean_game(), clean_game().assign(episode=1)]), merge_net, tmp_path / "replay")
     with pytest.raises(ValueError, match="one game"):
         write(clean_game().iloc[:0], merge_net, tmp_path / "replay")
-
-
-def test_title__is_text_whatever_it_holds(merge_net: Path, tmp_path: Path) -> None:
-    folder = write(clean_game(), merge_net, tmp_path / "replay", title="<script> & -- 'quoted' --> \"")
-    assert not play(folder)[0].empty
-    assert title_of(folder) == "<script> & -- 'quoted' --> \"   blue: ego, orange: non-ego"
 
 
 def test_title__calls_the_players_by_their_names(merge_net: Path, tmp_path: Path) -> None:
@@ -240,12 +233,6 @@ def test_choose_games__of_very_many_failures_the_worst_of_each_arm_and_seed() ->
     assert sorted(key(chosen)) == [*first, *[("naive_vs_x", 2, k) for k in range(MOST_FAILURES_PER_ARM)]]
 
 
-def test_choose_games__doesnt_depend_on_the_order_of_rows() -> None:
-    shuffled = episodes().sample(frac=1.0, random_state=1)
-    assert sorted(key(choose_games(shuffled))) == sorted(key(choose_games(episodes())))
-    assert choose_games(episodes().iloc[:0]).empty
-
-
 def test_worst_first__by_failure_then_time_to_collision_then_name() -> None:
     expected = [
         ("naive_vs_x", 2, 0),  # collisions
@@ -265,22 +252,6 @@ def test_worst_first__by_failure_then_time_to_collision_then_name() -> None:
     assert key(worst_first(episodes())) == expected
     assert key(worst_first(episodes().sample(frac=1.0, random_state=5))) == expected
     assert list(worst_first(episodes()).columns) == list(episodes().columns)
-
-
-def test_replay_name__sorts_by_episode() -> None:
-    assert replay_name("naive_vs_speedy", 1, 7) == "naive_vs_speedy-seed1-007"
-
-
-def test_open__names_all_that_is_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(sumo_gui_module.sys, "platform", "linux")
-    monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr(sumo_gui_module, "find_sumo_gui", lambda: None)
-    with pytest.raises(UsageError) as caught:
-        open_in_sumo_gui(tmp_path)
-    message = str(caught.value)
-    assert "no scene.sumocfg" in message
-    assert "is not installed" in message
-    assert "no screen" in message
 
 
 def test_open__starts_sumo_gui_on_the_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -9,11 +9,10 @@ import pandas as pd
 import pytest
 from PIL import Image
 
-from harness.errors import HarnessError, UsageError
-from harness.replay import write_film, write_replay
-from harness.replay.encoding import encode, find_ffmpeg
-from harness.replay.film import SIZE_PX, SMALL_WIDTH_M, WIDTH_M, film_problems, shown_steps
-from harness.replay.labels import labels_at
+from harness.errors import HarnessError
+from harness.replay import write_film
+from harness.replay.film import SIZE_PX, WIDTH_M, film_problems, shown_steps
+from harness.replay.pictures import encode, find_ffmpeg, labels_at
 from tests.support.pictures import blue, orange, require_gui
 from tests.support.replays import STEP_S, clean_game, collision_game, drive, game, straight, write
 
@@ -113,27 +112,6 @@ def test_labels__of_one_car_is_above_it() -> None:
     assert (label.name, label.at_px) == ("non-ego 2", (50.0, 45.0))
 
 
-def test_film__with_a_walker_shows_it_larger_on_its_stripes(merge_net: Path, tmp_path: Path) -> None:
-    require_gui()
-    routes = tmp_path / "walker.rou.xml"
-    routes.write_text(
-        '<routes><vType id="car" length="4.6" width="1.8"/>'
-        '<vType id="walker" vClass="pedestrian" length="0.5" width="0.5"/></routes>'
-    )
-    places = [(50.0, -1.6, 0.0, 9.0), (70.0, -4.8, 0.5 * np.pi, 1.0)]
-    trace = game(drive("ego", places[:1] * 2), drive("non_ego", places[1:] * 2, vehicle_type="walker"))
-    stripe = np.array([[68.0, -6.0], [72.0, -6.0], [72.0, -3.6], [68.0, -3.6], [68.0, -6.0]])
-    options = {"title": "", "step_length_s": STEP_S}
-    write_replay(trace, merge_net, [routes], tmp_path / "replay", stripes=[stripe], **options)  # type: ignore[arg-type]
-    write_film(tmp_path / "replay", trace, tmp_path / "film.gif", **options)  # type: ignore[arg-type]
-    px_per_m = SIZE_PX[0] / SMALL_WIDTH_M
-    x, y = (int(px_per_m * offset) for offset in (70.0 - 50.0, -4.8 + 1.6))
-    around = frames(tmp_path / "film.gif")[0][SIZE_PX[1] // 2 - y - 20 : SIZE_PX[1] // 2 - y + 20]
-    around = around[:, SIZE_PX[0] // 2 + x - 20 : SIZE_PX[0] // 2 + x + 20]
-    assert orange(around).sum() > 4  # pixels of the walker
-    assert (around > 230).all(-1).mean() > 0.5  # of the stripe, above the lane and below the walker
-
-
 # --- what is missing ---
 
 
@@ -141,7 +119,7 @@ def test_problems__all_that_is_missing_with_its_remedy(tmp_path: Path, monkeypat
     monkeypatch.setenv("PATH", "")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.setattr("harness.replay.film.find_sumo_gui", lambda: None)
-    monkeypatch.setattr("harness.replay.encoding.importlib.util.find_spec", lambda name: None)
+    monkeypatch.setattr("harness.replay.pictures.importlib.util.find_spec", lambda name: None)
     monkeypatch.setattr("harness.replay.sumo_gui.sys.platform", "linux")
     text = "\n".join(map(str, film_problems(tmp_path / "nowhere" / "film.mp4")))
     for words in (
@@ -155,22 +133,6 @@ def test_problems__all_that_is_missing_with_its_remedy(tmp_path: Path, monkeypat
     ):
         assert words in text
     assert "ffmpeg" not in "\n".join(map(str, film_problems(tmp_path / "film.gif")))
-
-
-def test_problems__a_film_is_a_gif_or_an_mp4(tmp_path: Path) -> None:
-    (problem,) = [each for each in film_problems(tmp_path / "film.avi") if "film.avi" in each.file]
-    assert "neither .gif nor .mp4" in problem.message
-
-
-def test_film__without_a_screen_reports_it_and_writes_nothing(
-    merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = write(clean_game(), merge_net, tmp_path / "replay")
-    monkeypatch.setenv("PATH", "")
-    monkeypatch.delenv("DISPLAY", raising=False)
-    with pytest.raises(UsageError, match="Xvfb"):
-        write_film(folder, clean_game(), tmp_path / "film.gif", title="", step_length_s=STEP_S)
-    assert [path.name for path in tmp_path.iterdir()] == ["replay"]
 
 
 def test_film__a_failed_sumo_gui_is_reported_with_its_message(

@@ -16,11 +16,10 @@ import pytest
 from PIL import Image, ImageGrab
 
 from harness.replay import follow_in_sumo_gui, open_in_sumo_gui, sumo_gui
-from harness.replay.contact import contacts
+from harness.replay.contacts import contacts
 from harness.replay.gui_settings import choose_view
-from harness.replay.sumo_gui import find_sumo_gui
+from harness.replay.sumo_gui import find_sumo_gui, find_xvfb, virtual_screen
 from harness.replay.vehicles import types_of_vehicles
-from harness.replay.virtual_screen import find_xvfb, virtual_screen
 from harness.traffic import gui
 from tests.support.pictures import blue, orange, require_gui
 from tests.support.replays import GAMES, RAILS, STEP_S, collision_game, write
@@ -92,29 +91,6 @@ def test_gui__a_vehicle_that_left_is_gone_and_the_others_stay(screen: str, merge
     assert not blue(gone).any()
     assert orange(gone).any()
     assert orange(last).any()
-
-
-def test_gui__halts_at_the_contact(
-    screen: str, merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    folder = write(collision_game(), merge_net, tmp_path / "replay")
-    settings = (folder / "view.xml").read_text()
-    snapshots = '<snapshot file="halt.png" time="3.3"/><snapshot file="beyond.png" time="3.5"/></viewsettings>'
-    settings = re.sub(r"<delay [^>]*>", '<delay value="20"/>', settings).replace("</viewsettings>", snapshots)
-    (folder / "view.xml").write_text(settings)
-    monkeypatch.setenv("DISPLAY", screen)
-    gui = open_in_sumo_gui(folder)
-    try:
-        deadline = time.monotonic() + 300.0
-        while not (folder / "halt.png").exists() and time.monotonic() < deadline:
-            time.sleep(0.1)
-        assert (folder / "halt.png").exists()
-        time.sleep(2.0)  # a hundred times what the two further steps would take
-        assert gui.poll() is None
-        assert not (folder / "beyond.png").exists()
-    finally:
-        gui.kill()
-        gui.wait(timeout=300)
 
 
 def test_gui__follows_the_ego_and_halts_at_the_contact(

@@ -64,10 +64,6 @@ def test_embedded__games_are_read_only_until_the_page_is_full(games):
     assert len(asked) == len(part.games) + 1
 
 
-def test_embedded__without_a_road_there_are_no_games(games):
-    assert read(Embedded(None, games, {}, 10_000_000))["games"] == []
-
-
 def test_document__names_the_persona_of_each_of_a_crowd(games):
     ego, person = games[0].players[:2]
     people = [replace(person, name=name) for name in ("non_ego", "non_ego_2")]

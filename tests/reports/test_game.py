@@ -5,14 +5,13 @@ from __future__ import annotations
 import csv
 import math
 import re
-from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps
 from harness.evaluation.game_theory.empirical_game import equilibria
-from harness.evaluation.game_theory.records import GameFindings, Response
+from harness.evaluation.game_theory.records import Response
 from harness.evaluation.tables import write_csv
 from harness.reports.game import game_section
 from harness.reports.game_links import GameLinks
@@ -21,7 +20,6 @@ from harness.reports.game_wording import (
     MEANINGS,
     NEAR,
     NO,
-    NO_GAME,
     OPEN,
     equilibrium_sentences,
     gap_verdicts,
@@ -114,10 +112,6 @@ def test_heat_map__a_cell_links_to_the_worst_of_its_games(found):
     assert OPENS_A_GAME not in second.maps[0].caption
 
 
-def test_heat_map__of_one_seed_there_is_nothing_to_choose():
-    assert [view.label for view in game_section(findings(games=20)).views] == ["seed 1"]
-
-
 def test_heat_map__has_a_personas_strategies_side_by_side(found):
     rows = found.crossplay[found.crossplay["seed"] == 1]
     rows = pd.concat([rows[rows["non_ego"] != "speedy_round2"], rows[rows["non_ego"] == "speedy_round2"]])
@@ -135,18 +129,6 @@ def test_section__is_there_only_where_a_run_has_such_tables(html):
     assert 'href="#game"' in html
     assert 'id="game"' not in without
     assert 'href="#game"' not in without
-
-
-def test_section__gaps_alone_or_a_crossplay_alone_are_a_section_too(found):
-    empty = findings(games=4)
-    empty = {name: getattr(empty, name)[:0] for name in CAPTIONS}
-    gaps_alone = Page(page_of(GameFindings(**empty | {"gaps": found.gaps})))
-    assert "Cross-play" not in gaps_alone.text
-    assert "gaps" in gaps_alone.tables
-    others = {name: getattr(found, name) for name in CAPTIONS if name != "gaps"}
-    crossplay_alone = Page(page_of(GameFindings(**empty | others)))
-    assert "gaps" not in crossplay_alone.tables
-    assert "crossplay" in crossplay_alone.tables
 
 
 # --- words ---
@@ -201,15 +183,6 @@ def test_words__both_sides_could_gain():
         "instead of 3."
     )
     assert tone == "harm"
-
-
-def test_words__one_could_gain():
-    label, sentence, _, tone = verdict_texts(-0.2, 6.2)
-    assert label == "no"
-    assert sentence == (
-        f"For the ego nothing better was found; the speedy driver could still gain 31 % of its payoff: {MEANINGS[NO]}."
-    )
-    assert tone == "open"
 
 
 def test_words__nothing_better_found_is_not_refuted():
@@ -282,20 +255,6 @@ def test_words__only_the_last_round_is_the_headline(found):
     assert verdicts["speedy"].label == "no in 2 of 2 seeds"
 
 
-def test_words__pairs_of_earlier_rounds_are_listed(found):
-    earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value, ego="naive")
-    both = pd.concat([earlier, found.gaps], ignore_index=True)
-    section = game_section(replace(found, gaps=both))
-    assert [(persona, pair, answer.seed) for persona, pair, answer in section.others] == [
-        ("speedy", "naive against speedy_round2", 1),
-        ("speedy", "naive against speedy_round2", 2),
-        ("distracted", "naive against distracted", 1),
-        ("distracted", "naive against distracted", 2),
-    ]
-    text = Page(page_of(replace(found, gaps=both), (1, 2))).text
-    assert "naive against distracted, seed 2: For the ego nothing better was found" in text
-
-
 def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
     cells = pd.DataFrame(
         {
@@ -318,25 +277,6 @@ def test_words__of_an_equilibrium_name_shares_failures_and_payoff():
         "The safest choice of egos is 33.3 % naive + 66.7 % retrained: in the worst case it fails in 13.3 % of games "
         "(against speedy, speedy_round2). The safest single ego is retrained, with 20 % in the worst case."
     )
-
-
-def test_words__an_incomplete_game_names_the_strategies_left_out():
-    cells = pd.DataFrame(
-        {
-            "seed": 1,
-            "ego": ["naive", "retrained"],
-            "non_ego": ["speedy", "speedy_round2"],
-            "persona": "speedy",
-            "failure_rate": 0.1,
-            "ego_payoff": 1.0,
-            "non_ego_payoff": 1.0,
-        }
-    )
-    for _, _, sentences in equilibrium_sentences(equilibria(cells)):
-        assert sentences == [
-            NO_GAME,
-            "Left out, because not played against all: naive, retrained, speedy, speedy_round2.",
-        ]
 
 
 # --- in a browser ---
@@ -409,45 +349,3 @@ def test_browser__a_seed_is_chosen_by_keyboard_or_mouse(opened):
     assert shown.inner_text() == "Failure rate of the ego (%), seed 2"
     page.keyboard.press("ArrowLeft")
     assert shown.inner_text() == "Failure rate of the ego (%), seed 1"
-
-
-@pytest.mark.parametrize("name", CAPTIONS)
-def test_browser__a_table_downloads_as_its_csv_file(opened, found, tmp_path, name):
-    page = opened()
-    page.evaluate("for (const each of document.querySelectorAll('details')) each.open = true;")
-    with page.expect_download() as download:
-        page.locator(f".filters:has(+ .holds-table #{name}) button").click()
-    assert download.value.suggested_filename == f"{name}.csv"
-    write_csv(getattr(found, name), tmp_path / "table.csv")
-    assert download.value.path().read_bytes() == (tmp_path / "table.csv").read_bytes()
-
-
-def test_browser__prints_the_verdicts_and_the_maps_chosen(opened):
-    page = opened()
-    page.emulate_media(media="print")
-    assert page.locator("#game .sentence").first.is_visible()
-    assert page.locator("#game .maps:visible").count() == 1
-    assert not page.get_by_label("seed 2", exact=True).is_visible()
-
-
-def test_browser__hostile_names_are_inert(opened, found, tmp_path):
-    hostile = "<img src=x onerror='alert(2)'>"
-    response = Response(
-        seed=1,
-        role="ego",
-        persona=hostile,
-        round=1,
-        pair_arm="pair",
-        response_arm="best_ego",
-        ego=hostile,
-        non_ego=hostile,
-    )
-    episodes = table(arm("pair", ego_failed=[0, 0]), arm("best_ego", ego_failed=[0, 0], ego_payoff=[11, 12]))
-    crossplay = found.crossplay.assign(ego=hostile)[:1]
-    game = replace(found, gaps=gaps([response], episodes, 0.01), crossplay=crossplay)
-    (tmp_path / "hostile.html").write_text(page_of(game), encoding="utf-8")
-    page = opened(tmp_path / "hostile.html")
-    page.wait_for_timeout(100)
-    page.evaluate("for (const each of document.querySelectorAll('details')) each.open = true;")
-    assert page.seen == []
-    assert page.get_by_role("heading", name=hostile).first.is_visible()

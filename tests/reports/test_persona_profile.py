@@ -20,13 +20,10 @@ from harness.reports.persona.persona_page import render_profile, write_profile
 from harness.reports.persona.persona_terminal import show
 from harness.reports.persona.profile import (
     AFTER_A_LAPSE,
-    ALWAYS_CHECKS,
     ATTENDS,
     COLLISION_IS_FREE,
     DECIDES,
-    MOST_LIKELY,
     NO_LAPSES,
-    SAMPLED,
     SHOWN,
     STRAIGHT_WHEEL,
     UNIMPAIRED_IN_TRAINING,
@@ -34,15 +31,13 @@ from harness.reports.persona.profile import (
     PersonaProfile,
     attends,
     body,
-    decides,
     function_in_words,
     persona_profile,
-    sees,
     wants,
 )
 from tests.support.bicycle import advance, state_of
 from tests.support.chromium import launched, opener
-from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY, harness
+from tests.support.tiny import CAREFUL, DISTRACTED, SPEEDY
 
 TEXTING = Attention(mean_attentive_s=4.0, lapse_s=(4.0, 6.0), crown_steering_rad=0.005, bump_steering_sd_rad=0.001)
 
@@ -124,17 +119,6 @@ def test_function__is_that_of_the_game() -> None:
     assert [(name, value) for name, value, _ in speeding.sets] == [("within", 0.0), ("over", 1.5), ("reckless", -2.0)]
 
 
-def test_function__of_a_distance_starts_at_zero_and_a_constant_one_is_stated() -> None:
-    sets = [{"name": "all", "points": [[3.0, 1.0]], "value": 2.0}]
-    (level,) = invented(
-        human={"weight": 0.5, "fuzzy": [{"name": "calm", "quantity": "goal_m", "sets": sets}]}
-    ).functions
-    assert function_in_words(level) == "+1 per second everywhere."
-    sets = [{"name": "near", "points": [[0.0, 1.0], [5.0, 0.0]], "value": -2.0}]
-    (near,) = invented(human={"fuzzy": [{"name": "near", "quantity": "clearance_m", "sets": sets}]}).functions
-    assert near.inputs[0] == 0.0
-
-
 def test_wants__compares_a_collision_with_progress() -> None:
     assert list(wants(profile_of(SPEEDY))) == ["A collision costs as much as 125 m of progress earn."]
     assert list(wants(invented())) == [COLLISION_IS_FREE]
@@ -181,18 +165,6 @@ def test_attends__in_words() -> None:
     assert STRAIGHT_WHEEL in text
 
 
-def test_sees__in_words() -> None:
-    of = profile_of(SPEEDY)
-    count = sum(each.no_blind_spot_check for each in of.drives)
-    sentence = next(sees(of))
-    assert sentence.startswith(f"No blind-spot check in 85 % of the drives ({count} of the 8 sample drives)")
-    assert "its centre is not at least 4 m ahead of the person's own" in sentence
-    behind = invented(perception={"no_blind_spot_check_share": 1.0, "unseen_behind_m": -5.0})
-    assert "8 of the 8 sample drives" in next(sees(behind))
-    assert "its centre is more than 5 m behind the person's own" in next(sees(behind))
-    assert list(sees(profile_of(CAREFUL))) == [ALWAYS_CHECKS]
-
-
 def test_body__in_words() -> None:
     assert list(body(profile_of(CAREFUL))) == []
     of = invented(
@@ -215,11 +187,6 @@ def test_body__in_words() -> None:
         "The person uses 50 % of the acceleration, 80 % of the steering of the car.",
         UNIMPAIRED_IN_TRAINING,
     ]
-
-
-def test_decides__in_words() -> None:
-    assert decides(profile_of(SPEEDY)) == SAMPLED
-    assert decides(profile_of(CAREFUL)) == MOST_LIKELY
 
 
 def test_drives__are_reproducible_and_have_lapses_of_the_documents_length() -> None:
@@ -270,10 +237,6 @@ def test_page__escapes_the_text_of_a_document() -> None:
     assert "one of &lt;b&gt;two&lt;/b&gt; people" in page
 
 
-def test_page__of_equal_profiles_is_equal() -> None:
-    assert render_profile(profile_of(SPEEDY)) == render_profile(profile_of(SPEEDY))
-
-
 def test_page__is_not_written_over_a_document(tmp_path: Path) -> None:
     file = tmp_path / "anna.toml"
     file.write_text("mine")
@@ -296,12 +259,3 @@ def test_page__opens_in_dark_and_light_loads_nothing_and_does_not_scroll_sideway
             assert page.seen == []
         page = open_page(width=320)
         assert page.evaluate("document.documentElement.scrollWidth") == 320
-
-
-def test_show__names_a_mistake_in_the_file(tmp_path: Path) -> None:
-    file = tmp_path / "anna.toml"
-    file.write_text(CAREFUL.read_text(encoding="utf-8").replace("progress", "progres"), encoding="utf-8")
-    result = harness("persona", "show", file)
-    assert result.returncode == 2
-    assert "operational.terms.progres" in result.stderr
-    assert "'progress'" in result.stderr

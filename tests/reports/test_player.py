@@ -129,28 +129,12 @@ def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(opened, ga
         assert time_of(page) == pytest.approx(expected, abs=1e-6), pressed
 
 
-def test_player__explains_every_key(opened):
-    page = opened()
-    page.locator(".keys summary").click()
-    explained = page.locator(".keys").inner_text().lower()
-    for name in ("space", ", .", "home end", "n p", "one second", "copy a link", "zoom"):
-        assert name in explained
-
-
 def test_player__the_slider_shows_the_values_of_its_time(opened, games):
     page = opened()
     ego = games[GAME].players[0]
     for step in (5, 33, 61):
         scrub(page, step * STEP_S)
         assert page.locator(".values .of-ego").inner_text().startswith(f"ego {ego.speed_mps[step]:.1f} m/s")
-
-
-def test_player__dragging_over_the_curves_moves_through_time(opened, games):
-    page = opened()
-    page.locator(".curves").scroll_into_view_if_needed()
-    box = page.locator(".curves").bounding_box()
-    page.mouse.click(box["x"] + 34 + (box["width"] - 44) / 2, box["y"] + 60)
-    assert time_of(page) == pytest.approx(games[GAME].steps * STEP_S / 2, abs=0.06)
 
 
 # --- the road ---
@@ -212,13 +196,6 @@ def test_road__between_two_steps_a_car_is_between_its_places(opened, games):
     assert pixel(page, 0, ahead, ego.y_m[20]) != colour(page, "--asphalt")
 
 
-def test_road__background_traffic_is_drawn(opened, games):
-    page = opened("#game=naive_vs_speedy,1,6&t=4")
-    press(page, "f")
-    other = games[GAME].background[0]
-    assert pixel(page, 0, other.x_m[40] - 0.4, other.y_m[40]) == colour(page, "--other")
-
-
 def test_road__follows_the_players_or_shows_the_whole_road_and_zooms(opened):
     page = opened()
 
@@ -260,15 +237,6 @@ def test_side_by_side__games_have_the_same_time(opened, games):
         assert text.startswith(f"ego {games[name].players[0].speed_mps[step]:.1f} m/s")
     press(page, "b")
     page.wait_for_selector(".screens:not(.two)")
-
-
-def test_side_by_side__an_ended_game_shows_its_last_step(opened, games):
-    assert games[GAME].steps < games[OTHER].steps
-    page = opened(f"#game={GAME}&t=2&with={OTHER}")
-    press(page, "End")
-    assert time_of(page) == pytest.approx(games[OTHER].steps * STEP_S)
-    ego = games[GAME].players[0]
-    assert f"{ego.speed_mps[-1]:.1f} m/s" in page.locator(".values").first.inner_text()
 
 
 def test_one_road__shows_the_other_game_as_ghosts(opened, games):
@@ -398,33 +366,6 @@ def test_clip__does_not_move_with_reduced_motion(opened):
 
 
 # --- the page it is in ---
-
-
-@pytest.mark.parametrize("fragment", [f"#game={GAME}&t=5", f"#game={GAME}&t=5&with={OTHER}"])
-def test_player__fits_a_narrow_window(opened, fragment):
-    page = opened(fragment, width=400)
-    page.locator(".keys summary").click()
-    assert page.evaluate("document.documentElement.scrollWidth") <= 400
-
-
-def test_player__hostile_names_are_inert(browser, tmp_path):
-    hostile = "</script><img src=x onerror='alert(1)'>"
-    arguments = campaign(personas=[hostile], games=4)
-    arguments["training"] = arguments["training"][:0]
-    found = recordings(arguments)
-    found["manoeuvres"]["text"] = hostile
-    path = tmp_path / "report.html"
-    path.write_text(rendered(**arguments, **found), encoding="utf-8")
-    with opener(browser, path) as open_page:
-        page = open_page()
-        page.wait_for_selector(".player[data-ready]")
-        assert page.locator(".screen h3").inner_text().startswith(f"naive_vs_{hostile}, game")
-        assert hostile in page.locator(".marks").inner_text()
-        link = page.locator(".clip a").first.get_attribute("href")
-        page.evaluate("link => { location.hash = link; }", link)
-        page.wait_for_timeout(300)
-        assert page.locator(".player").get_attribute("data-game")
-        assert page.seen == []
 
 
 def test_page__of_a_campaign_is_soon_interactive(browser, tmp_path):

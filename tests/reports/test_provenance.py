@@ -32,10 +32,6 @@ def test_mixed_versions__names_only_the_differences() -> None:
     ]
 
 
-def test_mixed_versions__within_a_resumed_training() -> None:
-    assert mixed_versions(stages(a=[OLD, NEW]))[1:] == ["  by numpy 2.1.0, then 2.2.6: a"]
-
-
 def test_mixed_versions__a_program_missing_in_one_stage() -> None:
     assert mixed_versions(stages(a=[NEW], b=[{"python": "3.11.7"}]))[1:] == [
         "  by numpy 2.2.6: a",

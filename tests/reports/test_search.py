@@ -79,23 +79,12 @@ def test_page__shows_naive_against_reconfigured_as_it_does_naive_against_retrain
     assert not re.search("retrain", page.replace("the retrained or reconfigured one", ""), re.IGNORECASE)
 
 
-def test_page__of_several_seeds_counts_them() -> None:
-    page = words_of(rendered(**reconfigured(seeds=(1, 2))))
-    assert "In 2 of 2 training seeds reconfiguration makes the ego fail significantly less often" in page
-
-
 def test_page__says_what_was_found_and_escapes_names() -> None:
     page = rendered(**reconfigured())
     assert '<tr><th scope="row">gap_s</th><td>1.5</td><td>2.25</td><td>\N{MINUS SIGN}1</td><td>3</td></tr>' in page
     assert "<b>odd</b>" not in page
     assert "&lt;b&gt;odd&lt;/b&gt;" in page
     assert rounds([{"kind": "reconfiguration"}]) in words_of(page)
-
-
-def test_page__without_a_search_has_no_such_section() -> None:
-    page = words_of(rendered(**campaign(personas=["speedy"])))
-    assert "econfiguration" not in page
-    assert "trial" not in page
 
 
 def test_searches__in_words() -> None:

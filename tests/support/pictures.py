@@ -7,8 +7,7 @@ import os
 import numpy as np
 import pytest
 
-from harness.replay.sumo_gui import find_sumo_gui
-from harness.replay.virtual_screen import find_xvfb
+from harness.replay.sumo_gui import find_sumo_gui, find_xvfb
 
 
 def require_gui() -> None:

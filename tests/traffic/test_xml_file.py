@@ -9,7 +9,7 @@ import pytest
 from sumolib.net import readNet
 
 from harness.errors import UsageError
-from harness.replay.lanes import Lanes
+from harness.replay.floating_car_data import Lanes
 from harness.traffic import tiles, xml_file
 from harness.traffic.net_file import check_net
 from harness.traffic.network import read_net

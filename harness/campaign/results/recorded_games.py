@@ -17,7 +17,7 @@ from harness.evaluation.trace_quantities import series_of
 from harness.evaluation.worst_first import worst_first
 from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
-from harness.replay.contact import contacts
+from harness.replay.contacts import contacts
 from harness.replay.vehicles import types_of_vehicles
 from harness.reports.player_data import GameTracks, PlayerTrack, SceneDrawing, Touch, Track
 from harness.traffic import drawing
