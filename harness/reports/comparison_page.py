@@ -9,9 +9,9 @@ from typing import Any
 
 from harness.evaluation.run_comparison import Difference, Side
 from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
-from harness.reports.header import command_of, facts, made_by
 from harness.reports.numbers import MISSING, NO_SPACE, interval, number, p_number, percent, signed
 from harness.reports.page_template import environment_of
+from harness.reports.provenance import command_of, facts, made_by
 
 BETTER, WORSE, UNKNOWN = "better", "worse", "not the same games"
 EQUAL, NOT_SHOWN = "no difference", "no difference shown"

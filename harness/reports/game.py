@@ -18,11 +18,10 @@ from harness.reports.game_wording import (
     equilibrium_sentences,
     fewer_failures,
     gap_verdicts,
-    other_pairs,
 )
 from harness.reports.heatmaps import MatrixView, views
 from harness.reports.numbers import MISSING, interval, percent
-from harness.reports.verdict_wording import NOT_ANSWERED, Answer, Conclusion, as_sentence
+from harness.reports.verdict_wording import NOT_ANSWERED, Conclusion, as_sentence
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,8 +46,6 @@ class GameSection:
     cautions: Sequence[tuple[int, str]]
     """Seed and sentence: which strategies were not shown to drive the scene."""
     verdicts: Sequence[tuple[str, Conclusion]]
-    others: Sequence[tuple[str, str, Answer]]
-    """Persona, name and answer of each pair that is not of the last round."""
     views: Sequence[MatrixView]
     solutions: Sequence[tuple[int, str, Sequence[str]]]
     """Of each seed and game, its solutions in sentences."""
@@ -65,7 +62,6 @@ def game_section(findings: GameFindings | None, links: GameLinks = NO_LINKS) -> 
     return GameSection(
         cautions=[(seed, as_sentence(reason)) for seed, reason in findings.cautions],
         verdicts=gap_verdicts(gaps),
-        others=other_pairs(gaps),
         views=views(frames["crossplay"], links),
         solutions=equilibrium_sentences(frames["equilibria"]),
         new_personas=_new_personas(frames["generalisation"]),

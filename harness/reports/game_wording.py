@@ -71,22 +71,6 @@ def last_pairs(gaps: pd.DataFrame) -> list[list[Row]]:
     return pairs(gaps[gaps["round"] == last])
 
 
-def other_pairs(gaps: pd.DataFrame) -> list[tuple[str, str, Answer]]:
-    """Persona, name and answer of every pair that is not of its seed's last round with that persona."""
-    answers = []
-    for persona in dict.fromkeys(gaps["persona"]):
-        of_persona = gaps[gaps["persona"] == persona]
-        last = of_persona.groupby("seed")["round"].transform("max")
-        for rows in pairs(of_persona[of_persona["round"] < last]):
-            answers.append((str(persona), pair_name(rows[0]), pair_answer(rows)))
-    return answers
-
-
-def pair_name(row: Row) -> str:
-    """The two players of a pair."""
-    return f"{row['ego']} against {row['non_ego']}"
-
-
 def pair_answer(rows: Sequence[Row]) -> Answer:
     """Whether a pair is an equilibrium as far as was found, and how a best-responding persona affects the ego."""
     by_role = {row["role"]: row for row in rows}

@@ -18,21 +18,17 @@ from harness.reports.data_table import table
 from harness.reports.differences import effect
 from harness.reports.distributions import MOST_DOTS
 from harness.reports.embedding import Embedded
-from harness.reports.first_answers import first_answers
 from harness.reports.game import game_section
-from harness.reports.game_links import GameLinks
-from harness.reports.header import command_of, facts, made_by
-from harness.reports.learning import learning, stopped
-from harness.reports.listed_replays import replay_list, worst_game
+from harness.reports.game_links import GameLinks, replay_list, worst_game
+from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
-from harness.reports.next_steps import next_steps
+from harness.reports.next_steps import first_answers, next_steps
 from harness.reports.numbers import percent
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, environment_of, libraries, script
 from harness.reports.player_data import GameTracks, SceneDrawing, key
-from harness.reports.provenance import mixed_versions
+from harness.reports.provenance import command_of, facts, made_by, mixed_versions
 from harness.reports.run_findings import RunFindings, results, unplayed
 from harness.reports.run_tables import RunTables
-from harness.reports.searches import searches
 
 MOST_ROWS = 10_000
 """The page leaves out a longer table of games and refers to its CSV file."""

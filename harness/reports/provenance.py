@@ -1,64 +1,90 @@
-"""The versions that the stages of a run were made with, and the warning for a run that mixes versions."""
+"""How a run was made: the facts below the title, the command, and the versions of its stages."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
+
+from harness.reports.numbers import steps_text
+
+
+def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
+    """The facts below the page's title, as label and value. `personas` is their number."""
+    campaign = manifest.get("campaign", {})
+    assessment, training = campaign.get("assessment", {}), campaign.get("training", {})
+    ego = str(campaign.get("ego", {}).get("driver", ""))
+    found = [
+        ("Scene", str(campaign.get("scene", "")).rstrip("/").rsplit("/", 1)[-1]),
+        ("Ego", str((manifest.get("ego_driver") or {}).get("in_words") or ego)),
+        ("Rounds", "" if ego in ("", "learned") else rounds(manifest.get("stages", {}).values())),
+        ("Personas", str(personas)),
+        ("Training seeds", ", ".join(map(str, manifest.get("seeds", seeds)))),
+        ("Games per arm and seed", f"{assessment['episodes']:,}" if "episodes" in assessment else ""),
+        ("Players", "trained before" if campaign.get("policies") else ""),
+        ("Training budget", f"{steps_text(training['steps'])} steps" if "steps" in training else ""),
+        ("Significance", f"{assessment['significance']:g}" if "significance" in assessment else ""),
+    ]
+    return [(label, value) for label, value in found if value]
+
+
+def made_by(manifest: Mapping[str, Any]) -> list[str]:
+    """How the run was made: the version of the harness and the date of the last stage, where they are known."""
+    version = manifest.get("versions", {}).get("harness")
+    dates = [each["finished_on"] for each in manifest.get("stages", {}).values() if each.get("finished_on")]
+    return [*([f"harness {version}"] if version else []), *([f"finished on {max(dates)}"] if dates else [])]
+
+
+def command_of(manifest: Mapping[str, Any]) -> str:
+    """The command that makes the run."""
+    file = manifest.get("file") or f"{manifest.get('name', 'campaign')}.toml"
+    return f"harness campaign {shlex.quote(str(file))}" + (" --quick" if manifest.get("quick") else "")
+
+
+def rounds(stages: Iterable[Mapping[str, Any]]) -> str:
+    """The rounds of an ego that is not trained."""
+    if any(stage.get("kind") == "reconfiguration" for stage in stages):
+        return "0, 1 and 2: this ego is not trained, but its parameters are tuned"
+    return "0 and 1: this ego has nothing to train or to tune"
+
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 MIXED_VERSIONS = "This run mixes versions: its results may differ from those of a single version."
-UNKNOWN_VERSION = "of no known version"
+THEN = ", then "
 
 
 def mixed_versions(stages: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Sentences for a run whose finished stages were not all made with the same versions; none for any other run.
 
-    `stages` are those of the manifest.
+    `stages` are those of the manifest. A program is compared among the stages that used it.
     """
-    recorded = {name: _versions(stage) for name, stage in stages.items() if stage.get("status") == "done"}
-    known = {name: versions for name, versions in recorded.items() if versions}
-    programs_of_kind: dict[str, set[str]] = {}  # a search uses programs that an arm does not use
-    for name, versions in known.items():
-        programs_of_kind.setdefault(_kind(stages[name]), set()).update(program for each in versions for program in each)
+    done = {name: stage.get("versions") for name, stage in stages.items() if stage.get("status") == "done"}
     texts = {
-        name: {program: _text(versions, program) for program in sorted(programs_of_kind[_kind(stages[name])])}
-        for name, versions in known.items()
+        name: {program: _text(versions, program) for program in sorted(set().union(*versions))}
+        for name, versions in done.items()
+        if isinstance(versions, list)
     }
-    programs = sorted(set().union(*programs_of_kind.values()))
-    different = {program: {each[program] for each in texts.values() if program in each} for program in programs}
-    mixed = [program for program in programs if len(different[program]) > 1]
-    mixed += [
-        program for program in programs if program not in mixed and any("then" in each for each in different[program])
-    ]
-    if not mixed:
-        return []
+    found: dict[str, set[str]] = {}
+    for by_program in texts.values():
+        for program, version in by_program.items():
+            found.setdefault(program, set()).add(version)
+    mixed = [program for program, each in sorted(found.items()) if len(each) > 1 or THEN in next(iter(each))]
     groups: dict[str, list[str]] = {}
     for name, text in texts.items():
-        group = ", ".join(f"{program} {text[program]}" for program in mixed if program in text)
-        if group:
+        if group := ", ".join(f"{program} {text[program]}" for program in mixed if program in text):
             groups.setdefault(group, []).append(name)
-    return [MIXED_VERSIONS, *(f"  by {group}: {', '.join(names)}" for group, names in groups.items())]
+    lines = [f"  by {group}: {', '.join(names)}" for group, names in groups.items()]
+    return [MIXED_VERSIONS, *lines] if mixed else []
+
+
+def _text(versions: Sequence[Mapping[str, str]], program: str) -> str:
+    """A program's versions, in the order in which a stage used them."""
+    return THEN.join(dict.fromkeys(str(each[program]) for each in versions if program in each))
 
 
 def warn(sentences: Sequence[str], console: Console) -> None:
     """Print warnings."""
     for sentence in sentences:
         console.print(sentence, style="yellow", highlight=False, markup=False, soft_wrap=True)
-
-
-def _kind(stage: Mapping[str, Any]) -> str:
-    return "reconfiguration" if stage.get("kind") == "reconfiguration" else ""
-
-
-def _versions(stage: Mapping[str, Any]) -> list[Mapping[str, str]]:
-    versions = stage.get("versions")
-    if not isinstance(versions, list) or not all(isinstance(each, Mapping) for each in versions):
-        return []
-    return versions
-
-
-def _text(versions: list[Mapping[str, str]], program: str) -> str:
-    """A program's versions, in the order in which a stage used them."""
-    return ", then ".join(dict.fromkeys(str(each.get(program, UNKNOWN_VERSION)) for each in versions))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import pandas as pd
@@ -55,19 +55,10 @@ class RunTables:
 
     def with_types(self) -> RunTables:
         """The same with the dtypes of `TABLES`. Raises ValueError when a frame does not have a table's columns."""
-        return replace(
-            self,
-            episodes=typed(self.episodes),
-            summary=typed(self.summary),
-            comparisons=typed(self.comparisons),
-            training=typed(self.training),
-            reconfiguration=typed(self.reconfiguration),
-            populations=typed(self.populations),
-            causes=typed(self.causes),
-            reference_drivers=typed(self.reference_drivers),
-            preventability=typed(self.preventability),
-            manoeuvres=None if self.manoeuvres is None else typed(self.manoeuvres),
-        )
+        frames = {
+            each.name: value for each in fields(self) if isinstance(value := getattr(self, each.name), pd.DataFrame)
+        }
+        return replace(self, **{name: typed(frame) for name, frame in frames.items()})
 
     @property
     def stages(self) -> Mapping[str, Mapping[str, Any]]:

@@ -24,7 +24,6 @@ from harness.reports.persona.profile import (
     COLLISION_IS_FREE,
     DECIDES,
     NO_LAPSES,
-    SHOWN,
     STRAIGHT_WHEEL,
     UNIMPAIRED_IN_TRAINING,
     WANTS,
@@ -67,10 +66,6 @@ def drawn(of: PersonaProfile, width: int, encoding: str = "utf-8") -> str:
 
 
 # --- payoffs ---
-
-
-def test_profile__shows_every_key_of_a_persona() -> None:
-    assert set(SHOWN) == set(Persona.model_fields)
 
 
 def test_profile__has_a_moment_for_every_term() -> None:

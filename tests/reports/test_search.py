@@ -13,9 +13,8 @@ import pandas as pd
 from harness.evaluation.strategies import ReconfiguredEgo, against_persona
 from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed
 from harness.reports.cards import STILL_DRIVES
-from harness.reports.header import rounds
-from harness.reports.provenance import mixed_versions
-from harness.reports.searches import searches
+from harness.reports.learning import searches
+from harness.reports.provenance import mixed_versions, rounds
 from harness.reports.verdict_wording import QUESTIONS, RECONFIGURED
 from tests.support.pages import campaign, rendered
 

@@ -23,18 +23,6 @@ from harness.reports.persona.drives import (
 )
 from harness.reports.persona.worth import PayoffFunction, TermExample, payoff_functions, term_examples
 
-SHOWN = (
-    "name",
-    "description",
-    "sources",
-    *GROUPS,
-    "attention",
-    "perception",
-    "reaction",
-    "actuators",
-    "decisions",
-)
-"""The tables and keys of a persona that its profile shows: all of them."""
 NEAR_M = 20.0
 """The distance at which errors are stated."""
 FORMULA = "payoff = α₀ · Σ safety + α₁ · Σ operational + α₂ · Σ human, summed over every step of the game"
