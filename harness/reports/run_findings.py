@@ -12,10 +12,9 @@ from harness.config.campaign import LEARNED, ego_called
 from harness.evaluation.causes.sentences import cause_lines
 from harness.evaluation.preventability import Preventability, preventability_of
 from harness.evaluation.strategies import Arm, ReconfiguredEgo
-from harness.reports import verdict_wording
 from harness.reports.differences import Row
 from harness.reports.run_tables import RunTables
-from harness.reports.verdict_wording import ARMS, RECONFIGURED, RETRAINED, Change, Conclusion, played
+from harness.reports.verdict_wording import ARMS, RECONFIGURED, RETRAINED, Asked, Change, Conclusion, conclusion, played
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,16 +75,16 @@ class RunFindings:
 
     def verdicts(self, question: str, persona: str) -> Conclusion:
         """The answer to a question about a persona, in words."""
-        return verdict_wording.verdicts(
-            question,
-            persona,
-            seeds=self.asked(question, persona),
-            rows=self._rows(question, persona),
+        asked = Asked(
+            question=question,
+            persona=persona,
+            who=self.who(persona) or f"the {persona} driver",
+            comparisons=self._rows(question, persona),
             arms=self.arms,
             significance=self.significance,
             change=self.change,
-            who=self.who(persona),
         )
+        return conclusion(asked, self.asked(question, persona))
 
     def causes(self, question: str, persona: str) -> tuple[str, ...]:
         """Why the ego failed against a persona in the arm that a question is about, a line for each kind of cause."""

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 from harness.evaluation.research_questions import INCOMPETENT, Verdict
 from harness.evaluation.strategies import NAIVE_ALONE, NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
-from harness.reports.differences import CHANCE, NO_T_STATISTIC, Row, speed_sentence, statistics, too_few
+from harness.reports.differences import CHANCE, NO_T_STATISTIC, Row, speed_sentence, too_few
 from harness.reports.numbers import p_text
 
 Tone = Literal["harm", "mended", "open"]
@@ -71,14 +71,12 @@ class Answer:
     """One research question about one persona and training seed, answered by its failures."""
 
     seed: int
-    yes: bool
+    yes: bool = False
     label: str
-    tone: Tone
+    tone: Tone = "open"
     sentence: str
-    speed: str
+    speed: str = ""
     """What happened to the average speed; empty when it was not compared."""
-    statistics: Sequence[str] = ()
-    """A line for each test behind the answer."""
 
     @property
     def answered(self) -> bool:
@@ -92,59 +90,53 @@ class Conclusion:
 
     question: str
     label: str
-    tone: Tone
+    tone: Tone = "open"
     sentence: str
-    speed: str
-    per_seed: Sequence[Answer]
-    statistics: Sequence[str] = ()
+    speed: str = ""
+    per_seed: Sequence[Answer] = ()
 
     @classmethod
     def of_one(cls, question: str, answer: Answer) -> Conclusion:
         """The headline where there is one answer only."""
         return cls(
-            question=question,
-            label=answer.label,
-            tone=answer.tone,
-            sentence=answer.sentence,
-            speed=answer.speed,
-            per_seed=(),
-            statistics=answer.statistics,
+            question=question, label=answer.label, tone=answer.tone, sentence=answer.sentence, speed=answer.speed
         )
 
 
-def verdicts(
-    question: str,
-    persona: str,
-    *,
-    seeds: Sequence[int],
-    rows: Sequence[Row],
-    arms: Mapping[tuple[str, int], Row],
-    significance: float | None,
-    change: Change = RETRAINED,
-    who: str = "",
-) -> Conclusion:
-    """Answer `question` for the training seeds it is asked of, by `rows`: its comparisons of this persona.
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """A question about a persona, and the tables that answer it."""
 
-    `arms` are the rows of `summary` by arm and seed, `change` is the treatment of round 2, `who` is what the ego meets,
-    if it is not one driver with the persona. A seed without rows is not answered yet.
-    """
-    who = who or f"the {persona} driver"
-    answers = [
-        _answer(question, persona, who, seed, [row for row in rows if row["seed"] == seed], arms, significance, change)
-        for seed in seeds
-    ]
+    question: str
+    persona: str
+    who: str
+    """What the ego meets."""
+    comparisons: Sequence[Row]
+    """Of this question and persona."""
+    arms: Mapping[tuple[str, int], Row]
+    """Rows of `summary` by arm and seed."""
+    significance: float | None
+    change: Change = RETRAINED
+    """The treatment of round 2."""
+
+
+def conclusion(asked: Asked, seeds: Sequence[int]) -> Conclusion:
+    """The answer for the seeds that a question is asked of. A seed without a comparison is not answered yet."""
+    answers = [_answer(asked, seed) for seed in seeds]
     if not answers:
-        sentence = NO_ROUND_2 if question == "RQ2" else NOT_COMPARED
-        return Conclusion(question=question, label=NOT_ASKED, tone="open", sentence=sentence, speed="", per_seed=())
-    return Conclusion.of_one(question, answers[0]) if len(answers) == 1 else _of_seeds(question, who, answers, change)
+        sentence = NO_ROUND_2 if asked.question == "RQ2" else NOT_COMPARED
+        return Conclusion(question=asked.question, label=NOT_ASKED, sentence=sentence)
+    if len(answers) == 1:
+        return Conclusion.of_one(asked.question, answers[0])
+    return _of_seeds(asked, answers)
 
 
-def _of_seeds(question: str, who: str, answers: Sequence[Answer], change: Change) -> Conclusion:
+def _of_seeds(asked: Asked, answers: Sequence[Answer]) -> Conclusion:
     yes, seeds = sum(answer.yes for answer in answers), len(answers)
     finding = {
-        "RQ1": f"{who} makes the {change.naive} fail significantly more often than it does alone",
-        "RQ2": f"{change.doing} makes the ego fail significantly less often against {who}",
-    }[question]
+        "RQ1": f"{asked.who} makes the {asked.change.naive} fail significantly more often than it does alone",
+        "RQ2": f"{asked.change.doing} makes the ego fail significantly less often against {asked.who}",
+    }[asked.question]
     label = f"yes in {yes} of {seeds} seeds" if yes else f"not shown in any of {seeds} seeds"
     sentence = f"In {yes} of {seeds} training seeds {finding} (after Holm's correction)."
     if unanswered := [answer.label for answer in answers if not answer.answered]:
@@ -152,45 +144,30 @@ def _of_seeds(question: str, who: str, answers: Sequence[Answer], change: Change
             label, sentence = unanswered[0] if len(set(unanswered)) == 1 else NOT_ANSWERED, NO_SEED_ANSWERS
         else:
             sentence += f" In {len(unanswered)} of {seeds} it is not answered."
-    return Conclusion(
-        question=question,
-        label=label,
-        tone=TONE_OF_YES[question] if yes == seeds or (yes and question == "RQ1") else "open",
-        sentence=sentence,
-        speed="",
-        per_seed=answers,
-    )
+    harmed = asked.question == "RQ1" and yes > 0
+    tone = TONE_OF_YES[asked.question] if harmed or yes == seeds else "open"
+    return Conclusion(question=asked.question, label=label, tone=tone, sentence=sentence, per_seed=answers)
 
 
-def _answer(
-    question: str,
-    persona: str,
-    who: str,
-    seed: int,
-    rows: Sequence[Row],
-    arms: Mapping[tuple[str, int], Row],
-    significance: float | None,
-    change: Change,
-) -> Answer:
-    by_metric = {row["metric"]: row for row in rows}
-    before_arm, after_arm = ARMS[question](persona, change)
-    before, after = arms.get((before_arm, seed)), arms.get((after_arm, seed))
-    unplayed = [arm for arm, row in ((before_arm, before), (after_arm, after)) if played(row) == 0]
+def _answer(asked: Asked, seed: int) -> Answer:
+    by_metric = {row["metric"]: row for row in asked.comparisons if row["seed"] == seed}
+    names = ARMS[asked.question](asked.persona, asked.change)
+    before, after = (asked.arms.get((name, seed)) for name in names)
+    unplayed = [name for name, row in zip(names, (before, after), strict=True) if played(row) == 0]
     failure, speed = by_metric.get("failure"), by_metric.get("mean_speed")
     if unplayed or failure is None or before is None or after is None:
-        sentence = arms_not_played(unplayed) if unplayed else FAILURES_NOT_COMPARED
-        return Answer(seed=seed, yes=False, label=NOT_ANSWERED, tone="open", sentence=sentence, speed="")
+        sentence = f"Not played: {' and '.join(unplayed)}." if unplayed else FAILURES_NOT_COMPARED
+        return Answer(seed=seed, label=NOT_ANSWERED, sentence=sentence)
     verdict = Verdict(failure["verdict"])
     if verdict in INCOMPETENT:
-        return Answer(
-            seed=seed, yes=False, label=LABELS[verdict], tone="open", sentence=as_sentence(failure["reason"]), speed=""
-        )
-    sentence = _failure_sentence(question, who, verdict, failure, before, after, change)
-    if verdict is Verdict.ALL_EQUAL and significance is not None:
-        sentence += _beside_significance(failure["mcnemar_p"], significance)
+        return Answer(seed=seed, label=LABELS[verdict], sentence=as_sentence(failure["reason"]))
+    sentence = _failure_sentence(asked, failure, before, after)
+    if verdict is Verdict.ALL_EQUAL and asked.significance is not None:
+        below = "below" if failure["mcnemar_p"] < asked.significance else "not below"
+        sentence += f" This is {below} the campaign's significance of {asked.significance:g} (without correction)."
     told_speed = ""
     if speed is not None:
-        told_speed = speed_sentence(speed, before, after, significance)
+        told_speed = speed_sentence(speed, before, after, asked.significance)
         if speed["pairs_left_out"] != failure["pairs_left_out"]:
             told_speed += left_out(speed)
     yes = verdict is Verdict.SIGNIFICANT
@@ -198,18 +175,10 @@ def _answer(
         seed=seed,
         yes=yes,
         label=LABELS[verdict],
-        tone=TONE_OF_YES[question] if yes else "open",
+        tone=TONE_OF_YES[asked.question] if yes else "open",
         sentence=sentence + left_out(failure),
         speed=told_speed,
-        statistics=[statistics(row) for row in (failure, speed) if row is not None],
     )
-
-
-def arms_not_played(arms: Sequence[str]) -> str:
-    """Which arms of a question are missing."""
-    if len(arms) == 1:
-        return f"The arm {arms[0]} was not played."
-    return f"The arms {' and '.join(arms)} were not played."
 
 
 def as_sentence(reason: str) -> str:
@@ -217,22 +186,15 @@ def as_sentence(reason: str) -> str:
     return f"{reason[:1].upper()}{reason[1:]}."
 
 
-def _beside_significance(p: float, significance: float) -> str:
-    below = "below" if p < significance else "not below"
-    return f" This is {below} the campaign's significance of {significance:g} (without correction)."
-
-
-def _failure_sentence(
-    question: str, who: str, verdict: Verdict, row: Row, before: Row, after: Row, change: Change
-) -> str:
+def _failure_sentence(asked: Asked, row: Row, before: Row, after: Row) -> str:
     was, now, pairs = failures_of(before), failures_of(after), row["pairs"]
-    if question == "RQ1":
+    who, change = asked.who, asked.change
+    if asked.question == "RQ1":
         claim = f"{who[:1].upper()}{who[1:]} makes the {change.naive} fail in {now} games instead of {was}"
         counts = f"The {change.naive} fails in {now} games against {who} and in {was} alone"
         direction = "more often"
     else:
-        claim = f"{change.doing.capitalize()} reduces the ego's failures against {who} "
-        claim += f"from {was} games to {now}"
+        claim = f"{change.doing.capitalize()} reduces the ego's failures against {who} from {was} games to {now}"
         counts = f"Against {who} the {change.made} ego fails in {now} games, the {change.naive} in {was}"
         direction = "less often"
     return {
@@ -244,7 +206,7 @@ def _failure_sentence(
             f"{counts}; {NO_T_STATISTIC.format(pairs=pairs)}. McNemar's exact test gives {p_text(row['mcnemar_p'])}."
         ),
         Verdict.NOT_ENOUGH_PAIRS: f"{counts}, {too_few(pairs)}.",
-    }[verdict]
+    }[Verdict(row["verdict"])]
 
 
 def left_out(row: Row) -> str:

@@ -15,11 +15,7 @@ from harness.reports import page as page_module
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, speed_sentence
 from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
 from harness.reports.page import QUICK, REPLAYS_SHOWN
-from harness.reports.verdict_wording import (
-    NO_ROUND_2,
-    arms_not_played,
-    verdicts,
-)
+from harness.reports.verdict_wording import NO_ROUND_2, Asked, conclusion
 from tests.support.incompetent import cannot_drive
 from tests.support.pages import (
     Page,
@@ -75,6 +71,14 @@ def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatc
 
 # --- words ---
 
+NOT_PLAYED = "Not played: retrained_vs_speedy."
+
+
+def asked(question, rows, arms):
+    """A question about the speedy driver."""
+    who = "the speedy driver"
+    return Asked(question=question, persona="speedy", who=who, comparisons=rows, arms=arms, significance=0.01)
+
 
 def text_of(arguments):
     """The page's text without the learning curves, which take long."""
@@ -125,15 +129,15 @@ def test_words__an_arm_that_was_not_played_is_named():
     arguments = campaign(personas=["speedy"])
     rq1, rq2 = verdict_texts(with_errors(arguments, arguments["episodes"]["arm"] == "retrained_vs_speedy"))
     assert rq1[0] == "RQ1: yes"
-    assert rq2 == ("RQ2: not answered", arms_not_played(["retrained_vs_speedy"]))
+    assert rq2 == ("RQ2: not answered", NOT_PLAYED)
 
 
 def test_words__a_stage_that_is_not_done_leaves_its_question_not_answered():
     arguments = without_arm(campaign(personas=["speedy"]), "retrained_vs_speedy", seeds=[1])
-    assert verdict_texts(arguments)[1] == ("RQ2: not answered", arms_not_played(["retrained_vs_speedy"]))
+    assert verdict_texts(arguments)[1] == ("RQ2: not answered", NOT_PLAYED)
     arguments = without_arm(campaign(personas=["speedy"], seeds=(1, 2)), "retrained_vs_speedy", seeds=[2])
     assert verdict_texts(arguments)[1][0] == "RQ2: yes in 1 of 2 seeds"
-    assert f"Seed 2: not answered. {arms_not_played(['retrained_vs_speedy'])}" in text_of(arguments)
+    assert f"Seed 2: not answered. {NOT_PLAYED}" in text_of(arguments)
 
 
 def without_arm(arguments, arm, seeds):
@@ -179,7 +183,7 @@ def test_words__only_significant_is_a_yes(verdict, question, small):
     row |= {"mean_difference": 0.3, "ci_low": 0.1, "ci_high": 0.5}
     rows = [row | {"metric": metric} for metric in ("failure", "mean_speed")]
     arms = {(arm["arm"], arm["seed"]): arm for arm in small["summary"].to_dict("records")}
-    answer = verdicts(question, "speedy", seeds=[1], rows=rows, arms=arms, significance=0.01)
+    answer = conclusion(asked(question, rows, arms), [1])
     yes = verdict is Verdict.SIGNIFICANT
     assert (answer.label == "yes") == yes
     assert (answer.tone != "open") == yes
@@ -222,7 +226,7 @@ def test_words__one_seed_of_several_is_enough_for_harm_but_not_for_mended():
     for question, tone in (("RQ1", "harm"), ("RQ2", "open")):
         rows = [row for row in arguments["comparisons"].to_dict("records") if row["question"] == question]
         rows = [row | {"verdict": Verdict.NOT_SIGNIFICANT.value} if row["seed"] == 2 else row for row in rows]
-        answer = verdicts(question, "speedy", seeds=[1, 2], rows=rows, arms=arms, significance=0.01)
+        answer = conclusion(asked(question, rows, arms), [1, 2])
         assert answer.label == "yes in 1 of 2 seeds"
         assert answer.tone == tone
 

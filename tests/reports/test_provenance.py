@@ -32,13 +32,6 @@ def test_mixed_versions__names_only_the_differences() -> None:
     ]
 
 
-def test_mixed_versions__a_program_missing_in_one_stage() -> None:
-    assert mixed_versions(stages(a=[NEW], b=[{"python": "3.11.7"}]))[1:] == [
-        "  by numpy 2.2.6: a",
-        "  by numpy of no known version: b",
-    ]
-
-
 def test_mixed_versions__stages_that_are_not_done_or_of_no_known_versions_do_not_count() -> None:
     others = {
         "b": {"status": "pending", "versions": [OLD]},
