@@ -94,7 +94,7 @@ def write_film(
                 display=display,
             )
             interval_s = step_length_s * shown.step
-            filmed = _held(_reported(pictures, len(shown), on_progress), round(HOLD_S / interval_s))
+            filmed = _filmed(pictures, len(shown), on_progress, round(HOLD_S / interval_s))
             encode(filmed, scratch, SIZE_PX, interval_s)
         os.replace(scratch, file)
     finally:
@@ -102,22 +102,15 @@ def write_film(
     return len(shown)
 
 
-def _reported(
-    pictures: Iterator[Image.Image], total: int, on_progress: Callable[[int, int], None]
+def _filmed(
+    pictures: Iterator[Image.Image], total: int, on_progress: Callable[[int, int], None], held: int
 ) -> Iterator[Image.Image]:
+    """The pictures, the last of them `held` more times."""
     for done, picture in enumerate(pictures, 1):
         yield picture
         on_progress(done, total)
-
-
-def _held(pictures: Iterator[Image.Image], times: int) -> Iterator[Image.Image]:
-    """The pictures, the last of them `times` more."""
-    last = None
-    for last in pictures:
-        yield last
-    for _ in range(times if last is not None else 0):
-        assert last is not None
-        yield last
+        if done == total:
+            yield from [picture] * held
 
 
 def _pictures(

@@ -35,11 +35,6 @@ def test_folder__has_a_file_per_game_and_a_list(merge: OpenScene, tmp_path: Path
     assert sorted(tmp_path.iterdir()) == [tmp_path / "out"]
 
 
-def test_folder__that_is_empty_is_used(merge: OpenScene, tmp_path: Path) -> None:
-    (tmp_path / "out").mkdir()
-    assert write_games(games(merge), merge, tmp_path / "out", BOTH, title="two games") == 2
-
-
 def test_folder__that_holds_something_stays(merge: OpenScene, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "mine.txt").write_text("mine")

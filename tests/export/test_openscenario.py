@@ -165,11 +165,3 @@ def test_signals__change_when_they_did() -> None:
     assert [state for _, state in changes["1"]] == [red, red, green]
     phases = [(float(phase.get("duration", "nan")), phase[3].get("state")) for phase in root.iter("Phase")]
     assert phases == [(pytest.approx(2.0), green), (pytest.approx(3.0), yellow), (3600.0, red)]
-
-
-def test_scenario__twice_gives_the_same_bytes(scene: OpenScene) -> None:
-    first, second = (
-        scenario_file(exported(trace, scene), ROAD)
-        for trace in (busy_game(), busy_game().sample(frac=1.0, random_state=3))
-    )
-    assert first == second

@@ -18,12 +18,12 @@ from harness.replay.floating_car_data import Lanes
 from harness.replay.gui_settings import choose_view
 from harness.replay.selection import MOST_FAILURES_PER_ARM
 from harness.replay.vehicles import types_of_vehicles
+from harness.traffic.scene import open_scene
 from tests.support.replays import (
     GAMES,
     RAILS,
     SIZES,
     STEP_S,
-    Pose,
     assert_plays,
     busy_game,
     clean_game,
@@ -35,6 +35,7 @@ from tests.support.replays import (
     straight,
     write,
 )
+from tests.support.repository import REPOSITORY
 
 
 @pytest.mark.parametrize("name", GAMES)
@@ -118,16 +119,6 @@ def test_scenery__types_that_occur_in_the_colours_of_the_game(merge_net: Path, t
     assert len([poly for poly in root.iter("poly") if poly.get("id").startswith("rail")]) == len(RAILS)
 
 
-def test_scenery__another_vehicles_type_called_ego_stays_its_own(merge_net: Path, tmp_path: Path) -> None:
-    routes = tmp_path / "own.rou.xml"
-    routes.write_text('<routes><vType id="ego" length="4.0"/><vType id="car" length="4.6"/></routes>')
-    trace = game(drive("ego", straight(30, -1.6, 9, 5)), drive("flow.0", straight(50, -1.6, 9, 5), vehicle_type="ego"))
-    types = types_of_vehicles(trace, [routes])
-    assert (types["ego"].name, types["ego"].length_m) == ("ego", 4.6)
-    assert (types["flow.0"].name, types["flow.0"].length_m) == ("ego_type", 4.0)
-    assert types["flow.0"].colour != types["ego"].colour
-
-
 def test_contacts__are_found_where_and_when_the_bodies_touch(merge_net: Path, tmp_path: Path) -> None:
     routes = merge_net.with_name("merge.rou.xml")
     (crash,) = contacts(collision_game(), types_of_vehicles(collision_game(), [routes]), RAILS)
@@ -141,16 +132,6 @@ def test_contacts__are_found_where_and_when_the_bodies_touch(merge_net: Path, tm
     assert scrape.y_m == pytest.approx(0.0)
     assert contacts(clean_game(), types_of_vehicles(clean_game(), [routes]), RAILS) == []
     assert contacts(busy_game(), types_of_vehicles(busy_game(), [routes]), RAILS) == []
-
-
-def test_contacts__one_wreck_after_another(merge_net: Path) -> None:
-    wreck: list[Pose] = [(80.0, -6.0, -0.3, 0.0)] * 31
-    trace = game(
-        drive("non_ego", straight(68.0, -4.8, 12.0, 10) + wreck, outcome="rail"),
-        drive("ego", straight(40.0, -4.8, 12.0, 31) + [(76.5, -4.8, 0.0, 0.0)] * 10, outcome="collision"),
-    )
-    found = contacts(trace, types_of_vehicles(trace, [merge_net.with_name("merge.rou.xml")]), RAILS)
-    assert [contact.label for contact in found] == ["rail at 1.0 s", "collision at 3.1 s"]
 
 
 @pytest.mark.parametrize(("make", "times"), [(collision_game, ["3.300", "4.400"]), (clean_game, ["17.000"])])
@@ -268,3 +249,13 @@ def test_open__starts_sumo_gui_on_the_folder(monkeypatch: pytest.MonkeyPatch, tm
     home, option, file = (tmp_path / "game" / "called").read_text().strip().split("|")
     assert (Path(home), option) == ((tmp_path / "sumo").resolve(), "-c")
     assert Path(file) == tmp_path / "game" / "scene.sumocfg"
+
+
+def test_types__a_walker_and_a_cyclist_look_like_what_they_are() -> None:
+    expected = {"crossing": ("pedestrian", 0.5, 0.5), "cyclist": ("bicycle", 1.8, 0.65)}
+    for name, looks in expected.items():
+        scene = open_scene(REPOSITORY / "networks" / name)
+        kinds = [scene.vehicle(player).vehicle_type for player in range(2)]
+        trace = pd.DataFrame({"player": ["ego", "non_ego"], "vehicle_type": kinds})
+        drawn = types_of_vehicles(trace, scene.route_files)["non_ego"]
+        assert (drawn.shape, drawn.length_m, drawn.width_m) == looks

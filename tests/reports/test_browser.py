@@ -62,13 +62,6 @@ def test_report__the_page_itself_never_scrolls_sideways(opened, width):
     assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
-def test_report__long_names_and_messages_do_not_widen_it(opened, tmp_path):
-    arguments = campaign(personas=["a_persona_with_a_name_of_forty_letters_x"])
-    arguments["manifest"]["stages"]["naive-seed1"] |= {"status": "failed", "message": "x" * 300}
-    page = opened(write(tmp_path, arguments), width=400)
-    assert page.evaluate("document.documentElement.scrollWidth") <= 400
-
-
 @pytest.mark.parametrize("width", [400, 1280])
 def test_report__a_person_that_cannot_drive_is_on_the_first_screen(width, opened, tmp_path):
     page = opened(write(tmp_path, cannot_drive(campaign(personas=["speedy"]))), width=width)

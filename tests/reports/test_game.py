@@ -29,8 +29,6 @@ from tests.support.chromium import launched, opener
 from tests.support.game_tables import arm, findings, table
 from tests.support.pages import CONTRAST, Page, campaign, rendered
 
-PERSONAS = ("speedy", "distracted")
-
 
 @pytest.fixture(scope="module")
 def found():
@@ -236,23 +234,6 @@ def test_words__games_that_could_not_be_compared_are_counted_not_rated():
     assert "1 of 2 pairs is left out: not played or not measured." in verdict.sentence
     assert verdict.speed == "The effect of a speedy driver newly trained against this ego was not measured."
     assert "%" not in verdict.sentence
-
-
-def test_words__several_seeds_are_counted_and_each_is_listed(found):
-    (speedy, distracted) = (dict(gap_verdicts(found.gaps))[persona] for persona in PERSONAS)
-    assert speedy.label == "no in 2 of 2 seeds"
-    assert plain(speedy.speed).startswith(
-        "A speedy driver newly trained against this ego makes it fail in 26 % of games"
-    )
-    assert distracted.label == "not refuted in 2 of 2 seeds"
-    assert distracted.sentence == "In 2 of 2 seeds no gain that is distinguishable from 0 was found for either side."
-    assert [answer.seed for answer in speedy.per_seed] == [1, 2]
-
-
-def test_words__only_the_last_round_is_the_headline(found):
-    earlier = found.gaps.assign(round=1, verdict=GapVerdict.NONE_FOUND.value)
-    verdicts = dict(gap_verdicts(pd.concat([earlier, found.gaps], ignore_index=True)))
-    assert verdicts["speedy"].label == "no in 2 of 2 seeds"
 
 
 def test_words__of_an_equilibrium_name_shares_failures_and_payoff():

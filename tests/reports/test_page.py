@@ -14,7 +14,7 @@ from harness.replay.selection import choose_games, replay_name
 from harness.reports import page as page_module
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, speed_sentence
 from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
-from harness.reports.page import QUICK, REPLAYS_SHOWN
+from harness.reports.page import REPLAYS_SHOWN
 from harness.reports.verdict_wording import NO_ROUND_2, Asked, conclusion
 from tests.support.incompetent import cannot_drive
 from tests.support.pages import (
@@ -293,11 +293,6 @@ def test_effect__names_the_direction_it_has(question, metric, mean, words):
 
 
 # --- banners ---
-
-
-def test_banner__a_quick_run_says_so(page):
-    assert QUICK in text_of(campaign(personas=["speedy"], quick=True))
-    assert QUICK not in page.text
 
 
 def test_banner__stages_that_are_not_done_are_named_with_their_message(page):

@@ -269,14 +269,6 @@ def test_list__next_follows_its_order_and_its_filter(opened, games):
         press(page, "n")
 
 
-def test_list__has_the_games_of_one_arm_or_of_all(opened, games):
-    page = opened()
-    ofarm = sum(game.arm == games[GAME].arm for game in games.values())
-    assert page.locator("[data-is=place]").inner_text().endswith(f" of {ofarm}")
-    page.locator("[data-is=arm]").select_option("")
-    until(page, "count => document.querySelector('[data-is=place]').textContent.endsWith(` of ${count}`)", len(games))
-
-
 # --- figures ---
 
 
@@ -323,17 +315,6 @@ def test_link__nonsense_is_harmless(opened, fragment):
     page = opened(fragment)
     assert page.locator(".screen").count() == 1
     assert page.seen == []
-
-
-def test_link__the_rows_of_the_tables_open_their_games(opened):
-    page = opened("")
-    page.locator("#manoeuvres > details > summary").click()
-    page.locator("#pairs tbody a").first.click()
-    page.locator(".pair[open] a").first.click()
-    until(page, "() => location.hash.startsWith('#game=')")
-    wanted = re.match(r"#game=([^&]*)&t=([\d.]+)", page.evaluate("location.hash"))
-    until(page, "key => document.querySelector('.player').dataset.game === key", wanted[1])
-    assert time_of(page) == pytest.approx(float(wanted[2]))
 
 
 def test_marks__a_manoeuvre_seeks_to_its_time(opened):

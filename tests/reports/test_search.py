@@ -97,13 +97,6 @@ def test_searches__in_words() -> None:
     assert found.summary == "3 trials, none better than the ego as given: mean payoff 3.00, failures in 12.5 %."
 
 
-def test_searches__each_seed_has_its_own() -> None:
-    both = pd.concat([trials(1), trials(2, (1.0, 2.0))])
-    assert [each.stage for each in searches(both)] == ["reconfigured_speedy, seed 1", "reconfigured_speedy, seed 2"]
-    assert "2 trials; the best is trial 1" in str(searches(both)[1].figure)
-    assert searches(trials()[:0]) == []
-
-
 def test_mixed_versions__programs_of_searches_are_compared_among_searches() -> None:
     def stage(kind: str, **versions: str) -> dict[str, Any]:
         return {"status": "done", "kind": kind, "versions": [versions]}
