@@ -56,7 +56,7 @@ def training_table(seconds: float) -> str:
 
     spec: Any = training_spec(endless_training())
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch, suppress(_Over):
-        train(spec, Path(scratch) / "checkpoint", key="benchmark", card={}, on_progress=on_progress)
+        train(spec, checkpoint=Path(scratch) / "checkpoint", key="benchmark", card={}, on_progress=on_progress)
     steps, whole_us = last[0] - first[0], 1e6 * (last[1] - first[1]) / (last[0] - first[0])
     rows = [(words, 1e6 * profiler.total_s[words] / steps) for words, *_ in _PARTS]
     rows.append(("the rest: segments, checkpoints", whole_us - sum(part_us for _, part_us in rows)))

@@ -157,7 +157,7 @@ def run(
     opened = open_campaign(document_at(Path(campaign), "campaigns"), quick, allow_code)
     folder = RunFolder(Path(out) if out is not None else Path("reports") / opened.run_name)
     console = Console(file=None if progress else io.StringIO())
-    run_campaign(opened, folder, partial(WorkerPool, jobs=jobs or cores()), console, keep_going)
+    run_campaign(opened, folder, partial(WorkerPool, jobs=jobs or cores()), console, keep_going=keep_going)
     return load(folder.path)
 
 

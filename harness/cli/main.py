@@ -130,7 +130,7 @@ def campaign(
         _handle_termination_signals()
         try:
             with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
-                outcome = run_campaign(opened, folder, start_workers, console, keep_going)
+                outcome = run_campaign(opened, folder, start_workers, console, keep_going=keep_going)
         except KeyboardInterrupt as interrupt:
             console.print(messages.INTERRUPTED)
             raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None

@@ -108,7 +108,7 @@ def export(
     """
     from rich.console import Console
 
-    from harness.campaign.results.export_games import Failures, export_failures, export_game
+    from harness.campaign.results.export_games import ChosenFailures, export_failures, export_game
     from harness.export import Formats
 
     if not (openscenario or opendrive or csv):
@@ -119,13 +119,13 @@ def export(
         if len(rest) > 2:
             message, remedy = "is more than an arm and a new folder", "harness export RUN [ARM] --failures DIR"
             raise UsageError.of("--failures", " ".join(rest), message, remedy)
-        chosen = Failures(arm=rest[0] if len(rest) == 2 else None, seed=seed)
-        count = export_failures(run, chosen, folder, formats, console)
+        chosen = ChosenFailures(arm=rest[0] if len(rest) == 2 else None, seed=seed)
+        count = export_failures(run, chosen, folder=folder, formats=formats, console=console)
     else:
         if len(rest) != 3:
             remedy = "harness export RUN ARM EPISODE DIR, or harness export RUN --failures DIR"
             raise UsageError.of("harness export", " ".join(rest), "is not an arm, an episode and a new folder", remedy)
-        export_game(run, rest[0], _episode(rest[1]), seed, folder, formats)
+        export_game(run, rest[0], _episode(rest[1]), seed=seed, folder=folder, formats=formats)
         count = 1
     print_plain([f"Wrote {count} {'game' if count == 1 else 'games'} to {folder}: games.csv lists them"], console)
 

@@ -47,6 +47,7 @@ class TrainingResult:
 
 def train(
     spec: TrainingSpec,
+    *,
     checkpoint: Path,
     key: str,
     card: dict[str, Any],

@@ -43,7 +43,7 @@ _MOST_STARTS = 12  # starts of other episodes that are tried until one does not 
 
 
 @dataclass(frozen=True, kw_only=True)
-class Failure:
+class RunFailure:
     """A failed game of a run."""
 
     arm: str
@@ -72,7 +72,7 @@ class PinnedGames:
         manoeuvres = folder.path / "manoeuvres.csv"
         self._pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
 
-    def failures(self, arm: str | None = None) -> list[Failure]:
+    def failures(self, arm: str | None = None) -> list[RunFailure]:
         """One failure for each kind of failure of each arm (of one arm, if named) and seed.
 
         Failures are of one kind if they have the same outcome and the same pair of manoeuvres led to it. The worst
@@ -87,11 +87,11 @@ class PinnedGames:
             kind = (str(game.arm), int(game.seed), str(game.ego_outcome), pair.words if pair else "")
             kinds.setdefault(kind, []).append(int(game.episode))
         return [
-            Failure(arm=name, seed=seed, episode=episodes[0], alike=len(episodes))
+            RunFailure(arm=name, seed=seed, episode=episodes[0], alike=len(episodes))
             for (name, seed, _, _), episodes in kinds.items()
         ]
 
-    def failure(self, arm: str, seed: int, episode: int) -> Failure:
+    def failure(self, arm: str, seed: int, episode: int) -> RunFailure:
         """One failed game. Raises UsageError if the run has no such game, or if the ego does not fail in it."""
         self._players.arm(arm, seed)
         failed = self._failed()
@@ -100,9 +100,9 @@ class PinnedGames:
             some = ", ".join(str(each) for each in episodes[:10])
             remedy = f"it fails in {some}" if episodes else "the ego fails in no game of this arm"
             raise UsageError.of(self._out, f"{arm} {episode}", "the ego does not fail in this game", remedy)
-        return Failure(arm=arm, seed=seed, episode=episode)
+        return RunFailure(arm=arm, seed=seed, episode=episode)
 
-    def pin(self, failure: Failure) -> Pinned:
+    def pin(self, failure: RunFailure) -> Pinned:
         """Minimise a failure and write it. Raises UsageError if the game can't be repeated, SimulationError."""
         stage = self._players.arm(failure.arm, failure.seed)
         ego, people = self._players.ego(stage), self._players.people(stage, failure.episode)
@@ -124,7 +124,7 @@ class PinnedGames:
                 failing, passing, games = found.fails, found.passes, found.games
             last = trials.play(failing)
         starts = {"drawn_start": drawn, "start": failing, "no_failure_from": passing}
-        pinned = self._document(failure, stage, str(last.record["ego_outcome"]), starts, people)
+        pinned = self._document(failure, (ego, *people), str(last.record["ego_outcome"]), starts)
         file = self._out / f"{failure.arm}-seed{failure.seed}-{failure.episode:04d}.toml"
         write_atomically(file, toml_of(pinned, [_COMMENT]).encode())
         return Pinned(file=file, game=pinned, games=games)
@@ -150,14 +150,9 @@ class PinnedGames:
         return np.concatenate((drawn.position_m, drawn.speed_mps))
 
     def _document(
-        self,
-        failure: Failure,
-        stage: AssessmentStage,
-        outcome: str,
-        starts: Mapping[str, FloatArray | None],
-        people: Sequence[SeatedDriver],
+        self, failure: RunFailure, seats: Sequence[SeatedDriver], outcome: str, starts: Mapping[str, FloatArray | None]
     ) -> PinnedGame:
-        ego = self._players.ego(stage)
+        ego, *people = seats
         return PinnedGame.model_validate(
             {
                 "format": FORMAT,
@@ -167,7 +162,7 @@ class PinnedGames:
                 "seed": failure.seed,
                 "episode": failure.episode,
                 "outcome": outcome,
-                "found_with": ego.policy.name if ego.policy is not None else stage.name.partition("_vs_")[0],
+                "found_with": ego.policy.name if ego.policy is not None else failure.arm.partition("_vs_")[0],
                 "alike": failure.alike,
                 "ego_persona": self._copied_persona(ego.persona),
                 "people": [self._person(each) for each in people],

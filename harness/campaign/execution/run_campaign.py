@@ -33,7 +33,12 @@ NOTHING_TO_DO = "Nothing to do: every stage is finished, and the results are tho
 
 
 def run_campaign(
-    campaign: OpenCampaign, folder: RunFolder, start_workers: StartWorkers, console: Console, keep_going: bool = False
+    campaign: OpenCampaign,
+    folder: RunFolder,
+    start_workers: StartWorkers,
+    console: Console,
+    *,
+    keep_going: bool = False,
 ) -> RunResult:
     """Carry out what is left of a campaign, and write its tables, replays and report. `keep_going` is that of
     `assessment_stage.play_segments`.
@@ -49,7 +54,7 @@ def run_campaign(
         stages = plan(campaign.document, [persona.name for persona in campaign.personas], campaign.tunable)
         keys = stage_keys(campaign, stages)
         with console.status(CHECKING):
-            manifest = _ManifestKeeper(campaign, folder, stages, keys, varying)
+            manifest = _ManifestKeeper(campaign, folder, stages=stages, keys=keys, varying=varying)
             scene = campaign.scene.document
             folder.keep_scene(campaign.scene.folder, scene.files)
             finished = [stage.id for stage in stages if manifest.status(stage) in FINISHED]
@@ -103,6 +108,7 @@ class _ManifestKeeper:
         self,
         campaign: OpenCampaign,
         folder: RunFolder,
+        *,
         stages: Sequence[Stage],
         keys: Mapping[str, str],
         varying: Mapping[str, str],

@@ -22,14 +22,14 @@ from harness.traffic.scene import OpenScene, open_scene
 
 
 @dataclass(frozen=True, kw_only=True)
-class Failures:
+class ChosenFailures:
     """Which failures of a run to export: None stands for all arms, or seeds."""
 
     arm: str | None = None
     seed: int | None = None
 
 
-def export_game(run: Path, arm: str, episode: int, seed: int | None, folder: Path, formats: Formats) -> None:
+def export_game(run: Path, arm: str, episode: int, *, seed: int | None, folder: Path, formats: Formats) -> None:
     """Export one game. Raises UsageError if there is no such game or trace, or the folder can't be used."""
     check_formats(formats)
     check_folder(folder)
@@ -38,7 +38,7 @@ def export_game(run: Path, arm: str, episode: int, seed: int | None, folder: Pat
     write_games(iter([exported]), game.scene, folder, formats, title=RunFolder(run).manifest()["name"])
 
 
-def export_failures(run: Path, chosen: Failures, folder: Path, formats: Formats, console: Console) -> int:
+def export_failures(run: Path, chosen: ChosenFailures, *, folder: Path, formats: Formats, console: Console) -> int:
     """Export every game in which the judged player fails, worst first; the number of games.
 
     Raises UsageError if there is none, its traces are missing, or the folder can't be used.
@@ -63,7 +63,7 @@ def export_failures(run: Path, chosen: Failures, folder: Path, formats: Formats,
         )
 
 
-def _failures(run: Path, episodes: pd.DataFrame, chosen: Failures) -> pd.DataFrame:
+def _failures(run: Path, episodes: pd.DataFrame, chosen: ChosenFailures) -> pd.DataFrame:
     """The rows of the failures, worst first."""
     episodes = games_of(run, episodes, chosen.arm, chosen.seed)
     failures = episodes[judged_outcomes(episodes).isin(FAILURES)]

@@ -84,7 +84,7 @@ def model_card(stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, p
         seed=entry["seed"],
         intervals="Clopper-Pearson of rates" + (", t of speeds" if is_ego else ""),
         headings=_HEADINGS[is_ego],
-        figures=list(_figures(stage, entry["seed"], manifest, summary, is_ego)),
+        figures=list(_figures(stage, manifest, summary, is_ego)),
         purpose=_purpose(persona, is_ego),
         scene=policy["scene"],
         snippet=_snippet(stage, entry, is_ego),
@@ -219,9 +219,9 @@ _HEADINGS = {
 
 
 def _figures(
-    stage: str, seed: int, manifest: Mapping[str, Any], summary: pd.DataFrame, is_ego: bool
+    stage: str, manifest: Mapping[str, Any], summary: pd.DataFrame, is_ego: bool
 ) -> Iterator[tuple[str, Sequence[str]]]:
-    campaign = Campaign.model_validate(manifest["campaign"], strict=False)
+    campaign, seed = Campaign.model_validate(manifest["campaign"], strict=False), manifest["stages"][stage]["seed"]
     rows = {row["arm"]: row for row in summary[summary["seed"] == seed].to_dict("records")}
     for arm in plan(campaign, manifest["personas"], is_tuned(manifest)):
         if not isinstance(arm, AssessmentStage) or arm.seed != seed or arm.name not in rows:
