@@ -19,7 +19,7 @@ from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.stage_events import Event, StageJob
 from harness.campaign.execution.stage_run import Attempt, Work
-from harness.campaign.execution.worker_process import put_scratch_into
+from harness.campaign.execution.worker_pool import put_scratch_into
 from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.locks import held_by_worker
 from harness.campaign.storage.run_folder import RunFolder

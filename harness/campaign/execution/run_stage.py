@@ -1,6 +1,9 @@
 """Carrying out one stage: its inputs are read from the run folder, its outputs written into it.
 
-A stage is a function of its inputs alone, which `cache_keys` hashes: a stage that is done is skipped.
+A stage is a function of its inputs alone, which `cache_keys` hashes: a stage that is done is skipped. Where an
+approximate equilibrium is reached, later stages have nothing to do: no player's best response gains anything
+distinguishable from 0. A pair of which a player can't drive the scene alone is in none: that no training found anything
+better shows nothing.
 """
 
 from __future__ import annotations
@@ -9,9 +12,16 @@ import logging
 import time
 from typing import Any
 
-from harness.campaign.execution.equilibrium_stop import equilibrium_before
 from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
-from harness.campaign.plan.stages import AssessmentStage, PreventabilityStage, SearchStage, Stage, TrainingStage
+from harness.campaign.plan.stages import (
+    AssessmentStage,
+    EquilibriumGate,
+    PreventabilityStage,
+    SearchStage,
+    Stage,
+    TrainingStage,
+)
+from harness.campaign.storage.run_folder import RunFolder
 from harness.traffic.scene import open_scene
 
 
@@ -58,3 +68,35 @@ def _make(stage: Stage, inputs: StageInputs) -> Made:
             from harness.campaign.execution.preventability_stage import carry_out_preventability
 
             return carry_out_preventability(stage, inputs)
+
+
+def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> EquilibriumGate | None:
+    """The first gate of a stage whose pair is an approximate equilibrium; None if the stage has to be carried out."""
+    return next((gate for gate in stage.gates if _is_equilibrium(gate, stage, folder, significance)), None)
+
+
+def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, significance: float) -> bool:
+    import pandas as pd  # slow to import, and few stages have gates
+
+    from harness.evaluation.game_theory.best_response_gap import gaps, nothing_to_gain
+    from harness.evaluation.game_theory.records import Response, Role
+    from harness.evaluation.tables import read_csv
+
+    episodes = pd.concat([read_csv(folder.work(each) / "episodes.csv") for each in gate.stages], ignore_index=True)
+    pair, *responses = (str(name) for name in episodes["arm"].unique()[:3])
+    roles: tuple[Role, Role] = ("ego", "non_ego")
+    asked = [
+        Response(
+            seed=stage.seed,
+            role=role,
+            persona=stage.persona,
+            round=0,
+            pair_arm=pair,
+            response_arm=arm,
+            ego="",
+            non_ego="",
+            alone=gate.bounds,
+        )
+        for role, arm in zip(roles, responses, strict=True)
+    ]
+    return nothing_to_gain(gaps(asked, episodes, significance))

@@ -12,7 +12,7 @@ Heinrich et al. 2015) |
 oracles: Lanctot et al. 2017) |
 
 With `[best_response]` the rounds of a persona end early, when neither player's best response gains anything
-distinguishable from 0 (`execution.equilibrium_stop`): the later stages have nothing to do.
+distinguishable from 0 (`execution.run_stage`): the later stages have nothing to do.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from harness.campaign.execution.equilibrium_stop import equilibrium_before
+from harness.campaign.execution.run_stage import equilibrium_before
 from harness.campaign.plan.stages import EquilibriumGate, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.research_questions import AloneBound
