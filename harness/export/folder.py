@@ -80,7 +80,7 @@ def write_games(
             (partial / ROAD_FILE).write_bytes(road.xml)
         rows = []
         for number, game in enumerate(games, start=1):
-            for name, content in _files(game, number, road, courses, formats).items():
+            for name, content in _files(game, number, road=road, courses=courses, formats=formats).items():
                 (partial / name).write_bytes(content)
             rows.append((number, game.name, game.arm, game.seed, game.episode, game.outcome))
             on_game(number)
@@ -92,7 +92,7 @@ def write_games(
 
 
 def _files(
-    game: ExportedGame, number: int, road: RoadFile | None, courses: LaneCourses | None, formats: Formats
+    game: ExportedGame, number: int, *, road: RoadFile | None, courses: LaneCourses | None, formats: Formats
 ) -> Mapping[str, bytes]:
     """Contents of a game's files, by name."""
     files: dict[str, bytes] = {}

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from harness.evaluation.strategies import NAIVE_ALONE, NAIVE_VS_SUMO, Arm, NaiveEgo, against_persona, persona_alone
 from harness.reports.differences import Row, statistics
 from harness.reports.distributions import MOST_LINES, Pairs, paired_figure, pairs_of, spread_figure, spreads_of
-from harness.reports.figures import NOT_PLAYED, Column, Point, rate_figure, speed_figure
+from harness.reports.figures import NOT_PLAYED, ArmBar, Point, rate_figure, speed_figure
 from harness.reports.game_links import NO_LINKS, GameLinks
 from harness.reports.key_figures import CardVerdict, KeyFigure, card_verdict, key_figures, portrait
 from harness.reports.numbers import MISSING, SURE, interval, number, percent
@@ -267,9 +267,9 @@ def _columns(persona: str, change: Change | None) -> list[ArmColumn]:
     return columns
 
 
-def _drawn(column: ArmColumn, points: Sequence[Point], links: GameLinks) -> Column:
+def _drawn(column: ArmColumn, points: Sequence[Point], links: GameLinks) -> ArmBar:
     """A column of a figure; it leads to the worst game of its arm."""
-    return Column(label=column.label, series=column.series, points=points, link=links.worst(column.arm))
+    return ArmBar(label=column.label, series=column.series, points=points, link=links.worst(column.arm))
 
 
 def _rates(rows: Mapping[int, Row]) -> list[Point]:

@@ -124,7 +124,7 @@ def paired_figure(quantities: Sequence[Pairs], name: str, alternative: str, made
             before = (pairs.before, pairs.before_failed, "persona", pairs.before_links)
             after = (pairs.after, pairs.after_failed, "retrained", pairs.after_links)
             for place, (values, failed, series, links) in enumerate((before, after)):
-                _games(axes, np.full(len(values), float(place)), values, failed, series, links)
+                _games(axes, np.full(len(values), float(place)), values, failed=failed, series=series, links=links)
             if not both.any():
                 axes.annotate("no pair", (0.5, 0.5), xycoords="axes fraction", ha="center", fontsize=9)
             axes.set_xlim(-0.25, 1.25)
@@ -167,7 +167,7 @@ def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> 
                     axes.bar(place, high - low, 0.66, bottom=low, color=SERIES[series], alpha=0.22, linewidth=0)
                 axes.plot([place - 0.33, place + 0.33], [median, median], color=SERIES[series], linewidth=2)
                 if measured.sum() <= MOST_DOTS:
-                    _games(axes, place + _beside(len(values)), values, failed, series, links)
+                    _games(axes, place + _beside(len(values)), values, failed=failed, series=series, links=links)
             axes.use_sticky_edges = False
             axes.set_title(spread.label, fontsize=10, loc="left")
             axes.set_xlim(-0.6, len(spread.arms) - 0.4)
@@ -179,7 +179,7 @@ def spread_figure(quantities: Sequence[Spread], name: str, alternative: str) -> 
 
 
 def _games(
-    axes: Axes, x: FloatArray, values: FloatArray, failed: NDArray[np.bool_], series: str, links: Sequence[str]
+    axes: Axes, x: FloatArray, values: FloatArray, *, failed: NDArray[np.bool_], series: str, links: Sequence[str]
 ) -> None:
     """Games as dots, failed ones as crosses; each leads to its game, if it has an address."""
     measured, linked = np.isfinite(values), np.array(links, dtype=bool)

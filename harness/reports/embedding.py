@@ -61,6 +61,7 @@ class Embedded:
         games: Iterable[GameTracks],
         marks: Mapping[str, Sequence[Mapping[str, Any]]],
         budget_bytes: int,
+        *,
         crowds: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ) -> None:
         """`games`, those to watch first at the front, are embedded until the budget is used up; `marks` are the

@@ -68,7 +68,7 @@ class Point:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class ArmBar:
     """One arm in a figure. `series` is a key of SERIES."""
 
     label: str
@@ -91,7 +91,7 @@ class Curve:
     """The reason, as the manifest has it."""
 
 
-def rate_figure(columns: Sequence[Column], name: str, alternative: str) -> Markup:
+def rate_figure(columns: Sequence[ArmBar], name: str, alternative: str) -> Markup:
     """A share of games per arm: a bar for the mean over seeds, and each seed's value with its interval."""
     with figure_of(4.8, 3.3) as figure:
         axes = _arms(figure, columns)
@@ -109,7 +109,7 @@ def rate_figure(columns: Sequence[Column], name: str, alternative: str) -> Marku
         return svg(figure, name, alternative)
 
 
-def speed_figure(columns: Sequence[Column], name: str, alternative: str) -> Markup:
+def speed_figure(columns: Sequence[ArmBar], name: str, alternative: str) -> Markup:
     """Average speed per arm: a pale bar from quartile to quartile of the games, the mean and its interval."""
     with figure_of(4.8, 3.3) as figure:
         axes = _arms(figure, columns)
@@ -186,7 +186,7 @@ def figure_of(width_in: float, height_in: float) -> Iterator[Figure]:
         yield figure
 
 
-def _arms(figure: Figure, columns: Sequence[Column]) -> Axes:
+def _arms(figure: Figure, columns: Sequence[ArmBar]) -> Axes:
     axes = figure.subplots()
     axes.set_xticks(range(len(columns)), [""] * len(columns))
     for place, column in enumerate(columns):  # only a text of one line has the same middle in any font
@@ -207,7 +207,7 @@ def _beside(points: Sequence[Point]) -> Iterator[tuple[float, Point]]:
         yield 0.62 * ((place + 0.5) / len(points) - 0.5), point
 
 
-def _points(axes: Axes, columns: Sequence[Column], text: Callable[[float], str]) -> None:
+def _points(axes: Axes, columns: Sequence[ArmBar], text: Callable[[float], str]) -> None:
     for place, column in enumerate(columns):
         for offset, point in _beside(column.points):
             if not math.isfinite(point.value):

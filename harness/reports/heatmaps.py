@@ -78,7 +78,9 @@ def views(crossplay: pd.DataFrame, links: GameLinks = NO_LINKS) -> list[MatrixVi
     if len(seeds) > 1:
         shown.insert(0, (f"mean over {len(seeds)} seeds", _mean(crossplay)))
     return [
-        MatrixView(label=label, maps=[_map(quantity, rows, label, place, worst) for quantity in QUANTITIES])
+        MatrixView(
+            label=label, maps=[_map(quantity, rows, label=label, place=place, worst=worst) for quantity in QUANTITIES]
+        )
         for place, (label, rows) in enumerate(shown)
     ]
 
@@ -103,7 +105,12 @@ def _mean(crossplay: pd.DataFrame) -> pd.DataFrame:
 
 
 def _map(
-    quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int, worst: Mapping[tuple[str, int | None], str]
+    quantity: _Quantity,
+    crossplay: pd.DataFrame,
+    *,
+    label: str,
+    place: int,
+    worst: Mapping[tuple[str, int | None], str],
 ) -> HeatMap:
     """One heat map; `place` makes its ids unique. `worst` has the game that a cell of an arm and seed links to."""
     table = _by_persona(matrices(crossplay))
@@ -124,7 +131,7 @@ def _map(
     height_in = ROW_IN * len(table.egos) + 0.35 + LETTER_IN * longest[1] * 0.55
     with figure_of(width_in, height_in) as figure:
         axes = _axes(figure, table)
-        _draw_cells(axes, quantity, table, values, cells, worst)
+        _draw_cells(axes, quantity, table, values, cells=cells, worst=worst)
         for drawing in (*axes.texts, *axes.patches):
             drawing.set_in_layout(False)  # they are within the axes; to measure them again is slow
         name = f"heat-{quantity.name.replace('_', '-')}-{place}"
@@ -161,6 +168,7 @@ def _draw_cells(
     quantity: _Quantity,
     table: Matrices,
     values: Floats,
+    *,
     cells: Mapping[tuple[str, str], Mapping[str, Any]],
     worst: Mapping[tuple[str, int | None], str],
 ) -> None:

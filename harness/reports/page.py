@@ -57,7 +57,7 @@ def render_page(tables: RunTables, games: Iterable[GameTracks] = (), scene: Scen
     tables = tables.with_types()
     found = results(tables)
     listed = tables.episodes if len(tables.episodes) <= MOST_ROWS else tables.episodes[:0]
-    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), GAMES_BYTES, found.crowds)
+    embedded = Embedded(scene, games, marks_of(tables.manoeuvres), GAMES_BYTES, crowds=found.crowds)
     links = GameLinks(embedded=embedded.keys, episodes=tables.episodes)
     environment = environment_of("reports")
     page = environment.get_template("report.html.jinja").render(

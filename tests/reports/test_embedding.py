@@ -69,7 +69,7 @@ def test_document__names_the_persona_of_each_of_a_crowd(games):
     people = [replace(person, name=name) for name in ("non_ego", "non_ego_2")]
     game = replace(games[0], persona="rush", players=[ego, *people])
     for crowds, expected in ({"rush": ["speedy", "anna"]}, [None, "speedy", "anna"]), ({}, [None, None, None]):
-        embedded = Embedded(SCENE, [game], {}, 10_000_000, crowds)
+        embedded = Embedded(SCENE, [game], {}, 10_000_000, crowds=crowds)
         assert [player.get("persona") for player in read(embedded)["games"][0]["players"]] == expected
 
 
