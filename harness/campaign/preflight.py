@@ -13,20 +13,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.named_documents import NamedDocuments, find_named, read_named_persona, read_names
+from pydantic import ConfigDict
+
 from harness.campaign.plan.campaign_checks import check_names, check_people
 from harness.campaign.plan.persona_remarks import persona_remarks
 from harness.campaign.plan.plan import plan
 from harness.campaign.plan.strategy_stages import crossplay_name
 from harness.campaign.trained_policies import check_policies, find_policies
-from harness.config.campaign import LEARNED, SUMO, Campaign
+from harness.config.campaign import LEARNED, SUMO, Campaign, DocumentPath, Ego
 from harness.config.persona import Persona
-from harness.config.toml_reading import read_document
+from harness.config.toml_reading import Document, read_document
 from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO
-from harness.shipped_documents import PACKAGE
+from harness.shipped_documents import PACKAGE, Kind, find_document, is_name, missing_document
 from harness.traffic.load_check import check_loads
 from harness.traffic.scene import OpenScene, open_scene
 
@@ -34,6 +35,22 @@ QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536
 QUICK_TRIALS = 12
 QUICK_RESPONSE_STEPS = 131_072
+
+
+class _NamedByEgo(Document):
+    model_config = ConfigDict(extra="ignore")
+    driver: DocumentPath = LEARNED
+    persona: DocumentPath = Ego().persona
+
+
+class _Names(Document):
+    """The documents that a campaign names: they are checked even where the rest of it is wrong."""
+
+    model_config = ConfigDict(extra="ignore")
+    scene: DocumentPath
+    personas: list[DocumentPath]
+    policies: DocumentPath | None = None
+    ego: _NamedByEgo = _NamedByEgo()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,10 +105,17 @@ def open_campaign(
     """
     problems: list[Problem] = []
     document = collect(problems, lambda: read_document(file, Campaign))
-    named = document or read_names(file)
+    named = document or collect([], lambda: read_document(file, _Names))
     if named is None:
         raise UsageError(problems)
-    found = _find_documents(file, document, named, allow_code, policies_exist, problems)
+    found = _find_documents(
+        file,
+        document=document,
+        named=named,
+        allow_code=allow_code,
+        policies_exist=policies_exist,
+        problems=problems,
+    )
     if problems or document is None or found.scene is None:
         raise UsageError(problems)
     ego_persona, *personas = (persona for persona in found.personas if persona is not None)
@@ -102,8 +126,15 @@ def open_campaign(
     _check_stage_names(file, document, names, tunable)
     files, read = [file], None
     if found.policies is not None and policies_exist:
-        people = found.scene.world, allow_code
-        read = check_policies(file, document, ego_persona, personas, found.policies, *people)
+        read = check_policies(
+            file,
+            document=document,
+            ego_persona=ego_persona,
+            personas=personas,
+            folder=found.policies,
+            world=found.scene.world,
+            allow_code=allow_code,
+        )
         files += read.files
     files += found.files()
     quick = quick and (found.policies is None or tunable)
@@ -146,8 +177,9 @@ class _Documents:
 
 def _find_documents(
     file: Path,
+    *,
     document: Campaign | None,
-    named: Campaign | NamedDocuments,
+    named: Campaign | _Names,
     allow_code: bool,
     policies_exist: bool,
     problems: list[Problem],
@@ -155,16 +187,16 @@ def _find_documents(
     """Read and check what a campaign names; what is wrong is added to `problems`."""
     ego_driver = collect(problems, lambda: _find_ego(file, named.ego.driver, allow_code))
     vehicle_type = ego_driver.vehicle_type if ego_driver is not None else None
-    scene = collect(problems, lambda: open_scene(find_named(file, "scene", named.scene, "networks"), vehicle_type))
+    scene = collect(problems, lambda: open_scene(_find_named(file, "scene", named.scene, "networks"), vehicle_type))
     written = [("ego.persona", named.ego.persona), *(("personas", each) for each in named.personas)]
-    found = [collect(problems, lambda each=each: read_named_persona(file, *each)) for each in written]  # type: ignore[misc]
+    found = [collect(problems, lambda each=each: _read_persona(file, *each)) for each in written]  # type: ignore[misc]
     personas = [each[1] if each is not None else None for each in found]
     if ego_driver is not None and scene is not None:
         sampled = personas[0] is not None and personas[0].decisions == "sampled"
         games = _games_at_once(document, ego_driver)
         collect(problems, lambda: ego_driver.try_out(car_of(scene.world, EGO), sampled, games))
     collect(problems, lambda: _check_round_2(file, document, ego_driver))
-    other_egos = _find_other_egos(file, document, scene, allow_code, problems)
+    other_egos = _find_other_egos(file, document, scene, allow_code=allow_code, problems=problems)
     policies = collect(problems, lambda: find_policies(file, named.policies, policies_exist))
     problems += _same_names(file, named.personas, personas[1:])
     if not problems and scene is not None:
@@ -181,6 +213,20 @@ def _find_documents(
 
 def _is_tunable(driver: ExternalDriver | None) -> bool:
     return driver is not None and bool(driver.searched)
+
+
+def _find_named(file: Path, key: str, written: str, kind: Kind) -> Path:
+    """A document that a campaign names. Raises UsageError if a name is that of no document."""
+    found = find_document(written, file.parent, kind)
+    if is_name(written) and not os.path.exists(found):
+        raise UsageError.of(file, key, *missing_document(written, file.parent, kind))
+    return found
+
+
+def _read_persona(file: Path, key: str, written: str) -> tuple[Path, Persona]:
+    """The file of a persona that a campaign names, and the persona. Raises UsageError if it is missing or wrong."""
+    path = _find_named(file, key, written, "personas")
+    return path, read_document(path, Persona)
 
 
 def _relative(campaign_file: Path, path: Path) -> str:
@@ -253,7 +299,7 @@ def _find_ego(file: Path, driver: str, allow_code: bool) -> ExternalDriver | Non
 
 
 def _find_other_egos(
-    file: Path, document: Campaign | None, scene: OpenScene | None, allow_code: bool, problems: list[Problem]
+    file: Path, document: Campaign | None, scene: OpenScene | None, *, allow_code: bool, problems: list[Problem]
 ) -> dict[str, ExternalDriver]:
     """The external drivers of the cross-play, each found and tried; what is wrong is added to `problems`."""
     found: dict[str, ExternalDriver] = {}

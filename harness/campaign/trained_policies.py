@@ -50,6 +50,7 @@ def find_policies(file: Path, written: str | None, exist: bool = True) -> Path |
 
 def check_policies(
     file: Path,
+    *,
     document: Campaign,
     ego_persona: Persona,
     personas: Sequence[Persona],

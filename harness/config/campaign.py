@@ -8,7 +8,6 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from harness.config.acceptance import Acceptance
 from harness.config.scene import Name
 from harness.config.toml_reading import Document, Mistakes
 from harness.config.training import NaiveTraining, NonEgoTraining, Reconfiguration, Retraining, Training
@@ -19,6 +18,7 @@ TRAINING_TABLES = ("training", "naive_training", "non_ego_training", "retraining
 
 Seed = Annotated[int, Field(ge=0, lt=2**31)]
 CampaignName = Annotated[str, Field(min_length=1, max_length=40, pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
 DocumentPath = Annotated[str, Field(min_length=1, max_length=500, pattern=r"^[^\x00-\x1f]*$")]
 
 
@@ -75,7 +75,7 @@ class Rounds(Document):
     best-response gap that is distinguishable from 0. Left out: yes if there is a table [best_response]."""
 
 
-class BestResponse(Document):
+class BestResponseSearch(Document):
     """Best-response gap of each player of an arm: the gain from a change of its own strategy alone (equation 2). It is
     measured for the last arm of each persona's rounds, and for the arms named here."""
 
@@ -116,6 +116,48 @@ class Competence(Document):
     """Least share of its games alone in which a non-ego reaches its goal. 0: not asked of non-egos."""
 
 
+class Acceptance(Document):
+    """Bounds that the ego must keep for the campaign to pass. Each is judged for every persona and training seed, by
+    the unfavourable end of its 95 % interval, so that few games don't pass where many would fail. A bound that is left
+    out is not judged; one that can't be measured is not kept. `harness campaign` and `harness report` end with exit
+    code 3 if a bound is not kept."""
+
+    ego: Literal["last", "robust", "naive"] = "last"
+    """The ego that is judged. `last`: that of the last round against each persona; the naive ego, if no round changes
+    it. `robust`: the ego retrained against several personas. `naive`: the ego before round 2."""
+    failure_rate: Share | None = None
+    """Largest failure rate against a persona, in any arm of this ego against this persona."""
+    failure_rate_alone: Share | None = None
+    """Largest failure rate without the non-ego: what the ego could do before, it must not forget."""
+    preventable_failure_rate: Share | None = None
+    """Largest rate of failures against a persona that a reference driver prevents when it drives the game from its
+    start. Measured with assessment.reference_drivers."""
+    near_miss_rate: Share | None = None
+    """Largest share of games with a near miss against a persona: no contact, but closer than the bounds of the column
+    `near_miss` of episodes.csv."""
+    speed_loss_mps: Annotated[float, Field(ge=0.0, le=100.0)] | None = None
+    """Largest loss of average speed against a persona, compared with the naive ego in the same games."""
+    gap_share: Annotated[float, Field(ge=0.0, le=1000.0)] | None = None
+    """Largest best-response gap of the ego, as a share of its payoff. Measured with [best_response]."""
+
+    @property
+    def bounds(self) -> dict[str, float]:
+        """The bounds that are given, by their keys."""
+        values = self.model_dump(exclude={"ego"}, exclude_none=True)
+        return {name: float(value) for name, value in values.items()}
+
+    @property
+    def needs_gaps(self) -> bool:
+        """Whether a bound needs the table [best_response]."""
+        return self.gap_share is not None
+
+    @model_validator(mode="after")
+    def _bounds_something(self) -> Acceptance:
+        if not self.bounds:
+            raise ValueError("no bound is given: add one, such as failure_rate = 0.1, or leave out the table")
+        return self
+
+
 class Campaign(Document):
     """A campaign: one document, run by one command into one run folder."""
 
@@ -142,7 +184,7 @@ class Campaign(Document):
     crowd: list[Crowd] = Field([], max_length=50)
     """Mixed people of a scene with several. The ego meets a crowd like a persona, and is retrained against it."""
     rounds: Rounds = Rounds()
-    best_response: BestResponse | None = None
+    best_response: BestResponseSearch | None = None
     crossplay: CrossPlay | None = None
     competence: Competence = Competence()
     assessment: Assessment = Assessment()
@@ -202,8 +244,6 @@ class Campaign(Document):
         """The document as the manifest records it: every key with its value. Keys about training and tuning are left
         out where they have no effect."""
         unused: dict[str, Any] = {"reconfiguration": True} if self.ego.driver in (LEARNED, SUMO) else {}
-        unused |= {} if self.crowd else {"crowd": True}
-        unused |= {} if self.acceptance else {"acceptance": True}
         if self.policies is None:
             return self.model_dump(mode="json", exclude=unused)
         unused["naive_training"] = True

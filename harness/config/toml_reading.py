@@ -1,4 +1,5 @@
-"""Reading a TOML document into a pydantic model. All mistakes in it are reported together, each as a `Problem`."""
+"""Documents: pydantic models that are read from TOML files. All mistakes in a file are reported together, each as a
+`Problem`."""
 
 from __future__ import annotations
 
@@ -10,10 +11,11 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
+import tomli_w
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 from typing_extensions import Self
 
-from harness.errors import Problem, UsageError
+from harness.errors import Problem, UsageError, plain
 from harness.files import content_of
 
 if sys.version_info >= (3, 11):
@@ -42,6 +44,11 @@ class Document(BaseModel):
     def record(self) -> dict[str, Any]:
         """The document as JSON values, every key with its value: what a run folder records, and what is hashed."""
         return self.model_dump(mode="json")
+
+    def toml(self, *comments: str) -> str:
+        """The document as TOML text that reads back as an equal document, below the comments, one line each."""
+        lines = [f"# {plain(' '.join(comment.split()))}\n" for comment in comments]
+        return "".join(lines) + tomli_w.dumps(self.model_dump(exclude_none=True))
 
 
 def _ordered(interval: tuple[float, float]) -> tuple[float, float]:

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 from harness.config.driver import DriverDocument, Process, Python, read_driver
 from harness.config.toml_reading import tomllib
-from harness.config.toml_writing import toml_of
 from harness.config.tunable import Adjustable, Tunable
 from harness.errors import UsageError
 from tests.support.external_drivers import document, find
@@ -141,7 +140,7 @@ def test_document_in__names_the_same_files_from_another_folder(tmp_path: Path) -
     (tmp_path / "egos" / "mine.toml").write_text('kind = "process"\ncommand = ["perl", "drive.pl"]\n')
     here, there = find("egos/mine.toml", tmp_path), tmp_path / "run" / "policies"
     there.mkdir(parents=True)
-    (there / "driver.toml").write_text(toml_of(here.document_in(there)))
+    (there / "driver.toml").write_text(here.document_in(there).toml())
     moved = find("run/policies/driver.toml", tmp_path)
     assert moved.files == here.files
     assert moved.identity == here.identity
@@ -170,7 +169,7 @@ ANY: Any = st.recursive(
 @given(parameters=st.dictionaries(TEXT, ANY, max_size=4), comment=TEXT)
 def test_toml__reads_back_as_an_equal_document(parameters: dict[str, Any], comment: str) -> None:
     written = Python(kind="python", entry_point="steady", parameters=parameters)
-    text = toml_of(written, [comment])
+    text = written.toml(comment)
     assert tomllib.loads(text).get("parameters", {}) == parameters
     assert text.startswith("# ")
 
@@ -178,4 +177,4 @@ def test_toml__reads_back_as_an_equal_document(parameters: dict[str, Any], comme
 @pytest.mark.parametrize("name", ["adas", "rss", "fuzzy", "careful_and_competent"])
 def test_toml__of_every_shipped_ego_reads_back(name: str, tmp_path: Path) -> None:
     shipped: DriverDocument = read_driver(REPOSITORY / "egos" / f"{name}.toml")
-    assert read_driver(tmp_path / document(tmp_path, toml_of(shipped))) == shipped
+    assert read_driver(tmp_path / document(tmp_path, shipped.toml())) == shipped

@@ -23,7 +23,6 @@ from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.pinned_game import FORMAT, PinnedGame, PinnedPerson, PinnedStart
-from harness.config.toml_writing import toml_of
 from harness.drivers.policy_file import policy_files
 from harness.environments.rollout import parts_of
 from harness.environments.start_trials import StartTrials
@@ -126,7 +125,7 @@ class PinnedGames:
         starts = {"drawn_start": drawn, "start": failing, "no_failure_from": passing}
         pinned = self._document(failure, (ego, *people), str(last.record["ego_outcome"]), starts)
         file = self._out / f"{failure.arm}-seed{failure.seed}-{failure.episode:04d}.toml"
-        write_atomically(file, toml_of(pinned, [_COMMENT]).encode())
+        write_atomically(file, pinned.toml(_COMMENT).encode())
         return Pinned(file=file, game=pinned, games=games)
 
     def _failed(self) -> pd.DataFrame:
@@ -183,7 +182,7 @@ class PinnedGames:
     def _copied_persona(self, persona: Persona) -> str:
         written = f"personas/{persona.name}.toml"
         make_folder(self._out / "personas")
-        write_atomically(self._out / written, toml_of(persona).encode())
+        write_atomically(self._out / written, persona.toml().encode())
         return written
 
     def _person(self, seated: SeatedDriver) -> PinnedPerson:

@@ -11,7 +11,6 @@ import pandas as pd
 from harness.campaign.execution.player_factory import DRIVER, PlayerFactory
 from harness.campaign.execution.stage_run import Made, StageInputs, versions_since
 from harness.campaign.plan.stages import SearchStage
-from harness.config.toml_writing import toml_of
 from harness.config.tunable import Tunable
 from harness.errors import StageFailed
 from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed, write_csv
@@ -63,7 +62,7 @@ def _write_driver(stage: SearchStage, spec: SearchSpec, trials: Sequence[Trial],
     ]
     driver = spec.driver.tuned(found.values) if chosen else spec.driver
     make_folder(folder)
-    write_atomically(folder / DRIVER, toml_of(driver.document_in(folder), comments).encode())
+    write_atomically(folder / DRIVER, driver.document_in(folder).toml(*comments).encode())
 
 
 def _write_table(trials: Sequence[Trial], searched: Sequence[Tunable], labels: Mapping[str, Any], file: Path) -> None:
