@@ -27,7 +27,7 @@ from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene, open_scene
 from harness.training.paired_rollouts import PairedRollouts
 from harness.training.parameter_search import SearchSpec, Trial, best, propose, read_trials, run_search, write_trials
-from tests.support.external_drivers import document, find, fmu_example, install
+from tests.support.external_drivers import document, find, fmu_example
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import CAREFUL, SPEEDY
 
@@ -326,13 +326,6 @@ def check_speed_is_found(scene: OpenScene, folder: Path, text: str) -> None:
     assert speeds[0] == 5.0
     assert len(set(payoffs)) == 6
     assert np.corrcoef(speeds, payoffs)[0, 1] > 0.8  # the driver uses the proposed values
-
-
-def test_search__of_an_installed_package(scene: OpenScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    install(tmp_path / "site")
-    monkeypatch.syspath_prepend(tmp_path / "site")
-    monkeypatch.delitem(sys.modules, "steady", raising=False)
-    check_speed_is_found(scene, tmp_path, 'kind = "python"\nentry_point = "steady"\n')
 
 
 def test_search__of_a_program(scene: OpenScene, tmp_path: Path) -> None:

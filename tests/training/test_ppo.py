@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -329,14 +328,6 @@ def test_train__closes_the_simulation(alone: TrainingSpec, tmp_path: Path, monke
     with pytest.raises(KeyboardInterrupt):
         in_one_go(alone, tmp_path, on_progress=stop_after(0))
     assert len(closed) == 1
-
-
-def test_checkpoint__is_a_safetensors_file(alone: TrainingSpec, tmp_path: Path) -> None:
-    in_one_go(replace(alone, settings=settings(steps=1024)), tmp_path)
-    content = (tmp_path / "checkpoint.safetensors").read_bytes()
-    header = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])  # safetensors: a JSON header, numbers
-    assert header["__metadata__"]["key"] == "key"
-    assert any(name.startswith("optimizer/") for name in header)
 
 
 def test_train__a_flat_curve_of_failures_is_not_convergence(

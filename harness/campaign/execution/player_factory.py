@@ -32,8 +32,7 @@ from harness.config.driver import read_driver
 from harness.config.tunable import Adjustable
 from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver
-from harness.drivers.mixture import Member
-from harness.drivers.mixture import Mixture as DriverMixture
+from harness.drivers.mixture import Member, Mixture
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.protocol import Driver
@@ -69,15 +68,15 @@ class PlayerFactory:
         drivers = (self.ego(stage.ego), *self.people(stage.non_ego))
         return Arm(name=stage.name, scene=self.scene, drivers=drivers, seed=stage.seed)
 
-    def ego(self, side: Side) -> DriverMixture | None:
+    def ego(self, side: Side) -> Mixture | None:
         """The ego's drivers."""
         return self.player(driver_in(side, 0))
 
-    def people(self, side: Side) -> tuple[DriverMixture | None, ...]:
+    def people(self, side: Side) -> tuple[Mixture | None, ...]:
         """The drivers in each place of the non-egos, each made anew."""
         return tuple(self.player(driver_in(side, place)) for place in range(len(self.scene.world.roles) - 1))
 
-    def player(self, planned: PlannedDriver | None) -> DriverMixture | None:
+    def player(self, planned: PlannedDriver | None) -> Mixture | None:
         """The player of a planned driver; None for none."""
         match planned:
             case None:
@@ -123,8 +122,8 @@ class PlayerFactory:
             case TrainedBefore(stage=stage):
                 return self.context.policy_before(stage)
 
-    def _mixture(self, members: tuple[PlannedMember, ...], shares: tuple[float, ...]) -> DriverMixture:
-        return DriverMixture(
+    def _mixture(self, members: tuple[PlannedMember, ...], shares: tuple[float, ...]) -> Mixture:
+        return Mixture(
             tuple(
                 Member(driver=self.driver(each), persona=self.context.persona(persona_of(each)), share=share)
                 for each, share in zip(members, shares, strict=True)
