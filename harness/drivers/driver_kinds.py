@@ -44,7 +44,7 @@ def driver_in_words(document: DriverDocument | None, written: str, package: Mapp
 
 
 def make_driver(
-    document: DriverDocument | None, place: Path, command: Sequence[str], car: Car, sampled: bool
+    document: DriverDocument | None, place: Path, *, command: Sequence[str], car: Car, sampled: bool
 ) -> Driver:
     """Make a driver for a car. `place` is the folder that paths are relative to, or a policy's folder; `command` is a
     program's. Raises as `ExternalDriver.make` does."""

@@ -108,7 +108,7 @@ def proactive(gap_m: FloatArray, own_mps: FloatArray, other_mps: FloatArray, law
 
 
 def critical(
-    gap_m: FloatArray, own_mps: FloatArray, own_mps2: FloatArray, other_mps: FloatArray, law: FuzzySafety
+    gap_m: FloatArray, *, own_mps: FloatArray, own_mps2: FloatArray, other_mps: FloatArray, law: FuzzySafety
 ) -> FloatArray:
     """[...] CFS (critical fuzzy surrogate safety metric) in 0..1 (ibid.): 0 if comfortable braking avoids a leader
     that keeps its speed, 1 if the hardest braking does not.

@@ -164,7 +164,7 @@ class ExternalDriver:
         changed = [file for file, known in self.files.items() if sha256_of(Path(file)) != known]
         if changed:
             raise DriverError(f"changed since the campaign was checked: {', '.join(changed)}")
-        return make_driver(self.document, self.place, self.command, car, sampled)
+        return make_driver(self.document, self.place, command=self.command, car=car, sampled=sampled)
 
     def try_out(self, car: Car, sampled: bool, games: int = 1) -> None:
         """Make the driver, reset this number of games and decide once in each. Raises UsageError if that fails."""

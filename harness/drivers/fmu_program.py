@@ -143,7 +143,12 @@ def main() -> None:
 
 
 def _answer(
-    message: Mapping[str, Any], spec: Mapping[str, Any], description: Any, folder: str, instances: dict[int, _Instance]
+    message: Mapping[str, Any],
+    spec: Mapping[str, Any],
+    *,
+    description: Any,
+    folder: str,
+    instances: dict[int, _Instance],
 ) -> dict[str, Any]:
     if message["type"] == "hello":
         return {"protocol": PROTOCOL}

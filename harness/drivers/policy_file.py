@@ -168,7 +168,7 @@ def _check_names(names: Iterable[str]) -> None:
         raise ValueError(f"there are no parameters {missing[0]!r}")
 
 
-def check_no_archive(file: Path, key: str, written: str, path: Path, remedy: str = "") -> None:
+def check_no_archive(file: Path, key: str, written: str, path: Path, *, remedy: str = "") -> None:
     """Raise UsageError if `path`, written as `written` under `key` in `file`, is a file and not a policy's folder.
 
     The archive of a training library is never opened, because pickles in it are programs. `remedy` is added to the

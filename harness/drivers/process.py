@@ -57,6 +57,7 @@ class ProcessDriver:
         command: Sequence[str],
         folder: Path,
         car: Car,
+        *,
         units: str,
         deadline_s: float,
         start_deadline_s: float,

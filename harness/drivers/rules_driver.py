@@ -8,17 +8,83 @@ continues the request of the step before, because the foot is still on its way t
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
-from harness.config.rule_driver import ReferenceReaction, Rules
+from harness.config.rule_driver import LaneKeeping, ReferenceReaction, Rules
 from harness.drivers import emergency_braking
 from harness.drivers.adaptive_cruise import cruise_mps2
 from harness.drivers.car import Car
-from harness.drivers.lane_keeping import steering_rad
 from harness.drivers.perception import Encounters, OwnMotion, perceive
-from harness.drivers.reaction import BrakeReaction, ReactionState, react
 from harness.game.arrays import BoolArray, FloatArray, IntArray
+
+CALM_S = 1.0
+"""After this time without danger, the next danger needs the full reaction time again."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BrakeReaction:
+    """Parameters of a driver's reaction to danger."""
+
+    reaction_s: float
+    jerk_mps3: float
+    coasting_mps2: float = 0.0
+    """Deceleration of the car while its driver reacts."""
+
+
+class ReactionState(NamedTuple):
+    """State of the reaction in each game, [N] each."""
+
+    reacted_s: FloatArray
+    """Time spent reacting."""
+    calm_s: FloatArray
+    """Time without danger."""
+    braking_mps2: FloatArray
+    """Braking built up so far."""
+
+
+def react(
+    state: ReactionState, *, danger: BoolArray, demand_mps2: FloatArray, parameters: BrakeReaction, step_s: float
+) -> tuple[ReactionState, BoolArray, FloatArray]:
+    """One step of N games: the new state, the games [N] in which the driver still reacts, and the braking [N], 0 in
+    games without danger."""
+    reacted, calm, braking = state
+    reacting = danger & (reacted < parameters.reaction_s - 1e-9)
+    acting = danger & ~reacting
+    braking = np.where(acting, np.minimum(braking + parameters.jerk_mps3 * step_s, demand_mps2), braking)
+    braking = np.where(reacting, np.maximum(braking, parameters.coasting_mps2), braking)
+    reacted = np.where(reacting, reacted + step_s, reacted)
+    calm = np.where(danger, 0.0, calm + step_s)
+    over = calm >= CALM_S - 1e-9
+    updated = ReactionState(np.where(over, 0.0, reacted), calm, np.where(over, 0.0, braking))
+    return updated, reacting, np.where(danger, braking, 0.0)
+
+
+def steering_rad(motion: OwnMotion, *, law: LaneKeeping, wheelbase_m: float, step_s: float) -> FloatArray:
+    """Steering angle to request (Stanley's law: Hoffmann et al. 2007, Autonomous Automobile Trajectory Tracking,
+    with feedforward of the path's curvature, as the observation gives it):
+
+        steering = atan(wheelbase curvature) + heading_gain turned + atan(offset_gain left / (v + softening))
+
+    where `turned` is the direction of the path relative to that in which the middle of the car moves when it follows
+    the path, and `left` is the distance of the path to the left of the front axle. In a bend a car on its path points
+    outwards by the steady-state yaw of that paper, atan(tan(steering) / 2): without this term it would cut the bend.
+    The angle and its rate are limited so that lateral acceleration and lateral jerk stay within UN R79.
+    """
+    steady_yaw = np.arctan(0.5 * np.tan(motion.road_steering_rad))
+    turned, speed = motion.path_turned_rad[:, 0] - steady_yaw, motion.speed_mps
+    left = motion.path_left_m + 0.5 * wheelbase_m * np.sin(turned)
+    wanted = (
+        motion.road_steering_rad
+        + law.heading_gain * turned
+        + np.arctan(law.offset_gain_per_s * left / (speed + law.softening_mps))
+    )
+    speed2 = np.maximum(speed, 0.5) ** 2
+    largest = np.arctan(wheelbase_m * law.max_lateral_mps2 / speed2)
+    rate = wheelbase_m * law.max_lateral_jerk_mps3 * step_s / speed2
+    wanted = np.clip(wanted, -largest, largest)
+    return np.clip(wanted, motion.steering_rad - rate, motion.steering_rad + rate)
 
 
 @dataclass(kw_only=True)

@@ -90,7 +90,7 @@ def actions(
     return np.clip(np.stack((acceleration_mps2 / strongest, wheel), axis=-1), -1.0, 1.0)
 
 
-class Motion(NamedTuple):
+class _Motion(NamedTuple):
     """The columns of `State` that motion changes, and the friction of the games."""
 
     x_m: FloatArray
@@ -110,8 +110,8 @@ class Requested(NamedTuple):
     moving: BoolArray
 
 
-motion_of = attrgetter(*Motion._fields)
-"""The columns of `Motion` of a state."""
+motion_of = attrgetter(*_Motion._fields)
+"""The columns of a state that motion changes, and the friction."""
 
 
 def move(state: State, requested: Requested, actuators: ActuatorLimits, step_s: float) -> None:
@@ -168,7 +168,7 @@ def lateral_acceleration_mps2(state: State, actuators: ActuatorLimits) -> FloatA
 
 @compiled
 def _lateral_acceleration_mps2(columns: tuple[Any, ...], limits: tuple[Any, ...]) -> FloatArray:
-    motion, actuators = Motion(*columns), ActuatorLimits(*limits)
+    motion, actuators = _Motion(*columns), ActuatorLimits(*limits)
     lateral = np.empty(motion.speed_mps.shape)
     for g, p in np.ndindex(lateral.shape):
         curvature = curvature_per_m(motion.steering_rad[g, p], actuators.wheelbase_m[p])

@@ -30,9 +30,8 @@ from harness.game.human_factors import (
 )
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
-from harness.game.route_starts import draw_along_route
 from harness.game.seeding import between, generator_of, seed_of
-from harness.game.start_range import StartRange
+from harness.game.start_range import StartRange, draw_along_route
 
 _UNLIMITED = (Reaction(), Sight(), ActuatorShares())
 
@@ -147,12 +146,12 @@ def draw_initial_state(start_distribution: StartDistribution, *parts: str | int)
     if start_distribution.along_route_share and not (start_distribution.meet_in_place and sum(present) > 1):
         along = draw_along_route(
             start_distribution.routes,
-            start_distribution.length_m,
-            start_distribution.max_speed_mps,
-            np.array(present),
-            start_distribution.along_route_share,
             generator_of(*parts, "along route"),
-            start_distribution.obstacles.boxes(*parts),
+            length_m=start_distribution.length_m,
+            max_speed_mps=start_distribution.max_speed_mps,
+            present=np.array(present),
+            share=start_distribution.along_route_share,
+            obstacles=start_distribution.obstacles.boxes(*parts),
         )
         if along is not None:
             x, y, heading, speeds, stations = along

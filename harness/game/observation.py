@@ -7,10 +7,8 @@ An error of estimated distances scales the distance of other bodies in their tru
 adds a radial velocity to theirs (`game.human_factors`).
 
 The free width at a distance ahead ends at the nearest surface on either side, rail or vehicle (paper, section 4.3.2:
-the ego "seeks to maintain a large distance between itself and nearby objects").
-
-The other bodies are those that the player may meet first: by the time to the conflict of the two ways, or by their
-distance.
+the ego "seeks to maintain a large distance between itself and nearby objects"). The other bodies are those that the
+player may meet first: by the time to the conflict of the two ways, or by their distance.
 """
 
 from __future__ import annotations
@@ -24,17 +22,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled, inlined
 from harness.game.junctions import Control, Signal, StopLines
 from harness.game.meetings import Meetings
-from harness.game.observation_layout import (
-    BEHIND,
-    COMPRESSED,
-    ENTRIES,
-    FIRST_OTHER,
-    OTHER,
-    OTHERS,
-    OWN,
-    SCALE,
-    SIZE,
-)
+from harness.game.observation_layout import BEHIND, COMPRESSED, ENTRIES, FIRST_OTHER, OTHER, OTHERS, OWN, SCALE, SIZE
 from harness.game.quantities import Quantities
 from harness.game.road import AHEAD_M, Along, Routes
 from harness.game.route_coordinates import OnRoute, half_extents_m, on_route, point_along_route, row_ahead
@@ -169,7 +157,8 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
                     if gap_m < leader_m:
                         leader_m, leader_mps = gap_m, relative_mps
             if leader_m < np.inf:  # else zeros: a learner that is always alone must not learn from its absence
-                _see_leader(view, leader_m, leader_mps)
+                view[OWN.leader_seen], view[OWN.leader_mps] = 1.0, leader_mps
+                view[OWN.leader_gap_m] = max(leader_m, 0.0)
             last, last_s = -1, -1.0  # the body of the previous entry
             for k in range(OTHERS):  # the most urgent first; missing bodies stay zeros
                 b = _next_urgent(seen, urgency_s, last, last_s)
@@ -253,10 +242,9 @@ def _see_own_motion(view: FloatArray, eye: _Eye, along: Along) -> None:
 @inlined
 def _see_own_side(view: FloatArray, eye: _Eye, routes: Routes) -> None:
     """Write the entries of the path and of the own side of the road beside the player."""
-    row, offset_m = eye.place.row, eye.place.offset_m
-    view[OWN.own_side_left_m] = routes.own_left_m[row] - offset_m
-    view[OWN.own_side_right_m] = routes.own_right_m[row] - offset_m
-    view[OWN.path_left_m] = -offset_m
+    view[OWN.own_side_left_m] = routes.own_left_m[eye.place.row] - eye.place.offset_m
+    view[OWN.own_side_right_m] = routes.own_right_m[eye.place.row] - eye.place.offset_m
+    view[OWN.path_left_m] = -eye.place.offset_m
 
 
 @inlined
@@ -306,9 +294,8 @@ def _look(eye: _Eye, body: _Body) -> tuple[bool, float]:
 def _see_on_path(view: FloatArray, eye: _Eye, body: _Body, routes: Routes) -> tuple[float, float]:
     """Reduce the free widths by a body. If it is ahead in the player's way: the gap to it and its relative speed, else
     an infinite gap."""
-    error = eye.distance_error
-    seen_x_m, seen_y_m = body.x_m + error * (body.x_m - eye.x_m), body.y_m + error * (body.y_m - eye.y_m)
-    along, beside, frame = point_along_route(eye.place, routes, seen_x_m, seen_y_m)
+    dx, dy, error = body.x_m - eye.x_m, body.y_m - eye.y_m, eye.distance_error
+    along, beside, frame = point_along_route(eye.place, routes, body.x_m + error * dx, body.y_m + error * dy)
     extent = 0.5 * (body.length_m + body.width_m)  # at least the half extents, which take longer to compute
     if along + extent <= _EDGES[0] or along - extent >= _EDGES[-1]:
         return np.inf, 0.0
@@ -331,12 +318,6 @@ def _narrow(view: FloatArray, ends_m: tuple[float, float], left_m: float, half_w
                 view[OWN.free_left_m + k] = min(view[OWN.free_left_m + k], left_m - half_width_m)
             else:
                 view[OWN.free_right_m + k] = max(view[OWN.free_right_m + k], left_m + half_width_m)
-
-
-@compiled
-def _see_leader(view: FloatArray, gap_m: float, relative_mps: float) -> None:
-    """Write the entries of the leader."""
-    view[OWN.leader_seen], view[OWN.leader_gap_m], view[OWN.leader_mps] = 1.0, max(gap_m, 0.0), relative_mps
 
 
 @compiled

@@ -117,11 +117,6 @@ class Quantities:
         return self.rules.passed_red_s
 
     @property
-    def passed_stop_sign_mps(self) -> FloatArray:
-        """Speed at which the player passed a stop sign in this step; else -1."""
-        return self.rules.passed_stop_sign_mps
-
-    @property
     def permitted_mps(self) -> FloatArray:
         """Speed that the limits, signals, signs and right of way permit."""
         return self.rules.permitted_mps
@@ -234,14 +229,6 @@ class Quantities:
     def clearance_m(self) -> FloatArray:
         """Distance to the nearest surface, vehicle or rail."""
         return np.minimum(self.vehicle_clearance_m, self.rail_clearance_m)
-
-    @cached_property
-    def touches_vehicle(self) -> BoolArray:
-        return self.vehicle_clearance_m <= 0.0
-
-    @cached_property
-    def touches_rail(self) -> BoolArray:
-        return self.rail_clearance_m <= 0.0
 
     @cached_property
     def time_to_collision_s(self) -> FloatArray:

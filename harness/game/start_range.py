@@ -1,4 +1,9 @@
-"""Where a player starts: a range along a lane or a route, or a time of arrival relative to the ego's."""
+"""Where players start: a range along a lane or a route, or a time of arrival relative to the ego's; in training also
+anywhere along their routes.
+
+A scene's starts are a few seconds from its conflict, and a learner that fails early sees little of the rest of its
+route. With starts along the whole route, every part of it is practised from the first game on.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +14,16 @@ from math import atan2, hypot
 
 import numpy as np
 
-from harness.game.arrays import FloatArray
+from harness.game.arrays import BoolArray, FloatArray
+from harness.game.geometry import Box, box_distance
+from harness.game.road import Routes
 from harness.game.seeding import between
+
+_BEFORE_GOAL_M = 10.0
+_APART_M = 6.0  # between the bumpers of two players, in any direction
+_CLEAR_WIDTH_M = 2.6  # of the way, `_APART_M` before and behind a car, that is free of obstacles
+_ATTEMPTS = 20
+_OFFSET_SD_M, _TURNED_SD_RAD = 0.2, 0.03  # from the centre of the lane, and from its direction
 
 
 @dataclass(frozen=True)
@@ -71,3 +84,71 @@ class StartRange:
         """The points of the line, and the distance of each along the line."""
         lengths = np.hypot(*np.diff(self.line, axis=0).T)
         return self.line.tolist(), [0.0, *np.cumsum(lengths).tolist()]
+
+
+def draw_along_route(
+    routes: Routes,
+    generator: np.random.Generator,
+    *,
+    length_m: FloatArray,
+    max_speed_mps: FloatArray,
+    present: BoolArray,
+    share: float,
+    obstacles: Box | None = None,
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """x_m, y_m, heading_rad, speed_mps and station_m [P] of the centres of players of `length_m` [P].
+
+    None in 1 - `share` of the games, and if `_ATTEMPTS` draws have no place for all that are `present` [P], apart from
+    one another and from the `obstacles` [O]. A lane and a station are drawn uniformly, the speed uniformly from 0 to
+    the speed limit, or to the player's `max_speed_mps` [P] if that is less.
+    """
+    if generator.random() >= share:
+        return None
+    for _ in range(_ATTEMPTS):
+        drawn = [_draw(routes, each, (length_m[each], max_speed_mps[each]), generator) for each in range(len(length_m))]
+        starts = np.array(drawn).T
+        if _apart(starts[0], starts[1], length_m, present) and _clear(starts, length_m, present, obstacles):
+            x_m, y_m, heading_rad, speed_mps, station_m = starts
+            return x_m, y_m, heading_rad, speed_mps, station_m
+    return None
+
+
+def _draw(
+    routes: Routes, player: int, car: tuple[float, float], generator: np.random.Generator
+) -> tuple[float, float, float, float, float]:
+    """A start of a player whose car has a length and a top speed."""
+    length_m, max_speed_mps = car
+    last_m = max(routes.goal_m[player] - _BEFORE_GOAL_M, 0.5 * length_m)
+    station_m = generator.uniform(0.5 * length_m, last_m)
+    row = int(routes.rows(np.full((1, len(routes.goal_m)), station_m))[0, player])
+    lanes_m = routes.lane_offset_m[row]
+    lanes_m = lanes_m[np.isfinite(lanes_m)]
+    lane_m = float(generator.choice(lanes_m)) if len(lanes_m) else 0.0
+    offset_m = lane_m + generator.normal(0.0, _OFFSET_SD_M)
+    heading_rad = routes.heading_rad[row]
+    x_m = routes.x_m[row] - offset_m * np.sin(heading_rad)
+    y_m = routes.y_m[row] + offset_m * np.cos(heading_rad)
+    turned_rad = generator.normal(0.0, _TURNED_SD_RAD)
+    speed_mps = generator.uniform(0.0, min(routes.speed_limit_mps[row], max_speed_mps))
+    return x_m, y_m, heading_rad + turned_rad, speed_mps, station_m
+
+
+def _apart(x_m: FloatArray, y_m: FloatArray, length_m: FloatArray, present: BoolArray) -> bool:
+    """Whether all players that are present are at least `_APART_M` from one another."""
+    for one in range(len(x_m)):
+        for other in range(one):
+            least_m = 0.5 * (length_m[one] + length_m[other]) + _APART_M
+            if present[one] and present[other] and np.hypot(x_m[one] - x_m[other], y_m[one] - y_m[other]) < least_m:
+                return False
+    return True
+
+
+def _clear(starts: FloatArray, length_m: FloatArray, present: BoolArray, obstacles: Box | None) -> bool:
+    """Whether no obstacle stands on the way just before, beside or behind a player that is present."""
+    boxes = [] if obstacles is None else [Box(*each) for each in np.array(obstacles).T.tolist()]
+    for player in np.flatnonzero(present).tolist():
+        x_m, y_m, heading_rad = starts[:3, player].tolist()
+        way = Box(x_m, y_m, heading_rad, float(length_m[player]) + 2.0 * _APART_M, _CLEAR_WIDTH_M)
+        if any(box_distance(way, box) <= 0.0 for box in boxes):
+            return False
+    return True

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from harness.cli import messages
-from harness.config.campaign import LEARNED
 from harness.drivers.car import Car, car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import UsageError
@@ -83,13 +82,6 @@ def test_installed__identity_has_the_weights_in_the_package(site: Path, tmp_path
     identities.append(find("steady", tmp_path).identity)
     assert identities[0] == identities[1]
     assert identities[1] != identities[2]
-
-
-def test_installed__an_unknown_name_gets_the_nearest_as_remedy(site: Path, tmp_path: Path) -> None:
-    for written, remedy in (("staedy", "'steady'"), ("lerned", f"'{LEARNED}'")):
-        with pytest.raises(UsageError) as caught:
-            find(written, tmp_path)
-        assert f"there is no driver {written!r} (did you mean {remedy}?" in str(caught.value)
 
 
 def test_installed__two_packages_of_one_name_are_refused(site: Path, tmp_path: Path) -> None:

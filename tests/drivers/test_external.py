@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import html
 import json
-import os
 import re
 import shutil
 from pathlib import Path
@@ -22,7 +21,6 @@ from harness.config.toml_reading import tomllib
 from harness.drivers.external import ALLOW_CODE
 from harness.drivers.policy_file import write_policy
 from harness.errors import UsageError
-from harness.game.observation_layout import LAYOUT
 from tests.support.external_drivers import document, find, install, problems
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY
@@ -172,22 +170,10 @@ def test_open_campaign__makes_a_test_decision_before_anything_runs(tmp_path: Pat
     assert "no road today" in message
 
 
-def test_open_campaign__reports_the_egos_problems_with_all_others(tmp_path: Path) -> None:
-    driver = document(tmp_path, 'kind = "proces"')
-    found = problems(write_campaign(tmp_path, ego=ego(driver), personas=["nobody.toml"], assessment={"episodes": 1}))
-    assert len(found) == 3
-
-
 def test_open_campaign__an_unknown_vehicle_type_is_an_error(tmp_path: Path) -> None:
     driver = document(tmp_path, 'kind = "sumo"\nvehicle_type = "ego_cra"')
     (message,) = problems(write_campaign(tmp_path, ego=ego(driver)))
     assert "merge.rou.xml: vType: has no vehicle type 'ego_cra' for the ego (did you mean 'ego_car'?)" in message
-
-
-def test_open_campaign__hashes_the_files_of_the_driver(tmp_path: Path) -> None:
-    opened = open_campaign(write_campaign(tmp_path, ego=ego(PERL / "perl.toml")), allow_code=True)
-    assert opened.ego_driver is not None
-    assert opened.hashes[os.path.relpath(PERL / "drive.pl", tmp_path)]
 
 
 def keys(folder: Path, driver: object) -> dict[str, str]:
@@ -324,9 +310,3 @@ def test_page__has_a_valid_document_of_each_kind() -> None:
     blocks = [block for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "kind =" in block]
     kinds = {KINDS[table["kind"]].model_validate(table).kind for table in map(tomllib.loads, blocks)}  # type: ignore[attr-defined]
     assert kinds == set(KINDS) - {"rules"}
-
-
-def test_page__names_every_entry_of_the_observation() -> None:
-    page = (REPOSITORY / "docs" / "egos.md").read_text()
-    for name in LAYOUT:
-        assert re.sub(r"@.*", "", re.sub(r"other\d", "other0", name)) in page, name

@@ -170,19 +170,6 @@ def test_fmu__a_variable_that_is_missing_or_does_not_fit_is_an_error(
     assert message in problems(document(**keys), changed(tmp_path, (old, new)))
 
 
-def test_fmu__all_missing_variables_are_reported_at_once(tmp_path: Path) -> None:
-    file = changed(tmp_path, ('name="steering_rad"', 'name="delta"'), ('name="path_left_m"', 'name="path_lft_m"'))
-    found = problems(document(start={"gap": 1.0}), file)
-    assert all(name in found for name in ("steering_rad:", "path_lft_m:", "gap:"))
-
-
-def test_fmu__many_problems_fit_a_screen(tmp_path: Path) -> None:
-    found = problems(document(start={f"gap{k}": 1.0 for k in range(50)}), changed(tmp_path))
-    assert len(found.splitlines()) == 11
-    assert "40 more problems" in found
-    assert max(map(len, found.splitlines())) < 400
-
-
 def test_fmu__an_input_without_an_entry_keeps_its_start_value(tmp_path: Path) -> None:
     file = changed(tmp_path, ('name="path_left_m"', 'name="y_lane"'))
     assert unconnected_inputs(document(), file) == "inputs of the FMU that keep their start values: y_lane"

@@ -150,13 +150,3 @@ def test_games__a_driver_by_rules_stops_at_red_and_goes_at_green(
     stopped = slowest < 0.5
     assert 3 <= stopped.sum() <= 10, "in some games it is red when it arrives, in some it is not"
     assert (slowest > 9.0).sum() >= 3, "it does not slow down for a green light"
-
-
-def test_games__it_waits_within_3_m_before_the_line(played: dict[str, FloatArray], lights: OpenScene) -> None:
-    lines = lights.world.right_of_way.stop_lines
-    line_m = float(lines.station_m[lines.player == EGO][0])
-    standing = played["speed_mps"] < 0.1
-    assert standing.any()
-    before_m = line_m - played["front_m"][standing]
-    assert before_m.min() > 0.0
-    assert before_m.max() < 3.0

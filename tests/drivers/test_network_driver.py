@@ -21,7 +21,6 @@ from harness.drivers.network_driver import NetworkDriver
 from harness.drivers.network_export import export_network
 from harness.drivers.policy_file import write_policy
 from harness.drivers.sb3_policy import Sb3Driver
-from harness.environments.rollout import Arm, assess
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
@@ -29,7 +28,6 @@ from harness.traffic.scene import OpenScene
 from tests.support.external_drivers import document, find
 from tests.support.policies import some_policy
 from tests.support.random_observations import Recorded
-from tests.support.rollouts import arm
 
 torch.set_num_threads(1)
 GAMES = np.arange(5)
@@ -123,12 +121,6 @@ def test_onnx__is_data_and_torchscript_is_code(tmp_path: Path) -> None:
     name = document(tmp_path, 'kind = "torchscript"\nfile = "a.onnx"')
     with pytest.raises(UsageError, match=r"runs a TorchScript module, which is a program.*--allow-code"):
         find(name, tmp_path, allow_code=False)
-
-
-def test_onnx__plays_a_game(tmp_path: Path, merge: OpenScene, car: Car) -> None:
-    played: Arm = arm(merge, of_onnx(onnx_file(tmp_path / "a.onnx"), car), None)
-    (game,) = assess(played, 1)
-    assert game.record["error"] == ""
 
 
 def test_torchscript__decides_by_the_module(tmp_path: Path, car: Car) -> None:

@@ -66,23 +66,6 @@ def test_learned__samples_by_the_noise_and_the_policys_deviation() -> None:
     np.testing.assert_array_equal(driver.decide(GAMES, inputs, noise), driver.decide(GAMES, inputs, noise))
 
 
-@pytest.mark.parametrize("sampled", [False, True])
-def test_learned__stays_within_its_bounds(sampled: bool) -> None:
-    driver = LearnedDriver(policy_of(learner([16]), {}), sampled)
-    actions = driver.decide(GAMES, observations(), np.full((len(GAMES), 2), 50.0))
-    assert actions.shape == (len(GAMES), 2)
-    assert actions.min() >= -1.0
-    assert actions.max() <= 1.0
-
-
-def test_learned__decisions_are_independent_of_other_games() -> None:
-    driver = LearnedDriver(some_policy(), sampled=True)
-    inputs, noise = observations(), np.zeros((len(GAMES), 2))
-    together = driver.decide(GAMES, inputs, noise)
-    alone = np.concatenate([driver.decide(GAMES[k : k + 1], inputs[k : k + 1], noise[k : k + 1]) for k in GAMES])
-    np.testing.assert_allclose(alone, together, atol=1e-5)
-
-
 def test_policy__survives_a_round_trip_through_a_learner() -> None:
     policy = policy_of(learner([8, 6]), {})
     other = learner([8, 6], seed=4)

@@ -129,12 +129,6 @@ def test_process__a_program_that_never_reads_misses_the_deadline(tmp_path: Path,
         mine.decide(many, np.zeros((500, SIZE), dtype=np.float32), np.zeros((500, 2)))
 
 
-def test_process__many_games_fit_through_the_pipes(tmp_path: Path, car: Car) -> None:
-    many, mine = np.arange(1000), driver(tmp_path, car)
-    mine.reset(many)
-    assert mine.decide(many, np.zeros((1000, SIZE), dtype=np.float32), np.zeros((1000, 2))).shape == (1000, 2)
-
-
 def test_process__a_long_standard_error_does_not_block(tmp_path: Path, car: Car) -> None:
     mine = driver(tmp_path, car, "sys.stderr.write('blah ' * 100_000 + chr(10)); sys.stderr.flush()")
     for _ in range(3):

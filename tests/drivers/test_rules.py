@@ -18,11 +18,9 @@ from harness.config.rule_driver import REACTIONS, Cruise, LaneKeeping, Rules
 from harness.config.toml_reading import read_document
 from harness.drivers.adaptive_cruise import cruise_mps2, in_path, target_speed_mps, time_gap_law_mps2
 from harness.drivers.car import Car, car_of
-from harness.drivers.external import find_driver
-from harness.drivers.lane_keeping import steering_rad
 from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.drivers.protocol import Driver
-from harness.drivers.rules_driver import RulesDriver
+from harness.drivers.rules_driver import RulesDriver, steering_rad
 from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import UsageError
@@ -72,14 +70,6 @@ def seeing(speed_mps: float = 13.89, limit_mps: float | None = None, turned: flo
 # --- documents -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", EGOS)
-def test_shipped_egos__are_documents_of_rules(repository: Path, name: str) -> None:
-    document = read_driver(repository / "egos" / f"{name}.toml")
-    assert isinstance(document, Rules)
-    assert document.name == name
-    assert [each for each in REACTIONS if getattr(document, each)] == [name.replace("adas", "emergency_braking")]
-
-
 def test_rules__have_at_most_one_reaction_to_danger() -> None:
     with pytest.raises(ValidationError, match="one reaction to danger"):
         rules(rss={}, fuzzy={})
@@ -115,12 +105,6 @@ def test_tunable__has_no_parameters_of_missing_tables_or_reference_drivers() -> 
         rules().tuned({"emergency_braking.brakes_ttc_s": 1.0})
     with pytest.raises(ValidationError):
         rules().tuned({"cruise.time_gap_s": 0.1})
-
-
-def test_page__lists_the_tunable_parameters(repository: Path) -> None:
-    page = (repository / "docs" / "egos-by-rules.md").read_text(encoding="utf-8")
-    listed = re.findall(r"^\| `([\w.]+\.\w+)` \| ([\d.]+) \| ([\d.]+) \|$", page, re.MULTILINE)
-    assert [(key, float(low), float(high)) for key, low, high in listed] == [*rules(emergency_braking={}).searched]
 
 
 def test_page__lists_every_parameter_with_its_default(repository: Path) -> None:
@@ -159,18 +143,6 @@ def test_perceive__the_path_turns_with_the_road(car: Car) -> None:
     assert encounters.offset_m[0, 0] == pytest.approx(0.0, abs=1e-6)
     assert encounters.approach_mps[0, 0] == pytest.approx(0.0, abs=1e-6)
     assert encounters.speed_mps[0, 0] == pytest.approx(10.0)
-
-
-@pytest.mark.parametrize("other_mps", [0.0, 3.0, 40.0, -25.0])
-def test_perceive__a_closing_speed_is_known_at_every_speed(car: Car, other_mps: float) -> None:
-    """A car that stands, and an oncoming one that closes at 50 m/s, are told apart."""
-    _, encounters = perceive(car, seeing(25.0, ahead_m=40.0, ahead_mps=other_mps - 25.0))
-    assert encounters.speed_mps[0, 0] == pytest.approx(other_mps)
-
-
-def test_perceive__the_limit_is_seen_while_standing(car: Car) -> None:
-    view, _ = perceive(car, seeing(0.0, 13.89))
-    assert view.limit_mps[0] == pytest.approx(13.89)
 
 
 def test_perceive__a_crossing_car_with_priority(car: Car) -> None:
@@ -282,16 +254,6 @@ def test_steering__by_hand() -> None:
         assert steering_rad(view, law=law, wheelbase_m=2.7, step_s=0.1)[0] == pytest.approx(expected, abs=1e-6)
 
 
-def test_steering__adds_the_angle_that_follows_the_road() -> None:
-    """On the path in a bend for which the road asks 0.08 rad: nothing else is added. The middle of the car then moves
-    along the path, and the car points outwards by atan(tan(0.08) / 2): the bend's centre is beside the rear axle.
-    """
-    law = LaneKeeping(max_lateral_mps2=6.0, max_lateral_jerk_mps3=20.0)
-    for road in (0.08, -0.08):
-        view = motion(9.0, 13.9, turned=np.arctan(0.5 * np.tan(road)), steering=road, road=road)
-        assert steering_rad(view, law=law, wheelbase_m=2.7, step_s=0.1)[0] == pytest.approx(road)
-
-
 @pytest.mark.parametrize("speed_mps", [3.0, 8.0, 14.0, 25.0])
 def test_steering__brings_the_car_onto_its_path_within_limits(car: Car, speed_mps: float) -> None:
     """From 1.5 m beside and 0.05 rad turned away, within UN R79's limits."""
@@ -367,21 +329,6 @@ def test_driver__keeps_a_state_per_game(car: Car) -> None:
     assert decided(driver, car, danger, game=2)[0] == 0.0
 
 
-def test_driver__decisions_are_independent_of_other_games(car: Car) -> None:
-    views = [seeing(10.0, ahead_m=gap, ahead_mps=-6.0, left_m=left) for gap in (6.0, 15.0, 40.0) for left in (0, 3.2)]
-    together = new_driver(rules(fuzzy={}), car, games=6).decide(np.arange(6), np.concatenate(views), np.zeros((6, 2)))
-    alone = [
-        new_driver(rules(fuzzy={}), car).decide(np.zeros(1, dtype=int), view, np.zeros((1, 2)))[0] for view in views
-    ]
-    np.testing.assert_allclose(together, alone, atol=1e-12)
-
-
-def test_driver__starts_from_standing(car: Car) -> None:
-    driver = new_driver(rules(), car)
-    requested = decided(driver, car, *[seeing(0.0, 13.89)] * 30)
-    assert requested[-1] == pytest.approx(2.0)  # of 13.89 / 2 m/s2, by the greatest acceleration
-
-
 # --- whole games ---------------------------------------------------------------------------------------------------
 
 
@@ -424,19 +371,3 @@ def test_games__a_bend_is_driven_slower_and_in_the_lane(repository: Path, tmp_pa
         assert (record["ego_outcome"], record["error"]) == ("goal", "")
         assert 1.0 < record["ego_max_lateral_acceleration_mps2"] <= 3.1
         assert record["ego_max_deceleration_mps2"] <= 3.5
-
-
-@pytest.mark.parametrize("ego", EGOS)
-def test_games__a_roundabout_is_driven_without_touching_the_kerb(repository: Path, ego: str) -> None:
-    """Bends of some 6 m to the right, the left and the right, with 0.7 m beside the car."""
-    roundabout = open_scene(repository / "networks" / "roundabout")
-    (record,) = play(repository, roundabout, ego=ego, other=None, games=1)
-    assert (record["ego_outcome"], record["error"]) == ("goal", "")
-    assert record["ego_max_lateral_acceleration_mps2"] <= 3.1
-
-
-def test_find_driver__makes_a_rule_based_ego(repository: Path, car: Car) -> None:
-    external = find_driver("egos/adas.toml", repository / "campaign.toml", "ego.driver", allow_code=False)
-    assert isinstance(external.make(car, sampled=False), RulesDriver)
-    assert (external.kind, external.in_words) == ("rules", "the rules adas (egos/adas.toml)")
-    external.try_out(car, sampled=False)

@@ -213,11 +213,6 @@ def test_recurrent__samples_with_its_state(recurrent: Path) -> None:
         np.testing.assert_allclose(drawn, np.clip(mean + deviation * NOISE, -1.0, 1.0), atol=1e-5)
 
 
-def test_recurrent__is_refused_under_the_name_of_another_algorithm(recurrent: Path) -> None:
-    with pytest.raises(UsageError, match="RecurrentPPO saved this file, not PPO"):
-        Sb3Driver(document("PPO"), recurrent, sampled=False)
-
-
 def test_discrete__each_index_stands_for_pedals_and_wheel(tmp_path: Path) -> None:
     file = save("DQN", "MlpPolicy", Recorded(discrete=True), tmp_path)
     chosen, _ = stable_baselines3.DQN.load(file, device="cpu").predict(SEEN, deterministic=True)
@@ -256,29 +251,6 @@ def test_normalised__sees_what_it_learned_from(name: str, normalised: tuple[dict
 def test_normalised__is_refused_without_the_scaling(name: str, normalised: tuple[dict[str, Path], Path]) -> None:
     with pytest.raises(UsageError, match="learned from observations that VecNormalize scaled"):
         Sb3Driver(document(name), normalised[0][name], sampled=False)
-
-
-def test_normalised__the_scaling_is_a_file_of_the_driver(
-    normalised: tuple[dict[str, Path], Path], tmp_path: Path
-) -> None:
-    files, scaling = normalised
-    for file in (files["PPO"], scaling):
-        (tmp_path / file.name).write_bytes(file.read_bytes())
-    text = 'kind = "stable_baselines3"\nfile = "PPO.zip"\nalgorithm = "PPO"\nnormalize = "vn.pkl"\n'
-    (tmp_path / "mine.toml").write_text(text)
-    found = find_driver("mine.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=True)
-    assert {Path(each).name for each in found.files} == {"PPO.zip", "vn.pkl"}
-    with pytest.raises(UsageError, match="--allow-code"):
-        find_driver("mine.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=False)
-    (tmp_path / "vn.pkl").write_bytes(pickle.dumps({"mean": 0.0}))
-    with pytest.raises(UsageError, match="can't be read as a VecNormalize: TypeError: it holds a dict"):
-        Sb3Driver(document("PPO"), files["PPO"], sampled=False, normalize=tmp_path / "vn.pkl")
-
-
-def test_saved__a_file_that_is_no_zip_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "PPO.zip").write_bytes(b"PK nothing")
-    with pytest.raises(UsageError, match="can't be read as a policy of PPO"):
-        Sb3Driver(document("PPO"), tmp_path / "PPO.zip", sampled=False)
 
 
 class Trap:

@@ -11,7 +11,6 @@ import pytest
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
-from harness.drivers.external import find_driver
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
@@ -83,13 +82,6 @@ def test_sumo_types__car_following_models_differ(folder: Path) -> None:
     assert len(set(paths.values())) == len(FOLLOWING)
 
 
-def test_sumo_types__the_ego_is_a_car_of_its_type(folder: Path) -> None:
-    scene, plain = open_scene(folder, "IDM_LC2013"), open_scene(folder)
-    assert scene.world.length_m.tolist() == [4.4, 4.6]
-    assert scene.world.actuators.max_speed_mps.tolist() == [38.0, 40.0]
-    assert plain.world.length_m.tolist() == [4.6, 4.6]
-
-
 def test_sumo_types__sublanes_allow_a_player_that_leaves_the_road(folder: Path) -> None:
     wild = LearnedDriver(some_policy(), sampled=True)
     games = play(open_scene(folder, "EIDM_SL2015"), wild, 5)
@@ -102,10 +94,3 @@ def test_sumo_types__an_unknown_type_is_an_error(folder: Path) -> None:
         open_scene(folder, "IDM_LC2014")
     assert "has no vehicle type 'IDM_LC2014'" in str(caught.value)
     assert "did you mean 'IDM_LC2013'?" in str(caught.value)
-
-
-def test_sumo_types__a_document_names_the_type(tmp_path: Path) -> None:
-    (tmp_path / "idm.toml").write_text('kind = "sumo"\nvehicle_type = "IDM_LC2013"\n')
-    found = find_driver("idm.toml", tmp_path / "campaign.toml", "ego.driver", allow_code=False)
-    assert found.vehicle_type == "IDM_LC2013"
-    assert found.in_words == "SUMO's own models of vehicle type IDM_LC2013 (idm.toml)"

@@ -79,12 +79,6 @@ def test_drive__wheels_turn_no_faster_than_the_rack() -> None:
     assert state.steering_rad[0, 0] == pytest.approx(0.0)
 
 
-def test_drive__wheels_stop_at_the_lock() -> None:
-    state = state_of(2.0, steering_rad=0.58)
-    advance(state, 0.0, 2.0)
-    assert state.steering_rad[0, 0] == pytest.approx(0.6)
-
-
 def test_drive__too_fast_for_the_curve_the_car_runs_wide() -> None:
     # 20 m/s and 0.3 rad would need 0.1132 /m * 400 = 45 m/s2; the tyres give 7.848 = 0.01962 /m * 400
     state = state_of(20.0, steering_rad=0.3)
@@ -231,11 +225,3 @@ def test_actions__are_the_inverse_of_requests_in_a_bend(pedals: float, wheel: fl
     # not beyond the lock of 1.2 rad: what the lock cuts off can't be found again
     assume(abs(asked[1][0, 0]) < 1.2)
     assert found[0, 0] == pytest.approx([pedals, wheel], abs=1e-6)
-
-
-def test_actions__of_the_bend_itself_leave_the_wheel_at_0() -> None:
-    bend = np.array([[0.12]])
-    found = actions(
-        np.array([[-2.0]]), bend, speed_mps=np.array([[10.0]]), road_steering_rad=bend, actuators=actuators()
-    )
-    assert found[0, 0] == pytest.approx([-0.25, 0.0])  # 2 of 8 m/s2

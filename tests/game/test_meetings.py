@@ -111,11 +111,6 @@ def test_meetings__a_player_conflicts_until_its_rear_has_left_the_zone(moment: M
     assert meeting(moment(world, [ego(103.9), FAR], [northbound(-40.0)])).conflict == -1
 
 
-def test_meetings__only_the_player_with_the_conflict_has_it(moment: Moment, world: World) -> None:
-    q = moment(world, [ego(70.0), ego(60.0)], [northbound(-40.0)])
-    assert q.meetings.conflict[0].tolist() == [[-1, -1, 0], [-1, -1, -1]]
-
-
 def test_meetings__players_meet_each_other(moment: Moment, merge: OpenScene) -> None:
     world = with_conflicts(merge.world, CROSSING)
     q = moment(world, [ego(70.0), {**northbound(-40.0)}])
@@ -141,12 +136,6 @@ def test_meetings__a_body_on_the_players_own_way_is_a_leader_and_no_conflict(mom
     world = with_conflicts(merge.world, {**CROSSING, "from_m": -50.0, "until_m": 8.0})
     for y_m, conflict in ((-61.0, -1), (-59.0, 0), (-2.5, 0), (-1.5, -1)):
         assert meeting(moment(world, [ego(70.0), FAR], [northbound(y_m)])).conflict == conflict
-
-
-def test_meetings__without_conflicts_there_are_none(moment: Moment, merge: OpenScene) -> None:
-    q = moment(merge.world, [ego(70.0), FAR], [northbound(-40.0)])
-    assert (q.meetings.conflict == -1).all()
-    assert np.isinf(q.meetings.gap_s).all()
 
 
 # --- who must yield --------------------------------------------------------------------------------------------------

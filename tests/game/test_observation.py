@@ -296,14 +296,6 @@ def test_observation__does_not_show_controls_or_lapses_of_others(moment: Moment,
     assert (observe(plain)[0, 0] == observe(busy)[0, 0]).all()
 
 
-def test_observation__shows_a_wreck_as_a_stationary_vehicle(moment: Moment, world: World) -> None:
-    wreck = moment(world, [car(50.0), car(70.0, speed_mps=0.0, outcome=Outcome.RAIL)])
-    parked = moment(world, [car(50.0), car(10.0, -4.8)], [car(70.0, speed_mps=0.0)])
-    assert seen(wreck)["other0_ahead_m"] == pytest.approx(20.0 / 40.0)
-    assert seen(wreck)["other0_ahead_mps"] == pytest.approx(-10.0 / 20.0)
-    assert seen(parked)["other0_ahead_m"] == seen(wreck)["other0_ahead_m"]
-
-
 def test_observation__without_a_blind_spot_check_vehicles_beside_and_behind_are_missing(
     moment: Moment, world: World
 ) -> None:
@@ -313,7 +305,3 @@ def test_observation__without_a_blind_spot_check_vehicles_beside_and_behind_are_
     assert seen(unchecked)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
     assert seen(checked)["other0_seen"] == 1.0
     assert unchecked.touches_vehicle[0, 0] == checked.touches_vehicle[0, 0]  # contact does not depend on sight
-
-
-def test_observation__without_a_blind_spot_check_vehicles_ahead_are_seen(moment: Moment, world: World) -> None:
-    assert seen(moment(world, [car(50.0, unseen_behind_m=1.0), car(51.1, -4.8)]))["other0_seen"] == 1.0

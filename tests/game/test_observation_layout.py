@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from itertools import pairwise
-
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.game.observation import observe
 from harness.game.observation_layout import COMPRESSED, LAYOUT, SCALE, SCALES, SIZE, in_units
-from harness.game.quantities import Quantities
-from harness.traffic.scene import OpenScene
 from tests.support.observations import observation_of
 
-Moment = Callable[..., Quantities]
 LOCK_RAD = 0.6
 
 
@@ -58,31 +51,3 @@ def test_in_units__of_the_bounds_is_finite_and_keeps_the_sign(sign: float) -> No
     in_lock = ["steering_rad" in name for name in LAYOUT]
     expected = np.where(in_lock, LOCK_RAD, SCALE)
     assert np.abs(values[~COMPRESSED]) == pytest.approx(expected[~COMPRESSED])
-
-
-CROSSING = [
-    (9.0, 5.0),
-    (20.0, 7.0),
-    (40.0, 10.0),
-    (60.0, 12.0),
-    (80.0, 14.0),
-]  # distance to the side, m, and speed, m/s
-
-
-def test_crossing_cars__from_9_m_to_80_m_and_from_5_to_14_mps_look_different(moment: Moment, merge: OpenScene) -> None:
-    views = []
-    for distance_m, speed_mps in CROSSING:
-        other = {"x_m": 70.0, "y_m": -1.6 - distance_m, "heading_rad": np.pi / 2.0, "speed_mps": speed_mps}
-        ego = {"x_m": 50.0, "y_m": -1.6}
-        q = moment(merge.world, [ego, {"x_m": 10.0, "y_m": -4.8, "present": False}], [other])
-        views.append(dict(zip(LAYOUT, observe(q)[0, 0].tolist(), strict=True)))
-    for near, far in pairwise(views):
-        assert near["other0_seen"] == far["other0_seen"] == 1.0
-        assert near["other0_left_m"] - far["other0_left_m"] > 0.02  # they come from the right
-        assert far["other0_left_mps"] - near["other0_left_mps"] > 0.02
-    for view, (distance_m, speed_mps) in zip(views, CROSSING, strict=True):
-        values = dict(zip(LAYOUT, in_units(np.array(list(view.values())), LOCK_RAD).tolist(), strict=True))
-        assert values["other0_left_m"] == pytest.approx(-distance_m, rel=1e-4)
-        assert values["other0_left_mps"] == pytest.approx(speed_mps, rel=1e-4)
-        assert values["other0_ahead_m"] == pytest.approx(20.0, rel=1e-4)
-        assert values["other0_turned_sin"] == pytest.approx(1.0)

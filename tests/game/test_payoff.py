@@ -64,19 +64,6 @@ def test_event__has_its_weight_in_its_own_outcome_only(
         assert value_of(q, term, weight=7.0) == (7.0 * unit_value if each is outcome else 0.0)
 
 
-def test_event__of_the_other_player_is_not_the_egos(moment: Moment, world: World) -> None:
-    q = moment(world, [car(50.0), car(90.0, outcome=Outcome.COLLISION)])
-    payoff = Payoff(alpha=dict.fromkeys(GROUPS, 1.0), terms=(Weighted(name="collision", weight=10.0),), fuzzy={})
-    assert payoff.total(q, 0).tolist() == [0.0]
-    assert payoff.total(q, 1).tolist() == [-10.0]
-
-
-def test_event__is_not_multiplied_by_the_step_length(moment: Moment, world: World) -> None:
-    for step_s in (0.1, 0.5):
-        q = moment(replace(world, step_s=step_s), [car(50.0, outcome=Outcome.RAIL), FAR])
-        assert value_of(q, "rail") == -1.0
-
-
 PER_SECOND = [
     # flanks 0.7 m from the rail at y = 0: 1 - 0.7 / 1.4 = 0.5
     ("clearance", 1.4, car(50.0), FAR, -0.5),
@@ -135,11 +122,6 @@ def test_progress__is_paid_per_100_m_whatever_the_step(moment: Moment, world: Wo
 def test_red_light__counts_once_from_its_time_on(moment: Moment, world: World, since_s: float, value: float) -> None:
     q = with_rule(moment(world, [car(50.0), FAR]), passed_red_s=np.array([[since_s, -1.0]]))
     assert value_of(q, "red_light", 2.0, weight=5.0) == 5.0 * value
-
-
-@pytest.mark.parametrize("after_s", [0.0, 2.0])
-def test_red_light__not_passed_costs_nothing(moment: Moment, world: World, after_s: float) -> None:
-    assert value_of(moment(world, [car(50.0), FAR]), "red_light", after_s) == 0.0
 
 
 @pytest.mark.parametrize(("speed_mps", "value"), [(-1.0, 0.0), (0.0, 0.0), (2.9, 0.0), (3.0, -1.0), (12.0, -1.0)])
@@ -222,22 +204,6 @@ def test_payoff__is_equation_1(moment: Moment, world: World) -> None:
         abs=2e-4,
     )
     assert payoff.total(q, 0)[0] == pytest.approx(sum(shares.values()))
-
-
-def test_payoff__a_group_of_weight_0_has_no_effect(moment: Moment, world: World) -> None:
-    q = moment(world, [car(50.0, outcome=Outcome.COLLISION), FAR])
-    payoff = Payoff(
-        alpha={"safety": 0.0, "operational": 1.0, "human": 1.0},
-        terms=(Weighted(name="collision", weight=10.0),),
-        fuzzy={},
-    )
-    assert payoff.total(q, 0).tolist() == [0.0]
-
-
-def test_payoff__without_terms_is_0(moment: Moment, world: World) -> None:
-    assert Payoff(alpha=dict.fromkeys(GROUPS, 1.0), terms=(), fuzzy={}).total(
-        moment(world, [car(50.0), FAR]), 0
-    ).tolist() == [0.0]
 
 
 # --- from a document -------------------------------------------------------------------------------------------------
@@ -349,16 +315,6 @@ def test_document__an_invalid_term_is_named(read: Callable[[str], Persona], text
     assert problems(read, text + (GOAL if "operational" not in text else "")) == [expected]
 
 
-def test_document__all_invalid_terms_are_named_at_once(read: Callable[[str], Persona]) -> None:
-    found = problems(read, "[safety.terms]\ncolision = 1.0\ngoal = 1.0\nclearance = 1.0\n[human.terms]\nrail = 1.0\n")
-    assert [each.split(":")[0] for each in found] == [
-        "human.terms.rail",
-        "safety.terms.clearance",
-        "safety.terms.colision",
-        "safety.terms.goal",
-    ]
-
-
 def test_document__without_terms_is_refused(read: Callable[[str], Persona]) -> None:
     assert problems(read, "[safety]\nweight = 1.0\n")[0].endswith("nothing could be learned from it")
 
@@ -378,12 +334,6 @@ def fuzzy(quantity: str, sets: str) -> str:
     return f"[[human.fuzzy]]\nname = 'x'\nquantity = '{quantity}'\nsets = [{sets}]\n"
 
 
-@pytest.mark.parametrize("quantity", ["ego_payoff", "touches_vehicle", "time_to_collision_s", "vehicle_clearance_m"])
-def test_harm__a_fuzzy_term_can_not_use_such_a_quantity(read: Callable[[str], Persona], quantity: str) -> None:
-    text = fuzzy(quantity, "{ name = 'a', points = [[0.0, 1.0]], value = 1.0 }")
-    assert "unknown quantity" in problems(read, text)[0]
-
-
 @pytest.mark.parametrize("quantity", ["clearance_m", "time_gap_s", "gap_s"])
 @pytest.mark.parametrize(
     "sets",
@@ -396,25 +346,3 @@ def test_harm__a_fuzzy_term_can_not_use_such_a_quantity(read: Callable[[str], Pe
 )
 def test_harm__a_fuzzy_term_may_not_reward_contact(read: Callable[[str], Persona], quantity: str, sets: str) -> None:
     assert "a crash must not be rewarded" in problems(read, fuzzy(quantity, sets))[0]
-
-
-def test_fuzzy__of_the_lane_that_ends(read: Callable[[str], Persona], moment: Moment, merge: OpenScene) -> None:
-    # lane 0 (y = -4.8) ends at 100 m, lane 1 does not end: half-way from 0 to 80 m, and infinite
-    sets = (
-        "{ name = 'late', points = [[0.0, 1.0], [80.0, 0.0]], value = 3.0 },"
-        "{ name = 'early', points = [[0.0, 0.0], [80.0, 1.0]], value = -1.0 }"
-    )
-    payoff = read(fuzzy("lane_end_m", sets)).payoff
-    q = moment(merge.world, [{"x_m": 60.0, "y_m": -4.8}, {"x_m": 60.0, "y_m": -1.6}])
-    assert q.lane_end_m[0] == pytest.approx([40.0, np.inf])
-    assert payoff.total(q, 0) == pytest.approx(0.1 * (0.5 * 3.0 - 0.5 * 1.0))
-    assert payoff.total(q, 1) == pytest.approx(0.1 * -1.0)
-
-
-def test_harm__a_fuzzy_term_may_reward_a_short_gap(read: Callable[[str], Persona]) -> None:
-    sets = (
-        "{ name = 'crash', points = [[0.0, 1.0], [0.2, 0.0]], value = -9.0 },"
-        "{ name = 'close', points = [[0.0, 0.0], [0.2, 1.0], [0.6, 1.0], [1.5, 0.0]], value = 1.0 },"
-        "{ name = 'far', points = [[0.6, 0.0], [1.5, 1.0]], value = -1.0 }"
-    )
-    assert read(fuzzy("time_gap_s", sets)).payoff.fuzzy["x"][1](np.array([0.0, 0.4, 3.0])).tolist() == [-9.0, 1.0, -1.0]

@@ -33,12 +33,6 @@ def test_locate__on_a_straight_road(heading: float) -> None:
     assert offset[0] == pytest.approx(1.2, abs=1e-9)
 
 
-def test_locate__works_before_the_start_and_beyond_the_end() -> None:
-    station, offset = locate(Routes.of([straight(0.0), straight(0.0)]), [(-7.3, 0.4), (103.1, -2.0)], [-5.0, 100.0])
-    assert station == pytest.approx([-7.3, 103.1])
-    assert offset == pytest.approx([0.4, -2.0])
-
-
 @settings(max_examples=100, deadline=None)
 @given(
     radius=st.sampled_from([8.0, -8.0, 12.0, 25.0, -60.0, 300.0]),
@@ -138,11 +132,6 @@ def test_steering_of_bend__drives_the_bend(radius: float, sign: float) -> None:
     assert curvature_per_m(np.array(steering), np.array(2.7)) == pytest.approx(sign / radius, rel=1e-9)
 
 
-def test_steering_of_bend__of_a_corner_is_finite() -> None:
-    # the lines of a net may turn at a point: as a bend as tight as the wheelbase, 0.8571 rad
-    assert steering_of_bend_rad(50.0, 2.7) == pytest.approx(np.arctan(1.0 / np.sqrt(0.75)))
-
-
 # --- limits ahead ----------------------------------------------------------------------------------------------------
 
 
@@ -184,12 +173,6 @@ def distance(point: FloatArray, segment: FloatArray) -> float:
     start, span = segment[0], segment[1] - segment[0]
     share = np.clip((point - start) @ span / max(span @ span, 1e-12), 0.0, 1.0)
     return float(np.linalg.norm(point - start - share * span))
-
-
-def test_rails__may_be_empty() -> None:
-    rails = Rails.of(np.zeros((0, 2, 2)), 20.0)
-    near = rails.near(np.array([[0.0, 500.0]]), np.array([[0.0, -500.0]]))
-    assert (np.abs(rails.segments[near]) > 1e5).all()  # only the padding
 
 
 def test_rails__a_point_far_away_is_no_error() -> None:

@@ -12,13 +12,12 @@ from harness.game.arrays import FloatArray
 from harness.game.human_factors import Attention, HumanFactors, Reaction
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.road import Routes
-from harness.game.route_starts import draw_along_route
+from harness.game.start_range import draw_along_route
 from harness.traffic.scene import OpenScene
 from tests.support.roads import arc, straight
 
 LENGTH_M = np.array([4.6, 4.6])
 MAX_SPEED_MPS = np.array([40.0, 8.0])  # a car and a bicycle
-BOTH = np.array([True, True])
 BEND = Routes.of([arc(25.0, length=60.0), straight(0.0, length=80.0, y0=40.0)])
 ONE_ROAD = Routes.of([straight(0.0), straight(0.0)])
 
@@ -28,7 +27,17 @@ def draws(
 ) -> list[tuple[FloatArray, ...] | None]:
     """The draws of `count` games."""
     generators = (np.random.default_rng(seed) for seed in range(count))
-    return [draw_along_route(routes, LENGTH_M, MAX_SPEED_MPS, np.array(present), share, each) for each in generators]
+    return [
+        draw_along_route(
+            routes,
+            each,
+            length_m=LENGTH_M,
+            max_speed_mps=MAX_SPEED_MPS,
+            present=np.array(present),
+            share=share,
+        )
+        for each in generators
+    ]
 
 
 def placed(routes: Routes, count: int, present: Sequence[bool] = (True, True)) -> FloatArray:
@@ -72,11 +81,6 @@ def test_starts__of_two_cars_are_6_m_apart() -> None:
     distance = np.hypot(x[:, 0] - x[:, 1], y[:, 0] - y[:, 1])
     assert distance.min() >= 4.6 + 6.0
     assert distance.min() < 12.0, "and may be as near as that"
-
-
-def test_starts__an_absent_player_takes_no_place() -> None:
-    x, y, *_ = placed(ONE_ROAD, 300, present=(True, False)).transpose(1, 0, 2)
-    assert np.hypot(x[:, 0] - x[:, 1], y[:, 0] - y[:, 1]).min() < 4.6
 
 
 def test_starts__without_a_place_for_all_are_those_of_the_scene() -> None:
@@ -124,12 +128,6 @@ def test_initial_state__players_that_meet_start_in_their_places(merge: OpenScene
     drawn = [draw_initial_state(replace(starts, meet_in_place=True), "test", k) for k in range(60)]
     assert 15 < sum(each.present[1] for each in drawn) < 45
     assert all(np.isnan(each.position_m).all() != each.present[1] for each in drawn)
-
-
-def test_initial_state__along_the_route_is_the_same_for_the_same_parts(merge: OpenScene) -> None:
-    for one, two in zip(states(merge, 0.7, 10), states(merge, 0.7, 10), strict=True):
-        for name in ("x_m", "y_m", "heading_rad", "speed_mps", "station_m"):
-            assert np.array_equal(getattr(one, name), getattr(two, name))
 
 
 def test_initial_state__a_start_in_the_range_of_the_scene_knows_its_station(merge: OpenScene) -> None:

@@ -114,21 +114,6 @@ def value_of(q: Quantities, name: str, parameter: float | None) -> float:
     return float(Payoff(alpha=dict.fromkeys(GROUPS, 1.0), terms=(term,), fuzzy={}).evaluate(q, 0)[name][0])
 
 
-@pytest.mark.parametrize(("since_s", "after_s", "value"), [(1.9, 2.0, 0.0), (2.0, 2.0, -1.0), (0.0, 0.0, -1.0)])
-def test_red_light__may_spare_the_first_seconds_of_red(
-    moment: Moment, light: World, since_s: float, after_s: float, value: float
-) -> None:
-    assert value_of(at(moment, light, 90.4, signal=(Signal.RED, since_s)), "red_light", after_s) == value
-    assert value_of(at(moment, light, 90.4, signal=(Signal.GREEN, since_s)), "red_light", after_s) == 0.0
-
-
-@pytest.mark.parametrize(("speed_mps", "value"), [(0.4, 0.0), (2.9, 0.0), (3.0, -1.0), (9.0, -1.0)])
-def test_stop_sign__may_spare_a_slow_passage(moment: Moment, merge: OpenScene, speed_mps: float, value: float) -> None:
-    world = world_of(merge, Control.STOP)
-    assert value_of(at(moment, world, 90.4, speed_mps=speed_mps), "stop_sign", 3.0) == value
-    assert value_of(at(moment, world, 80.0, speed_mps=speed_mps), "stop_sign", 3.0) == 0.0
-
-
 # --- permitted speed -------------------------------------------------------------------------------------------------
 
 
@@ -178,11 +163,6 @@ def test_permitted__before_a_stop_sign_ends_at_a_rolling_half_metre_per_second(
     # sqrt(2 * 2 * 16 + 0.5^2) = sqrt(64.25)
     for front_m, permitted in ((74.0, np.sqrt(64.25)), (90.0, 0.5), (90.1, LIMIT_MPS)):
         assert at(moment, world, front_m).permitted_mps[0, 0] == pytest.approx(permitted)
-
-
-@pytest.mark.parametrize("control", [Control.NONE, Control.GIVE_WAY])
-def test_permitted__a_free_junction_asks_for_nothing(moment: Moment, merge: OpenScene, control: Control) -> None:
-    assert at(moment, world_of(merge, control), 80.0).permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
 
 
 CROSSING: Mapping[str, Any] = {
@@ -268,11 +248,6 @@ def test_permitted__does_not_wait_for_a_car_that_must_yield(moment: Moment, merg
     assert q.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
 
 
-def test_permitted__does_not_wait_for_a_car_that_stands(moment: Moment, merge: OpenScene) -> None:
-    q = at(moment, crossed(merge), 74.0, others=[{**from_the_south(2.0), "speed_mps": 0.0}])
-    assert q.permitted_mps[0, 0] == pytest.approx(LIMIT_MPS)
-
-
 @pytest.mark.parametrize(
     ("front_m", "speed_mps", "over_mps"),
     [
@@ -289,11 +264,6 @@ def test_speed_over_permitted__a_car_that_waits_is_not_late(
     assert q.speed_over_permitted[0, 0] * LIMIT_MPS == pytest.approx(over_mps)
 
 
-def test_speed_over_permitted__before_a_stop_sign_nothing_is_waited_for(moment: Moment, merge: OpenScene) -> None:
-    q = at(moment, world_of(merge, Control.STOP), 89.0, speed_mps=0.0)
-    assert q.speed_over_permitted[0, 0] * LIMIT_MPS == pytest.approx(-np.sqrt(4.25))  # 2 * 2 * 1 + 0.5^2
-
-
 def test_speed_over_permitted__is_a_share_of_the_limit(moment: Moment, light: World) -> None:
     # 8 m/s are permitted 16 m before a red light; 10 m/s are 2 m/s more, 6 m/s are 2 m/s less
     for speed_mps, over_mps in ((10.0, 2.0), (6.0, -2.0)):
@@ -302,13 +272,6 @@ def test_speed_over_permitted__is_a_share_of_the_limit(moment: Moment, light: Wo
         assert value_of(q, "speed_over_limit", None) == pytest.approx(-0.1 * max(over_mps, 0.0) / LIMIT_MPS)
         assert value_of(q, "speed_under_limit", None) == pytest.approx(0.1 * min(over_mps, 0.0) / LIMIT_MPS)
         assert q.speed_over_limit[0, 0] == pytest.approx(speed_mps / LIMIT_MPS - 1.0), "the limit itself is the same"
-
-
-def test_waiting__at_a_red_light_costs_no_speed_under_the_limit(moment: Moment, light: World) -> None:
-    waiting = at(moment, light, LINE_M, speed_mps=0.0, signal=(Signal.RED, 20.0), advanced_m=0.0)
-    assert value_of(waiting, "speed_under_limit", None) == 0.0
-    dawdling = at(moment, light, LINE_M, speed_mps=0.0, signal=(Signal.GREEN, 20.0), advanced_m=0.0)
-    assert value_of(dawdling, "speed_under_limit", None) == pytest.approx(-0.1)
 
 
 # --- what is observed of them ----------------------------------------------------------------------------------------

@@ -35,10 +35,6 @@ def test_walk__starts_at_the_limit_of_acceleration() -> None:
     assert state.acceleration_mps2[0, 0] == pytest.approx(2.3)
 
 
-def test_walk__runs_up_to_the_top_speed() -> None:
-    assert step_on(state_of(3.9), 2.3, steps=5).speed_mps[0, 0] == 4.0
-
-
 def test_walk__stops_and_stands_while_it_brakes_gently() -> None:
     state = step_on(state_of(0.1), -1.1, steps=5)  # less than half of 2.3 m/s2
     assert state.speed_mps[0, 0] == 0.0
@@ -74,12 +70,6 @@ def test_walk__turns_by_the_curvature_of_its_steering() -> None:
     state = step_on(state_of(1.4, heading_rad=pi - 0.01), 0.0, 0.3)
     turned = 0.14 * curvature_per_m(np.array(0.3), np.array(0.6))
     assert state.heading_rad[0, 0] == pytest.approx(-pi - 0.01 + turned)  # headings wrap at half a turn
-
-
-def test_walk__players_that_do_not_move_are_untouched() -> None:
-    state = state_of(1.0)
-    walk(state, Requested(np.array([[1.0]]), np.array([[0.5]]), np.array([[False]])), walker(), STEP_S)
-    assert (state.x_m[0, 0], state.speed_mps[0, 0], state.steering_rad[0, 0]) == (0.0, 1.0, 0.0)
 
 
 def test_bicycle__turns_no_sharper_than_it_leans() -> None:
