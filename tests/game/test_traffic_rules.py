@@ -105,7 +105,7 @@ def test_passed_stop_sign__at_the_speed_of_that_step(
 ) -> None:
     world = world_of(merge, control)
     for front_m, passed in ((89.9, -1.0), (90.4, passed_mps), (91.1, -1.0)):
-        assert at(moment, world, front_m, speed_mps=4.0).passed_stop_sign_mps[0].tolist() == [passed, -1.0]
+        assert at(moment, world, front_m, speed_mps=4.0).rules.passed_stop_sign_mps[0].tolist() == [passed, -1.0]
 
 
 def value_of(q: Quantities, name: str, parameter: float | None) -> float:
