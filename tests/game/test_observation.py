@@ -304,4 +304,4 @@ def test_observation__without_a_blind_spot_check_vehicles_beside_and_behind_are_
     assert seen(unchecked)["other0_seen"] == 0.0
     assert seen(unchecked)["free_right_m@0m"] == pytest.approx(-4.8 / 8.0, abs=2e-3)
     assert seen(checked)["other0_seen"] == 1.0
-    assert unchecked.touches_vehicle[0, 0] == checked.touches_vehicle[0, 0]  # contact does not depend on sight
+    assert unchecked.vehicle_clearance_m[0, 0] == checked.vehicle_clearance_m[0, 0]  # contact does not depend on sight

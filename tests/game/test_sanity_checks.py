@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -22,6 +21,7 @@ from harness.campaign.execution.stage_run import StageRun
 from harness.campaign.plan.plan import plan
 from harness.campaign.preflight import open_campaign
 from harness.campaign.storage.run_folder import RunFolder
+from harness.drivers.mixture import mixture_of
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import read_sumo_players
 from harness.environments.gymnasium_env import DrivingEnv
@@ -43,7 +43,7 @@ from harness.traffic.scene import OpenScene
 from tests.support.rollouts import Steady, arm, play, records
 from tests.support.scenes import build_scene
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign
-from tests.support.trainings import in_one_go, naive_ego
+from tests.support.trainings import beside, in_one_go, naive_ego
 
 STEP = 5  # the step with a fault
 
@@ -116,8 +116,9 @@ def test_opponent__that_misbehaves_ends_a_training_with_driver_and_step(
             return decision(steady) if next(self.calls) == STEP else steady
 
     expected = rf"the driver of non_ego, AfterAWhile, decided .* in step {STEP} of game \d, in a demonstration"
+    spec = naive_ego(merge)
     with pytest.raises(FloatingPointError, match=expected):
-        in_one_go(replace(naive_ego(merge), opponent=AfterAWhile(), alone_share=0.0), tmp_path)
+        in_one_go(beside(spec, EGO, mixture_of(AfterAWhile(), spec.persona), alone_share=0.0), tmp_path)
     assert not (tmp_path / "checkpoint.safetensors").exists()
 
 
@@ -144,7 +145,7 @@ def test_payoff__that_is_not_finite_is_an_error_row_with_step(
 ) -> None:
     monkeypatch.setattr(Quantities, "lane_offset_m", faulty(Quantities.lane_offset_m, value))
     assessed = arm(merge, Steady(), SumoDriver())
-    assert "lane_offset" in {term.name for term in assessed.personas[EGO].payoff.terms}
+    assert "lane_offset" in {term.name for term in assessed.drivers[EGO].members[0].persona.payoff.terms}
     (game,) = play(assessed, 1)
     assert re.match(rf"ImpossibleNumber: the payoff of ego is (nan|inf) in step {STEP}$", game.record["error"])
 
@@ -215,7 +216,8 @@ def test_motion__a_training_fails_if_sumo_displaces_a_player(
     displace_in_sumo(monkeypatch, 50.0)
     alone = naive_ego(merge)
     one = alone.settings.model_copy(update={"games": 1})  # of two: SB3 needs more than one step per rollout
-    spec = replace(alone, scene=road, opponent=SumoDriver(), alone_share=0.0, settings=one)
+    sumo = mixture_of(SumoDriver(), alone.persona)
+    spec = beside(alone, EGO, sumo, scene=road, alone_share=0.0, settings=one)
     with pytest.raises(FloatingPointError, match=rf"non_ego moved 5\d\.\d+ m in step {STEP}, .* in a demonstration"):
         in_one_go(spec, tmp_path)
 
