@@ -26,24 +26,22 @@ def export(run: Path, stage: str, file: Path) -> None:
     """Write both players' motion, and the ego's time to collision and gap, of the first games of an arm."""
     import numpy as np
 
+    from harness.environments.recorded import recorded_game
     from harness.evaluation.trace_file import read_traces
-    from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
     from harness.traffic.scene import open_scene
 
     scene = open_scene(run / "scene")
-    types = {name: (kind.length_m, kind.width_m) for name, kind in scene.routes.types.items()}
     games = []
     for episode, trace in read_traces(run / "traces" / f"{stage}.parquet"):
         if episode >= GAMES:
             break
-        sizes = sizes_by_name(trace, types)
-        players = trace[trace["player"].isin(scene.world.roles)]
-        q = quantities_of(players, scene.world, sizes)
-        steps = int(np.flatnonzero(drove_in(players, scene.world.roles).all(1))[-1]) + 1
+        game = recorded_game(trace[trace["player"].isin(scene.world.roles)], scene)
+        q, kinds = game.quantities, game.body_kinds[: len(scene.world.roles)]
+        steps = int(np.flatnonzero(game.drove.all(1))[-1]) + 1
         poses = np.stack([q.state.x_m, q.state.y_m, q.state.heading_rad, q.state.speed_mps], axis=-1)
         games.append(
             {
-                "sizes": [sizes[role] for role in scene.world.roles],
+                "sizes": [(kind.length_m, kind.width_m) for kind in kinds],
                 "poses": poses[:steps].tolist(),
                 "ttc_s": q.time_to_collision_s[:steps, 0].tolist(),
                 "headway_s": q.time_gap_s[:steps, 0].tolist(),

@@ -40,7 +40,16 @@ ROOMS: dict[str, set[str]] = {
     "reports": GROUND | {"evaluation"},
     "training": GROUND | {"traffic", "drivers", "environments"},
     "campaign.plan": {"errors", "game", "config", "evaluation"},
-    "campaign.storage": {"errors", "files", "version", "config", "traffic", "evaluation", "campaign.plan"},
+    "campaign.storage": {
+        "errors",
+        "files",
+        "version",
+        "config",
+        "traffic",
+        "evaluation",
+        "environments",
+        "campaign.plan",
+    },
     "campaign": GROUND | {"traffic", "drivers", "campaign.plan"},  # preflight
     "campaign.results": GROUND
     | {"traffic", "drivers", "evaluation", "environments", "replay", "export", "reports"}

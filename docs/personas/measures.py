@@ -8,17 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from harness.evaluation.trace_quantities import drove_in, quantities_of
+from harness.environments.recorded import recorded_game
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities
 from harness.game.roles import NON_EGO
 from harness.game.world import World
-from harness.replay.vehicles import types_of_vehicles
 from harness.traffic.scene import OpenScene
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecordedGame:
+class PersonGame:
     """A recorded game and its non-ego: arrays are [T] over the steps, the start included."""
 
     quantities: Quantities
@@ -26,13 +25,10 @@ class RecordedGame:
     """Whether the non-ego was driving: its game had not ended."""
 
     @classmethod
-    def of(cls, trace: pd.DataFrame, scene: OpenScene) -> RecordedGame:
+    def of(cls, trace: pd.DataFrame, scene: OpenScene) -> PersonGame:
         """The game of a trace."""
-        sizes_m = {
-            name: (each.length_m, each.width_m) for name, each in types_of_vehicles(trace, scene.route_files).items()
-        }
-        quantities = quantities_of(trace, scene.world, sizes_m)
-        return cls(quantities=quantities, drove=drove_in(trace, scene.world.roles)[:, NON_EGO])
+        game = recorded_game(trace, scene)
+        return cls(quantities=game.quantities, drove=game.drove[:, NON_EGO])
 
     @property
     def world(self) -> World:
@@ -43,18 +39,18 @@ class RecordedGame:
         return values[self.drove, NON_EGO]
 
 
-def speed_over_limit(games: Sequence[RecordedGame]) -> float:
+def speed_over_limit(games: Sequence[PersonGame]) -> float:
     """Mean of the speed over the limit, as a share of the limit."""
     return float(np.mean(np.concatenate([game.while_driving(game.quantities.speed_over_limit) for game in games])))
 
 
-def time_gap_s(games: Sequence[RecordedGame]) -> float:
+def time_gap_s(games: Sequence[PersonGame]) -> float:
     """Median of the time gap, in the steps with a car ahead."""
     gaps = np.concatenate([game.while_driving(game.quantities.time_gap_s) for game in games])
     return float(np.median(gaps[np.isfinite(gaps)]))
 
 
-def reaction_s(games: Sequence[RecordedGame]) -> float:
+def reaction_s(games: Sequence[PersonGame]) -> float:
     """Mean time from the start of a game to the first movement of pedal or wheel by the driver. 0 stands for a movement
     in the first step."""
     times_s = []
@@ -67,7 +63,7 @@ def reaction_s(games: Sequence[RecordedGame]) -> float:
     return float(np.mean(times_s))
 
 
-def lapse_s(games: Sequence[RecordedGame]) -> float:
+def lapse_s(games: Sequence[PersonGame]) -> float:
     """Mean length of the lapses that begin and end within a game. This underestimates the mean: a long lapse is more
     often cut off by the end of a game."""
     lengths = []
@@ -80,7 +76,7 @@ def lapse_s(games: Sequence[RecordedGame]) -> float:
     return float(np.mean(lengths)) if lengths else float("nan")
 
 
-def lane_left_m(games: Sequence[RecordedGame]) -> float:
+def lane_left_m(games: Sequence[PersonGame]) -> float:
     """Median of the rest of the ending lane when the car's centre crosses the line to the next lane; negative in the
     taper."""
     rests_m = []
@@ -99,7 +95,7 @@ def lane_left_m(games: Sequence[RecordedGame]) -> float:
     return float(np.median(rests_m)) if rests_m else float("nan")
 
 
-def lateral_deviation_m(games: Sequence[RecordedGame]) -> float:
+def lateral_deviation_m(games: Sequence[PersonGame]) -> float:
     """Standard deviation of lateral position (SDLP) of all games, where the road has its final width."""
     parts = []
     for game in games:

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 import typer
 from measures import (
-    RecordedGame,
+    PersonGame,
     lane_left_m,
     lapse_s,
     lateral_deviation_m,
@@ -38,7 +38,7 @@ class Characteristic:
 
     name: str
     arm: str
-    measure: Callable[[Sequence[RecordedGame]], float]
+    measure: Callable[[Sequence[PersonGame]], float]
     format: str
     people: str
     low: float
@@ -192,10 +192,10 @@ class Run:
         own, *baseline = (characteristic.measure(list(self.recorded_games(arm))) for arm in arms)
         return own - sum(baseline)
 
-    def recorded_games(self, arm: str) -> Iterator[RecordedGame]:
+    def recorded_games(self, arm: str) -> Iterator[PersonGame]:
         """The recorded games of an arm."""
         for _, trace in read_traces(self.folder / "traces" / f"{arm}-seed{self.seed}.parquet"):
-            yield RecordedGame.of(trace, self.scene)
+            yield PersonGame.of(trace, self.scene)
 
 
 def rows(run: Run) -> list[dict[str, str]]:

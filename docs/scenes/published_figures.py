@@ -24,9 +24,8 @@ import numpy as np
 import pandas as pd
 import typer
 
-from harness.evaluation.encounters import encounters_of
+from harness.environments.recorded import recorded_game
 from harness.evaluation.trace_file import read_traces
-from harness.evaluation.trace_quantities import drove_in, quantities_of, sizes_by_name
 from harness.files import write_atomically
 from harness.game.arrays import FloatArray
 from harness.game.roles import NON_EGO
@@ -141,11 +140,10 @@ def rows_of(run: Path) -> Iterator[dict[str, Any]]:
 def games_of(file: Path, scene: OpenScene) -> Iterator[dict[str, float]]:
     """The accepted gap and the speeds of the person in each game; the gap is inf without a vehicle, a speed NaN without
     a step to measure."""
-    sizes_m = {name: (kind.length_m, kind.width_m) for name, kind in scene.routes.types.items()}
     for _, trace in read_traces(file):
-        quantities = quantities_of(trace, scene.world, sizes_by_name(trace, sizes_m))
-        drove = drove_in(trace, scene.world.roles)[:, NON_EGO]
-        gaps_s = [each.gap_s for each in encounters_of(quantities, NON_EGO, drove)]
+        game = recorded_game(trace, scene)
+        quantities, drove = game.quantities, game.drove[:, NON_EGO]
+        gaps_s = [each.gap_s for each in game.encounters[NON_EGO]]
         walking = scene.document.players[NON_EGO].on_foot
         counted = drove & (quantities.on_carriageway[:, NON_EGO] > 0.0) if walking else drove
         speeds = quantities.state.speed_mps[counted, NON_EGO]

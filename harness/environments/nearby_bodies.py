@@ -6,13 +6,11 @@ import numpy as np
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
-from harness.game.near_players import NOTICED_M
+from harness.game.near_players import NEAREST, NOTICED_M
 from harness.game.placed_obstacles import Obstacles
 from harness.game.state import Bodies, State
 from harness.game.world import World
 from harness.traffic.simulation import Reading
-
-NEAREST = 16  # background vehicles in a game's bodies
 
 
 class NearbyBodies:

@@ -15,9 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from harness.evaluation.trace_quantities import quantities_of, sizes_by_name
+from harness.environments.recorded import recorded_game
+from harness.evaluation.recorded_game import RecordedGame
 from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.geometry import Box, box_distance
+from harness.game.geometry import box_distance
 from harness.game.initial_state import InitialState
 from harness.game.quantities import Quantities
 from harness.game.road import MARGIN_M, SPACING_M, Routes
@@ -66,10 +67,9 @@ def course_of(trace: pd.DataFrame, scene: OpenScene, afterwards_s: float) -> Rec
     if ends.empty:
         raise ValueError("the ego's game did not end in this trace")
     failed = int(ends.min())
-    types_m = {name: (kind.length_m, kind.width_m) for name, kind in scene.routes.types.items()}
-    known = trace[trace["step"] <= failed]
-    quantities = quantities_of(known, world, sizes_by_name(known, types_m))
-    state, bodies, count = quantities.state, quantities.bodies, len(world.roles)
+    game = recorded_game(trace[trace["step"] <= failed], scene)
+    quantities, bodies, count = game.quantities, game.bodies, len(world.roles)
+    state = quantities.state
     more = round(afterwards_s / world.step_s)
     players = np.stack([getattr(state, name) for name in _POSE], axis=-1)
     others = np.stack([getattr(bodies, name)[:, count:] for name in _POSE], axis=-1)
@@ -84,7 +84,7 @@ def course_of(trace: pd.DataFrame, scene: OpenScene, afterwards_s: float) -> Rec
         others_present=_held(bodies.present[:, count:], more),
         others_size_m=np.stack((bodies.length_m[-1, count:], bodies.width_m[-1, count:]), axis=-1),
         signals=_held(state.signals, more),
-        opponent=_touched(quantities),
+        opponent=_touched(game),
     )
 
 
@@ -120,15 +120,12 @@ def _stations_of(routes: Routes, row: IntArray) -> FloatArray:
     return (row - routes.first_row) * SPACING_M - MARGIN_M
 
 
-def _touched(quantities: Quantities) -> int:
+def _touched(game: RecordedGame) -> int:
     """The body nearest to the ego in the last step, if it touches it; -1 if none does."""
-    bodies = quantities.bodies
-    boxes = [
-        Box(*(float(getattr(bodies, name)[-1, body]) for name in Box._fields)) for body in range(bodies.x_m.shape[1])
-    ]
-    gaps_m = {body: box_distance(boxes[EGO], boxes[body]) for body in np.flatnonzero(bodies.present[-1]) if body != EGO}
-    nearest = min(gaps_m, key=gaps_m.__getitem__, default=-1)
-    return int(nearest) if nearest >= 0 and gaps_m[nearest] <= _TOUCHING_M else -1
+    last = len(game.drove) - 1
+    nearest = game.nearest(last, EGO)
+    touches = nearest is not None and box_distance(game.box(last, EGO), game.box(last, nearest)) <= _TOUCHING_M
+    return nearest if nearest is not None and touches else -1
 
 
 _TOUCHING_M = 0.01  # coordinates in a trace are exact; the margin covers the rounding of rotated boxes

@@ -1,70 +1,300 @@
-"""What the columns of `episodes.csv` are: unit, meaning with formula, and source. `docs/columns.md` is made of it."""
+"""The registry of columns: every table of a run, with what each of its columns is. Metrics are entered beside their
+functions (`metrics.metric`); `docs/columns.md` and the headings of pages are made of this."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
-from harness.evaluation.severity.columns import OF_SEVERITY, Column
+from harness.evaluation.column import (
+    COUNT,
+    FLAG,
+    MAYBE,
+    NUMBER,
+    OF_METRIC,
+    P_VALUE,
+    POINTS,
+    SHARE,
+    TEXT,
+    Column,
+    by_name,
+)
+from harness.evaluation.measured_game import METRICS_OF_GAMES, METRICS_OF_PLAYERS
 
-_SPEED = Column("float64", "m/s", "Mean speed while driving.", "the paper, step 1c")
-_RED = Column("float64", "", "Number of stop lines passed on red.", "")
-_WRONG_WAY = Column("float64", "s", "Time among oncoming lanes.", "")
-_PAYOFF = Column("float64", "", "The player's own payoff, summed over the game.", "the paper, equation 1")
-_OUTCOME = "`goal`, `collision` (with a road user), `rail` (with the edge of the drivable area), `timeout` or `error`"
+_EXACT, _T = "95 % Clopper-Pearson interval", "95 % t interval"
+_PAPER = "the paper, section 4.2"
+ARM = Column("arm", TEXT, "The name of the arm, such as naive_vs_speedy.")
+PERSONA = Column("persona", TEXT, "The persona of the non-ego; of an arm with one.")
+SEED = Column("seed", COUNT, "The training seed.")
+EPISODE = Column("episode", COUNT, "The game. Equal numbers begin alike in every arm.")
+_GAME = (ARM, PERSONA, SEED, EPISODE)
+_EGO_FAILED = Column("ego_failed", MAYBE, "1 if the ego did not reach its goal, else 0.", source="the paper, section 4")
+_ERROR = Column("error", TEXT, "Why the game could not be played; empty if it was.")
+_EPISODES = Column("episodes", COUNT, "Games of the arm.", label="games")
+_PAIRS = (
+    Column("pairs", COUNT, "Games of both arms that are compared, with the same start."),
+    Column("pairs_left_out", COUNT, "Pairs with a game that errored, is missing or has an empty value."),
+)
+_P = Column("p_value", NUMBER, "Of the paired one-tailed t-test.", unit=P_VALUE, label="p", source=_PAPER)
+_P_HOLM = Column(
+    "p_holm", NUMBER, "Corrected for all tests of the table.", unit=P_VALUE, label="p after Holm", source="Holm 1979"
+)
+_REASON = Column("reason", TEXT, "Why there is no verdict for want of competence; else empty.")
+_VERDICT = Column("verdict", TEXT, "What the row says about its question.")
+_FAILURE_RATE = Column("failure_rate", NUMBER, "Share of the games in which the ego failed.", unit=SHARE)
 
-EPISODES: Mapping[str, Column] = {
-    "arm": Column("object", "", "The name of the arm, such as naive_vs_speedy.", ""),
-    "persona": Column("object", "", "The persona of the non-ego; of an arm with one.", ""),
-    "seed": Column("int64", "", "The training seed.", ""),
-    "episode": Column("int64", "", "The game. Equal numbers begin alike in every arm.", ""),
-    "ego_outcome": Column("object", "", f"How the ego's game ended: {_OUTCOME}; empty without an ego.", ""),
-    "ego_failed": Column("Int64", "", "1 if the ego did not reach its goal, else 0.", "the paper, section 4"),
-    "ego_mean_speed_mps": _SPEED,
-    "ego_trailing_distance_m": Column(
-        "float64",
-        "m",
-        "Mean gap to the leader, bumper to bumper, over the steps with one.",
-        "the paper, step 1c",
+
+def _outcome(role: str, who: str) -> Column:
+    kinds = "`goal`, `collision` (with a road user), `rail` (with the edge of the drivable area), `timeout` or `error`"
+    return Column(f"{role}_outcome", TEXT, f"How the {who}'s game ended: {kinds}; empty without one.")
+
+
+def _of_player(role: str, whose: str) -> Iterator[Column]:
+    for each in METRICS_OF_PLAYERS:
+        if whose in each.whose:
+            yield replace(each.column, name=f"{role}_{each.column.name}")
+
+
+def _means(whose: str) -> Iterator[Column]:
+    for each in METRICS_OF_PLAYERS:
+        if each.mean and whose in each.whose:
+            name = each.mean if whose == "ego" else f"non_ego_{each.column.name}"
+            yield replace(each.column, name=name, meaning=f"Mean over the games: {each.column.meaning}")
+
+
+def _summary() -> Iterator[Column]:
+    yield from (ARM, PERSONA, SEED, _EPISODES)
+    yield Column("errors", COUNT, "Games that could not be played.")
+    yield from _FAILURE_RATE.with_interval(_EXACT)
+    for outcome in ("collision", "rail", "timeout"):
+        yield Column(f"{outcome}s", MAYBE, f"Games in which the ego's outcome is {outcome}.")
+    for each in _means("ego"):
+        yield each
+        if each.name == "mean_speed_mps":
+            for end in ("low", "high"):
+                yield Column(f"mean_speed_{end}_mps", NUMBER, f"The {end} end of the {_T} of mean_speed_mps.")
+    rate = Column("non_ego_goal_rate", NUMBER, "Share of the people that reached their goals.", unit=SHARE)
+    yield from rate.with_interval(f"{_EXACT} (empty with several people)")
+    yield from _means("person")
+    yield from Column("near_miss_rate", NUMBER, "Share of the games with a near miss.", unit=SHARE).with_interval(
+        _EXACT
+    )
+
+
+_COMPARISONS = (
+    Column("question", TEXT, "RQ1: does the persona cause failures; RQ2: does retraining reduce them."),
+    *(PERSONA, SEED),
+    Column("metric", TEXT, "`failure` or `mean_speed`."),
+    *_PAIRS,
+    Column(
+        "mean_difference",
+        NUMBER,
+        "Of the pairs; above 0 supports H1.",
+        unit=OF_METRIC,
+        label="mean difference towards H1",
     ),
-    "ego_min_ttc_s": Column(
-        "float64",
-        "s",
-        "Least time to collision (TTC) with a road user: oriented boxes at constant headings and speeds; 0 at contact.",
-        "Hayward 1972, Near-miss determination through use of a scale of danger, for boxes at any angle",
+    Column("ci_low", NUMBER, f"The low end of its {_T}.", unit=OF_METRIC, label="its 95 % low"),
+    Column("ci_high", NUMBER, f"The high end of its {_T}.", unit=OF_METRIC, label="its 95 % high"),
+    Column("t", NUMBER, "The t statistic; empty where all differences are equal.", source=_PAPER),
+    *(_P, _P_HOLM),
+    Column("effect_size", NUMBER, "Cohen's d_z: mean over standard deviation.", label="effect size d_z"),
+    Column("mcnemar_p", NUMBER, "McNemar's exact test of failures.", unit=P_VALUE, label="McNemar p"),
+    Column("rejects_h0", FLAG, "Whether p_value is below the significance.", label="rejects H0 (p alone)"),
+    *(_VERDICT, _REASON),
+)
+
+_TRAINING = (
+    Column("stage", TEXT, "The name of the training."),
+    *(PERSONA, SEED),
+    Column("steps", COUNT, "Steps played so far."),
+    Column("mean_payoff", NUMBER, "Mean payoff of a game since the row before."),
+    _FAILURE_RATE,
+    Column("games", COUNT, "Games that ended since the row before."),
+    Column("mean_duration_s", NUMBER, "Their mean duration."),
+    Column("stopped", TEXT, "In the last row of a training: `converged`, `budget` or `did not learn`."),
+)
+
+_RECONFIGURATION = (
+    Column("stage", TEXT, "The name of the search."),
+    *(PERSONA, SEED),
+    Column("trial", COUNT, "The trial; 0 is the ego as given."),
+    Column("parameter", TEXT, "A parameter of the ego."),
+    Column("value", NUMBER, "Its value in the trial."),
+    Column("low", NUMBER, "The lower bound of the search."),
+    Column("high", NUMBER, "The upper bound of the search."),
+    Column("mean_payoff", NUMBER, "Mean payoff of the trial's games."),
+    _FAILURE_RATE,
+    Column("best_payoff", NUMBER, "The best mean payoff so far."),
+    Column("chosen", FLAG, "Whether this trial was taken."),
+    Column("error", TEXT, "Why the trial could not be played; else empty."),
+)
+
+_MANOEUVRES = (
+    *_GAME,
+    Column("player", TEXT, "Who performs it."),
+    Column("manoeuvre", TEXT, "Its name in docs/manoeuvres.md."),
+    Column("time_s", NUMBER, "When it begins."),
+    Column("until_s", NUMBER, "When it ends."),
+    Column("gap_m", NUMBER, "Gap to the leader; of a body that enters a lane, to the follower."),
+    Column("ttc_s", NUMBER, "Time to collision, of the same two."),
+    Column("text", TEXT, "What it was, in words."),
+)
+
+_CAUSES = (
+    *_GAME,
+    _outcome("ego", "ego"),
+    Column("other", TEXT, "The road user that was involved; empty if none was."),
+    Column("event", TEXT, "What led to the failure, by its name in docs/manoeuvres.md."),
+    Column("deed", TEXT, "The same in words."),
+    Column("time_s", NUMBER, "When that began."),
+    Column("time_left_s", NUMBER, "From then to the end of the ego's game: what the ego had."),
+    Column("ego_saw", TEXT, "`yes` or `no`; empty if no other was involved."),
+    Column("hidden_until_s", NUMBER, "Time before the end at which the other came into sight, if something hid it."),
+    Column("reaction", TEXT, "`brakes`, `swerves`, `brakes and swerves` or `no reaction`."),
+    Column("braking_mps2", NUMBER, "Strongest braking of the ego in that time."),
+    Column("ego_broke", TEXT, "A rule of the road that the ego broke; empty if none."),
+)
+
+_POPULATIONS = (
+    ARM,
+    Column("population", TEXT, "The population that drove against the ego."),
+    *(SEED, PERSONA, _EPISODES),
+    Column("errors", COUNT, "Games that could not be played."),
+    *_FAILURE_RATE.with_interval(_EXACT),
+    *(each for each in _means("ego") if each.name in ("mean_speed_mps", "ego_payoff")),
+    *(each for each in _means("person") if each.name == "non_ego_payoff"),
+)
+
+
+_STRATEGIES = (Column("ego", TEXT, "The strategy of the ego."), Column("non_ego", TEXT, "That of the non-ego."))
+
+_GAPS = (
+    *(SEED, PERSONA),
+    Column("round", COUNT, "The round of the iterated best response."),
+    Column("role", TEXT, "The player replaced by a best response: `ego` or `non_ego`."),
+    *_STRATEGIES,
+    *_PAIRS,
+    Column("payoff", NUMBER, "Mean payoff of the player of that role, over the pairs."),
+    Column("payoff_best_response", NUMBER, "That of its best response."),
+    Column("gap", NUMBER, "Mean of best response minus player; below 0: the training found nothing better."),
+    Column("ci_low", NUMBER, f"The low end of its {_T}.", label="its 95 % low"),
+    Column("ci_high", NUMBER, f"The high end of its {_T}.", label="its 95 % high"),
+    Column("gap_share", NUMBER, "gap / |payoff|; empty where the payoff is 0.", unit=SHARE),
+    *(_P, _P_HOLM),
+    *Column("ego_failure_rate", NUMBER, "Of the ego in the pair.", unit=SHARE).with_interval(_EXACT),
+    *Column(
+        "ego_failure_rate_best_response", NUMBER, "The same with the best response in its place.", unit=SHARE
+    ).with_interval(_EXACT),
+    *Column(
+        "failure_difference", NUMBER, "Mean of ego failures with the best response minus without.", unit=POINTS
+    ).with_interval(_T),
+    *(_VERDICT, _REASON),
+)
+
+_CROSSPLAY = (
+    SEED,
+    *_STRATEGIES,
+    *(PERSONA, ARM),
+    Column("games", COUNT, "Games that were played and measured."),
+    Column("left_out", COUNT, "Episodes of this seed that were not played, not measured, or are missing."),
+    *_FAILURE_RATE.with_interval(_EXACT),
+    *Column("ego_payoff", NUMBER, "Mean payoff of the ego.").with_interval(_T),
+    *Column("non_ego_payoff", NUMBER, "Mean payoff of the non-ego.").with_interval(_T),
+    Column("ego_mean_speed_mps", NUMBER, "Mean over the games of the ego's mean speed."),
+)
+
+_EQUILIBRIA = (
+    SEED,
+    Column("game", TEXT, "The persona of the non-egos, or `all`: every non-ego, of any persona or none."),
+    Column("solution", TEXT, "`nash`, `safest` (game `all` only), or why there is none."),
+    Column("number", MAYBE, "Of the equilibrium within seed and game, from 1, the one to choose first."),
+    Column("role", TEXT, "`ego` or `non_ego`."),
+    Column("player", TEXT, "The strategy."),
+    Column("share", NUMBER, "How often its role plays it; empty for the non-egos of `safest`.", unit=SHARE),
+    Column("payoff", NUMBER, "Of this strategy against the other side's shares (nash)."),
+    Column("solution_payoff", NUMBER, "Of its role in this solution (nash)."),
+    Column("regret", NUMBER, "The possible gain of its role by another strategy of the table (nash)."),
+    Column("failure_rate", NUMBER, "Of the ego against the other side's shares; safest: its worst case.", unit=SHARE),
+    Column("solution_failure_rate", NUMBER, "Of the ego in this solution; safest: the mixture's worst.", unit=SHARE),
+    Column("dominated_in_payoff", TEXT, "The strategy or mixture of its role that strictly dominates it; empty: none."),
+    Column("dominated_in_failures", TEXT, "The same for an ego's failure rates."),
+)
+
+_GENERALISATION = (
+    SEED,
+    Column("ego", TEXT, "The retrained ego."),
+    Column("met", TEXT, "The personas it was trained against, joined by ` + `."),
+    Column("persona", TEXT, "Of the non-ego: one it was not trained against."),
+    Column("non_ego", TEXT, "The non-ego."),
+    *_PAIRS,
+    *_FAILURE_RATE.with_interval(_EXACT),
+    Column("naive_failure_rate", NUMBER, "Of the naive ego against the same non-ego, same episodes.", unit=SHARE),
+    Column("share_of_naive", NUMBER, "failure_rate / naive_failure_rate; empty where the naive ego never fails."),
+    *Column(
+        "fewer_failures", NUMBER, "Mean of naive minus this ego; above 0 it fails less.", unit=POINTS
+    ).with_interval(_T),
+    *(_P, _P_HOLM, _VERDICT, _REASON),
+)
+
+_REFERENCE_DRIVERS = (
+    *_GAME,
+    Column("driver", TEXT, "The reference driver."),
+    _outcome("ego", "ego"),
+    Column("failed_s", NUMBER, "When the ego failed."),
+    Column("conflict_s", NUMBER, "The first moment at which the driver's rule says danger; empty: never."),
+    Column("prevented_from_conflict", MAYBE, "1: it prevents the collision from then on, 0: not, empty: no verdict."),
+    Column("prevented_from_start", MAYBE, "1: driving from the start it reaches the goal, 0: not."),
+    Column(
+        "outcome_from_start",
+        TEXT,
+        "How the game ends with this driver from the start; `on_red` or `wrong_way` for a goal that breaks this rule.",
     ),
-    "ego_max_deceleration_mps2": Column("float64", "m/s^2", "Strongest braking; 0 if the ego never braked.", ""),
-    "ego_max_lateral_acceleration_mps2": Column(
-        "float64", "m/s^2", "Greatest lateral acceleration, to either side; empty where SUMO drives.", ""
+    Column("preventable_from_s", NUMBER, "First moment from which full braking prevents the collision."),
+    Column("preventable_until_s", NUMBER, "Last moment from which full braking prevents the collision."),
+    Column("error", TEXT, "Why the game could not be played from the start; else empty."),
+)
+
+
+def _prevented(verdict: str) -> Iterator[Column]:
+    yield Column(f"{verdict}_judged", COUNT, "Failures with a verdict.")
+    yield Column(f"{verdict}_prevented", COUNT, "Of these, prevented.")
+    yield from Column(f"{verdict}_share", NUMBER, "prevented / judged.", unit=SHARE).with_interval(_EXACT)
+    yield from Column(f"{verdict}_rate", NUMBER, "prevented / episodes.", unit=SHARE).with_interval(_EXACT)
+
+
+_PREVENTABILITY = (
+    *(ARM, PERSONA, SEED),
+    Column("driver", TEXT, "The reference driver; `any`: any of them but the upper bound."),
+    Column("episodes", COUNT, "Games that were played.", label="games"),
+    Column("failures", COUNT, "Failures of the ego."),
+    *_prevented("from_conflict"),
+    *_prevented("from_start"),
+)
+
+TABLES: Mapping[str, Mapping[str, Column]] = {
+    "episodes": by_name(
+        *(*_GAME, _outcome("ego", "ego"), _EGO_FAILED, *_of_player("ego", "ego")),
+        *(_outcome("non_ego", "person"), *_of_player("non_ego", "person")),
+        Column("duration_s", NUMBER, "Duration of the game."),
+        *(each.column for each in METRICS_OF_GAMES),
+        _ERROR,
     ),
-    "ego_time_to_goal_s": Column("float64", "s", "Time until the goal; empty without it.", ""),
-    "ego_red_lights": _RED,
-    "ego_wrong_way_s": _WRONG_WAY,
-    "ego_min_pet_s": Column(
-        "float64",
-        "s",
-        "Least post-encroachment time in a zone of conflict of a junction, from when the first leaves the zone until "
-        "the second enters it.",
-        "Allen, Shin and Cooper 1978",
-    ),
-    "ego_pet_priority": Column("object", "", "Whether the `ego` or the `other` had priority in that passage.", ""),
-    "ego_accepted_gap_s": Column(
-        "float64",
-        "s",
-        "Least gap that the ego accepted: the time that a road user with priority would have needed to the zone of "
-        "conflict at constant speed when the ego entered it.",
-        "",
-    ),
-    "ego_payoff": _PAYOFF,
-    "non_ego_outcome": Column("object", "", f"How the person's game ended: {_OUTCOME}; empty without one.", ""),
-    "non_ego_mean_speed_mps": _SPEED,
-    "non_ego_red_lights": _RED,
-    "non_ego_latest_red_s": Column(
-        "float64", "s", "Longest time since the onset of red at which the person passed a stop line.", ""
-    ),
-    "non_ego_wrong_way_s": _WRONG_WAY,
-    "non_ego_payoff": _PAYOFF,
-    "duration_s": Column("float64", "s", "Duration of the game.", ""),
-    **OF_SEVERITY,
-    "error": Column("object", "", "Why the game could not be played; empty if it was.", ""),
+    "played": by_name(*_GAME, _outcome("ego", "ego"), _outcome("non_ego", "person"), _ERROR),
+    "causes": by_name(*_CAUSES),
+    "manoeuvres": by_name(*_MANOEUVRES),
+    "summary": by_name(*_summary()),
+    "comparisons": by_name(*_COMPARISONS),
+    "training": by_name(*_TRAINING),
+    "populations": by_name(*_POPULATIONS),
+    "reconfiguration": by_name(*_RECONFIGURATION),
+    "gaps": by_name(*_GAPS),
+    "crossplay": by_name(*_CROSSPLAY),
+    "equilibria": by_name(*_EQUILIBRIA),
+    "generalisation": by_name(*_GENERALISATION),
+    "reference_drivers": by_name(*_REFERENCE_DRIVERS),
+    "preventability": by_name(*_PREVENTABILITY),
 }
-"""Every column in order, with one person."""
+"""Each table by the name of its file; `played` is what a stage stores of the games that it plays."""
+
+MEANS = {each.column.name: each for each in METRICS_OF_PLAYERS if each.mean}
+"""The metrics of players whose means per arm are columns of `summary.csv`."""

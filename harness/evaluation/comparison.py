@@ -34,32 +34,12 @@ import numpy.typing as npt
 import pandas as pd
 import scipy  # loads `scipy.stats` at its first use: workers do without
 
+from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import Gate, gate
 from harness.evaluation.research_questions import Question, ResearchQuestion, Verdict
+from harness.evaluation.tables import typed
 
 Floats = npt.NDArray[np.float64]
-
-COMPARISON_COLUMNS = {
-    "question": "object",
-    "persona": "object",
-    "seed": "int64",
-    "metric": "object",
-    "pairs": "int64",
-    "pairs_left_out": "int64",
-    "mean_difference": "float64",
-    "ci_low": "float64",
-    "ci_high": "float64",
-    "t": "float64",
-    "p_value": "float64",
-    "p_holm": "float64",
-    "effect_size": "float64",
-    "mcnemar_p": "float64",
-    "rejects_h0": "bool",
-    "verdict": "object",
-    "reason": "object",
-}
-"""Columns of `comparisons.csv` in order, each with its pandas dtype. `reason`: why a question is not answered for
-want of competence; else empty."""
 
 CONFIDENCE = 0.95
 """The confidence of every interval in the tables; it does not depend on the campaign's significance."""
@@ -85,7 +65,7 @@ METRICS = (
 
 
 def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
-    """A row for each question and metric, in that order, with `COMPARISON_COLUMNS`.
+    """A row for each question and metric, in that order, the table `comparisons`.
 
     `episodes` has the columns of episodes.csv: arm, seed, episode, ego_outcome, error, and the metrics'.
     Games are paired by seed and episode. A pair is left out, and counted in `pairs_left_out`, when either
@@ -105,11 +85,11 @@ def compare(questions: Iterable[Question], episodes: pd.DataFrame, significance:
         for closed in [gate(question.alone, question.seed, games)]
         for metric in METRICS
     ]
-    table = pd.DataFrame(rows, columns=list(COMPARISON_COLUMNS))
+    table = pd.DataFrame(rows, columns=list(TABLES["comparisons"]))
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
     table["rejects_h0"] = table["p_value"].astype("float64") < significance
     table["verdict"] = [verdict_of(row, significance).value for row in table.to_dict("records")]
-    return table.astype(COMPARISON_COLUMNS)
+    return typed(table)
 
 
 def holm(p_values: Floats) -> Floats:

@@ -72,8 +72,8 @@ def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -
     Several people drive one at a time, and their games count together.
     An ego that breaks one of `RULES` can't drive the scene. Persons may: some are made for it.
     """
-    from harness.evaluation.manoeuvres.thresholds import WRONG_WAY_LEAST_S
     from harness.evaluation.people import outcomes_of_people
+    from harness.evaluation.rule_book.thresholds import WRONG_WAY_LEAST_S
 
     if games is None:
         return Goals(goals=0, games=0)
@@ -90,7 +90,7 @@ def goals_alone(games: pd.DataFrame | None, player: Literal["ego", "non_ego"]) -
 
 def broken_by(record: Mapping[str, Any]) -> str:
     """The key of the rule of `RULES` that the ego broke in a game, from its cells of episodes.csv; empty if none."""
-    from harness.evaluation.manoeuvres.thresholds import WRONG_WAY_LEAST_S
+    from harness.evaluation.rule_book.thresholds import WRONG_WAY_LEAST_S
 
     if (record.get("ego_red_lights") or 0.0) >= 1.0:
         return "on_red"

@@ -1,131 +1,200 @@
-"""The metrics of a player in one game: from the recording of its steps to a value, or None if unscored.
+"""The metrics of a player in one recorded game, each with its columns in `episodes.csv` and `summary.csv`.
 
-A metric that can't be measured in a game (no leader, no collision course) is unscored, never 0.
+A metric is a function with an entry of the registry, its decorator. Where it can't be measured in a game (no leader, no
+collision course) it is None, never 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 
+from harness.evaluation.column import NUMBER, TEXT, Column
 from harness.evaluation.encounters import Encounter
+from harness.evaluation.recorded_game import RecordedGame
 from harness.game.arrays import FloatArray
 from harness.game.outcome import Outcome
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drive:
+    """A player's part of a recorded game. Arrays are [N]: the steps in which it drove, without the start."""
+
+    game: RecordedGame
+    player: int
+
+    def of(self, quantity: str) -> FloatArray:
+        """One of the quantities [G, P] of `game.quantities.Quantities`; inf: no leader, or no collision course."""
+        return self.game.while_driving(getattr(self.game.quantities, quantity), self.player)
+
+    @property
+    def outcome(self) -> Outcome:
+        """How its game ended."""
+        return self.game.outcomes[self.player]
+
+    @property
+    def step_s(self) -> float:
+        """Length of a step."""
+        return self.game.world.step_s
+
+    @property
+    def steers(self) -> bool:
+        """Whether its steering is known: SUMO's cars change lanes without a steering angle."""
+        return bool(self.game.steers[self.player])
+
+    @property
+    def acceleration_mps2(self) -> FloatArray:
+        """Along its heading."""
+        return self.game.while_driving(self.game.quantities.state.acceleration_mps2, self.player)
+
+    @property
+    def payoff(self) -> FloatArray:
+        """Its payoff of each step."""
+        return self.game.while_driving(self.game.payoff, self.player)
+
+    @property
+    def encounters(self) -> tuple[Encounter, ...]:
+        """Its encounters at junctions."""
+        return self.game.encounters[self.player]
+
+
+Value: TypeAlias = float | str | None
+
+
 @dataclass(frozen=True, kw_only=True)
-class PlayerSeries:
-    """One player's game, step by step while it drove, [T]; inf: no leader, or no collision course."""
+class Metric:
+    """A metric: its column, whose it is, and its function."""
 
-    outcome: Outcome
-    step_s: float
-    speed_mps: FloatArray
-    acceleration_mps2: FloatArray
-    lateral_acceleration_mps2: FloatArray
-    leader_gap_m: FloatArray
-    time_to_collision_s: FloatArray
-    payoff: FloatArray
-    passed_red_s: FloatArray
-    """Where the player passed a stop line on red: seconds since the signal became red; else -1."""
-    wrong_way: FloatArray
-    """1 while the player was among oncoming lanes, else 0."""
-    encounters: tuple[Encounter, ...] = ()
+    column: Column
+    """Of the game; a player's has the player's name before this name."""
+    whose: tuple[str, ...]
+    """`ego`, `person` (each of them), or `game`: the judged player's, without a player's name."""
+    mean: str
+    """The column of `summary.csv` with the ego's mean per arm (that of the people: as in `episodes.csv`); empty:
+    none."""
+    of: Callable[[Drive], Value]
 
 
-def _finite(values: FloatArray, statistic: Callable[[FloatArray], float]) -> float | None:
+METRICS: list[Metric] = []
+"""In the order of their columns; those of severity are added by `severity.measures`."""
+
+
+def metric(
+    *whose: str, meaning: str, dtype: str = NUMBER, unit: str = "", source: str = "", mean: str = ""
+) -> Callable[[Callable[[Any], Value]], Callable[[Any], Value]]:
+    """Enter a function of a `Drive` into `METRICS`: its name is that of the column."""
+
+    def enter(function: Callable[[Any], Value]) -> Callable[[Any], Value]:
+        column = Column(function.__name__, dtype, meaning, unit=unit, source=source)
+        METRICS.append(Metric(column=column, whose=whose, mean=mean, of=function))
+        return function
+
+    return enter
+
+
+def finite(values: FloatArray, statistic: Callable[[FloatArray], float]) -> float | None:
+    """A statistic of the measured values; None without any."""
     measured = values[np.isfinite(values)]
     return float(statistic(measured)) if len(measured) else None
 
 
-def mean_speed_mps(drive: PlayerSeries) -> float | None:
-    """Mean speed while driving."""
-    return _finite(drive.speed_mps, np.mean)
+@metric("ego", "person", meaning="Mean speed while driving.", source="the paper, step 1c", mean="mean_speed_mps")
+def mean_speed_mps(drive: Drive) -> float | None:
+    return finite(drive.of("speed_mps"), np.mean)
 
 
-def trailing_distance_m(drive: PlayerSeries) -> float | None:
-    """Mean gap to the leader, bumper to bumper, over the steps in which there was one (paper, step 1c)."""
-    return _finite(drive.leader_gap_m, np.mean)
+@metric(
+    "ego",
+    meaning="Mean gap to the leader, bumper to bumper, over the steps with one.",
+    source="the paper, step 1c",
+    mean="trailing_distance_m",
+)
+def trailing_distance_m(drive: Drive) -> float | None:
+    return finite(drive.of("leader_gap_m"), np.mean)
 
 
-def min_ttc_s(drive: PlayerSeries) -> float | None:
-    """Least time to collision (TTC), of oriented boxes with constant heading and speed; 0 at contact."""
-    return _finite(drive.time_to_collision_s, np.min)
+@metric(
+    "ego",
+    meaning="Least time to collision (TTC) with a road user: oriented boxes at constant headings and speeds; 0 at "
+    "contact.",
+    source="Hayward 1972, Near-miss determination through use of a scale of danger, for boxes at any angle",
+    mean="min_ttc_s",
+)
+def min_ttc_s(drive: Drive) -> float | None:
+    return finite(drive.of("time_to_collision_s"), np.min)
 
 
-def max_deceleration_mps2(drive: PlayerSeries) -> float | None:
-    """Hardest braking; 0 if the player never decelerated."""
-    return _finite(np.maximum(-drive.acceleration_mps2, 0.0), np.max)
+@metric("ego", meaning="Strongest braking; 0 if the ego never braked.", mean="max_deceleration_mps2")
+def max_deceleration_mps2(drive: Drive) -> float | None:
+    return finite(np.maximum(-drive.acceleration_mps2, 0.0), np.max)
 
 
-def max_lateral_acceleration_mps2(drive: PlayerSeries) -> float | None:
-    """Greatest lateral acceleration, to either side."""
-    return _finite(np.abs(drive.lateral_acceleration_mps2), np.max)
+@metric(
+    "ego",
+    meaning="Greatest lateral acceleration, to either side; empty where SUMO drives.",
+    mean="max_lateral_acceleration_mps2",
+)
+def max_lateral_acceleration_mps2(drive: Drive) -> float | None:
+    return finite(np.abs(drive.of("lateral_acceleration_mps2")), np.max) if drive.steers else None
 
 
-def time_to_goal_s(drive: PlayerSeries) -> float | None:
-    """Time until the goal was reached."""
-    return len(drive.speed_mps) * drive.step_s if drive.outcome is Outcome.GOAL else None
+@metric("ego", meaning="Time until the goal; empty without it.")
+def time_to_goal_s(drive: Drive) -> float | None:
+    return len(drive.payoff) * drive.step_s if drive.outcome is Outcome.GOAL else None
 
 
-def payoff(drive: PlayerSeries) -> float | None:
-    """The player's own payoff, summed over the game (equation 1)."""
-    return float(drive.payoff.sum())
+@metric("ego", "person", meaning="Number of stop lines passed on red.")
+def red_lights(drive: Drive) -> float:
+    return float(np.count_nonzero(drive.of("passed_red_s") >= 0.0))
 
 
-def red_lights(drive: PlayerSeries) -> float:
-    """Number of stop lines that the player passed on red."""
-    return float(np.count_nonzero(drive.passed_red_s >= 0.0))
+@metric("person", meaning="Longest time since the onset of red at which the person passed a stop line.")
+def latest_red_s(drive: Drive) -> float | None:
+    passed_red_s = drive.of("passed_red_s")
+    return finite(passed_red_s[passed_red_s >= 0.0], np.max)
 
 
-def latest_red_s(drive: PlayerSeries) -> float | None:
-    """Longest time since the onset of red at which the player passed a stop line."""
-    return _finite(np.where(drive.passed_red_s >= 0.0, drive.passed_red_s, np.nan), np.max)
+@metric("ego", "person", meaning="Time among oncoming lanes.")
+def wrong_way_s(drive: Drive) -> float:
+    return float(drive.of("wrong_way").sum()) * drive.step_s
 
 
-def wrong_way_s(drive: PlayerSeries) -> float:
-    """Time among oncoming lanes."""
-    return float(drive.wrong_way.sum()) * drive.step_s
+@metric(
+    "ego",
+    meaning="Least post-encroachment time in a zone of conflict of a junction, from when the first leaves the zone "
+    "until the second enters it.",
+    source="Allen, Shin and Cooper 1978",
+)
+def min_pet_s(drive: Drive) -> float | None:
+    return finite(np.array([each.post_encroachment_s for each in drive.encounters]), np.min)
 
 
-def min_pet_s(drive: PlayerSeries) -> float | None:
-    """Least post-encroachment time (PET) of the player and another road user in a zone of conflict of a junction."""
-    return _finite(np.array([each.post_encroachment_s for each in drive.encounters]), np.min)
-
-
-def pet_priority(drive: PlayerSeries) -> str | None:
-    """`other` if the player had to yield in the passage of least PET, else `ego`."""
+@metric("ego", dtype=TEXT, meaning="Whether the `ego` or the `other` had priority in that passage.")
+def pet_priority(drive: Drive) -> str | None:
     found = [each for each in drive.encounters if np.isfinite(each.post_encroachment_s)]
     if not found:
         return None
     return "other" if min(found, key=lambda each: each.post_encroachment_s).must_yield else "ego"
 
 
-def accepted_gap_s(drive: PlayerSeries) -> float | None:
-    """Least gap that the player accepted: the time that a road user with priority would have needed to the zone of
-    conflict, at constant speed, when the player entered it; 0 if it was inside."""
-    return _finite(np.array([each.gap_s for each in drive.encounters if each.must_yield]), np.min)
+@metric(
+    "ego",
+    meaning="Least gap that the ego accepted: the time that a road user with priority would have needed to the zone of "
+    "conflict at constant speed when the ego entered it; 0 if it was inside.",
+)
+def accepted_gap_s(drive: Drive) -> float | None:
+    return finite(np.array([each.gap_s for each in drive.encounters if each.must_yield]), np.min)
 
 
-OF_EGO: Mapping[str, Callable[[PlayerSeries], float | str | None]] = {
-    "ego_mean_speed_mps": mean_speed_mps,
-    "ego_trailing_distance_m": trailing_distance_m,
-    "ego_min_ttc_s": min_ttc_s,
-    "ego_max_deceleration_mps2": max_deceleration_mps2,
-    "ego_max_lateral_acceleration_mps2": max_lateral_acceleration_mps2,
-    "ego_time_to_goal_s": time_to_goal_s,
-    "ego_red_lights": red_lights,
-    "ego_wrong_way_s": wrong_way_s,
-    "ego_min_pet_s": min_pet_s,
-    "ego_pet_priority": pet_priority,
-    "ego_accepted_gap_s": accepted_gap_s,
-    "ego_payoff": payoff,
-}
-OF_NON_EGO: Mapping[str, Callable[[PlayerSeries], float | None]] = {
-    "non_ego_mean_speed_mps": mean_speed_mps,
-    "non_ego_red_lights": red_lights,
-    "non_ego_latest_red_s": latest_red_s,
-    "non_ego_wrong_way_s": wrong_way_s,
-    "non_ego_payoff": payoff,
-}
+@metric(
+    "ego",
+    "person",
+    meaning="The player's own payoff, summed over the game.",
+    source="the paper, equation 1",
+    mean="ego_payoff",
+)
+def payoff(drive: Drive) -> float:
+    return float(drive.payoff.sum())

@@ -5,22 +5,19 @@ A person's columns begin with its name (`game.roles.roles_of`): `non_ego_outcome
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.metrics import OF_NON_EGO, PlayerSeries
+from harness.evaluation.column import TEXT, Column
 from harness.game.roles import MOST_PEOPLE, NON_EGO, ROLES, roles_of
 
 COLLIDED_WITH = "ego_collided_with"
-"""The column of what the ego collided with, a person or `background`; only tables of several people have it."""
+_COLLIDED_WITH = Column(COLLIDED_WITH, TEXT, "What the ego collided with: a person, an obstacle, or `background`.")
+"""Only tables of several people have it."""
 _ONE = f"{ROLES[NON_EGO]}_"
-
-
-def of_person(name: str) -> Mapping[str, Callable[[PlayerSeries], float | None]]:
-    """The metrics of a person, by their columns."""
-    return {f"{name}_{column.removeprefix(_ONE)}": metric for column, metric in OF_NON_EGO.items()}
 
 
 def people_in(columns: Iterable[str]) -> tuple[str, ...]:
@@ -29,20 +26,21 @@ def people_in(columns: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in roles_of(1 + MOST_PEOPLE)[NON_EGO:] if f"{name}_outcome" in columns)
 
 
-def columns_for(people: int, columns: Mapping[str, str]) -> dict[str, str]:
+def columns_for(people: int, columns: Mapping[str, Column]) -> dict[str, Column]:
     """Columns of a table of games with one person, for a number of people.
 
     With several, those of a person occur for each of them, and `COLLIDED_WITH` follows `ego_failed`.
     """
-    result: dict[str, str] = {}
+    result: dict[str, Column] = {}
     names = roles_of(1 + people)[NON_EGO:]
-    own = {name: dtype for name, dtype in columns.items() if name.startswith(_ONE)}
-    for name, dtype in columns.items():
+    own = {name: column for name, column in columns.items() if name.startswith(_ONE)}
+    for name, column in columns.items():
         if name not in own:
-            result[name] = dtype
-            result |= {COLLIDED_WITH: "object"} if people > 1 and name == "ego_failed" else {}
+            result[name] = column
+            result |= {COLLIDED_WITH: _COLLIDED_WITH} if people > 1 and name == "ego_failed" else {}
         elif name == next(iter(own)):
-            result |= {f"{each}_{cell.removeprefix(_ONE)}": kind for each in names for cell, kind in own.items()}
+            cells = [(each, cell.removeprefix(_ONE), kind) for each in names for cell, kind in own.items()]
+            result |= {f"{each}_{cell}": replace(kind, name=f"{each}_{cell}") for each, cell, kind in cells}
     return result
 
 

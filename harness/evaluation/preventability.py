@@ -23,7 +23,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.comparison import rate_interval
-from harness.evaluation.reference_columns import PREVENTABILITY_COLUMNS
+from harness.evaluation.tables import table_of
 
 ANY = "any"
 """The row of `preventability.csv` on the games that at least one person among the reference drivers prevents."""
@@ -70,7 +70,7 @@ class Preventability:
 def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame:
     """The rows of `preventability.csv`: for each arm and training seed, each reference driver and `ANY`.
 
-    `games` has `REFERENCE_COLUMNS`, `episodes` the columns of `episodes.csv`. Shares are of the failures with a
+    `games` is the table `reference_drivers`, `episodes` the table of this name. Shares are of the failures with a
     verdict, rates of all games that were played; both have the 95 % interval of all rates of a run.
     """
     rows: list[dict[str, object]] = []
@@ -83,7 +83,7 @@ def count_prevented(games: pd.DataFrame, episodes: pd.DataFrame) -> pd.DataFrame
         persons = judged[judged["driver"] != UPPER_BOUND]
         columns = [f"prevented_{FROM_CONFLICT}", f"prevented_{FROM_START}"]
         rows.append({**counted, "driver": ANY, **_verdicts(persons.groupby("episode")[columns].max(), len(played))})
-    return pd.DataFrame(rows, columns=list(PREVENTABILITY_COLUMNS)).astype(PREVENTABILITY_COLUMNS)
+    return table_of("preventability", rows)
 
 
 def preventability_of(counts: pd.DataFrame, games: pd.DataFrame, arm: str) -> list[Preventability]:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.columns import MEANS
 from harness.evaluation.comparison import mean_interval, rate_interval
 from harness.evaluation.people import of_people
-from harness.evaluation.tables import SUMMARY_COLUMNS, typed
+from harness.evaluation.tables import table_of, typed
 
 
 def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
-    """A row for each arm (in order of first appearance) and training seed, with `SUMMARY_COLUMNS`.
+    """A row for each arm (in order of first appearance) and training seed, the table `summary`.
 
     `episodes` counts all games of the arm and `errors` those that could not be played. Every other column is
     over the games that were played and in which the quantity was measured; it is empty without such games.
@@ -26,7 +27,7 @@ def summarise(episodes: pd.DataFrame) -> pd.DataFrame:
         for arm in episodes["arm"].unique()
         for (persona, seed), games in episodes[episodes["arm"] == arm].groupby(["persona", "seed"], sort=False)
     ]
-    return typed(pd.DataFrame(rows, columns=list(SUMMARY_COLUMNS)))
+    return table_of("summary", rows)
 
 
 def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict[str, object]:
@@ -34,6 +35,7 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
     with_ego = played[played["ego_failed"].notna()]
     outcomes = of_people(played, "outcome")
     people = outcomes.to_numpy()[(outcomes != "").to_numpy()]
+    near_misses = played["near_miss"].dropna()
     speeds = played["ego_mean_speed_mps"].dropna()
     speed_low, speed_high = mean_interval(speeds.to_numpy())
 
@@ -50,25 +52,13 @@ def _summary_row(arm: str, persona: str, seed: int, games: pd.DataFrame) -> dict
         "collisions": count_of("collision"),
         "rails": count_of("rail"),
         "timeouts": count_of("timeout"),
-        "mean_speed_mps": speeds.mean(),
         "mean_speed_low_mps": speed_low,
         "mean_speed_high_mps": speed_high,
-        "trailing_distance_m": played["ego_trailing_distance_m"].mean(),
-        "min_ttc_s": played["ego_min_ttc_s"].mean(),
-        "max_deceleration_mps2": played["ego_max_deceleration_mps2"].mean(),
-        "max_lateral_acceleration_mps2": played["ego_max_lateral_acceleration_mps2"].mean(),
-        "ego_payoff": played["ego_payoff"].mean(),
+        **{metric.mean: played[f"ego_{name}"].mean() for name, metric in MEANS.items() if "ego" in metric.whose},
         **_goal_rate(int((people == "goal").sum()), len(people), games=int((outcomes != "").any(axis=1).sum())),
-        "non_ego_mean_speed_mps": _mean(of_people(played, "mean_speed_mps")),
-        "non_ego_payoff": _mean(of_people(played, "payoff")),
-        **_near_misses(played),
+        **{f"non_ego_{name}": _mean(of_people(played, name)) for name in MEANS if "person" in MEANS[name].whose},
+        **_rate("near_miss_rate", int(near_misses.sum()), len(near_misses)),
     }
-
-
-def _near_misses(played: pd.DataFrame) -> dict[str, float]:
-    """The share of the games in which a near miss could be measured, and its interval; empty without the column."""
-    marks = played["near_miss"].dropna() if "near_miss" in played else pd.Series(dtype="float64")
-    return _rate("near_miss_rate", int(marks.sum()), len(marks))
 
 
 def _mean(cells: pd.DataFrame) -> float:

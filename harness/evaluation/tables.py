@@ -1,9 +1,8 @@
-"""The CSV tables of a run folder: their columns, and writing and reading them exactly.
+"""Writing and reading the CSV tables of a run folder exactly (`columns.TABLES`).
 
-An empty cell means "can't be measured", never 0. Equal tables are equal bytes: floats are written as the
-shortest text that reads back as the same number, whole numbers without a point, truth values as true/false,
-lines end in a line feed. A table is recognised by its columns, which are declared here only (those of
-`comparisons.csv` and of the findings on equilibria are declared beside their computation).
+An empty cell means "can't be measured", never 0. Equal tables are equal bytes: floats are written as the shortest text
+that reads back as the same number, whole numbers without a point, truth values as true/false, lines end in a line feed.
+A table is recognised by its columns.
 """
 
 from __future__ import annotations
@@ -13,169 +12,31 @@ import io
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from harness.errors import UsageError
-from harness.evaluation.causes.columns import CAUSE_COLUMNS
-from harness.evaluation.comparison import COMPARISON_COLUMNS
-from harness.evaluation.game_theory.columns import GAME_TABLES
+from harness.evaluation.column import COUNT, FLAG, NUMBER, TEXT, Column
+from harness.evaluation.columns import TABLES
 from harness.evaluation.people import columns_for, people_in
-from harness.evaluation.reference_columns import REFERENCE_TABLES
-from harness.evaluation.severity.columns import SEVERITY_COLUMNS
 from harness.files import content_of, replace_durably, scratch_beside, write_atomically
-
-PLAYED_COLUMNS = {
-    "arm": "object",
-    "persona": "object",
-    "seed": "int64",
-    "episode": "int64",
-    "ego_outcome": "object",
-    "ego_failed": "Int64",
-    "ego_mean_speed_mps": "float64",
-    "ego_trailing_distance_m": "float64",
-    "ego_min_ttc_s": "float64",
-    "ego_max_deceleration_mps2": "float64",
-    "ego_max_lateral_acceleration_mps2": "float64",
-    "ego_time_to_goal_s": "float64",
-    "ego_red_lights": "float64",
-    "ego_wrong_way_s": "float64",
-    "ego_min_pet_s": "float64",
-    "ego_pet_priority": "object",
-    "ego_accepted_gap_s": "float64",
-    "ego_payoff": "float64",
-    "non_ego_outcome": "object",
-    "non_ego_mean_speed_mps": "float64",
-    "non_ego_red_lights": "float64",
-    "non_ego_latest_red_s": "float64",
-    "non_ego_wrong_way_s": "float64",
-    "non_ego_payoff": "float64",
-    "duration_s": "float64",
-    "error": "object",
-}
-"""Columns of the records of played games in order, each with its pandas dtype (Int64: whole numbers or empty). With
-several people, those of the non-ego occur for each of them (`people.columns_for`)."""
-
-EPISODE_COLUMNS = {name: dtype for name, dtype in PLAYED_COLUMNS.items() if name != "error"}
-EPISODE_COLUMNS |= {**SEVERITY_COLUMNS, "error": PLAYED_COLUMNS["error"]}
-"""Columns of `episodes.csv`: those of the records, and what the traces tell besides. `columns.EPISODES` describes each
-of them."""
-
-SEVERITY_TABLE = {name: PLAYED_COLUMNS[name] for name in ("arm", "seed", "episode")} | dict(SEVERITY_COLUMNS)
-"""Columns of a stage's table of severity."""
-
-RECONFIGURATION_COLUMNS = {
-    "stage": "object",
-    "persona": "object",
-    "seed": "int64",
-    "trial": "int64",
-    "parameter": "object",
-    "value": "float64",
-    "low": "float64",
-    "high": "float64",
-    "mean_payoff": "float64",
-    "failure_rate": "float64",
-    "best_payoff": "float64",
-    "chosen": "bool",
-    "error": "object",
-}
-"""Columns of `reconfiguration.csv`. `low` and `high` are the bounds of the search, `best_payoff` is the best mean
-payoff so far, `chosen` is true for the trial that was taken; a trial that could not be played has an `error`."""
-
-SUMMARY_COLUMNS = {
-    "arm": "object",
-    "persona": "object",
-    "seed": "int64",
-    "episodes": "int64",
-    "errors": "int64",
-    "failure_rate": "float64",
-    "failure_rate_low": "float64",
-    "failure_rate_high": "float64",
-    "collisions": "Int64",
-    "rails": "Int64",
-    "timeouts": "Int64",
-    "mean_speed_mps": "float64",
-    "mean_speed_low_mps": "float64",
-    "mean_speed_high_mps": "float64",
-    "trailing_distance_m": "float64",
-    "min_ttc_s": "float64",
-    "max_deceleration_mps2": "float64",
-    "max_lateral_acceleration_mps2": "float64",
-    "ego_payoff": "float64",
-    "non_ego_goal_rate": "float64",
-    "non_ego_goal_rate_low": "float64",
-    "non_ego_goal_rate_high": "float64",
-    "non_ego_mean_speed_mps": "float64",
-    "non_ego_payoff": "float64",
-    "near_miss_rate": "float64",
-    "near_miss_rate_low": "float64",
-    "near_miss_rate_high": "float64",
-}
-"""Columns of `summary.csv`."""
-
-TRAINING_COLUMNS = {
-    "stage": "object",
-    "persona": "object",
-    "seed": "int64",
-    "steps": "int64",
-    "mean_payoff": "float64",
-    "failure_rate": "float64",
-    "games": "int64",
-    "mean_duration_s": "float64",
-    "stopped": "object",
-}
-"""Columns of `training.csv`. `stopped` is filled in the last row of a training: `converged`, `budget` or
-`did not learn`."""
-
-MANOEUVRE_COLUMNS = {
-    "arm": "object",
-    "persona": "object",
-    "seed": "int64",
-    "episode": "int64",
-    "player": "object",
-    "manoeuvre": "object",
-    "time_s": "float64",
-    "until_s": "float64",
-    "gap_m": "float64",
-    "ttc_s": "float64",
-    "text": "object",
-}
-"""Columns of `manoeuvres.csv`."""
-
-POPULATION_COLUMNS = {
-    "arm": "object",
-    "population": "object",
-    "seed": "int64",
-    "persona": "object",
-    "episodes": "int64",
-    "errors": "int64",
-    "failure_rate": "float64",
-    "failure_rate_low": "float64",
-    "failure_rate_high": "float64",
-    "mean_speed_mps": "float64",
-    "ego_payoff": "float64",
-    "non_ego_payoff": "float64",
-}
-"""Columns of `populations.csv`: the arms against a population, by the persona that drove."""
-
-TABLES = {
-    "episodes": EPISODE_COLUMNS,
-    "played": PLAYED_COLUMNS,
-    "severity": SEVERITY_TABLE,
-    "causes": CAUSE_COLUMNS,
-    "summary": SUMMARY_COLUMNS,
-    "comparisons": COMPARISON_COLUMNS,
-    "training": TRAINING_COLUMNS,
-    "manoeuvres": MANOEUVRE_COLUMNS,
-    "populations": POPULATION_COLUMNS,
-    "reconfiguration": RECONFIGURATION_COLUMNS,
-    **GAME_TABLES,
-    **REFERENCE_TABLES,
-}
 
 _MOST_BYTES = 500_000_000
 _TRUTH = {"true": True, "false": False}
+
+
+def table_of(name: str, rows: Iterable[Mapping[str, Any]] = (), people: int = 1) -> pd.DataFrame:
+    """Rows as a table of this name in `TABLES`; a missing cell is empty, another one is dropped. `people`: of
+    a game."""
+    return typed(pd.DataFrame(list(rows), columns=list(columns_for(people, TABLES[name]))))
+
+
+def joined(name: str, frames: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Tables with the same columns as one; without rows an empty one of this name."""
+    filled = [frame for frame in frames if len(frame)]
+    return typed(pd.concat(filled, ignore_index=True)) if filled else table_of(name)
 
 
 def typed(frame: pd.DataFrame) -> pd.DataFrame:
@@ -184,15 +45,15 @@ def typed(frame: pd.DataFrame) -> pd.DataFrame:
     Missing text becomes "". Raises ValueError when the columns are not those of a table, a whole
     number has a fraction, or a required cell is empty.
     """
-    columns = _columns_of(frame.columns)
-    return pd.DataFrame({name: _cast(frame[name], dtype) for name, dtype in columns.items()})
+    columns = columns_of(frame.columns)
+    return pd.DataFrame({name: _cast(frame[name], column.dtype) for name, column in columns.items()})
 
 
-def _columns_of(names: Iterable[str]) -> Mapping[str, str]:
+def columns_of(names: Iterable[str]) -> Mapping[str, Column]:
+    """The columns of the table that has these. Raises ValueError where there is none."""
     names = list(names)
     people = len(people_in(names))
-    of_games = (columns_for(people, columns) for columns in (EPISODE_COLUMNS, PLAYED_COLUMNS))
-    for columns in (*of_games, *TABLES.values()):
+    for columns in (columns_for(people, TABLES["episodes"]), columns_for(people, TABLES["played"]), *TABLES.values()):
         if sorted(names) == sorted(columns):
             return columns
     nearest, columns = max(TABLES.items(), key=lambda table: len(set(names) & set(table[1])))
@@ -203,15 +64,16 @@ def _columns_of(names: Iterable[str]) -> Mapping[str, str]:
 def _cast(column: pd.Series, dtype: str) -> pd.Series:
     column = column.reset_index(drop=True)
     try:
-        if dtype == "object":
+        if dtype == TEXT:
             text = column.astype(object).where(column.notna(), "")
             # str.__str__ gives the text of an enum's member, and a TypeError for a value that is not text
-            return pd.Series([str.__str__(cell) for cell in text], dtype=object)
-        if dtype == "bool" and not all(cell in (True, False) for cell in column):
+            lines = (str.__str__(cell).replace("\r\n", "\n").replace("\r", "\n") for cell in text)
+            return pd.Series(list(lines), dtype=object)
+        if dtype == FLAG and not all(cell in (True, False) for cell in column):
             raise ValueError("neither true nor false")
-        if dtype == "int64":
+        if dtype == COUNT:
             column = column.astype("Int64")  # refuses a fraction, which the next cast would truncate
-        if dtype == "float64":
+        if dtype == NUMBER:
             column = column.astype("Float64")  # takes every kind of missing number
         return column.astype(dtype)
     except (TypeError, ValueError) as error:
@@ -223,12 +85,19 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
 
     Raises ValueError as `typed` does, and OSError when the folder can't be written.
     """
-    table = typed(frame)
-    cells = [[_text(cell) for cell in table[name].tolist()] for name in table.columns]
-    lines = [list(table.columns), *zip(*cells, strict=True)]
-    text = "".join(",".join(line) + "\n" for line in lines)
+    table, text = typed(frame), io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table.columns)
+    writer.writerows(zip(*(map(exact, table[name].tolist()) for name in table.columns), strict=True))
     # an error message of another program may not be valid Unicode; it must not prevent the table
-    write_atomically(path, text.encode("utf-8", errors="backslashreplace"))
+    write_atomically(path, text.getvalue().encode("utf-8", errors="backslashreplace"))
+
+
+def exact(value: object) -> str:
+    """The text of a value in a table."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return value if isinstance(value, str) else "" if pd.isna(value) else repr(value)
 
 
 def join_csv(parts: Sequence[Path], path: Path) -> None:
@@ -246,15 +115,6 @@ def join_csv(parts: Sequence[Path], path: Path) -> None:
         scratch.unlink(missing_ok=True)
 
 
-def _text(cell: object) -> str:
-    if isinstance(cell, str):
-        quoted = any(character in cell for character in ',"\r\n')
-        return '"' + cell.replace('"', '""') + '"' if quoted else cell
-    if isinstance(cell, bool):
-        return "true" if cell else "false"
-    return "" if pd.isna(cell) else repr(cell)
-
-
 def read_csv(path: Path) -> pd.DataFrame:
     """The table `write_csv` wrote, equal to it in every value and dtype (empty text is "", not NaN).
 
@@ -265,12 +125,14 @@ def read_csv(path: Path) -> pd.DataFrame:
         text = content_of(path, _MOST_BYTES).decode("utf-8")
         reader = csv.reader(io.StringIO(text, newline=""), strict=True)
         header, lines = next(reader, []), list(reader)
-        columns = _columns_of(header)
+        columns = columns_of(header)
         cells = list(zip(*lines, strict=True)) if lines else [()] * len(header)
         if len(cells) != len(header):
             raise ValueError("rows are not as long as the header")
         return typed(
-            pd.DataFrame({name: _parse(column, columns[name]) for name, column in zip(header, cells, strict=True)})
+            pd.DataFrame(
+                {name: _parse(column, columns[name].dtype) for name, column in zip(header, cells, strict=True)}
+            )
         )
     except OSError as error:
         raise UsageError.of(path, "", f"can't be read: {error.strerror}", remedy) from error
@@ -279,11 +141,11 @@ def read_csv(path: Path) -> pd.DataFrame:
 
 
 def _parse(cells: Iterable[str], dtype: str) -> pd.Series:
-    if dtype == "object":
+    if dtype == TEXT:
         return pd.Series(list(cells), dtype=object)
-    if dtype == "bool":
+    if dtype == FLAG:
         return pd.Series([_TRUTH.get(cell) for cell in cells], dtype=object)
-    if dtype == "float64":
+    if dtype == NUMBER:
         return pd.Series([float(cell) if cell else np.nan for cell in cells], dtype="float64")
     return pd.Series([int(cell) if cell else pd.NA for cell in cells], dtype="Int64")
 

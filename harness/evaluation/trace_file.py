@@ -41,11 +41,21 @@ SCHEMA = pa.schema(
             for name in ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad")
         ),
         ("lapsed", pa.bool_()),
+        ("steers", pa.bool_()),
+        ("station_m", pa.float64()),
+        ("payoff", pa.float64()),
         ("outcome", _TEXT),
         ("signals", _TEXT),
+        ("signal_s", _TEXT),
+        ("friction", pa.float64()),
+        ("limit_share", pa.float64()),
     ]
 )
+"""A row for each road user in each step. `steers`: the harness moves the player, so that its steering is known;
+`station_m`: along its route; `payoff`: of the step; `signal_s`: at the start, seconds since the state of each signal
+link changed; `friction` and `limit_share` (the factor on speed limits) are those of the game."""
 
+_TEXTS = [field.name for field in SCHEMA if field.type == _TEXT]
 _NUMBERS = [field.name for field in SCHEMA if field.type == pa.float64()]
 
 
@@ -204,7 +214,7 @@ def _frame(table: pa.Table) -> pd.DataFrame:
 
 
 def _with_strings(frame: pd.DataFrame) -> pd.DataFrame:
-    for name in ("player", "vehicle_type", "outcome", "signals"):
+    for name in _TEXTS:
         frame[name] = frame[name].astype(str)
     return frame
 

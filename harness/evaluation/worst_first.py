@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.people import judged_outcomes
+from harness.evaluation.severity.limits import CONFLICT_TTC_S
 from harness.evaluation.severity.measures import CONTACT, RAIL, TIMEOUT, closeness
-from harness.evaluation.severity.thresholds import CONFLICT_TTC_S
 from harness.game.outcome import Outcome
 
 FAILURES = (Outcome.COLLISION.word, Outcome.RAIL.word, Outcome.TIMEOUT.word)

@@ -9,6 +9,7 @@ import numpy as np
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
 
+NEAREST = 16  # background vehicles in the bodies of a game
 NOTICED_M = 120.0  # a vehicle farther than this from every player does not affect the game
 
 

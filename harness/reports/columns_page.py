@@ -1,25 +1,27 @@
-"""The page on the columns of `episodes.csv`, as Markdown."""
+"""The page on the columns of every table of a run, as Markdown."""
 
 from __future__ import annotations
 
-from harness.evaluation.columns import EPISODES
-from harness.evaluation.severity.columns import Column
+from collections.abc import Mapping
 
-_INTRODUCTION = """# Columns of `episodes.csv`
+from harness.evaluation.column import Column
+from harness.evaluation.columns import TABLES
+
+_INTRODUCTION = """# Columns
 
 <!-- made by `harness columns --out docs/columns.md` from harness/evaluation/columns.py -->
 
-A row is a game. An empty cell means that the quantity can't be measured in this game, never 0. With several people, the
-columns of the non-ego occur for each of them, as `non_ego_2_outcome`, and `ego_collided_with` names the road user that
-the ego touched. The columns from `closing_speed_mps` to `severity` are worked out from the traces.
-
-| column | unit | meaning | source |
-| --- | --- | --- | --- |
+An empty cell means that the quantity can't be measured, never 0. `episodes.csv`, `causes.csv` and `manoeuvres.csv` are
+made from the traces: `harness report RUN` makes them anew where a metric is new. Shares and rates are from 0 to 1. With
+several people, the columns of the non-ego in `episodes.csv` occur for each of them, as `non_ego_2_outcome`, and
+`ego_collided_with` names the road user that the ego touched.
 """
 _NOTES = """
-The measures are computed from oriented boxes at any angle, not along lanes. `pytest tests/evaluation/test_severity.py`
+## The measures of severity
+
+They are computed from oriented boxes at any angle, not along lanes. `pytest tests/evaluation/test_severity.py`
 compares them with cases computed by hand. Masses are those of SUMO's vehicle classes
-(`harness/evaluation/severity/masses.py`); thresholds are in `harness/evaluation/severity/thresholds.py`. In a bend, a
+(`harness/evaluation/severity/masses.py`); thresholds are in `harness/evaluation/severity/limits.py`. In a bend, a
 course of constant heading leaves the lane: TTC is that of a car that does not steer.
 
 `python -m benchmarks.criticality` compares them with commonroad-crime 0.4.5, whose measures follow lanes; the script
@@ -29,11 +31,20 @@ have a time headway at 118 moments; the values differ by at most 0.10 s, to whic
 """
 
 
+_ORDER = ("episodes", "causes", "manoeuvres", "summary", "comparisons")
+
+
 def columns_page() -> str:
     """The page `docs/columns.md`."""
-    return _INTRODUCTION + "".join(_row(name, column) for name, column in EPISODES.items()) + _NOTES
+    names = [*_ORDER, *(name for name in TABLES if name not in (*_ORDER, "played"))]
+    return _INTRODUCTION + "".join(_table(name, TABLES[name]) for name in names) + _NOTES
 
 
-def _row(name: str, column: Column) -> str:
+def _table(name: str, columns: Mapping[str, Column]) -> str:
+    head = f"\n## `{name}.csv`\n\n| column | unit | meaning | source |\n| --- | --- | --- | --- |\n"
+    return head + "".join(_row(column) for column in columns.values())
+
+
+def _row(column: Column) -> str:
     meaning = column.meaning.replace("|", "\\|")
-    return f"| `{name}` | {column.unit} | {meaning} | {column.source or 'our own'} |\n"
+    return f"| `{column.name}` | {column.unit} | {meaning} | {column.source} |\n"

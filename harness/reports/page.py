@@ -21,7 +21,7 @@ from harness.reports.embedding import Embedded
 from harness.reports.game import game_section
 from harness.reports.game_links import GameLinks, replay_list, worst_game
 from harness.reports.learning import learning, searches, stopped
-from harness.reports.manoeuvres import MOST_LISTED, failures_by_pair, marks_of
+from harness.reports.manoeuvres import MOST_LISTED, failures_by_cause, marks_of
 from harness.reports.next_steps import first_answers, next_steps
 from harness.reports.numbers import percent
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, environment_of, libraries, script
@@ -156,7 +156,7 @@ def _player(tables: RunTables, embedded: Embedded) -> dict[str, Any]:
 def _manoeuvres(tables: RunTables) -> dict[str, Any]:
     if tables.manoeuvres is None:
         return {"pairs": None, "pair_arms": [], "most_listed": MOST_LISTED}
-    arms, pairs = failures_by_pair(tables.manoeuvres, tables.episodes)
+    arms, pairs = failures_by_cause(tables.causes)
     return {"pairs": pairs, "pair_arms": arms, "most_listed": MOST_LISTED}
 
 

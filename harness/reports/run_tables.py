@@ -11,19 +11,19 @@ import pandas as pd
 from harness.evaluation.acceptance import Check
 from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.strategies import Arm, Strategy
-from harness.evaluation.tables import TABLES, typed
+from harness.evaluation.tables import table_of, typed
 
 FINISHED = ("done", "settled")
 """Statuses of a stage that is complete."""
 
 
 def _empty(name: str) -> Callable[[], pd.DataFrame]:
-    return lambda: pd.DataFrame(columns=list(TABLES[name]))
+    return lambda: table_of(name)
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunTables:
-    """What a report is made of. The frames have the columns of `harness.evaluation.tables.TABLES`."""
+    """What a report is made of. The frames have the columns of `harness.evaluation.columns.TABLES`."""
 
     manifest: Mapping[str, Any]
     """The content of manifest.json."""

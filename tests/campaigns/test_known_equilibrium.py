@@ -39,7 +39,7 @@ from harness.drivers.protocol import Driver
 from harness.environments.rollout import Arm, assess, parts_of
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict, gaps, nothing_to_gain
 from harness.evaluation.game_theory.records import Response
-from harness.evaluation.tables import EPISODE_COLUMNS, typed
+from harness.evaluation.tables import table_of
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
@@ -355,7 +355,7 @@ class Coin:
     def games(self, arm: str, ego: Mixture, episodes: int = 40) -> pd.DataFrame:
         played = assess(Arm(name=arm, scene=self.scene, drivers=(ego, self.player), seed=1), episodes)
         rows = pd.DataFrame([{"arm": arm, "persona": "blind", "seed": 1, **game.record} for game in played])
-        return typed(rows.reindex(columns=list(EPISODE_COLUMNS)))
+        return table_of("episodes", rows.to_dict("records"))
 
     def best_response(self, initial: Policy | None) -> LearnedDriver:
         how, named = settings(**TRAINING), ("coin", 1)

@@ -32,7 +32,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.environments.rollout import assess
 from harness.evaluation.summary import summarise
-from harness.evaluation.tables import MANOEUVRE_COLUMNS, typed
+from harness.evaluation.tables import table_of, typed
 from harness.evaluation.trace_file import SCHEMA, TraceWriter
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.outcome import Outcome
@@ -280,7 +280,7 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
 
 
 def test_report__a_pair_of_manoeuvres_lists_no_more_games_than_can_be_read(large: dict[str, Any]) -> None:
-    html = rendered(**large, manoeuvres=pd.DataFrame(columns=list(MANOEUVRE_COLUMNS)))
+    html = rendered(**large, manoeuvres=table_of("manoeuvres"))
     listed = html.split('id="pair-1"')[1].split("</details>")[0]
     assert listed.count("<li>") == MOST_LISTED
     assert "more: <code>manoeuvres.csv</code>" in listed

@@ -19,9 +19,10 @@ from markupsafe import escape
 from scipy import stats
 
 from harness.drivers.policy_file import read_policy
-from harness.evaluation.comparison import COMPARISON_COLUMNS, compare
+from harness.evaluation.columns import TABLES
+from harness.evaluation.comparison import compare
 from harness.evaluation.research_questions import Question
-from harness.evaluation.tables import EPISODE_COLUMNS, SUMMARY_COLUMNS, TRAINING_COLUMNS, read_csv
+from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
 from harness.replay import replay_name
 from harness.traffic.scene import open_scene
@@ -92,10 +93,10 @@ def test_campaign__every_file_is_there(run: Path) -> None:
 @pytest.mark.parametrize(
     ("table", "columns"),
     [
-        ("episodes", EPISODE_COLUMNS),
-        ("summary", SUMMARY_COLUMNS),
-        ("comparisons", COMPARISON_COLUMNS),
-        ("training", TRAINING_COLUMNS),
+        ("episodes", TABLES["episodes"]),
+        ("summary", TABLES["summary"]),
+        ("comparisons", TABLES["comparisons"]),
+        ("training", TABLES["training"]),
     ],
 )
 def test_campaign__tables_have_their_columns(table: str, columns: dict[str, str], run: Path) -> None:

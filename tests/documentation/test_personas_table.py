@@ -36,7 +36,7 @@ def trace(*rows: dict[str, Any], ego_x_m: float | None = None) -> pd.DataFrame:
 
 
 def measured(name: str, scene: OpenScene, *traces: pd.DataFrame) -> float:
-    return float(getattr(table, name)([table.RecordedGame.of(each, scene) for each in traces]))
+    return float(getattr(table, name)([table.PersonGame.of(each, scene) for each in traces]))
 
 
 def test_speed__is_the_mean_against_the_limit_while_it_drives(merge: OpenScene) -> None:

@@ -79,7 +79,8 @@ def test_recipe__works_as_it_is_written(name: str, tmp_path: Path) -> None:
 
 
 def test_page__has_a_recipe_for_each_kind_of_extension() -> None:
-    assert set(RECIPES) == {"A payoff term", "A persona", "A scene", "A figure of the report", "A driver kind"}
+    recipes = {"A payoff term", "A metric", "A persona", "A scene", "A figure of the report", "A driver kind"}
+    assert set(RECIPES) == recipes
 
 
 def test_diff__changes_one_place_only() -> None:

@@ -16,7 +16,8 @@ from harness.drivers.mixture import Member, Mixture, mixture_of
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.environments.rollout import Arm, Game, assess
-from harness.evaluation.tables import EPISODE_COLUMNS, typed
+from harness.evaluation.columns import TABLES
+from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import Attention, HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
@@ -169,7 +170,7 @@ def test_by_who_drove__has_the_members_of_the_games(merge: OpenScene, people: di
         seed=3,
     )
     played = pd.DataFrame([{"arm": arm.name, "persona": "town", "seed": 3, **game.record} for game in assess(arm, 8)])
-    episodes = typed(played.reindex(columns=list(EPISODE_COLUMNS)))
+    episodes = typed(played.reindex(columns=list(TABLES["episodes"])))
     campaign = Campaign(name="any", scene="any", personas=["any"], population=[Population(name="town", shares=shares)])
     found = by_who_drove(campaign, episodes).set_index("persona")
     start_distribution = merge.start_distribution(

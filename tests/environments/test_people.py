@@ -17,8 +17,9 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
 from harness.environments.rollout import Arm, Game
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
+from harness.evaluation.columns import TABLES
 from harness.evaluation.people import COLLIDED_WITH, columns_for
-from harness.evaluation.tables import EPISODE_COLUMNS, typed
+from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
@@ -57,7 +58,7 @@ def played(scene: OpenScene, *drivers: Any, episodes: int = 1) -> list[Game]:
 
 def table(games: list[Game]) -> pd.DataFrame:
     rows = pd.DataFrame([{"arm": "any", "persona": "", "seed": 1, **game.record} for game in games])
-    return typed(rows.reindex(columns=list(columns_for(3, EPISODE_COLUMNS))))
+    return typed(rows.reindex(columns=list(columns_for(3, TABLES["episodes"]))))
 
 
 def test_game__has_a_track_and_a_record_of_each_player(scene: OpenScene) -> None:

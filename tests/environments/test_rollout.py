@@ -10,18 +10,20 @@ import pytest
 
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import TRACE_COLUMNS
+from harness.environments.arena import Arena, Step
 from harness.errors import SimulationError
-from harness.evaluation.metrics import OF_EGO, OF_NON_EGO
-from harness.evaluation.tables import EPISODE_COLUMNS, typed
+from harness.evaluation.column import NUMBER
+from harness.evaluation.columns import TABLES
+from harness.evaluation.tables import table_of
 from harness.evaluation.trace_file import SCHEMA
 from harness.game.arrays import FloatArray, IntArray
-from harness.traffic.scene import OpenScene
+from harness.traffic.scene import OpenScene, open_scene
 from tests.support.policies import some_policy
 from tests.support.rollouts import Steady, arm, play, records, trace
 from tests.support.tiny import DISTRACTED
 
 RANDOM = LearnedDriver(some_policy(), sampled=True)
+MEASURED = [name for name, column in TABLES["episodes"].items() if column.dtype == NUMBER]
 POSE = ["x_m", "y_m", "heading_rad", "speed_mps"]
 
 
@@ -102,12 +104,12 @@ def test_assess__lapses_depend_on_the_episode_and_not_on_the_arm(merge: OpenScen
 def test_record__cells_of_an_absent_player_are_empty(merge: OpenScene) -> None:
     (game, *_) = play(arm(merge, SumoDriver(), None), 1)
     assert game.record["non_ego_outcome"] == ""
-    assert all(game.record[name] is None for name in OF_NON_EGO)
+    assert all(game.record[name] is None for name in MEASURED if name.startswith("non_ego_"))
     assert game.record["ego_failed"] in (0, 1)
     (game, *_) = play(arm(merge, None, SumoDriver()), 1)
     assert game.record["ego_outcome"] == ""
     assert game.record["ego_failed"] is None
-    assert all(game.record[name] is None for name in OF_EGO)
+    assert all(game.record[name] is None for name in MEASURED if name.startswith("ego_"))
     assert game.record["non_ego_outcome"] != ""
     assert game.record["non_ego_mean_speed_mps"] > 0.0
 
@@ -139,7 +141,7 @@ def test_record__agrees_with_the_trace(merge: OpenScene) -> None:
 def test_records__make_a_table_of_episodes(merge: OpenScene) -> None:
     games = play(arm(merge, Failing(KeyError("x")), None), 2)
     rows = [{**game.record, "arm": "naive_alone", "persona": "", "seed": 1} for game in games]
-    table = typed(pd.DataFrame(rows).reindex(columns=list(EPISODE_COLUMNS)))
+    table = table_of("episodes", rows)
     assert table["ego_failed"].isna().tolist() == [False, True]
     assert table["ego_outcome"].tolist()[1] == "error"
 
@@ -183,13 +185,13 @@ def test_assess__actions_that_are_not_finite_are_an_error(merge: OpenScene) -> N
     assert game.record["error"]
 
 
-# --- traces -----------------------------------------------------------------------------------------------------------
+# --- the log --------------------------------------------------------------------------------------------------------
 
 
 def test_trace__has_every_step_of_every_player(merge: OpenScene) -> None:
-    assert list(TRACE_COLUMNS) == SCHEMA.names
     for episode, game in enumerate(play(arm(merge, Steady(), SumoDriver()), 3)):
         frame = trace(game)
+        assert list(frame.columns) == SCHEMA.names
         assert set(frame["episode"]) == {episode}
         assert np.array_equal(frame["time_s"], frame["step"] * merge.world.step_s)
         for player, rows in frame.groupby("player"):
@@ -224,3 +226,30 @@ def test_assess__metrics_that_need_a_steering_angle_are_empty_for_sumo(merge: Op
     assert game.record["ego_max_lateral_acceleration_mps2"] is None
     assert game.trace is not None
     assert set(game.trace["steering_rad"]) == {0.0}  # otherwise lane changes would be reported as swerves
+
+
+@pytest.mark.parametrize("scene", ["merge", "red_light", "roundabout", "zebra"])
+def test_log__has_every_quantity_of_the_live_game(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    live: list[Step] = []
+    step = Arena.step
+    monkeypatch.setattr(Arena, "step", lambda arena: live.append(step(arena)) or live[-1])
+    (game,) = play(arm(open_scene(scene), Steady(), SumoDriver() if scene == "merge" else Steady()), 1)
+    recorded = game.recorded
+    assert recorded is not None
+    names = (
+        "speed_mps",
+        "leader_gap_m",
+        "time_to_collision_s",
+        "lateral_acceleration_mps2",
+        "goal_m",
+        "front_m",
+        "gap_s",
+    )
+    names += ("passed_red_s", "wrong_way", "advanced_m", "speed_over_permitted", "clearance_m", "lateral_offset_m")
+    for t, now in enumerate(live, start=1):
+        drove = now.drove[0]
+        assert drove.tolist() == recorded.drove[t].tolist()
+        assert now.payoff[0] == pytest.approx(recorded.payoff[t], abs=0.0)
+        for name in names:
+            found = getattr(recorded.quantities, name)[t, drove]
+            assert getattr(now.quantities, name)[0, drove].tolist() == found.tolist(), (t, name)

@@ -14,29 +14,30 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from harness.campaign.storage.run_folder import RunFolder
-from harness.campaign.storage.trace_tables import CAUSES, SEVERITY, cause_table, severity_table
-from harness.evaluation.causes.columns import CAUSE_COLUMNS, cells_of
-from harness.evaluation.causes.find import Cause, cause_of
-from harness.evaluation.causes.sentences import cause_lines
-from harness.evaluation.severity.measures import Kind
-from harness.evaluation.tables import read_csv, typed
+from harness.evaluation.recorded_game import BodyKind
+from harness.evaluation.rule_book.cause_lines import cause_lines
+from harness.evaluation.rule_book.causes import Cause, cause_of
+from harness.evaluation.rule_book.course import Course
+from harness.evaluation.tables import table_of
 from harness.game.sight import Hiding
-from harness.traffic.scene import open_scene
-from tests.support.tiny import sumo_run
-from tests.support.traces import Pose, along, rows
+from harness.game.world import World
+from tests.support.traces import Pose, along, game, rows
 
 KINDS = {
-    "car": Kind(),
-    "van": Kind(length_m=6.5, width_m=2.2, vehicle_class="delivery"),
-    "foot": Kind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian"),
+    "car": BodyKind(),
+    "van": BodyKind(length_m=6.5, width_m=2.2, vehicle_class="delivery"),
+    "foot": BodyKind(length_m=0.5, width_m=0.5, vehicle_class="pedestrian"),
 }
 STEPS = 21
 NORTH = 1.5707963
 
 
+def course(world: World, *players: list[dict[str, Any]]) -> Course:
+    return Course(game=game(world, pd.DataFrame([row for player in players for row in player]), KINDS))
+
+
 def cause(merge: Any, *players: list[dict[str, Any]]) -> Cause:
-    found = cause_of(pd.DataFrame([row for player in players for row in player]), merge.world, KINDS)
+    found = cause_of(course(merge.world, *players))
     assert found is not None
     return found
 
@@ -60,7 +61,7 @@ def test_cut_in__begins_when_the_body_crosses_the_lane_mark(merge: Any) -> None:
     found = cause(merge, ego(), rows("non_ego", sideways(25.0, -1.6, -4.1)))
     assert (found.other, found.deed) == ("non_ego", "cuts in from the left")
     assert (found.time_s, found.time_left_s) == (1.0, 1.0)
-    assert (found.ego_saw, found.reaction, found.braking_mps2) == (True, "no reaction", 0.0)
+    assert (found.ego_saw, found.reaction, found.braking_mps2) == ("yes", "no reaction", 0.0)
 
 
 def test_drift__is_a_body_that_crosses_the_mark_in_a_lapse(merge: Any) -> None:
@@ -73,7 +74,7 @@ def test_drift__is_a_body_that_crosses_the_mark_in_a_lapse(merge: Any) -> None:
 )
 def test_ego__saw_it_if_it_was_attentive_in_some_step(merge: Any, lapsed: Sequence[int], saw: bool) -> None:
     found = cause(merge, ego(lapsed=lapsed), rows("non_ego", sideways(25.0, -1.6, -4.1)))
-    assert found.ego_saw is saw
+    assert found.ego_saw == ("yes" if saw else "no")
 
 
 def test_reaction__braking_is_one(merge: Any) -> None:
@@ -103,9 +104,9 @@ def test_hidden__behind_a_van_until_it_is_past_it(merge: Any) -> None:
     van = rows("van", along(36.0, -2.4, 0.0, 0.0, STEPS), "van")
     walker = rows("non_ego", along(40.2, -1.6, -NORTH, 2.0, STEPS), "foot")
     world = replace(merge.world, hiding=Hiding(vehicles=True))
-    found = cause_of(pd.DataFrame([*ego(), *van, *walker]), world, KINDS)
+    found = cause_of(course(world, ego(), van, walker))
     assert found is not None
-    assert found.ego_saw is True
+    assert found.ego_saw == "yes"
     assert 0.0 < found.hidden_until_s < found.time_left_s
 
 
@@ -135,16 +136,15 @@ def test_ego__that_changes_into_the_other_s_lane(merge: Any) -> None:
 
 def test_rail__with_and_without_a_road_user_near(merge: Any) -> None:
     alone = cause(merge, ego("rail"))
-    assert (alone.other, alone.deed, alone.ego_saw) == ("", "the ego leaves the road with no road user near", None)
+    assert (alone.other, alone.deed, alone.ego_saw) == ("", "the ego leaves the road with no road user near", "")
     near = cause(merge, ego("rail"), rows("non_ego", along(41.0, -4.8, 0.0, 2.0, STEPS)))
     assert (near.other, near.deed) == ("non_ego", "drives ahead of the ego")
 
 
 def test_goal__has_no_cause(merge: Any) -> None:
-    assert cause_of(pd.DataFrame(ego("goal")), merge.world, KINDS) is None
-    assert (
-        cause_of(pd.DataFrame(rows("non_ego", along(20.0, -4.8, 0.0, 9.0, 5), end="rail")), merge.world, KINDS) is None
-    )
+    assert cause_of(course(merge.world, ego("goal"))) is None
+    person = rows("non_ego", along(20.0, -4.8, 0.0, 9.0, 5), end="rail")
+    assert cause_of(course(merge.world, person)) is None
 
 
 # --- sentences ----------------------------------------------------------------------------------------------------
@@ -152,16 +152,20 @@ def test_goal__has_no_cause(merge: Any) -> None:
 
 def table(*causes: dict[str, Any]) -> pd.DataFrame:
     common = {"arm": "a", "persona": "p", "seed": 1, "ego_outcome": "collision", "other": "non_ego", "time_s": 1.0}
-    usual = {"deed": "cuts in from the left", "time_left_s": 0.4, "ego_saw": True, "reaction": "no reaction"}
+    usual = {
+        "event": "cut_in",
+        "deed": "cuts in from the left",
+        "time_left_s": 0.4,
+        "ego_saw": "yes",
+        "reaction": "no reaction",
+    }
     rest = {"braking_mps2": 0.3, "ego_broke": "", "hidden_until_s": math.nan}
     games = [{**common, **usual, **rest, **each, "episode": k} for k, each in enumerate(causes)]
-    for game in games:
-        game["ego_saw"] = cells_of(Cause(**{name: game[name] for name in Cause.__dataclass_fields__}))["ego_saw"]
-    return typed(pd.DataFrame(games, columns=list(CAUSE_COLUMNS)))
+    return table_of("causes", games)
 
 
 def test_lines__say_how_many_what_how_long_and_what_the_ego_did() -> None:
-    games = table({}, {"time_left_s": 0.9, "braking_mps2": 0.7}, {"deed": "brakes ahead of the ego", "ego_saw": False})
+    games = table({}, {"time_left_s": 0.9, "braking_mps2": 0.7}, {"deed": "brakes ahead of the ego", "ego_saw": "no"})
     assert cause_lines(games) == [
         "2 of 3: cuts in from the left, 0.4 to 0.9 s before contact; the ego sees it, no reaction "
         "(braking up to 0.7 m/s²)",
@@ -171,7 +175,7 @@ def test_lines__say_how_many_what_how_long_and_what_the_ego_did() -> None:
 
 
 def test_lines__count_several_reactions_and_name_a_rule_that_the_ego_broke() -> None:
-    games = table({}, {}, {"reaction": "brakes", "braking_mps2": 5.0, "ego_saw": False})
+    games = table({}, {}, {"reaction": "brakes", "braking_mps2": 5.0, "ego_saw": "no"})
     assert cause_lines(games.assign(ego_broke="runs a red light")) == [
         "3 of 3: cuts in from the left, 0.4 s before contact; the ego runs a red light; the ego sees it in 2: "
         "no reaction in 2, brakes in 1 (braking up to 5.0 m/s²)"
@@ -192,22 +196,3 @@ def test_lines__of_many_kinds_the_rest_is_counted() -> None:
     assert [line.split(":")[0] for line in lines] == ["2 of 6", "1 of 6", "3 of 6"]
     assert lines[-1] == "3 of 6: other causes"
     assert cause_lines(table()) == []
-
-
-# --- tables of an arm -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_tables__of_an_earlier_version_are_made_from_the_traces_again() -> None:
-    folder = RunFolder(sumo_run())
-    scene = open_scene(folder.scene)
-    for stage in sorted(file.stem for file in (folder.path / "traces").glob("*.parquet"))[:2]:
-        for name, make in ((SEVERITY, severity_table), (CAUSES, cause_table)):
-            file = folder.work(stage) / name
-            written = file.read_bytes()
-            file.unlink()
-            make(folder, stage, scene)
-            assert file.read_bytes() == written
-            file.write_text("damaged")
-            assert len(make(folder, stage, scene)) == len(read_csv(file))
-            assert file.read_bytes() == written

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from harness.evaluation.comparison import COMPARISON_COLUMNS, METRICS, compare, holm
+from harness.evaluation.columns import TABLES
+from harness.evaluation.comparison import METRICS, compare, holm
 from harness.evaluation.research_questions import Question, Verdict
 
 RQ1 = Question(question="RQ1", persona="speedy", seed=1, baseline="naive_alone", treatment="naive_vs_speedy")
@@ -250,7 +251,7 @@ def test_compare__holm_is_over_all_rows_that_have_a_p_value():
 def test_compare__columns_and_dtypes_are_those_of_the_table_even_when_empty():
     episodes = pd.concat([games("naive_alone", [0, 1]), games("naive_vs_speedy", [1, 1])])
     for table in (compare([RQ1], episodes, 0.01), compare([], episodes, 0.01)):
-        assert {name: str(dtype) for name, dtype in table.dtypes.items()} == COMPARISON_COLUMNS
+        assert list(table.columns) == list(TABLES["comparisons"])
 
 
 @pytest.mark.parametrize("significance", [0, 1, -0.01, math.nan])

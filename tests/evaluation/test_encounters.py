@@ -8,26 +8,27 @@ zone (y = -3 to 0) for 0.76 s as well.
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from harness.evaluation.encounters import Encounter, encounters_of
-from harness.evaluation.manoeuvres import Manoeuvre, find_manoeuvres
-from harness.evaluation.metrics import PlayerSeries, accepted_gap_s, min_pet_s, pet_priority
-from harness.evaluation.trace_quantities import drove_in, quantities_of
+from harness.evaluation.encounters import Encounter
+from harness.evaluation.metrics import accepted_gap_s, min_pet_s, pet_priority
+from harness.evaluation.recorded_game import BodyKind
+from harness.evaluation.rule_book.course import Course
+from harness.evaluation.rule_book.manoeuvres import Manoeuvre, find_manoeuvres
 from harness.game.arrays import FloatArray
 from harness.game.junctions import Control
-from harness.game.outcome import Outcome
-from harness.game.roles import ROLES
 from harness.game.world import World
 from harness.traffic.scene import OpenScene
 from tests.support.conflicts import CROSSING, with_conflicts
+from tests.support.traces import game
 
 STEPS = 60
-SIZE = {"ego": (4.6, 1.8), "non_ego": (4.6, 1.8), "car": (4.6, 1.8)}
+KINDS = {"car": BodyKind(length_m=4.6)}
 EAST, NORTH = 0.0, np.pi / 2.0
 
 
@@ -69,13 +70,12 @@ def trace_of(*cars: pd.DataFrame) -> pd.DataFrame:
 
 
 def met(world: World, *cars: pd.DataFrame) -> list[Encounter]:
-    trace = trace_of(*cars)
-    return encounters_of(quantities_of(trace, world, SIZE), 0, drove_in(trace, ROLES)[:, 0])
+    return list(game(world, trace_of(*cars), KINDS).encounters[0])
 
 
 def named(world: World, *cars: pd.DataFrame) -> list[Manoeuvre]:
     new = ("fails_to_yield", "turns_across", "runs_red", "rolls_through", "wrong_way")
-    return [each for each in find_manoeuvres(trace_of(*cars), world, SIZE) if each.manoeuvre in new]
+    return [each for each in find_manoeuvres(Course(game=game(world, trace_of(*cars), KINDS))) if each.manoeuvre in new]
 
 
 @pytest.fixture(scope="module")
@@ -83,21 +83,9 @@ def world(merge: OpenScene) -> World:
     return with_conflicts(merge.world, CROSSING)
 
 
-def series(encounters: list[Encounter]) -> PlayerSeries:
-    none = np.zeros(0)
-    return PlayerSeries(
-        outcome=Outcome.GOAL,
-        step_s=0.1,
-        speed_mps=none,
-        acceleration_mps2=none,
-        lateral_acceleration_mps2=none,
-        leader_gap_m=none,
-        time_to_collision_s=none,
-        payoff=none,
-        passed_red_s=none,
-        wrong_way=none,
-        encounters=tuple(encounters),
-    )
+def series(encounters: list[Encounter]) -> Any:
+    """A drive with these encounters."""
+    return SimpleNamespace(encounters=tuple(encounters))
 
 
 # --- passages and post-encroachment time -----------------------------------------------------------------------------
@@ -243,5 +231,5 @@ def test_wrong_way__among_oncoming_lanes_for_a_second(merge: OpenScene, speed_mp
 
 
 def test_crossing__is_no_cut_in(world: World) -> None:
-    found = find_manoeuvres(trace_of(ego(), northbound(-40.0)), world, SIZE)
+    found = find_manoeuvres(Course(game=game(world, trace_of(ego(), northbound(-40.0)), KINDS)))
     assert "cut_in" not in {each.manoeuvre for each in found}

@@ -14,26 +14,22 @@ import pytest
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.environments.rollout import Arm, assess
-from harness.evaluation.manoeuvres import (
-    NAMES,
-    Manoeuvre,
-    find_manoeuvres,
-    manoeuvres_in,
-    pair_of,
-    pairs_in,
-    rows_of,
-    thresholds,
-)
-from harness.evaluation.tables import MANOEUVRE_COLUMNS, typed
+from harness.evaluation.recorded_game import BodyKind
+from harness.evaluation.rule_book import thresholds
+from harness.evaluation.rule_book.cause_lines import event_words
+from harness.evaluation.rule_book.causes import cause_of
+from harness.evaluation.rule_book.course import Course
+from harness.evaluation.rule_book.manoeuvres import NAMES, Manoeuvre, find_manoeuvres
 from harness.game.arrays import FloatArray, IntArray
 from harness.traffic.scene import OpenScene
 from tests.support.rollouts import seated
 from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, build_scene
+from tests.support.traces import game
 
 STEP_S = 0.1
 LENGTH_M, WIDTH_M, WHEELBASE_M = 4.6, 1.8, 2.7
 ENDING_Y, THROUGH_Y = -4.8, -1.6  # lanes of the merge; the right one ends at x 100
-SIZES = {"car": (LENGTH_M, WIDTH_M), "van": (6.0, 2.0)}
+KINDS = {"car": BodyKind(length_m=LENGTH_M), "van": BodyKind(length_m=6.0, width_m=2.0)}
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +83,8 @@ def across(begin_m: float, end_m: float, first: int, last: int, steps: int = 60)
 
 def named(scene: OpenScene, *cars: pd.DataFrame) -> list[Manoeuvre]:
     trace = pd.concat(cars).sort_values(["step", "player"], ignore_index=True)
-    return find_manoeuvres(trace, scene.world, SIZES)
+    driven = trace.loc[trace["steering_rad"] != 0.0, "player"].unique()
+    return find_manoeuvres(Course(game=game(scene.world, trace, KINDS, steers=trace["player"].isin(driven))))
 
 
 def only(found: Sequence[Manoeuvre], player: str, name: str) -> list[Manoeuvre]:
@@ -117,7 +114,7 @@ def test_cut_in__has_its_time_gap_and_time_to_collision(merge: OpenScene) -> Non
     assert found.gap_m == pytest.approx(10.0 + 0.4 * 4.0, abs=0.3)  # 0.4 s before their bodies begin to overlap
     assert found.ttc_s == pytest.approx(found.gap_m / 4.0)
     assert found.until_s == 3.2  # within half a metre of the ego's path
-    assert found.text == f"cuts in {found.gap_m:.1f} m ahead, TTC {found.ttc_s:.1f} s"
+    assert found.text == f"cuts in from the right, {found.gap_m:.1f} m ahead of the ego, TTC {found.ttc_s:.1f} s"
 
 
 @pytest.mark.parametrize(
@@ -125,8 +122,8 @@ def test_cut_in__has_its_time_gap_and_time_to_collision(merge: OpenScene) -> Non
     [
         (17.5, 12.0, True),  # 1.5 s at 12 m/s are 18 m
         (18.5, 12.0, False),
-        (30.0, 4.0, True),  # 8 m/s slower: 3.75 s to the collision
-        (34.0, 4.0, False),  # 4.25 s
+        (28.5, 4.0, True),  # 8 m/s slower: 31.7 m and 3.96 s when it crosses the mark, in step 20
+        (29.2, 4.0, False),  # 32.4 m and 4.05 s
     ],
 )
 def test_cut_in__only_within_the_stated_gap_or_time_to_collision(
@@ -434,55 +431,6 @@ def test_find__in_order_of_begin(merge: OpenScene) -> None:
     assert {"cut_in", "hard_brake"} <= {each.manoeuvre for each in found}
 
 
-def test_table__keeps_every_value(merge: OpenScene) -> None:
-    found = named(merge, *cutting_in(10.0, 8.0))
-    rows = rows_of(found, arm="naive_vs_x", persona="x", seed=1, episode=7)
-    table = typed(pd.DataFrame(rows, columns=list(MANOEUVRE_COLUMNS)))
-    assert [repr(each) for each in manoeuvres_in(table)] == [repr(each) for each in found]
-    assert set(pairs_in(table)) == {("naive_vs_x", 1, 7)}
-
-
-# --- pairs ------------------------------------------------------------------------------------------------------------
-
-
-def done(player: str, name: str, time_s: float, until_s: float) -> Manoeuvre:
-    return Manoeuvre(player=player, manoeuvre=name, time_s=time_s, until_s=until_s, gap_m=np.nan, ttc_s=np.nan, text="")
-
-
-DRIFT, SWERVE = done("non_ego", "drift", 2.0, 6.0), done("ego", "swerve", 4.0, 4.5)
-
-
-@pytest.mark.parametrize(
-    ("found", "expected"),
-    [
-        ([], "nothing named -> no reaction -> rail"),
-        ([DRIFT], "drift -> no reaction -> rail"),
-        ([SWERVE], "nothing named -> swerve -> rail"),
-        ([DRIFT, SWERVE], "drift -> swerve -> rail"),
-        ([SWERVE, DRIFT], "drift -> swerve -> rail"),
-        # begins after the ego's response: it is not the cause
-        ([DRIFT, SWERVE, done("non_ego", "hard_brake", 4.8, 5.2)], "drift -> swerve -> rail"),
-        # a new cause after the end of the response
-        ([DRIFT, SWERVE, done("non_ego", "cut_in", 6.6, 7.0)], "cut in -> no reaction -> rail"),
-        # a response that had begun before the cause counts
-        (
-            [done("ego", "tailgate", 1.0, 8.0), done("non_ego", "hard_brake", 7.0, 8.0)],
-            "hard brake -> tailgate -> rail",
-        ),
-        ([done("ego", "tailgate", 1.0, 3.0), done("non_ego", "cut_in", 7.0, 8.0)], "cut in -> no reaction -> rail"),
-        ([DRIFT, SWERVE, done("ego", "hard_brake", 5.0, 5.5)], "drift -> hard brake -> rail"),
-        # an old manoeuvre is not a cause
-        ([done("non_ego", "overtake", 0.0, 1.0), done("ego", "swerve", 6.5, 7.0)], "nothing named -> swerve -> rail"),
-    ],
-)
-def test_pair__cause_and_response(found: list[Manoeuvre], expected: str) -> None:
-    assert f"{pair_of(found).words} -> rail" == expected
-
-
-def test_pair__nothing_after_the_end() -> None:
-    assert pair_of([DRIFT, SWERVE], ended_s=3.9).words == "drift -> no reaction"
-
-
 # --- the paper's figure 4, played -------------------------------------------------------------------------------------
 
 
@@ -512,12 +460,13 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path,
     drivers = (Scripted([0.0] * 30 + [0.9] * 10), Scripted([0.0]))
     arm = Arm(name="naive_vs_distracted", scene=merge, drivers=seated(drivers, (careful, distracted)), seed=1)
     stories = {}
-    for game in assess(arm, 12):
-        assert game.trace is not None
-        trace = pd.DataFrame(dict(game.trace))
-        words = pair_of(find_manoeuvres(trace, merge.world)).words
-        stories[game.record["episode"]] = f"{words} -> {game.record['ego_outcome']}"
-    assert "drift -> swerve -> rail" in stories.values(), stories
+    for played in assess(arm, 12):
+        assert played.recorded is not None
+        cause = cause_of(Course(game=played.recorded))
+        if cause is not None:
+            outcome = played.record["ego_outcome"]
+            stories[played.record["episode"]] = f"{event_words(cause.event)} -> {cause.reaction} -> {outcome}"
+    assert "drift -> swerves -> rail" in stories.values(), stories
 
 
 # --- the page about them ----------------------------------------------------------------------------------------------

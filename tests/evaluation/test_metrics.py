@@ -1,23 +1,24 @@
-"""Metrics of a game, compared with values computed by hand."""
+"""Metrics of a drive, compared with values computed by hand."""
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from harness.evaluation import metrics
-from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
-from harness.evaluation.tables import EPISODE_COLUMNS
+from harness.evaluation.columns import MEANS, TABLES
+from harness.evaluation.measured_game import METRICS_OF_PLAYERS
 from harness.game.outcome import Outcome
 
 INF = np.inf
 
 
-def drive(**changes: Any) -> PlayerSeries:
-    """Four steps of 0.5 s."""
-    series: dict[str, Any] = {
+def drive(outcome: Outcome = Outcome.GOAL, steers: bool = True, **changes: Any) -> Any:
+    """Four steps of 0.5 s, without encounters at junctions."""
+    of = {
         "speed_mps": [10.0, 12.0, 11.0, 3.0],
         "acceleration_mps2": [0.0, 4.0, -2.0, -7.5],
         "lateral_acceleration_mps2": [0.5, -1.5, 1.0, 0.0],
@@ -27,68 +28,57 @@ def drive(**changes: Any) -> PlayerSeries:
         "passed_red_s": [-1.0, 0.4, -1.0, 2.5],
         "wrong_way": [0.0, 1.0, 1.0, 1.0],
     }
-    outcome = changes.pop("outcome", Outcome.GOAL)
-    return PlayerSeries(
-        outcome=outcome, step_s=0.5, **{name: np.array(values) for name, values in {**series, **changes}.items()}
-    )
+    series = {name: np.array(values) for name, values in {**of, **changes}.items()}
+    shared = {"acceleration_mps2": series["acceleration_mps2"], "payoff": series["payoff"], "encounters": ()}
+    return SimpleNamespace(outcome=outcome, step_s=0.5, steers=steers, of=series.__getitem__, **shared)
 
 
 def test_metrics__by_hand() -> None:
-    assert {name: metric(drive()) for name, metric in OF_EGO.items()} == {
-        "ego_mean_speed_mps": 9.0,
-        "ego_trailing_distance_m": 15.0,
-        "ego_min_ttc_s": 2.5,
-        "ego_max_deceleration_mps2": 7.5,
-        "ego_max_lateral_acceleration_mps2": 1.5,
-        "ego_time_to_goal_s": 2.0,
-        "ego_red_lights": 2.0,
-        "ego_wrong_way_s": 1.5,
-        "ego_min_pet_s": None,  # without an encounter at a junction
-        "ego_pet_priority": None,
-        "ego_accepted_gap_s": None,
-        "ego_payoff": 4.75,
-    }
-    assert {name: metric(drive()) for name, metric in OF_NON_EGO.items()} == {
-        "non_ego_mean_speed_mps": 9.0,
-        "non_ego_red_lights": 2.0,
-        "non_ego_latest_red_s": 2.5,
-        "non_ego_wrong_way_s": 1.5,
-        "non_ego_payoff": 4.75,
+    assert {each.column.name: each.of(drive()) for each in METRICS_OF_PLAYERS} == {
+        "mean_speed_mps": 9.0,
+        "trailing_distance_m": 15.0,
+        "min_ttc_s": 2.5,
+        "max_deceleration_mps2": 7.5,
+        "max_lateral_acceleration_mps2": 1.5,
+        "time_to_goal_s": 2.0,
+        "red_lights": 2.0,
+        "latest_red_s": 2.5,
+        "wrong_way_s": 1.5,
+        "min_pet_s": None,  # without an encounter
+        "pet_priority": None,
+        "accepted_gap_s": None,
+        "payoff": 4.75,
     }
 
 
-def test_metrics__are_the_columns_of_the_episodes() -> None:
-    assert {*OF_EGO, *OF_NON_EGO} <= set(EPISODE_COLUMNS)
+def test_registry__has_a_column_for_each_player_that_a_metric_is_of_and_for_its_mean() -> None:
+    for each in METRICS_OF_PLAYERS:
+        names = {"ego": f"ego_{each.column.name}", "person": f"non_ego_{each.column.name}"}
+        assert all((names[who] in TABLES["episodes"]) == (who in each.whose) for who in names)
+    assert all(metric.mean in TABLES["summary"] for metric in MEANS.values())
 
 
-def test_latest_red__without_a_red_light_is_unscored() -> None:
-    assert metrics.latest_red_s(drive(passed_red_s=[-1.0] * 4)) is None
-    assert metrics.red_lights(drive(passed_red_s=[-1.0] * 4)) == 0.0
+def test_registry__says_what_each_column_is() -> None:
+    for columns in TABLES.values():
+        assert all(column.meaning.endswith(".") for column in columns.values())
+        assert all(name == column.name for name, column in columns.items())
 
 
-@pytest.mark.parametrize("outcome", [Outcome.COLLISION, Outcome.RAIL, Outcome.TIMEOUT])
-def test_time_to_goal__without_the_goal_is_unscored(outcome: Outcome) -> None:
-    assert metrics.time_to_goal_s(drive(outcome=outcome)) is None
-
-
-def test_trailing_distance__without_a_leader_is_unscored() -> None:
-    assert metrics.trailing_distance_m(drive(leader_gap_m=[INF] * 4)) is None
-
-
-def test_min_ttc__without_a_course_to_contact_is_unscored() -> None:
-    assert metrics.min_ttc_s(drive(time_to_collision_s=[INF] * 4)) is None
-
-
-def test_min_ttc__contact_is_zero_and_that_is_a_value() -> None:
-    assert metrics.min_ttc_s(drive(time_to_collision_s=[INF, 1.0, 0.4, 0.0])) == 0.0
-
-
-def test_max_deceleration__without_braking_is_zero() -> None:
-    assert metrics.max_deceleration_mps2(drive(acceleration_mps2=[0.0, 1.0, 2.0, 0.5])) == 0.0
-
-
-def test_metrics__of_no_steps_are_unscored() -> None:
-    empty = drive(**{name: [] for name in PlayerSeries.__dataclass_fields__ if name not in ("outcome", "step_s")})
-    assert metrics.mean_speed_mps(empty) is None
-    assert metrics.max_deceleration_mps2(empty) is None
-    assert metrics.max_lateral_acceleration_mps2(empty) is None
+@pytest.mark.parametrize(
+    ("name", "changes", "value"),
+    [
+        ("latest_red_s", {"passed_red_s": [-1.0] * 4}, None),
+        ("red_lights", {"passed_red_s": [-1.0] * 4}, 0.0),
+        ("time_to_goal_s", {"outcome": Outcome.COLLISION}, None),
+        ("time_to_goal_s", {"outcome": Outcome.TIMEOUT}, None),
+        ("trailing_distance_m", {"leader_gap_m": [INF] * 4}, None),
+        ("min_ttc_s", {"time_to_collision_s": [INF] * 4}, None),
+        ("min_ttc_s", {"time_to_collision_s": [INF, 1.0, 0.4, 0.0]}, 0.0),  # contact is a value
+        ("max_deceleration_mps2", {"acceleration_mps2": [0.0, 1.0, 2.0, 0.5]}, 0.0),
+        ("max_lateral_acceleration_mps2", {"steers": False}, None),
+        ("mean_speed_mps", {"speed_mps": []}, None),
+        ("max_deceleration_mps2", {"acceleration_mps2": []}, None),
+    ],
+)
+def test_metric__is_empty_where_it_can_t_be_measured(name: str, changes: Any, value: float | None) -> None:
+    assert getattr(metrics, name)(drive(**changes)) == value

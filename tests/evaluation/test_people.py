@@ -8,33 +8,36 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import goals_alone
-from harness.evaluation.manoeuvres import find_manoeuvres, pair_of
 from harness.evaluation.people import COLLIDED_WITH, columns_for, judged, judged_outcomes, people_in
+from harness.evaluation.recorded_game import BodyKind
+from harness.evaluation.rule_book.course import Course
+from harness.evaluation.rule_book.manoeuvres import find_manoeuvres
 from harness.evaluation.summary import summarise
-from harness.evaluation.tables import EPISODE_COLUMNS, read_csv, typed, write_csv
+from harness.evaluation.tables import read_csv, table_of, write_csv
 from tests.support.scenes import LEFT_Y, RIGHT_Y, THREE_PEOPLE, build_scene
-from tests.support.traces import drawn
+from tests.support.traces import drawn, game
 
 PEOPLE = ("non_ego", "non_ego_2", "non_ego_3")
 
 
 def games(*rows: dict[str, object], arm: str = "naive_vs_speedy") -> pd.DataFrame:
     whole = [{"arm": arm, "persona": "speedy", "seed": 1, "episode": k, **row} for k, row in enumerate(rows)]
-    return typed(pd.DataFrame(whole).reindex(columns=list(columns_for(3, EPISODE_COLUMNS))))
+    return table_of("episodes", whole, people=3)
 
 
 def test_columns__of_one_person_are_those_of_the_table() -> None:
-    assert columns_for(1, EPISODE_COLUMNS) == EPISODE_COLUMNS
-    assert people_in(EPISODE_COLUMNS) == ("non_ego",)
+    assert columns_for(1, TABLES["episodes"]) == TABLES["episodes"]
+    assert people_in(TABLES["episodes"]) == ("non_ego",)
 
 
 @pytest.mark.parametrize("people", [2, 3, 4])
 def test_columns__of_several_people_are_each_person_s(people: int) -> None:
-    columns = columns_for(people, EPISODE_COLUMNS)
+    columns = columns_for(people, TABLES["episodes"])
     assert people_in(columns) == ("non_ego", "non_ego_2", "non_ego_3", "non_ego_4")[:people]
-    own = [name for name in EPISODE_COLUMNS if name.startswith("non_ego_")]
-    assert len(columns) == len(EPISODE_COLUMNS) + (people - 1) * len(own) + 1
+    own = [name for name in TABLES["episodes"] if name.startswith("non_ego_")]
+    assert len(columns) == len(TABLES["episodes"]) + (people - 1) * len(own) + 1
     assert list(columns).index(COLLIDED_WITH) == list(columns).index("ego_failed") + 1
 
 
@@ -90,10 +93,6 @@ def test_manoeuvres__name_the_person_and_before_which_player(tmp_path: Path) -> 
     )
     moving = (trace["player"] == "non_ego_2") & (trace["step"] >= 10)
     trace.loc[moving, "y_m"] = np.maximum(LEFT_Y - 0.2 * (trace.loc[moving, "step"] - 9), RIGHT_Y)
-    trace["signals"] = ""
-    found = find_manoeuvres(trace, world, {"ego_car": (4.6, 1.8)})
-    cut_ins = [(each.player, each.text.rpartition(", ")[2]) for each in found if each.manoeuvre == "cut_in"]
-    assert cut_ins == [("non_ego_2", "before ego")]
-    pair = pair_of(found)
-    assert pair.non_ego is not None
-    assert pair.non_ego.player == "non_ego_2"
+    found = find_manoeuvres(Course(game=game(world, trace, {"ego_car": BodyKind(length_m=4.6)})))
+    cut_ins = [(each.player, each.text) for each in found if each.manoeuvre == "cut_in"]
+    assert cut_ins == [("non_ego_2", "cuts in from the left, 4.4 m ahead of the ego")]

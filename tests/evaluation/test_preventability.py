@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from harness.evaluation.columns import TABLES
 from harness.evaluation.preventability import ANY, count_prevented, preventability_of
-from harness.evaluation.reference_columns import PREVENTABILITY_COLUMNS, REFERENCE_COLUMNS
-from harness.evaluation.tables import TABLES, typed
+from harness.evaluation.tables import table_of, typed
 
 ARM = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1}
 
@@ -20,7 +20,7 @@ def episodes(failed: list[int]) -> pd.DataFrame:
         {**ARM, "episode": place, "ego_outcome": "collision" if bad else "goal", "ego_failed": bad, "error": ""}
         for place, bad in enumerate(failed)
     ]
-    return typed(pd.DataFrame(rows, columns=list(TABLES["episodes"])))
+    return table_of("episodes", rows)
 
 
 def judged(episode: int, driver: str, conflict: int | None, start: int | None, **cells: Any) -> dict[str, Any]:
@@ -41,7 +41,7 @@ GAMES = typed(
             judged(2, "rss", None, 1),
             judged(2, "upper_bound", None, None, error="it broke"),
         ],
-        columns=list(REFERENCE_COLUMNS),
+        columns=list(TABLES["reference_drivers"]),
     )
 )
 
@@ -49,7 +49,7 @@ GAMES = typed(
 @pytest.fixture
 def counts() -> dict[str, dict[str, Any]]:
     table = count_prevented(GAMES, episodes([1, 1, 1, 0, 0, 0, 0, 0, 0, 0]))
-    assert list(typed(table).columns) == list(PREVENTABILITY_COLUMNS)
+    assert list(typed(table).columns) == list(TABLES["preventability"])
     return {row["driver"]: row for row in table.to_dict("records")}
 
 

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from harness.errors import UsageError
+from harness.evaluation.columns import TABLES
 from harness.evaluation.comparison import compare
 from harness.evaluation.research_questions import Question
 from harness.evaluation.summary import summarise
-from harness.evaluation.tables import SUMMARY_COLUMNS, TABLES, read_csv, typed, write_csv
+from harness.evaluation.tables import read_csv, table_of, typed, write_csv
 
 WHOLE = st.integers(-(2**62), 2**62)
 CELLS = {
@@ -34,7 +35,7 @@ def game(arm="naive_alone", episode=0, **cells):
 
 
 def episodes_of(*games):
-    return typed(pd.DataFrame(list(games), columns=list(TABLES["episodes"])))
+    return table_of("episodes", games)
 
 
 @st.composite
@@ -44,8 +45,8 @@ def tables(draw):
     return typed(
         pd.DataFrame(
             {
-                name: pd.Series(draw(st.lists(CELLS[dtype], min_size=count, max_size=count)), dtype=object)
-                for name, dtype in columns.items()
+                name: pd.Series(draw(st.lists(CELLS[column.dtype], min_size=count, max_size=count)), dtype=object)
+                for name, column in columns.items()
             }
         )
     )
@@ -169,7 +170,9 @@ def test_summarise__an_arm_that_only_errored_has_no_rates():
 
 def test_summarise__of_no_games_is_an_empty_summary():
     table = summarise(episodes_of())
-    assert {name: str(dtype) for name, dtype in table.dtypes.items()} == SUMMARY_COLUMNS
+    assert {name: str(dtype) for name, dtype in table.dtypes.items()} == {
+        name: column.dtype for name, column in TABLES["summary"].items()
+    }
     assert len(table) == 0
 
 
@@ -180,11 +183,12 @@ def test_write_csv__writes_exactly_these_bytes(tmp_path):
         game(episode=1, ego_outcome="error", ego_failed=None, error='no "lane",\nat all', ego_payoff=-1e-17),
     )
     write_csv(episodes_of(*rows), path)
-    assert path.read_bytes().decode() == (
-        ",".join(TABLES["episodes"]) + "\n"
-        "naive_alone,,1,0,goal,0,0.30000000000000004,,,,,,,,,,,,,,,,,,12.0" + "," * 14 + "\n"
-        "naive_alone,,1,1,error,,,,,,,,,,,,,-1e-17,,,,,,," + "," * 14 + '"no ""lane"",\nat all"\n'
-    )
+    shown = {"arm": "naive_alone", "seed": "1", "episode": "0", "ego_outcome": "goal", "ego_failed": "0"}
+    shown |= {"ego_mean_speed_mps": "0.30000000000000004", "duration_s": "12.0"}
+    error = {"arm": "naive_alone", "seed": "1", "episode": "1", "ego_outcome": "error", "ego_payoff": "-1e-17"}
+    error |= {"error": '"no ""lane"",\nat all"'}
+    lines = [",".join(row.get(name, "") for name in TABLES["episodes"]) for row in (shown, error)]
+    assert path.read_bytes().decode() == "\n".join([",".join(TABLES["episodes"]), *lines, ""])
 
 
 def test_write_csv__truth_values_are_true_and_false(tmp_path):

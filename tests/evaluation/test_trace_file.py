@@ -28,8 +28,14 @@ def game(episode: int, steps: int = 3) -> dict[str, list[Any]]:
         "acceleration_mps2": [0.0] * steps,
         "steering_rad": [0.01] * steps,
         "lapsed": [k == 1 for k in rows],
+        "steers": [True] * steps,
+        "station_m": [20.0 + k for k in rows],
+        "payoff": [0.25] * steps,
         "outcome": [""] * (steps - 1) + ["goal"],
         "signals": ["crossing=Gr"] * (steps - 1) + ["crossing=yr"],
+        "signal_s": ["4.5 0.0"] + [""] * (steps - 1),
+        "friction": [0.9] * steps,
+        "limit_share": [1.0] * steps,
     }
 
 

@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import libsumo
@@ -26,7 +27,8 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import read_sumo_players
 from harness.environments.gymnasium_env import DrivingEnv
 from harness.errors import StageFailed, UsageError
-from harness.evaluation.metrics import OF_EGO, OF_NON_EGO, PlayerSeries
+from harness.evaluation.measured_game import METRICS_OF_PLAYERS
+from harness.evaluation.metrics import Metric
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.fuzzy import FuzzyFunction, FuzzySet
 from harness.game.observation import observe
@@ -381,24 +383,22 @@ def test_observation__can_be_made_at_every_place_of_every_route(everywhere: Quan
     check_observation(observe(everywhere), games, everywhere.state.step)
 
 
-@pytest.mark.parametrize("name", [*OF_EGO, *OF_NON_EGO])
-def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(name: str, everywhere: Quantities) -> None:
-    q, metric = everywhere, (OF_EGO | OF_NON_EGO)[name]
-    series = {
-        "speed_mps": q.state.speed_mps,
-        "acceleration_mps2": q.state.acceleration_mps2,
-        "lateral_acceleration_mps2": q.lateral_acceleration_mps2,
-        "leader_gap_m": q.leader_gap_m,
-        "time_to_collision_s": q.time_to_collision_s,
-        "payoff": np.zeros_like(q.state.x_m),
-        "passed_red_s": q.passed_red_s,
-        "wrong_way": q.wrong_way,
-    }
-    assert not any(np.isnan(each).any() for each in series.values())
+@pytest.mark.parametrize("metric", METRICS_OF_PLAYERS, ids=lambda each: each.column.name)
+def test_metric__is_a_number_or_unmeasured_at_every_place_of_every_route(
+    metric: Metric, everywhere: Quantities
+) -> None:
     for outcome in (Outcome.GOAL, Outcome.RAIL):
-        for game in (0, len(q.state.step) - 1):
-            of_game = {each: values[game, :1] for each, values in series.items()}
-            value = metric(PlayerSeries(outcome=outcome, step_s=0.1, **of_game))
+        for game in (0, len(everywhere.state.step) - 1):
+            drive: Any = SimpleNamespace(
+                outcome=outcome,
+                step_s=0.1,
+                steers=True,
+                encounters=(),
+                payoff=np.zeros(1),
+                acceleration_mps2=everywhere.state.acceleration_mps2[game, :1],
+                of=lambda name, game=game: getattr(everywhere, name)[game, :1],
+            )
+            value = metric.of(drive)
             assert value is None or np.isfinite(value)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from harness.evaluation.strategies import ReconfiguredEgo, against_persona
-from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed
+from harness.evaluation.tables import table_of
 from harness.reports.cards import STILL_DRIVES
 from harness.reports.learning import searches
 from harness.reports.provenance import mixed_versions, rounds
@@ -40,7 +40,7 @@ def trials(seed: int = 1, payoffs: tuple[float, ...] = PAYOFFS, error: str = "Va
         for trial, payoff in enumerate(payoffs)
         for name in ("gap_s", "<b>odd</b>")
     ]
-    return typed(pd.DataFrame(rows).reindex(columns=list(RECONFIGURATION_COLUMNS)))
+    return table_of("reconfiguration", rows)
 
 
 def _or_least(payoff: float) -> float:

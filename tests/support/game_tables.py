@@ -9,9 +9,10 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.columns import TABLES
 from harness.evaluation.game_theory.findings import find
 from harness.evaluation.game_theory.records import Pairing, Response
-from harness.evaluation.tables import EPISODE_COLUMNS, typed
+from harness.evaluation.tables import typed
 
 
 def arm(
@@ -45,7 +46,7 @@ def arm(
         }
         for place, failed in enumerate(ego_failed)
     ]
-    return pd.DataFrame(rows, columns=list(EPISODE_COLUMNS))
+    return pd.DataFrame(rows, columns=list(TABLES["episodes"]))
 
 
 def table(*arms: pd.DataFrame) -> pd.DataFrame:

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.config.campaign import Campaign
+from harness.evaluation.columns import TABLES
 from harness.evaluation.comparison import compare
 from harness.evaluation.research_questions import Question, ResearchQuestion
 from harness.evaluation.strategies import (
@@ -30,7 +31,7 @@ from harness.evaluation.strategies import (
     strategy_name,
 )
 from harness.evaluation.summary import summarise
-from harness.evaluation.tables import TABLES, typed
+from harness.evaluation.tables import table_of, typed
 from harness.replay.selection import choose_games, replay_name
 from harness.reports.page import render_page
 from harness.reports.player_data import GameTracks, SceneDrawing
@@ -73,7 +74,7 @@ def campaign(
         for seed in seeds
         for episode in range(games)
     ]
-    episodes = typed(pd.DataFrame(rows, columns=list(TABLES["episodes"])))
+    episodes = table_of("episodes", rows)
     questions = [
         Question(question=question, persona=persona, seed=seed, baseline=before, treatment=after)
         for persona in personas
@@ -253,7 +254,7 @@ def with_errors(arguments: dict[str, Any], games: Any) -> dict[str, Any]:
     frame = arguments["episodes"]
     frame.loc[games, "ego_outcome"] = "error"
     frame.loc[games, "error"] = "the simulator died"
-    measured = [name for name, dtype in TABLES["episodes"].items() if dtype in ("float64", "Int64")]
+    measured = [name for name, column in TABLES["episodes"].items() if column.dtype in ("float64", "Int64")]
     frame.loc[games, measured] = None
     return recomputed(arguments)
 

@@ -124,7 +124,7 @@ def _player(
 
 
 def manoeuvres(episodes: pd.DataFrame) -> pd.DataFrame:
-    """A frame of manoeuvres as `harness.evaluation.manoeuvres` writes it: two in each game against a persona."""
+    """A frame of manoeuvres as the rule book writes it: two in each game against a persona."""
     names = (("cut_in", "swerve"), ("drift", "hard_brake"), ("tailgate", "overtake"))
     rows = []
     for row in episodes[episodes["arm"].str.contains("_vs_")].itertuples():

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
 import pandas as pd
+
+from harness.evaluation.recorded_game import BodyKind, RecordedGame
+from harness.game.world import World
+from tests.support.stations import nearest_station_m
 
 
 def drawn(**players: tuple[list[float], float, float, dict[int, str]]) -> pd.DataFrame:
@@ -58,3 +63,19 @@ def along(x: float, y: float, heading: float, speed: float, steps: int) -> list[
     """Poses at constant velocity."""
     move = 0.1 * speed
     return [(x + k * move * math.cos(heading), y + k * move * math.sin(heading), heading, speed) for k in range(steps)]
+
+
+def game(world: World, trace: pd.DataFrame, kinds: Mapping[str, BodyKind] | None = None, **cells: Any) -> RecordedGame:
+    """The game of a trace; a column that it lacks is added: the station nearest to each player, steering that is known,
+    and what a game is without payoffs, signals, and differences to the scene. `cells` replace columns."""
+    usual = {"episode": 0, "signals": "", "payoff": 0.0, "steers": True, "limit_share": 1.0, "station_m": 0.0}
+    usual |= {
+        "friction": world.actuators.friction,
+        "signal_s": " ".join(["0.0"] * len(world.right_of_way.signal_links)),
+    }
+    trace = trace.assign(**{name: cell for name, cell in usual.items() if name not in trace} | cells)
+    for player, role in enumerate(world.roles):
+        own = trace["player"] == role
+        places = (np.tile(trace.loc[own, name].to_numpy()[:, None], len(world.roles)) for name in ("x_m", "y_m"))
+        trace.loc[own, "station_m"] = nearest_station_m(world.road.routes, *places)[:, player]
+    return RecordedGame(trace=trace.reset_index(drop=True), world=world, kinds=kinds or {})

@@ -1,7 +1,7 @@
 """Carrying out an arm in segments of games: each is stored when it is played, and all are joined at the end.
 
 <work>/segments/<first>-<last>.json            checksums: the segment is complete; and the versions that played it
-<work>/segments/<first>-<last>.<table>         its records, its manoeuvres, its traces
+<work>/segments/<first>-<last>.<table>         its log: outcomes and errors, and traces
 
 So an arm continues where it stopped, and needs the memory of one segment, however many games it has. A game depends on
 nothing but itself: the files of an arm are the same bytes with and without interruptions.
@@ -17,20 +17,16 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-import pandas as pd
-
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
 from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
-from harness.campaign.storage.manoeuvre_table import EPISODES, MANOEUVRES, name_manoeuvres
-from harness.campaign.storage.trace_tables import make_tables
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.environments.rollout import Arm, Game, assess
 from harness.errors import StageFailed
 from harness.evaluation.competence import goals_alone
-from harness.evaluation.people import columns_for
-from harness.evaluation.tables import PLAYED_COLUMNS, join_csv, read_csv, typed, write_csv
+from harness.evaluation.tables import join_csv, table_of, write_csv
 from harness.evaluation.trace_file import TraceWriter, join_traces
 from harness.evaluation.unplayed_games import reason_of
 from harness.files import make_folder
@@ -67,14 +63,13 @@ class Segment:
         with TraceWriter(self.file(_TRACES)) as traces:
             for _ in self.episodes:
                 game = next(games)
-                records.append({**game.record, **labels})
+                records.append({**game.played, **labels})
                 if game.trace is not None:
                     traces.add(game.trace)
                 on_game(game)
-        table = typed(pd.DataFrame(records).reindex(columns=list(columns_for(len(arm.drivers) - 1, PLAYED_COLUMNS))))
-        write_csv(table, self.file(EPISODES))
-        write_csv(name_manoeuvres(table, self.file(_TRACES), arm.scene), self.file(MANOEUVRES))
-        files = [self.file(name) for name in (EPISODES, MANOEUVRES, _TRACES)]
+        table = table_of("played", records, len(arm.drivers) - 1)
+        write_csv(table, self.file(PLAYED))
+        files = [self.file(name) for name in (PLAYED, _TRACES)]
         errors = int((table["error"] != "").sum())
         write_checksums(self.file("json"), self.folder, files, {"errors": errors, "versions": versions_of_numbers()})
         return errors
@@ -88,14 +83,14 @@ def carry_out_assessment(stage: AssessmentStage, inputs: StageInputs) -> Made:
     segments = segments_of(folder.segments(stage.id), run.context.document.assessment.episodes)
     labels: dict[str, str | int] = {"arm": stage.name, "persona": stage.persona, "seed": stage.seed}
     errors = play_segments(players.arm(stage), segments, labels, run)
-    work = folder.work(stage.id)
-    files = [work / EPISODES, work / MANOEUVRES, folder.traces(stage.id)]
-    join_segments(segments, files, labels)
+    played, traces = folder.work(stage.id) / PLAYED, folder.traces(stage.id)
+    join_segments(segments, played, traces, labels)
+    games = arm_tables(folder, stage.id, inputs.scene).episodes
     facts: dict[str, Any] = {"episodes": segments[-1].episodes.stop, "errors": errors}
     facts |= {"versions": [versions_of_numbers()], **choice}
     if not all(stage.sides):  # whether the training of the player that drives alone succeeded
-        facts |= goals_alone(read_csv(work / EPISODES), "ego" if stage.ego else "non_ego").record()
-    return Made(facts=facts, files=[*files, *make_tables(folder, stage.id, inputs.scene)])
+        facts |= goals_alone(games, "ego" if stage.ego else "non_ego").record()
+    return Made(facts=facts, files=[played, traces])
 
 
 def segments_of(folder: Path, episodes: int) -> list[Segment]:
@@ -123,7 +118,7 @@ def play_segments(arm: Arm, segments: Sequence[Segment], labels: Mapping[str, An
         done += 1
         run.on_progress(done, total)
         if first is not None and done <= HOPELESS_GAMES:
-            first.append(str(game.record["error"]))
+            first.append(str(game.played["error"]))
             _check_hope(arm, first)
 
     episodes = chain.from_iterable(segment.episodes for segment in missing)
@@ -142,11 +137,11 @@ def _check_hope(arm: Arm, errors: Sequence[str]) -> None:
 
 
 def join_segments(
-    segments: Sequence[Segment], files: Sequence[Path], labels: Mapping[str, str | int] = MappingProxyType({})
+    segments: Sequence[Segment],
+    played: Path,
+    traces: Path,
+    labels: Mapping[str, str | int] = MappingProxyType({}),
 ) -> None:
-    """Join the segments of an arm into its files: records, manoeuvres, traces. `labels` name the arm in the metadata of
-    its traces."""
-    episodes, manoeuvres, traces = files
-    join_csv([segment.file(EPISODES) for segment in segments], episodes)
-    join_csv([segment.file(MANOEUVRES) for segment in segments], manoeuvres)
+    """Join the segments of an arm into its log. `labels` name the arm in the metadata of its traces."""
+    join_csv([segment.file(PLAYED) for segment in segments], played)
     join_traces([segment.file(_TRACES) for segment in segments], traces, labels)

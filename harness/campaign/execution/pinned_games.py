@@ -27,8 +27,8 @@ from harness.drivers.policy_file import policy_files
 from harness.environments.rollout import parts_of
 from harness.environments.start_trials import StartTrials
 from harness.errors import UsageError
-from harness.evaluation.manoeuvres import pairs_in
 from harness.evaluation.minimising import minimise
+from harness.evaluation.rule_book.cause_lines import causes_in_words
 from harness.evaluation.tables import read_csv
 from harness.evaluation.worst_first import worst_first
 from harness.files import make_folder, write_atomically
@@ -68,8 +68,7 @@ class PinnedGames:
     def __init__(self, folder: RunFolder, players: RunPlayers, out: Path) -> None:
         self._players, self._out = players, out
         self._episodes = read_csv(folder.path / "episodes.csv")
-        manoeuvres = folder.path / "manoeuvres.csv"
-        self._pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
+        self._causes = causes_in_words(read_csv(folder.path / "causes.csv"))
 
     def failures(self, arm: str | None = None) -> list[RunFailure]:
         """One failure for each kind of failure of each arm (of one arm, if named) and seed.
@@ -82,8 +81,8 @@ class PinnedGames:
         failed = failed[[(game.arm, game.seed) in known and arm in (None, game.arm) for game in failed.itertuples()]]
         kinds: dict[tuple[str, int, str, str], list[int]] = {}
         for game in worst_first(failed).itertuples():
-            pair = self._pairs.get((game.arm, game.seed, game.episode))
-            kind = (str(game.arm), int(game.seed), str(game.ego_outcome), pair.words if pair else "")
+            cause = self._causes.get((game.arm, game.seed, game.episode), "")
+            kind = (str(game.arm), int(game.seed), str(game.ego_outcome), cause)
             kinds.setdefault(kind, []).append(int(game.episode))
         return [
             RunFailure(arm=name, seed=seed, episode=episodes[0], alike=len(episodes))

@@ -27,6 +27,7 @@ from harness.campaign.plan.planned_drivers import (
     persona_of,
 )
 from harness.campaign.plan.stages import AssessmentStage
+from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.driver import read_driver
 from harness.config.tunable import Adjustable
@@ -40,8 +41,7 @@ from harness.drivers.sumo import SumoDriver
 from harness.environments.rollout import Arm, assess
 from harness.errors import StageFailed
 from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_shares
-from harness.evaluation.tables import read_csv
-from harness.game.roles import EGO, ROLES
+from harness.game.roles import EGO
 from harness.traffic.scene import OpenScene
 
 DRIVER = "driver.toml"
@@ -105,8 +105,8 @@ class PlayerFactory:
             sides = [*stage.sides]
             sides[learner] = (member,)
             candidates.append(replace(stage, ego=sides[0], non_ego=sides[1]))
-            payoffs = [game.record.get(f"{ROLES[learner]}_payoff") for game in assess(self.arm(candidates[-1]), games)]
-            measured = [payoff for payoff in payoffs if payoff is not None]
+            played = (game.recorded for game in assess(self.arm(candidates[-1]), games))
+            measured = [float(game.payoff[:, learner].sum()) for game in played if game is not None]
             if not measured:
                 raise StageFailed(f"{stage.id}: none of the games that choose the best response could be played")
             earned.append(float(np.mean(measured)))
@@ -173,7 +173,7 @@ def equilibrium_of(mixture: EquilibriumMixture, folder: RunFolder) -> tuple[floa
 
 
 def _mean_payoffs(folder: RunFolder, arm: str) -> tuple[float, float]:
-    episodes = read_csv(folder.work(arm) / "episodes.csv")
+    episodes = arm_tables(folder, arm).episodes
     played = episodes[episodes["error"] == ""]
     if played.empty:
         raise StageFailed(f"{arm}: none of its games could be played, so that it can't weigh a mixture")

@@ -14,14 +14,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
 from harness.campaign.plan.planned_drivers import SumoDriven
 from harness.campaign.plan.stages import PreventabilityStage
+from harness.campaign.storage.arm_tables import arm_tables
 from harness.campaign.storage.checksums import read_checksums, write_checksums
-from harness.campaign.storage.manoeuvre_table import EPISODES
 from harness.campaign.storage.run_folder import JUDGED
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.car import car_of
@@ -30,8 +28,7 @@ from harness.drivers.reference_drivers import REFERENCES, lane_width_of, referen
 from harness.environments.conflict_replay import Chance, ConflictReplay, Takeover, collision_of
 from harness.environments.rollout import Arm, assess
 from harness.evaluation.competence import broken_by
-from harness.evaluation.reference_columns import REFERENCE_COLUMNS
-from harness.evaluation.tables import read_csv, typed, write_csv
+from harness.evaluation.tables import table_of, write_csv
 from harness.evaluation.trace_file import TraceReader
 from harness.files import make_folder
 from harness.game.roles import EGO
@@ -58,7 +55,7 @@ def carry_out_preventability(stage: PreventabilityStage, inputs: StageInputs) ->
     run, of = inputs.run, stage.of
     seatless = replace(of, ego=(SumoDriven(),))
     work = _JudgedArm(stage=stage, run=run, arm=PlayerFactory.of(inputs).arm(seatless))
-    episodes = read_csv(run.folder.work(of.id) / EPISODES)
+    episodes = arm_tables(run.folder, of.id).episodes
     failures = episodes[(episodes["error"] == "") & (episodes["ego_failed"] == 1)]
     numbers = [int(episode) for episode in failures["episode"]]
     conflicts, failed_s = _from_conflict(work, numbers)
@@ -71,7 +68,7 @@ def carry_out_preventability(stage: PreventabilityStage, inputs: StageInputs) ->
         for name in REFERENCES
     ]
     table = run.folder.work(stage.id) / JUDGED
-    write_csv(typed(pd.DataFrame(rows, columns=list(REFERENCE_COLUMNS))), table)
+    write_csv(table_of("reference_drivers", rows), table)
     errors = int((episodes["error"] != "").sum()) + sum(row["error"] != "" for row in rows)
     facts = {"episodes": len(numbers), "errors": errors, "versions": [versions_of_numbers()]}
     return Made(facts=facts, files=[table])

@@ -78,11 +78,11 @@ def equilibrium_before(stage: Stage, folder: RunFolder, significance: float) -> 
 def _is_equilibrium(gate: EquilibriumGate, stage: Stage, folder: RunFolder, significance: float) -> bool:
     import pandas as pd  # slow to import, and few stages have gates
 
+    from harness.campaign.storage.arm_tables import arm_tables
     from harness.evaluation.game_theory.best_response_gap import gaps, nothing_to_gain
     from harness.evaluation.game_theory.records import Response, Role
-    from harness.evaluation.tables import read_csv
 
-    episodes = pd.concat([read_csv(folder.work(each) / "episodes.csv") for each in gate.stages], ignore_index=True)
+    episodes = pd.concat([arm_tables(folder, each).episodes for each in gate.stages], ignore_index=True)
     pair, *responses = (str(name) for name in episodes["arm"].unique()[:3])
     roles: tuple[Role, Role] = ("ego", "non_ego")
     asked = [

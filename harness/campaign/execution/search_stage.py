@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import pandas as pd
-
 from harness.campaign.execution.player_factory import DRIVER, PlayerFactory
 from harness.campaign.execution.stage_run import Made, StageInputs, versions_since
 from harness.campaign.plan.stages import SearchStage
 from harness.config.tunable import Tunable
 from harness.errors import StageFailed
-from harness.evaluation.tables import RECONFIGURATION_COLUMNS, typed, write_csv
+from harness.evaluation.tables import table_of, write_csv
 from harness.files import make_folder, write_atomically
 from harness.training.parameter_search import SearchSpec, Trial, best, run_search, version_of_search
 
@@ -81,4 +79,4 @@ def _write_table(trials: Sequence[Trial], searched: Sequence[Tunable], labels: M
         for key, low, high in searched:
             tried = {"trial": number, "parameter": key, "value": trial.values[key], "low": low, "high": high}
             rows.append({**labels, **tried, **results})
-    write_csv(typed(pd.DataFrame(rows).reindex(columns=list(RECONFIGURATION_COLUMNS))), file)
+    write_csv(table_of("reconfiguration", rows), file)

@@ -15,7 +15,7 @@ from harness.campaign.plan.planned_drivers import SumoDriven, description
 from harness.campaign.plan.stages import TrainingStage
 from harness.drivers.policy_file import persona_hash, policy_files, read_policy, write_policy
 from harness.errors import StageFailed
-from harness.evaluation.tables import TRAINING_COLUMNS, typed, write_csv
+from harness.evaluation.tables import table_of, write_csv
 from harness.files import make_folder
 from harness.game.roles import EGO, ROLES
 from harness.training.early_stopping import RULE
@@ -102,5 +102,5 @@ def _write(stage: TrainingStage, inputs: StageInputs, result: TrainingResult) ->
     ends = [*[""] * (len(curve) - 1), result.stopped][: len(curve)]
     curve = curve.assign(stage=stage.name, persona=stage.persona, seed=stage.seed, stopped=ends)
     table = folder.work(stage.id) / "training.csv"
-    write_csv(typed(curve.reindex(columns=list(TRAINING_COLUMNS))), table)
+    write_csv(table_of("training", curve.to_dict("records")), table)
     return [*policy_files(folder.policy(stage.id)), table]

@@ -11,8 +11,7 @@ from __future__ import annotations
 import hashlib
 import importlib.metadata
 import json
-from collections.abc import Iterable, Iterator, Mapping
-from functools import cache
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,11 +19,11 @@ from pydantic import Field, ValidationError
 
 from harness.campaign.storage.checksums import checksums_of, mismatches, read_checksums
 from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.storage.versions import digest_of_sources
 from harness.config.toml_reading import Document
 from harness.errors import FAILED, NOT_ACCEPTED
 from harness.files import write_atomically
 
-_SOURCES = {".py", ".jinja", ".css", ".js"}
 _DRAWN_WITH = ("jinja2", "junitparser", "markupsafe", "matplotlib", "shapely")
 """Libraries that a report depends on, beside those that the manifest names."""
 
@@ -114,23 +113,5 @@ def _results(folder: RunFolder) -> Iterator[Path]:
 def _key(folder: RunFolder, manifest: Mapping[str, Any]) -> str:
     stages = {name: (folder.done(name) or {}).get("files") for name in manifest["stages"]}
     libraries = {name: importlib.metadata.version(name) for name in _DRAWN_WITH}
-    made_from = [dict(manifest), stages, libraries, _digest_of_sources()]
+    made_from = [dict(manifest), stages, libraries, digest_of_sources()]
     return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
-
-
-@cache
-def _digest_of_sources() -> str:
-    """A digest of this program: a version number does not tell one state of a working copy from another."""
-    top = Path(__file__).parents[2]
-    return _digest((file.relative_to(top).as_posix().encode(), file.read_bytes()) for file in sorted(_sources(top)))
-
-
-def _sources(top: Path) -> Iterator[Path]:
-    return (file for file in top.rglob("*") if file.suffix in _SOURCES)
-
-
-def _digest(parts: Iterable[tuple[bytes, bytes]]) -> str:
-    digest = hashlib.sha256()
-    for name, content in parts:
-        digest.update(b"%d %s %d " % (len(name), name, len(content)) + content)
-    return digest.hexdigest()

@@ -8,26 +8,27 @@ import pandas as pd
 
 from harness.config.campaign import Campaign, Population
 from harness.environments.rollout import parts_of
+from harness.evaluation.columns import TABLES
 from harness.evaluation.people import people_in
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, ReconfiguredEgo, RetrainedEgo
 from harness.evaluation.summary import summarise
-from harness.evaluation.tables import POPULATION_COLUMNS, typed
+from harness.evaluation.tables import joined
 from harness.game.initial_state import draw_member
 from harness.game.roles import NON_EGO
 
-_SUMMARY_COLUMNS = [name for name in POPULATION_COLUMNS if name not in ("arm", "population", "seed", "persona")]
+_SUMMARY_COLUMNS = [name for name in TABLES["populations"] if name not in ("arm", "population", "seed", "persona")]
 
 
 def by_who_drove(campaign: Campaign, episodes: pd.DataFrame) -> pd.DataFrame:
-    """A row for each arm against a population, seed and persona that drove in it, with `POPULATION_COLUMNS`. With
-    several people, the personas in their places.
+    """A row for each arm against a population, seed and persona that drove in it, the table `populations`. With several
+    people, the personas in their places.
 
     The draw is repeated here: it depends on the place, the arm's seed and the episode only.
     """
     frames = [
         _rows(population, games) for population in campaign.population for games in _arms_of(population, episodes)
     ]
-    return typed(pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=list(POPULATION_COLUMNS)))
+    return joined("populations", frames)
 
 
 def _arms_of(population: Population, episodes: pd.DataFrame) -> Iterable[pd.DataFrame]:

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.environments.recorded import recorded_game as game_of
 from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
-from harness.evaluation.trace_quantities import series_of
 from harness.evaluation.worst_first import worst_first
 from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
@@ -40,7 +40,7 @@ def recorded_games(
     for game in watching_order(episodes, arms).itertuples():
         trace = reader.read(traces(game.arm, game.seed), game.episode)
         if not trace.empty:
-            yield recorded_game(trace, scene, game)
+            yield tracks_of(trace, scene, game)
 
 
 def watching_order(episodes: pd.DataFrame, arms: Mapping[str, Arm]) -> pd.DataFrame:
@@ -66,11 +66,12 @@ def _counterparts(arm: Arm | None) -> list[str]:
     return [each.name for each in counterparts(arm)] if arm is not None else []
 
 
-def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
+def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
     """One game's trace as tracks; `game` is its row of `episodes`."""
     types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
     sizes_m = {name: (kind.length_m, kind.width_m) for name, kind in types.items()}
-    series = series_of(trace, scene.world, sizes_m)
+    recorded = game_of(trace, scene)
+    measures = {name: getattr(recorded.quantities, name) for name in ("leader_gap_m", "time_to_collision_s")}
     by_name = {str(name): rows.sort_values("step") for name, rows in trace.groupby("player", sort=True)}
     players = []
     for place, role in enumerate(scene.world.roles):
@@ -84,8 +85,7 @@ def recorded_game(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTrack
                     acceleration_mps2=rows["acceleration_mps2"].to_numpy(),
                     steering_rad=rows["steering_rad"].to_numpy(),
                     lapsed=rows["lapsed"].to_numpy(dtype=bool),
-                    leader_gap_m=series.leader_gap_m[steps, place],
-                    time_to_collision_s=series.time_to_collision_s[steps, place],
+                    **{name: np.where(recorded.drove, each, np.nan)[steps, place] for name, each in measures.items()},
                     outcome="".join(ended["outcome"]),
                     ended_step=int(ended["step"].iloc[0]) if len(ended) else None,
                 )

@@ -21,8 +21,8 @@ from harness.campaign.plan.stages import stage_id
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.toml_reading import nearest
 from harness.errors import UsageError, plain
-from harness.evaluation.manoeuvres import pairs_in
 from harness.evaluation.people import people_in
+from harness.evaluation.rule_book.cause_lines import causes_in_words
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
 from harness.evaluation.worst_first import FAILURES, severities, worst_first
@@ -53,34 +53,30 @@ class ListedGames:
     """Games of a run, worst first: a page of them."""
 
     games: pd.DataFrame
-    """Of episodes.csv: arm, seed, episode, an outcome per player, ego_min_ttc_s; and severity, and manoeuvres in words:
-    the pair that led to the end."""
+    """Of episodes.csv: arm, seed, episode, an outcome per player, ego_min_ttc_s and severity; and the cause of a
+    failure in words."""
     players: tuple[str, ...]
     number: int
     """Of the games on all pages."""
     pages: int
-    named: bool
-    """Whether the run has named its manoeuvres."""
 
 
 def listed_games(run: Path, chosen: GameList) -> ListedGames:
     """The chosen games of a run. Raises UsageError where no game is of an arm, a seed or an outcome."""
     folder = RunFolder(run)
     episodes = episodes_of(folder)
-    manoeuvres = folder.path / "manoeuvres.csv"
-    pairs = pairs_in(read_csv(manoeuvres)) if manoeuvres.is_file() else {}
+    causes = causes_in_words(read_csv(folder.path / "causes.csv"))
     episodes = _chosen(run, episodes, chosen)
     ordered = worst_first(episodes.assign(severity=severities(episodes)))
     games, pages = _page(ordered, chosen)
     players = ("ego", *people_in(episodes.columns))
     columns = ["arm", "seed", "episode", *(f"{name}_outcome" for name in players), "ego_min_ttc_s", "severity"]
-    found = [pairs.get((game.arm, game.seed, game.episode)) for game in games.itertuples()]
+    found = [causes.get((game.arm, game.seed, game.episode), "") for game in games.itertuples()]
     return ListedGames(
-        games=games[columns].assign(manoeuvres=[pair.words if pair else "" for pair in found]),
+        games=games[columns].assign(cause=found),
         players=players,
         number=len(ordered),
         pages=pages,
-        named=manoeuvres.is_file(),
     )
 
 
@@ -88,22 +84,21 @@ def game_table(run: Path, chosen: GameList) -> Table:
     """The chosen games of a run, for the terminal."""
     listed = listed_games(run, chosen)
     left = f"page {chosen.page} of {listed.pages}, {listed.number:,} games; {_OTHERS}; " if listed.pages > 1 else ""
-    missing = "" if listed.named else f"; to name the manoeuvres: harness report {run}"
     table = Table(
         title=Text(f"Games of {run}, worst first"),
         title_justify="left",
-        caption=Text(f"{left}to watch one: harness replay RUN ARM EPISODE{missing}"),
+        caption=Text(f"{left}to watch one: harness replay RUN ARM EPISODE"),
         box=SIMPLE,
         padding=0,
     )
-    for name in ("arm", "seed", "episode", *listed.players, "manoeuvres", "TTC (s)", "severity"):
+    for name in ("arm", "seed", "episode", *listed.players, "cause", "TTC (s)", "severity"):
         heading = name.replace("non_ego", "non-ego").replace("_", " ")
         table.add_column(heading, overflow="fold", no_wrap=name in ("arm", *listed.players))
     for game in listed.games.itertuples():
         ttc = "" if pd.isna(game.ego_min_ttc_s) else f"{game.ego_min_ttc_s:.1f}"
         severity = "" if math.isinf(game.severity) else f"{game.severity:.1f}"
         outcomes = [getattr(game, f"{name}_outcome") for name in listed.players]
-        words = (game.arm, str(game.seed), str(game.episode), *outcomes, game.manoeuvres, ttc, severity)
+        words = (game.arm, str(game.seed), str(game.episode), *outcomes, game.cause, ttc, severity)
         table.add_row(*(Text(plain(cell)) for cell in words))  # text without markup, whatever the table contains
     return table
 

@@ -13,7 +13,7 @@ from urllib.parse import unquote
 import pandas as pd
 
 from harness.campaign.plan.stages import stage_id
-from harness.campaign.results.recorded_games import recorded_game
+from harness.campaign.results.recorded_games import tracks_of
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
 from harness.evaluation.people import judged
@@ -66,7 +66,7 @@ class ServedReport:
             trace = self._reader.read(self._folder.traces(stage_id(game.arm, game.seed)), game.episode)
         crowds = self._folder.manifest().get("campaign", {}).get("crowd", ())
         people = {each["name"]: each["personas"] for each in crowds}
-        return game_text(recorded_game(trace, self._scene, game), self._marks, people).encode()
+        return game_text(tracks_of(trace, self._scene, game), self._marks, people).encode()
 
 
 def _entry(game: Any) -> list[Any]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.metadata
 import platform
 from functools import cache
+from pathlib import Path
 
 from harness.version import __version__
 
@@ -13,6 +15,23 @@ _PACKAGES = (
     *("stable-baselines3", "gymnasium", "pyarrow", "safetensors"),
 )
 _OF_NUMBERS = ("python", "platform", "harness", "libsumo", "numpy", "numba", "torch", "stable-baselines3")
+
+
+_SOURCES = {".py", ".jinja", ".css", ".js"}
+
+
+@cache
+def digest_of_sources(*parts: str) -> str:
+    """A digest of this program, or of these files and folders of it: a version number does not tell one state of a
+    working copy from another."""
+    top, digest = Path(__file__).parents[2], hashlib.sha256()
+    found = {
+        file for part in parts or ("",) for file in (top / part, *(top / part).rglob("*")) if file.suffix in _SOURCES
+    }
+    for file in sorted(found):
+        name, content = file.relative_to(top).as_posix().encode(), file.read_bytes()
+        digest.update(b"%d %s %d " % (len(name), name, len(content)) + content)
+    return digest.hexdigest()
 
 
 @cache

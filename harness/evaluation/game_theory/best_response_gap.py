@@ -24,8 +24,8 @@ from harness.evaluation.comparison import (
     rate_interval,
 )
 from harness.evaluation.competence import gate
-from harness.evaluation.game_theory.columns import GAP_COLUMNS
 from harness.evaluation.game_theory.records import Response
+from harness.evaluation.tables import table_of, typed
 
 Floats = npt.NDArray[np.float64]
 
@@ -57,7 +57,7 @@ NOTHING_TO_GAIN = frozenset({GapVerdict.NOT_DISTINGUISHABLE, GapVerdict.NONE_FOU
 
 
 def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: float) -> pd.DataFrame:
-    """A row for each response, in their order, with `GAP_COLUMNS`.
+    """A row for each response, in their order, the table `gaps`.
 
     `episodes` has the columns of episodes.csv. A pair is left out, and counted, when either game errored, is missing,
     or lacks the payoff or the ego's outcome. A value that can't be computed is NaN; where all differences are equal
@@ -69,10 +69,10 @@ def gaps(responses: Iterable[Response], episodes: pd.DataFrame, significance: fl
     if not 0 < significance < 1:
         raise ValueError(f"significance must be between 0 and 1, not {significance}")
     games = games_by_arm(episodes)
-    table = pd.DataFrame([_row(response, games) for response in responses], columns=list(GAP_COLUMNS))
+    table = table_of("gaps", [_row(response, games) for response in responses])
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
     table["verdict"] = [_verdict(row, significance).value for row in table.to_dict("records")]
-    return table.astype(GAP_COLUMNS)
+    return typed(table)
 
 
 def nothing_to_gain(found: pd.DataFrame) -> bool:

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pandas as pd
 
 from harness.evaluation.comparison import games_by_arm, mean_interval, measured_values, rate_interval
-from harness.evaluation.game_theory.columns import CROSSPLAY_COLUMNS
 from harness.evaluation.game_theory.records import Pairing
+from harness.evaluation.tables import table_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -19,7 +19,7 @@ MEASURED = ("ego_failed", "ego_payoff", "non_ego_payoff", "ego_mean_speed_mps")
 
 
 def crossplay(pairings: Iterable[Pairing], episodes: pd.DataFrame) -> pd.DataFrame:
-    """A row for each pairing, in their order, with `CROSSPLAY_COLUMNS`.
+    """A row for each pairing, in their order, the table `crossplay`.
 
     `episodes` has the columns of episodes.csv. A game counts when it was played and the ego's outcome is known; the
     other means are over those of these games in which they were measured, and empty without any. Episodes that only
@@ -39,7 +39,7 @@ def crossplay(pairings: Iterable[Pairing], episodes: pd.DataFrame) -> pd.DataFra
             raise ValueError(f"arm {pairing.arm!r}, seed {pairing.seed}: an episode appears more than once")
         played.setdefault(pairing.seed, set()).update(values[pairing].index)
     rows = [_row(pairing, values[pairing], len(played[pairing.seed])) for pairing in pairings]
-    return pd.DataFrame(rows, columns=list(CROSSPLAY_COLUMNS)).astype(CROSSPLAY_COLUMNS)
+    return table_of("crossplay", rows)
 
 
 def _row(pairing: Pairing, values: pd.DataFrame, episodes: int) -> dict[str, object]:

@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from harness.evaluation.game_theory.columns import EQUILIBRIUM_COLUMNS
 from harness.evaluation.game_theory.crossplay import Matrices, matrices
 from harness.evaluation.game_theory.dominance import dominated, safest_mixture
 from harness.evaluation.game_theory.nash import Equilibrium, regrets, solve
+from harness.evaluation.tables import table_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class SolutionKind(str, Enum):
 
 
 def equilibria(crossplay: pd.DataFrame) -> pd.DataFrame:
-    """The solutions of every seed's games, with `EQUILIBRIUM_COLUMNS`, from a table of `crossplay`.
+    """The solutions of every seed's games, the table `equilibria`, from a table of `crossplay`.
 
     A strategy that was not measured against every strategy of the other side is left out of the game, with a row of
     kind `NOT_PLAYED`. A non-ego without any measured cell is left out itself; the egos stay.
@@ -53,10 +53,7 @@ def equilibria(crossplay: pd.DataFrame) -> pd.DataFrame:
             for row in _nash(table.among(range(len(table.egos)), places)):
                 rows.append({"seed": seed, "game": persona, **row})
         rows.extend({"seed": seed, "game": ALL, **row} for row in _safest(table))
-    return pd.DataFrame(rows, columns=list(EQUILIBRIUM_COLUMNS)).astype(EQUILIBRIUM_COLUMNS).fillna(_NO_TEXT)
-
-
-_NO_TEXT = {name: "" for name, dtype in EQUILIBRIUM_COLUMNS.items() if dtype == "object"}
+    return table_of("equilibria", rows)
 
 
 def _complete(table: Matrices, measured: npt.NDArray[np.bool_]) -> tuple[Matrices, list[dict[str, object]]]:

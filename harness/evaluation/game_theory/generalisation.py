@@ -10,8 +10,8 @@ import pandas as pd
 
 from harness.evaluation.comparison import games_by_arm, holm, paired_t_test, pairs_of, rate_interval, verdict_of
 from harness.evaluation.competence import gate
-from harness.evaluation.game_theory.columns import GENERALISATION_COLUMNS
 from harness.evaluation.game_theory.records import Pairing
+from harness.evaluation.tables import table_of, typed
 
 NAIVE = "naive"
 
@@ -23,7 +23,7 @@ def generalisation(
     significance: float,
 ) -> pd.DataFrame:
     """A row for each pairing of an ego in `trained_against` with a non-ego of another persona, in the order of the
-    pairings, with `GENERALISATION_COLUMNS`. The baseline is the naive ego against the same non-ego.
+    pairings, the table `generalisation`. The baseline is the naive ego against the same non-ego.
 
     `trained_against` names for each retrained ego the personas it was trained against; the naive ego is not in it.
     `episodes` has the columns of episodes.csv. Pairs and tests are those of `harness.evaluation.comparison`; where a
@@ -40,11 +40,11 @@ def generalisation(
         for pairing in pairings
         if pairing.ego in trained_against and pairing.persona and pairing.persona not in trained_against[pairing.ego]
     ]
-    table = pd.DataFrame(rows, columns=list(GENERALISATION_COLUMNS))
+    table = table_of("generalisation", rows)
     table["p_holm"] = holm(table["p_value"].to_numpy(dtype=np.float64))
     judged = table.rename(columns={"fewer_failures": "mean_difference"}).to_dict("records")
     table["verdict"] = [verdict_of(row, significance).value for row in judged]
-    return table.astype(GENERALISATION_COLUMNS)
+    return typed(table)
 
 
 def _row(

@@ -8,7 +8,6 @@ from typing import Literal
 
 import pandas as pd
 
-from harness.evaluation.game_theory.columns import GAME_TABLES
 from harness.evaluation.research_questions import AloneBound
 
 Role = Literal["ego", "non_ego"]
@@ -47,7 +46,7 @@ class Response:
 
 @dataclass(frozen=True, kw_only=True)
 class GameFindings:
-    """The four tables of findings, each with its columns of `columns`; empty where the campaign does not ask for it."""
+    """The four tables of findings, each a table of `columns.TABLES`; empty where the campaign does not ask for it."""
 
     gaps: pd.DataFrame
     crossplay: pd.DataFrame
@@ -59,4 +58,4 @@ class GameFindings:
     @property
     def tables(self) -> dict[str, pd.DataFrame]:
         """The tables by their names in the run folder."""
-        return {name: getattr(self, name) for name in GAME_TABLES}
+        return {name: getattr(self, name) for name in ("gaps", "crossplay", "equilibria", "generalisation")}

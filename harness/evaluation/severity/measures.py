@@ -1,171 +1,131 @@
-"""The columns of severity of one recorded game, from its trace. `columns` defines each of them."""
+"""How severe a recorded game is: the contact of the judged player, and how close it came without one."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-import pandas as pd
 
-from harness.evaluation.severity import thresholds as at
-from harness.evaluation.severity.contact import impact_angle_rad, needed_braking_mps2, post_encroachment_s
+from harness.evaluation.column import MAYBE, TEXT
+from harness.evaluation.metrics import Drive, finite, metric
+from harness.evaluation.severity import contact
+from harness.evaluation.severity import limits as at
 from harness.evaluation.severity.masses import mass_kg
-from harness.evaluation.trace_quantities import body_names, drove_in, obstacle_names, quantities_of
 from harness.game.arrays import BoolArray, FloatArray
 from harness.game.bicycle import GRAVITY_MPS2
-from harness.game.geometry import Box, box_distance
+from harness.game.geometry import Box
 from harness.game.outcome import Outcome
-from harness.game.quantities import SIGHT_M, Quantities
-from harness.game.roles import EGO
-from harness.game.world import World
+from harness.game.quantities import SIGHT_M
 
 CONTACT, RAIL, TIMEOUT = 300.0, 200.0, 100.0
 """What `severity` adds up from, in games with such an end."""
 _MOST_MPS = 99.0
+_CRIME = "commonroad-crime"
+_SHELBY = f"Shelby 2011, Delta-V as a measure of traffic conflict severity ({_CRIME}: Delta-v)"
+_MINDERHOUD = "Minderhoud and Bovy 2001, Extended time-to-collision measures for road traffic safety assessment"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Kind:
-    """What a contact depends on, of a vehicle type. The defaults are those of SUMO."""
+class Impact:
+    """A contact of two bodies at the end of a game."""
 
-    length_m: float = 5.0
-    width_m: float = 1.8
-    vehicle_class: str = "passenger"
-
-
-def severity_of(trace: pd.DataFrame, world: World, kinds: Mapping[str, Kind]) -> dict[str, Any]:
-    """The cells of `SEVERITY_COLUMNS` of one game's trace, None where one can't be measured.
-
-    `kinds` are the vehicle types in the trace; one without an entry is SUMO's default. In a game without the ego, the
-    person that drives is judged: such a game has the severity alone.
-    """
-    roles = [role for role in world.roles if (trace["player"] == role).any()]
-    if not roles:
-        return {}
-    drive = _Drive.of(trace, world, kinds, world.roles.index(roles[0]))
-    cells = drive.contact_cells() | drive.closeness_cells()
-    severity = {"severity": drive.severity(cells)}
-    return cells | severity if drive.player == EGO else severity
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Drive:
-    """The judged player's game until its end; row t of arrays is its t-th step, without the start."""
-
-    player: int
-    outcome: str
-    q: Quantities
-    drove: BoolArray
-    """[T] of all steps of the trace."""
-    masses_kg: FloatArray
-    """[B] inf: an obstacle, which does not move."""
-
-    @classmethod
-    def of(cls, trace: pd.DataFrame, world: World, kinds: Mapping[str, Kind], player: int) -> _Drive:
-        """The drive of a player of the world."""
-        types = {str(row.player): str(row.vehicle_type) for row in trace.drop_duplicates("player").itertuples()}
-        by_name = {name: kinds.get(kind, Kind()) for name, kind in types.items()}
-        q = quantities_of(trace, world, {name: (kind.length_m, kind.width_m) for name, kind in by_name.items()})
-        names = body_names(trace, world)
-        fixed = obstacle_names(world)
-        masses = [np.inf if name in fixed else mass_kg(by_name.get(name, Kind()).vehicle_class) for name in names]
-        own = trace.loc[trace["player"] == world.roles[player], "outcome"]
-        ends = own[own != ""]
-        drove = drove_in(trace, world.roles)[:, player].copy()
-        drove[0] = False
-        outcome = str(ends.iloc[0]) if len(ends) else Outcome.RUNNING.word
-        return cls(player=player, outcome=outcome, q=q, drove=drove, masses_kg=np.array(masses))
-
-    # --- a contact -------------------------------------------------------------------------------------------------
-
-    def contact_cells(self) -> dict[str, Any]:
-        """The cells of a contact with a road user; empty without one."""
-        found = self._partner() if self.outcome == Outcome.COLLISION.word and self.drove.any() else None
-        if found is None:
-            return {}
-        step, other = found
-        velocities = [self._velocity(step, body) for body in (self.player, other)]
-        relative = velocities[1] - velocities[0]
-        closing = float(np.hypot(*relative))
-        own_kg, other_kg = self.masses_kg[[self.player, other]].tolist()
-        angle = impact_angle_rad(self._box(step, self.player), self._box(step, other), *relative.tolist())
-        return {
-            "closing_speed_mps": closing,
-            "ego_delta_v_mps": closing / (1.0 + own_kg / other_kg),
-            "other_delta_v_mps": closing / (1.0 + other_kg / own_kg),
-            "impact_side": side_of(angle),
-        }
-
-    def _partner(self) -> tuple[int, int] | None:
-        """The step of the contact, and the body that is nearest in it."""
-        step = int(np.flatnonzero(self.drove)[-1])
-        present = self.q.bodies.present[step]
-        others = [body for body in np.flatnonzero(present).tolist() if body != self.player]
-        if not others:
-            return None
-        own = self._box(step, self.player)
-        return step, min(others, key=lambda body: box_distance(own, self._box(step, body)))
-
-    def _box(self, step: int, body: int) -> Box:
-        return Box(*(float(getattr(self.q.bodies, name)[step, body]) for name in Box._fields))
-
-    def _velocity(self, step: int, body: int) -> FloatArray:
-        bodies = self.q.bodies
-        heading = bodies.heading_rad[step, body]
-        return np.array([np.cos(heading), np.sin(heading)]) * bodies.speed_mps[step, body]
-
-    # --- how close it came -----------------------------------------------------------------------------------------
-
-    def closeness_cells(self) -> dict[str, Any]:
-        """The cells of a game with or without a contact."""
-        step_s, ttc = self.q.world.step_s, self._ttc_s
-        needed, braking = self._needed_mps2, -self.q.state.acceleration_mps2[self.drove, self.player]
-        since = np.flatnonzero(needed > 0.0)
-        below = ttc <= at.CONFLICT_TTC_S
-        touched = self.outcome == Outcome.COLLISION.word
-        return {
-            "min_time_headway_s": _least(self._headway_s),
-            "min_post_encroachment_time_s": None if math.isinf(self._pet_s) else self._pet_s,
-            "needed_braking_mps2": float(needed.max()) if len(needed) else None,
-            "used_braking_mps2": max(0.0, float(braking[since[0] :].max())) if len(since) else None,
-            "time_exposed_ttc_s": float(np.count_nonzero(below)) * step_s,
-            "time_integrated_ttc_s2": float((at.CONFLICT_TTC_S - ttc[below]).sum()) * step_s,
-            "time_headway_below_1_s": float(np.count_nonzero(self._headway_s < at.SHORT_HEADWAY_S)) * step_s,
-            "near_miss": int(not touched and self._closest <= 1.0),
-        }
+    closing_mps: float
+    own_kg: float
+    other_kg: float
+    """inf: an obstacle, which does not move."""
+    side: str
 
     @property
-    def _closest(self) -> float:
-        """The least of the measures of closeness, each over its limit; inf without any."""
-        measures = (
-            _least(self._ttc_s, math.inf) / at.CONFLICT_TTC_S,
-            self._pet_s / at.CONFLICT_PET_S,
-            _least(self._headway_s, math.inf) / at.CONFLICT_HEADWAY_S,
-        )
-        return min(measures)
+    def own_delta_v_mps(self) -> float:
+        """Change of the player's velocity, if both move on as one."""
+        return self.closing_mps / (1.0 + self.own_kg / self.other_kg)
 
-    def severity(self, cells: Mapping[str, Any]) -> float:
-        """The number that orders games."""
-        if self.outcome == Outcome.COLLISION.word:
-            return CONTACT + min(max(cells.get("ego_delta_v_mps", 0.0), cells.get("other_delta_v_mps", 0.0)), _MOST_MPS)
-        if self.outcome == Outcome.RAIL.word:
-            speeds = self.q.state.speed_mps[self.drove, self.player]
-            return RAIL + (min(float(speeds[-1]), _MOST_MPS) if len(speeds) else 0.0)
-        return float(closeness(self._closest)) + (TIMEOUT if self.outcome == Outcome.TIMEOUT.word else 0.0)
+    @property
+    def other_delta_v_mps(self) -> float:
+        """Change of the other's velocity."""
+        return self.closing_mps / (1.0 + self.other_kg / self.own_kg)
+
+
+def impact_of(drive: Drive) -> Impact | None:
+    """The contact that ends a drive, with the body that is nearest then; None without one."""
+    game, player, last = drive.game, drive.player, drive.game.last_step(drive.player)
+    if drive.outcome is not Outcome.COLLISION or last is None or (other := game.nearest(last, player)) is None:
+        return None
+    relative = game.velocity_mps(last, other) - game.velocity_mps(last, player)
+    fixed = game.names[other] in game.obstacles
+    return Impact(
+        closing_mps=float(np.hypot(*relative)),
+        own_kg=mass_kg(game.body_kinds[player].vehicle_class),
+        other_kg=np.inf if fixed else mass_kg(game.body_kinds[other].vehicle_class),
+        side=side_of(contact.impact_angle_rad(game.box(last, player), game.box(last, other), *relative.tolist())),
+    )
+
+
+@metric(
+    "game",
+    meaning="At a contact of the ego with a road user: length of the difference of the two velocities, |v - v_other|.",
+    source="Brach and Brach 2011, Vehicle accident analysis and reconstruction methods: closing velocity",
+)
+def closing_speed_mps(drive: Drive) -> float | None:
+    impact = impact_of(drive)
+    return impact.closing_mps if impact is not None else None
+
+
+@metric(
+    "game",
+    meaning="Change of the ego's velocity in the contact, if both move on as one: closing_speed_mps * m_other / (m_ego "
+    "+ m_other). An upper bound for a contact that scrapes. Masses are those of the vehicle classes; an obstacle does "
+    "not move.",
+    source=_SHELBY,
+)
+def ego_delta_v_mps(drive: Drive) -> float | None:
+    impact = impact_of(drive)
+    return impact.own_delta_v_mps if impact is not None else None
+
+
+@metric(
+    "game",
+    meaning="Change of the other's velocity: closing_speed_mps * m_ego / (m_ego + m_other).",
+    source=_SHELBY,
+)
+def other_delta_v_mps(drive: Drive) -> float | None:
+    impact = impact_of(drive)
+    return impact.other_delta_v_mps if impact is not None else None
+
+
+@metric(
+    "game",
+    dtype=TEXT,
+    meaning="The side of the ego's box that is hit, `front`, `left`, `rear` or `right`: the direction of the normal of "
+    "the two surfaces that met, within 45 degrees.",
+)
+def impact_side(drive: Drive) -> str | None:
+    impact = impact_of(drive)
+    return impact.side if impact is not None else None
+
+
+# --- how close it came -----------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Closeness:
+    """How close a drive came to others. Arrays are [N], the steps of the drive."""
+
+    drive: Drive
 
     @cached_property
-    def _ttc_s(self) -> FloatArray:
-        return self.q.time_to_collision_s[self.drove, self.player]
+    def ttc_s(self) -> FloatArray:
+        """Time to collision; inf without a course to one."""
+        return self.drive.of("time_to_collision_s")
 
     @cached_property
-    def _headway_s(self) -> FloatArray:
-        """[T] inf without a road user ahead that goes the same way."""
-        q, player = self.q, self.player
-        path, world = q.on_path, q.world
+    def headway_s(self) -> FloatArray:
+        """inf without a road user ahead that goes the same way."""
+        q, player, world = self.drive.game.quantities, self.drive.player, self.drive.game.world
+        path = q.on_path
         turned = q.bodies.heading_rad - q.state.heading_rad[:, player, None]
         ahead, left = path.ahead_m[:, player], path.left_m[:, player]
         in_way = np.abs(left) < path.half_width_m[:, player] + 0.5 * world.width_m[player]
@@ -173,31 +133,155 @@ class _Drive:
         leads &= np.cos(turned) > math.cos(at.LEADER_TURNED_RAD)
         gap = np.maximum(ahead - path.half_length_m[:, player] - 0.5 * world.length_m[player], 0.0)
         nearest = np.where(leads, gap, np.inf).min(-1)
-        return (nearest / np.maximum(q.state.speed_mps[:, player], 0.1))[self.drove]
+        return np.asarray((nearest / np.maximum(q.state.speed_mps[:, player], 0.1))[self._steps])
 
     @cached_property
-    def _needed_mps2(self) -> FloatArray:
-        actuators = self.q.world.actuators
-        most = min(float(actuators.max_braking_mps2[self.player]), actuators.friction * GRAVITY_MPS2)
+    def needed_mps2(self) -> FloatArray:
+        """The braking that is needed."""
+        game, player = self.drive.game, self.drive.player
+        actuators, speeds = game.world.actuators, game.bodies.speed_mps[self._steps]
+        friction = float(game.quantities.state.friction[0])
+        most = min(float(actuators.max_braking_mps2[player]), friction * GRAVITY_MPS2)
         own, others, among = self._boxes
-        speeds = self.q.bodies.speed_mps[self.drove]
-        own_speed = self.q.state.speed_mps[self.drove, self.player]
-        return needed_braking_mps2(own, own_speed, others, speeds, among, most, at.NEEDED_WITHIN_S)
+        own_speed = np.ascontiguousarray(speeds[:, player])
+        return contact.needed_braking_mps2(own, own_speed, others, speeds, among, most, at.NEEDED_WITHIN_S)
 
     @cached_property
-    def _pet_s(self) -> float:
-        step_s = self.q.world.step_s
-        return float(post_encroachment_s(*self._boxes, at.CROSSING_RAD, step_s, round(at.LONGEST_PET_S / step_s)))
+    def pet_s(self) -> float:
+        """Least post-encroachment time; inf without one."""
+        step_s = self.drive.step_s
+        return float(
+            contact.post_encroachment_s(*self._boxes, at.CROSSING_RAD, step_s, round(at.LONGEST_PET_S / step_s))
+        )
+
+    @cached_property
+    def share(self) -> float:
+        """The least of the measures of closeness, each over its limit; inf without any."""
+        ttc_s, headway_s = (min(each, default=math.inf) for each in (self.ttc_s, self.headway_s))
+        return min(ttc_s / at.CONFLICT_TTC_S, self.pet_s / at.CONFLICT_PET_S, headway_s / at.CONFLICT_HEADWAY_S)
+
+    @cached_property
+    def _steps(self) -> BoolArray:
+        """[T]"""
+        drove = self.drive.game.drove[:, self.drive.player].copy()
+        drove[0] = False
+        return drove
 
     @cached_property
     def _boxes(self) -> tuple[Box, Box, BoolArray]:
-        """The player's boxes [T], all bodies' [T, B], and which of those are others that are there [T, B]."""
-        bodies, drove = self.q.bodies, self.drove
-        others = Box(*(getattr(bodies, name)[drove] for name in Box._fields))
-        own = Box(*(np.ascontiguousarray(each[:, self.player]) for each in others))
-        among = bodies.present[drove].copy()
-        among[:, self.player] = False
+        """The player's boxes [N], all bodies' [N, B], and which of those are others that are there [N, B]."""
+        bodies, steps = self.drive.game.bodies, self._steps
+        others = Box(*(getattr(bodies, name)[steps] for name in Box._fields))
+        own = Box(*(np.ascontiguousarray(each[:, self.drive.player]) for each in others))
+        among = bodies.present[steps].copy()
+        among[:, self.drive.player] = False
         return own, others, among
+
+
+@lru_cache(maxsize=1)
+def closeness_of(drive: Drive) -> Closeness:
+    """The closeness of a drive: one record for all of its metrics."""
+    return Closeness(drive=drive)
+
+
+@metric(
+    "game",
+    meaning="Least time headway (THW): gap from the ego's front to the road user ahead, along the ego's route, over "
+    "the ego's speed. The road user overlaps the ego's width and heads less than 90 degrees off the route.",
+    source=f"ISO 34502 and {_CRIME}: THW, with its lanes replaced by the width of the box",
+)
+def min_time_headway_s(drive: Drive) -> float | None:
+    return finite(closeness_of(drive).headway_s, np.min)
+
+
+@metric(
+    "game",
+    meaning="Least post-encroachment time (PET): from when one of the ego and another road user has left a place until "
+    "the other is there, where their headings differ by 30 degrees or more; measured up to "
+    f"{at.LONGEST_PET_S:g} s, in steps of the scene.",
+    source=f"Allen, Shin and Cooper 1978 ({_CRIME}: PET); angle and limit: FHWA-HRT-08-051",
+)
+def min_post_encroachment_time_s(drive: Drive) -> float | None:
+    return finite(np.array([closeness_of(drive).pet_s]), np.min)
+
+
+@metric(
+    "game",
+    meaning="Strongest braking that was needed at any moment: the least constant braking with which the ego's box "
+    f"avoids a contact that is at most {at.NEEDED_WITHIN_S:g} s away, the others at constant velocity. The value is "
+    "the most that the ego and the road can do, where no braking was enough. Against a road user that would hit the "
+    "standing ego none is needed.",
+    source=f"Jansson 2005, Collision avoidance theory ({_CRIME}: a_long,req), for boxes at any angle",
+)
+def needed_braking_mps2(drive: Drive) -> float | None:
+    return finite(closeness_of(drive).needed_mps2, np.max)
+
+
+@metric(
+    "game",
+    meaning="Strongest braking of the ego after braking was needed for the first time; empty if it never was.",
+)
+def used_braking_mps2(drive: Drive) -> float | None:
+    since = np.flatnonzero(closeness_of(drive).needed_mps2 > 0.0)
+    return max(0.0, float((-drive.acceleration_mps2)[since[0] :].max())) if len(since) else None
+
+
+@metric(
+    "game",
+    meaning=f"Time exposed (TET): time at a time to collision of at most {at.CONFLICT_TTC_S:g} s.",
+    source=f"{_MINDERHOUD} ({_CRIME}: TET)",
+)
+def time_exposed_ttc_s(drive: Drive) -> float:
+    return float(np.count_nonzero(closeness_of(drive).ttc_s <= at.CONFLICT_TTC_S)) * drive.step_s
+
+
+@metric(
+    "game",
+    meaning=f"Time integrated (TIT): the integral over that time of {at.CONFLICT_TTC_S:g} s minus the time to "
+    "collision.",
+    source=f"{_MINDERHOUD} ({_CRIME}: TIT)",
+)
+def time_integrated_ttc_s2(drive: Drive) -> float:
+    ttc_s = closeness_of(drive).ttc_s
+    return float((at.CONFLICT_TTC_S - ttc_s[ttc_s <= at.CONFLICT_TTC_S]).sum()) * drive.step_s
+
+
+@metric(
+    "game",
+    meaning=f"Time at a time headway below {at.SHORT_HEADWAY_S:g} s.",
+    source="UN Regulation No. 157, 5.2.3.3: the shortest time gap",
+)
+def time_headway_below_1_s(drive: Drive) -> float:
+    return float(np.count_nonzero(closeness_of(drive).headway_s < at.SHORT_HEADWAY_S)) * drive.step_s
+
+
+@metric(
+    "game",
+    dtype=MAYBE,
+    meaning="1 if the ego touched no road user and came as close as one of: time to collision at most "
+    f"{at.CONFLICT_TTC_S:g} s, PET at most {at.CONFLICT_PET_S:g} s, headway below {at.CONFLICT_HEADWAY_S:g} s.",
+    source="FHWA-HRT-08-051 (TTC); Peesapati, Hunter and Rodgers 2013 (PET); headway: our own",
+)
+def near_miss(drive: Drive) -> int:
+    return int(drive.outcome is not Outcome.COLLISION and closeness_of(drive).share <= 1.0)
+
+
+@metric(
+    "judged",
+    meaning="Orders games, the worst with the greatest number. Contact with a road user: 300 plus the greater delta-v. "
+    "Contact with a rail: 200 plus the speed. No goal in time: 100 plus closeness. Else closeness, from 0 to 100: 100 "
+    "/ (1 + m), where m is the least of TTC, PET and headway, each over its limit of near_miss; so 50 and more is a "
+    "near miss. Where the ego takes no part, the person that drives is judged.",
+)
+def severity(drive: Drive) -> float:
+    if drive.outcome is Outcome.COLLISION:
+        impact = impact_of(drive)
+        return CONTACT + (min(max(impact.own_delta_v_mps, impact.other_delta_v_mps), _MOST_MPS) if impact else 0.0)
+    if drive.outcome is Outcome.RAIL:
+        speeds_mps = drive.of("speed_mps")
+        return RAIL + (min(float(speeds_mps[-1]), _MOST_MPS) if len(speeds_mps) else 0.0)
+    timeout = TIMEOUT if drive.outcome is Outcome.TIMEOUT else 0.0
+    return float(closeness(closeness_of(drive).share)) + timeout
 
 
 def closeness(share: Any) -> Any:
@@ -212,8 +296,3 @@ def side_of(angle_rad: float) -> str:
     if abs(angle_rad) >= 0.75 * math.pi:
         return "rear"
     return "left" if angle_rad > 0.0 else "right"
-
-
-def _least(values: FloatArray, otherwise: float | None = None) -> Any:
-    finite = values[np.isfinite(values)]
-    return float(finite.min()) if len(finite) else otherwise

@@ -193,8 +193,7 @@ def game(episode):
     record = {"episode": episode, "ego_outcome": "goal", "ego_failed": 0, "error": ""}
     return Game(record=record, trace=columns)
 segments.assess = lambda arm, episodes, begin, abandoned: (game(each) for each in episodes)
-segments.name_manoeuvres = lambda table, traces, scene: segments.pd.DataFrame(columns=list(MANOEUVRE_COLUMNS))
-from harness.evaluation.tables import MANOEUVRE_COLUMNS
+segments.name_manoeuvres = lambda table, traces, scene: segments.table_of("manoeuvres")
 class Anyone:
     scene, drivers = None, (None, None)
 parts = segments.segments_of(folder / "segments", episodes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from harness.campaign.execution.preventability_stage import outcome_of
-from harness.evaluation.manoeuvres.thresholds import WRONG_WAY_LEAST_S
+from harness.evaluation.rule_book.thresholds import WRONG_WAY_LEAST_S
 
 
 @pytest.mark.parametrize(

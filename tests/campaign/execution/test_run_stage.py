@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -11,8 +13,6 @@ from harness.campaign.plan.stages import EquilibriumGate, TrainingStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.research_questions import AloneBound
 from harness.evaluation.strategies import PersonaNonEgo
-from harness.evaluation.tables import write_csv
-from harness.files import make_folder
 from tests.support.game_tables import arm
 
 BOUND = AloneBound(player="ego", words="the retrained ego", arm="retrained_alone_anna", goal_share=0.97)
@@ -35,10 +35,12 @@ ROUND_3 = TrainingStage(
 
 
 @pytest.mark.parametrize(("failures", "ends"), [(0, True), (4, False)])
-def test_equilibrium__of_a_pair_that_cannot_drive_is_none(failures: int, ends: bool, tmp_path: Path) -> None:
-    folder = RunFolder(tmp_path)
-    for stage in GATE.stages:  # no best response earns anything more
+def test_equilibrium__of_a_pair_that_cannot_drive_is_none(
+    failures: int, ends: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def tables(folder: RunFolder, stage: str) -> Any:  # no best response earns anything more
         failed = [1] * failures + [0] * (20 - failures) if stage in GATE.alone else [0] * 20
-        make_folder(folder.work(stage))
-        write_csv(arm(stage.removesuffix("-seed1"), ego_failed=failed), folder.work(stage) / "episodes.csv")
-    assert equilibrium_before(ROUND_3, folder, 0.01) == (GATE if ends else None)
+        return SimpleNamespace(episodes=arm(stage.removesuffix("-seed1"), ego_failed=failed))
+
+    monkeypatch.setattr("harness.campaign.storage.arm_tables.arm_tables", tables)
+    assert equilibrium_before(ROUND_3, RunFolder(tmp_path), 0.01) == (GATE if ends else None)

@@ -13,8 +13,9 @@ import pytest
 from harness.campaign.results.model_cards import model_card
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
+from harness.evaluation.columns import TABLES
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.tables import SUMMARY_COLUMNS, read_csv, typed
+from harness.evaluation.tables import read_csv, typed
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, learned_run, sumo_run
 
@@ -73,7 +74,7 @@ SUMMARY = typed(
             | {"non_ego_mean_speed_mps": 11.56},
             {"arm": "naive_alone", "seed": 2, "episodes": 7, "errors": 0, "failure_rate": 1.0},
         ],
-        columns=list(SUMMARY_COLUMNS),
+        columns=list(TABLES["summary"]),
     )
 )
 

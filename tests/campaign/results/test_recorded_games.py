@@ -4,11 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from harness.campaign.results.recorded_games import TAKE_TURNS, recorded_game, scene_drawing, watching_order
+from harness.campaign.results.recorded_games import TAKE_TURNS, scene_drawing, tracks_of, watching_order
 from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
 from harness.traffic.drawing import lane_marks
 from harness.traffic.network import read_net
 from harness.traffic.scene import open_scene
+from tests.support.traces import game
 
 NAIVE, RETRAINED, RECONFIGURED = NaiveEgo(), RetrainedEgo(against="speedy"), ReconfiguredEgo(against="speedy")
 ARMS = {arm.name: arm for arm in (against_persona(ego, "speedy") for ego in (NAIVE, RETRAINED, RECONFIGURED))}
@@ -55,7 +56,7 @@ def test_order__has_played_games_only():
     assert in_order(table) == [("naive_alone", 0)]
 
 
-def trace(**players):
+def trace(world, **players):
     """A trace of road users that drive straight at 10 m/s, each with the steps of its presence and its y (m)."""
     rows = []
     for name, (steps, y_m, outcomes) in players.items():
@@ -63,7 +64,7 @@ def trace(**players):
             cells = {"episode": 0, "step": step, "time_s": step * 0.1, "player": name, "vehicle_type": "ego_car"}
             cells |= {"x_m": 20.0 + step, "y_m": y_m, "heading_rad": 0.0, "speed_mps": 10.0, "acceleration_mps2": 0.0}
             rows.append(cells | {"steering_rad": 0.0, "lapsed": step == 2, "outcome": outcomes.get(step, "")})
-    return pd.DataFrame(rows)
+    return game(world, pd.DataFrame(rows)).trace
 
 
 @pytest.fixture
@@ -73,23 +74,23 @@ def row():
 
 
 def test_game__is_its_trace(merge, row):
-    rows = trace(ego=(range(5), -0.9, {3: "rail", 4: "rail"}), non_ego=(range(3), -4.8, {2: "goal"}))
-    game = recorded_game(rows, merge, row)
-    ego, non_ego = game.players
-    assert (game.steps, game.step_s, game.outcome) == (4, 0.1, "rail")
+    rows = trace(merge.world, ego=(range(5), -0.9, {3: "rail", 4: "rail"}), non_ego=(range(3), -4.8, {2: "goal"}))
+    tracks = tracks_of(rows, merge, row)
+    ego, non_ego = tracks.players
+    assert (tracks.steps, tracks.step_s, tracks.outcome) == (4, 0.1, "rail")
     assert (ego.outcome, ego.ended_step) == ("rail", 3)
     assert (non_ego.outcome, non_ego.ended_step, len(non_ego.x_m)) == ("goal", 2, 3)
     assert ego.x_m.tolist() == [20, 21, 22, 23, 24]
     assert ego.lapsed.tolist() == [False, False, True, False, False]
     assert (ego.length_m, ego.width_m) == (4.6, 1.8)
-    (touch,) = game.touches
+    (touch,) = tracks.touches
     assert touch.time_s == pytest.approx(0.3)
     assert touch.y_m == pytest.approx(0.0, abs=0.01)
 
 
 def test_game__a_background_vehicle_that_is_absent_for_a_while_is_in_pieces(merge, row):
-    game = recorded_game(trace(ego=(range(6), -1.6, {}), van=([1, 2, 4, 5], -4.8, {})), merge, row)
-    assert [(each.name, each.first_step, len(each.x_m)) for each in game.background] == [("van", 1, 2), ("van", 4, 2)]
+    tracks = tracks_of(trace(merge.world, ego=(range(6), -1.6, {}), van=([1, 2, 4, 5], -4.8, {})), merge, row)
+    assert [(each.name, each.first_step, len(each.x_m)) for each in tracks.background] == [("van", 1, 2), ("van", 4, 2)]
 
 
 def test_drawing__of_the_merge(merge):

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import io
-import json
 import shutil
 from pathlib import Path
 
-import pandas as pd
 import pytest
 from PIL import Image
 from rich.console import Console
 
 import tests.support.tiny as tiny
 from harness.campaign.results.replay_game import GameList, film, found_game, game_table, watch
+from harness.campaign.results.results import write_results
+from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
-from harness.evaluation.manoeuvres import pairs_in
-from harness.evaluation.tables import MANOEUVRE_COLUMNS, read_csv, typed, write_csv
+from harness.evaluation.columns import TABLES
+from harness.evaluation.tables import read_csv, table_of, write_csv
 from harness.replay import replay_name
 from tests.support.pictures import require_gui
 
@@ -36,38 +36,29 @@ def printed(run: Path, arm: str | None = None, width: int = 160) -> str:
 
 def test_run__names_the_manoeuvres_of_every_arm(run: Path) -> None:
     table = read_csv(run / "manoeuvres.csv")
-    assert list(table.columns) == list(MANOEUVRE_COLUMNS)
+    assert list(table.columns) == list(TABLES["manoeuvres"])
     kept = [read_csv(file) for file in sorted((run / ".stages").glob("*/manoeuvres.csv"))]
     assert len(kept) == len(list((run / ".stages").glob("*/episodes.csv")))
     assert len(table) == sum(map(len, kept))
 
 
-def test_list__has_the_manoeuvre_pair_of_each_game(run: Path) -> None:
-    row = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1, "episode": 2, "gap_m": None, "ttc_s": 1.0}
-    spans = [("non_ego", "cut_in", 1.0, 1.5), ("ego", "hard_brake", 1.8, 2.4)]
-    rows = [
-        {**row, "player": player, "manoeuvre": name, "time_s": begin, "until_s": end, "text": ""}
-        for player, name, begin, end in spans
-    ]
-    write_csv(typed(pd.DataFrame(rows)), run / "manoeuvres.csv")
-    assert pairs_in(read_csv(run / "manoeuvres.csv"))["naive_vs_speedy", 1, 2].words == "cut in -> hard brake"
-    (line,) = [each for each in printed(run).splitlines() if "cut in -> hard brake" in each]
+def test_list__has_the_cause_of_each_failure(run: Path) -> None:
+    row = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1, "episode": 2, "ego_outcome": "collision"}
+    event = {"other": "non_ego", "event": "cut_in", "deed": "cuts in from the left", "reaction": "brakes"}
+    write_csv(table_of("causes", [row | event]), run / "causes.csv")
+    (line,) = [each for each in printed(run).splitlines() if "cut-in -> brakes" in each]
     assert line.split()[:3] == ["naive_vs_speedy", "1", "2"]
 
 
-def test_list__without_manoeuvres_names_the_command_for_them(run: Path) -> None:
-    (run / "manoeuvres.csv").unlink()
-    assert "name the manoeuvres: harness report" in " ".join(printed(run).split())
-
-
-def test_report__adds_manoeuvres_to_an_older_run(run: Path) -> None:
-    before = (run / "manoeuvres.csv").read_bytes()
-    for file in [run / "manoeuvres.csv", *(run / ".stages").glob("*/manoeuvres.csv")]:
-        file.unlink()
-    for seal in (run / ".stages").glob("*/done.json"):  # as they were before they vouched for files
-        seal.write_text(json.dumps({**json.loads(seal.read_text()), "files": {}}))
-    assert tiny.harness("report", run).returncode == 0
-    assert (run / "manoeuvres.csv").read_bytes() == before
+def test_report__makes_tables_of_the_log_anew_without_playing_a_game(run: Path) -> None:
+    before = {name: (run / f"{name}.csv").read_bytes() for name in ("episodes", "causes", "manoeuvres")}
+    for number, file in enumerate(sorted((run / ".stages").glob("*/tables.json"))):
+        if number % 2:
+            file.unlink()  # as if the sources of a metric had changed
+        else:
+            file.with_name("episodes.csv").write_text("damaged")
+    write_results(RunFolder(run), Console(file=io.StringIO()))
+    assert {name: (run / f"{name}.csv").read_bytes() for name in before} == before
 
 
 def test_game__is_made_from_its_trace_and_not_from_the_folder_replays(run: Path) -> None:

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from harness.evaluation.game_theory.columns import CROSSPLAY_COLUMNS
+from harness.evaluation.columns import TABLES
 from harness.evaluation.game_theory.crossplay import crossplay, matrices
 from harness.evaluation.game_theory.records import Pairing
-from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
+from harness.evaluation.tables import read_csv, typed, write_csv
 from tests.support.game_tables import arm, table
 
 NAIVE = Pairing(arm="naive_vs_speedy", seed=1, ego="naive", non_ego="speedy", persona="speedy")
@@ -44,7 +44,7 @@ def test_crossplay__unmeasured_values_are_empty_and_unplayed_games_are_counted()
     assert math.isnan(sumo["non_ego_payoff"])
     (naive, retrained) = rows([NAIVE, RETRAINED], arm("naive_vs_speedy", ego_failed=[1, 0]))
     assert (retrained["games"], retrained["left_out"]) == (0, 2)
-    assert all(math.isnan(retrained[name]) for name, kind in CROSSPLAY_COLUMNS.items() if kind == "float64")
+    assert all(math.isnan(retrained[name]) for name, column in TABLES["crossplay"].items() if column.dtype == "float64")
 
 
 def test_crossplay__a_pairing_or_an_episode_twice_is_refused():

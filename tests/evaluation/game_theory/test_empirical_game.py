@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.evaluation.columns import TABLES
 from harness.evaluation.game_theory import empirical_game as module
-from harness.evaluation.game_theory.columns import CROSSPLAY_COLUMNS
 from harness.evaluation.game_theory.empirical_game import SolutionKind, equilibria
 from harness.evaluation.game_theory.nash import Solution
-from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
+from harness.evaluation.tables import read_csv, table_of, typed, write_csv
 from tests.support.game_tables import findings
 
 NASH, SAFEST, LEFT_OUT = (kind.value for kind in (SolutionKind.NASH, SolutionKind.SAFEST, SolutionKind.NOT_PLAYED))
@@ -21,7 +21,7 @@ def played(cells, seed=1):
     names = ("ego", "non_ego", "persona", "failure_rate", "ego_payoff", "non_ego_payoff")
     rows = [dict(zip(names, cell, strict=True)) | {"seed": seed, "arm": f"{cell[0]}_vs_{cell[1]}"} for cell in cells]
     counts = {"games": 100, "left_out": 0}
-    return pd.DataFrame([row | counts for row in rows], columns=list(CROSSPLAY_COLUMNS)).astype(CROSSPLAY_COLUMNS)
+    return table_of("crossplay", [row | counts for row in rows])
 
 
 PENNIES = [

@@ -5,11 +5,12 @@ from dataclasses import replace
 
 import pytest
 
+from harness.evaluation.columns import TABLES
 from harness.evaluation.game_theory.findings import find
 from harness.evaluation.game_theory.generalisation import generalisation
 from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.research_questions import AloneBound, Verdict
-from harness.evaluation.tables import TABLES, read_csv, typed, write_csv
+from harness.evaluation.tables import read_csv, typed, write_csv
 from tests.support.game_tables import TRAINED_AGAINST, a_campaign, arm, findings, table
 
 NAIVE = Pairing(arm="naive_vs_distracted", seed=1, ego="naive", non_ego="distracted", persona="distracted")

@@ -1,10 +1,10 @@
-"""The numbers of the rules that name manoeuvres, each with its source. `docs/manoeuvres.md` describes the rules."""
+"""The numbers of the rules, each with its source. `docs/manoeuvres.md` describes the rules."""
 
 from __future__ import annotations
 
 import math
 
-# --- cut_in: enters the other's path ahead of it and near ---
+# --- a body enters another's lane, near it ---
 
 CUT_IN_TIME_GAP_S = 1.5
 """Largest gap over the follower's speed. UN Regulation No. 157 (automated lane keeping, 5.2.3.3): the least time gap
@@ -12,10 +12,16 @@ of an automated car at 50 km/h, the speed limit of the paper's road."""
 CUT_IN_TTC_S = 4.0
 """Alternatively: largest time to collision. Van der Horst and Hogema (1993), "Time-to-collision and collision avoidance
 systems": 4 s separates drivers in danger from drivers in control."""
-CUT_IN_TURNED_RAD = math.radians(60.0)
-"""Largest angle between the two cars: a car at a larger one crosses the way, or turns into it. Our own."""
-CUT_IN_LOOK_BACK_S = 1.0
-"""The player that moved more towards the other's path during this time before is the one that cuts in. Our own."""
+CROSSES_RAD = math.radians(60.0)
+"""A body at a larger angle to the other crosses its way, at a smaller one it cuts in. Our own."""
+ONCOMING_RAD = math.radians(120.0)
+"""A body at a larger angle comes towards the other. Our own."""
+HALF_LANE_M = 1.6
+"""From the centre of a lane to its mark, where no other lane is nearer, as inside a junction: SUMO's default lane has
+3.2 m."""
+LANE_CHANGE_M = 1.0
+"""The centre of a driver's lane that moves by more than this in a step is that of another lane: it changes lanes. Our
+own."""
 
 # --- hard_brake ---
 
@@ -103,12 +109,19 @@ WRONG_WAY_LEAST_S = 1.0
 
 SAME_WITHIN_S = 0.5
 """Two manoeuvres of one kind with at most this pause between them are one. Our own."""
-ANSWER_WITHIN_S = 5.0
-"""A response begins at most this long after the end of its cause. Our own: five times the second in which drivers react
-to the unexpected (Green 2000, "How long does it take to stop?": 1.25 to 1.5 s)."""
-AFTERMATH_S = 2.0
-"""A manoeuvre that the non-ego begins at most this long after the end of the ego's response belongs to the same event;
-a later one is a new cause. Our own."""
-HALF_LANE_M = 1.6
-"""From the centre of a lane to its mark, where no other lane is nearer, as inside a junction: SUMO's default lane has
-3.2 m."""
+
+# --- causes of failures ---
+
+SINCE_S = 5.0
+"""What a road user did longer than this before the end is not its cause. Our own: five times the second in which
+drivers react to the unexpected (Green 2000, "How long does it take to stop?": 1.25 to 1.5 s)."""
+DANGER_TTC_S = CUT_IN_TTC_S
+"""Danger begins at this time to collision where no body enters a lane."""
+BRAKES_MPS2 = 2.0
+"""Least deceleration that counts as braking. Our own: a car that coasts decelerates less."""
+STANDS_MPS = STOPPED_MPS
+"""A slower road user stands."""
+BEFORE_S = 1.0
+"""A reaction may begin this long before the other enters the lane: the ego sees it come. Our own."""
+SEEN_M = 120.0
+"""The ego does not observe road users farther away."""

@@ -2,15 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.manoeuvres.pairs import NO_REACTION
+from harness.evaluation.rule_book.causes import NO_REACTION
 
+_WORDS = {
+    "cut_in": "cut-in",
+    "oncoming": "oncoming",
+    "cross": "crosses the way",
+    "ahead": "goes on ahead",
+    "stands": "stands ahead",
+    "from_behind": "hits from behind",
+    "changes_lane": "the ego changes lane",
+    "leaves_lane": "the ego leaves its lane",
+    "leaves_road": "the ego leaves the road",
+    "late": "the ego is late",
+}
 MOST_LINES = 3
 """Kinds of causes in a summary; the rest is counted."""
+
+
+def event_words(event: str) -> str:
+    """The name of a manoeuvre or of another event as text."""
+    return _WORDS.get(event, event.replace("_", " "))
+
+
+def causes_in_words(causes: pd.DataFrame) -> Mapping[tuple[str, int, int], str]:
+    """Event and response of every failure, such as "drift in -> swerves", by arm, seed and episode."""
+    rows = causes.itertuples()
+    return {(row.arm, row.seed, row.episode): f"{event_words(row.event)} -> {row.reaction}" for row in rows}
 
 
 def cause_lines(causes: pd.DataFrame, most: int = MOST_LINES) -> list[str]:

@@ -1,0 +1,112 @@
+"""Evaluating a run: every number of its tables and of its report, from what the run holds. Reads and writes nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import pandas as pd
+
+from harness.campaign.plan.paper_rounds import questions
+from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
+from harness.campaign.results.acceptance import checks_of
+from harness.campaign.results.matchups import matchups_of
+from harness.campaign.results.population_summary import by_who_drove
+from harness.campaign.results.read_run import ReadRun
+from harness.campaign.storage.learned import judged
+from harness.campaign.storage.manifest import is_tuned
+from harness.evaluation.acceptance import Evidence, unanswered
+from harness.evaluation.comparison import compare, games_by_arm
+from harness.evaluation.competence import Goals, goals_alone
+from harness.evaluation.game_theory.findings import find
+from harness.evaluation.game_theory.records import GameFindings
+from harness.evaluation.preventability import count_prevented
+from harness.evaluation.research_questions import Question
+from harness.evaluation.summary import summarise
+from harness.reports.run_tables import RunTables
+
+
+def evaluated(run: ReadRun) -> RunTables:
+    """What a run's report is made of, without its replays."""
+    entries = judged(run.manifest["stages"], run.campaign, run.stages, _goals(run))
+    manifest = {**run.manifest, "stages": entries}
+    prevented = (
+        {}
+        if run.reference_drivers is None
+        else {
+            "reference_drivers": run.reference_drivers,
+            "preventability": count_prevented(run.reference_drivers, run.episodes),
+        }
+    )
+    tables = RunTables(
+        manifest=manifest,
+        arms={stage.name: stage.arm for stage in run.stages if isinstance(stage, AssessmentStage)},
+        strategies={stage.name: stage.strategy for stage in run.stages if isinstance(stage, TrainingStage)},
+        episodes=run.episodes,
+        summary=summarise(run.episodes),
+        comparisons=compare(_questions(run), run.episodes, run.campaign.assessment.significance),
+        training=_with_ends(run.training, entries),
+        reconfiguration=run.reconfiguration,
+        manoeuvres=run.manoeuvres,
+        causes=run.causes,
+        game=_game(run),
+        non_ego_drives=all(each.drives for each in run.scene.document.players[1:]),
+        populations=by_who_drove(run.campaign, run.episodes),
+        **prevented,
+    )
+    evidence = Evidence(
+        arms=tables.arms,
+        episodes=tables.episodes,
+        summary=tables.summary,
+        gaps=tables.game.gaps if tables.game is not None else None,
+        preventability=tables.preventability if run.reference_drivers is not None else None,
+        unanswered=unanswered(tables.comparisons),
+    )
+    return replace(tables, acceptance=checks_of(run.campaign, run.manifest["personas"], evidence))
+
+
+def csv_tables(run: ReadRun, tables: RunTables) -> dict[str, pd.DataFrame]:
+    """The tables that the run folder gets, by the names of their files."""
+    names = ["episodes", "training", "summary", "comparisons", "causes", "manoeuvres"]
+    names += ["reference_drivers", "preventability"] if run.reference_drivers is not None else []
+    names += ["populations"] if run.campaign.population else []
+    names += ["reconfiguration"] if is_tuned(run.manifest) else []
+    found = {name: getattr(tables, name) for name in names}
+    return found | (tables.game.tables if tables.game is not None else {})
+
+
+def _goals(run: ReadRun) -> dict[str, Goals]:
+    """How often the player of each arm without another player reached its goal, by the arm's stage."""
+    games = games_by_arm(run.episodes)
+    alone = [each for each in run.stages if isinstance(each, AssessmentStage) and not all(each.sides)]
+    return {each.id: goals_alone(games.get((each.name, each.seed)), "ego" if each.ego else "non_ego") for each in alone}
+
+
+def _with_ends(training: pd.DataFrame, entries: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
+    """The learning curves, with the judgement of the manifest in the last row of each training."""
+    last = training.drop_duplicates(["stage", "seed"], keep="last")
+    ends = [entries[stage_id(str(row.stage), row.seed)].get("stopped") for row in last.itertuples()]
+    return training.assign(stopped=pd.Series(ends, index=last.index, dtype=object).reindex(training.index).fillna(""))
+
+
+def _questions(run: ReadRun) -> list[Question]:
+    """The questions that the finished arms of a run can answer."""
+    return [
+        question
+        for question in questions(run.campaign, run.manifest["personas"], is_tuned(run.manifest))
+        if {stage_id(arm, question.seed) for arm in (question.baseline, question.treatment)} <= _done(run)
+    ]
+
+
+def _game(run: ReadRun) -> GameFindings | None:
+    """The findings on the game between strategies, from the finished arms of a run; None where it is not asked."""
+    game = matchups_of(run.campaign, run.manifest["personas"], _done(run), is_tuned(run.manifest))
+    if game is None:
+        return None
+    significance = run.campaign.assessment.significance
+    return find(game.pairings, game.responses, game.training_personas, run.episodes, significance)
+
+
+def _done(run: ReadRun) -> set[str]:
+    return {name for name, entry in run.manifest["stages"].items() if entry["status"] == "done"}

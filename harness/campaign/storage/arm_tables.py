@@ -1,0 +1,93 @@
+"""What the log of an arm tells, as tables: its games with all metrics, the causes of failures, the manoeuvres.
+
+<run>/.stages/<arm>/played.csv         what was stored when the games were played: outcomes, and errors
+<run>/traces/<arm>.parquet             the games
+<run>/.stages/<arm>/episodes.csv       made from these two, as are causes.csv and manoeuvres.csv
+<run>/.stages/<arm>/tables.json        what they were made from: checksums of the log and of the sources that read it
+
+The tables are made again when the log or the sources have changed: a new metric needs no game to be played again.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from harness.campaign.storage.checksums import checksums_of, mismatches, read_checksums, write_checksums
+from harness.campaign.storage.run_folder import RunFolder
+from harness.campaign.storage.versions import digest_of_sources
+from harness.environments.recorded import recorded_game
+from harness.errors import UsageError
+from harness.evaluation.measured_game import measured
+from harness.evaluation.people import people_in
+from harness.evaluation.rule_book.causes import cause_of
+from harness.evaluation.rule_book.course import Course
+from harness.evaluation.rule_book.manoeuvres import find_manoeuvres
+from harness.evaluation.tables import read_csv, table_of, write_csv
+from harness.evaluation.trace_file import read_traces
+from harness.traffic.scene import OpenScene, open_scene
+
+PLAYED = "played.csv"
+_READ_BY = ("environments/recorded.py", "evaluation", "game", "traffic")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmTables:
+    """The tables of an arm."""
+
+    episodes: pd.DataFrame
+    causes: pd.DataFrame
+    manoeuvres: pd.DataFrame
+
+
+def arm_tables(folder: RunFolder, stage: str, scene: OpenScene | None = None) -> ArmTables:
+    """The tables of an arm: as they are stored, or made now. `scene` is the run's; None: it is opened if it is needed.
+
+    Raises UsageError for a damaged log.
+    """
+    work, record = folder.work(stage), folder.work(stage) / "tables.json"
+    key, stored = _key(folder, stage), read_checksums(record) or {}
+    if stored.get("key") == key and stored.get("files") and not mismatches(stored, folder.path):
+        return ArmTables(**{name: read_csv(work / f"{name}.csv") for name in ArmTables.__dataclass_fields__})
+    made = _made(folder, stage, scene or open_scene(folder.scene))
+    for name, table in vars(made).items():
+        write_csv(table, work / f"{name}.csv")
+    write_checksums(record, folder.path, [work / f"{name}.csv" for name in vars(made)], {"key": key})
+    return made
+
+
+def _key(folder: RunFolder, stage: str) -> str:
+    log = [folder.work(stage) / PLAYED, folder.traces(stage), *sorted(folder.scene.glob("*"))]
+    try:
+        made_from = [checksums_of(folder.path, log), digest_of_sources(*_READ_BY)]
+    except OSError as error:
+        message = f"can't be read: {error.strerror}"
+        raise UsageError.of(Path(str(error.filename)), "", message, "run the campaign again") from None
+    return hashlib.sha256(json.dumps(made_from, sort_keys=True).encode()).hexdigest()
+
+
+def _made(folder: RunFolder, stage: str, scene: OpenScene) -> ArmTables:
+    played = read_csv(folder.work(stage) / PLAYED)
+    games = {int(row["episode"]): row for row in played.to_dict("records")}
+    causes, manoeuvres = list[Mapping[str, Any]](), list[Mapping[str, Any]]()
+    for episode, trace in read_traces(folder.traces(stage)) if not (played["error"] != "").all() else ():
+        row = games.get(episode)
+        if row is None or row["error"]:
+            continue
+        game = recorded_game(trace, scene)
+        course, labels = Course(game=game), {name: row[name] for name in ("arm", "persona", "seed", "episode")}
+        games[episode] = {**row, **measured(game)}
+        manoeuvres += [labels | asdict(each) for each in find_manoeuvres(course)]
+        if (cause := cause_of(course)) is not None:
+            causes.append(labels | {"ego_outcome": row["ego_outcome"]} | asdict(cause))
+    return ArmTables(
+        episodes=table_of("episodes", games.values(), len(people_in(played.columns))),
+        causes=table_of("causes", causes),
+        manoeuvres=table_of("manoeuvres", manoeuvres),
+    )

@@ -1,0 +1,213 @@
+"""One recorded game: everything that is computed of a game is computed from this record of its trace.
+
+The games' axis of `game.quantities`, on which payoffs and observations are based, is the steps' axis here: row t of
+arrays [T, P] is step t, and row 0 is the start. P are the players, B all bodies: players, other road users, obstacles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from harness.evaluation.encounters import Encounter, encounters_of
+from harness.game.arrays import BoolArray, FloatArray, IntArray
+from harness.game.geometry import Box, box_distance
+from harness.game.junctions import SIGNALS, Signal
+from harness.game.near_players import NEAREST, NOTICED_M
+from harness.game.outcome import Outcome
+from harness.game.quantities import Quantities
+from harness.game.state import Bodies, State
+from harness.game.traffic_rules import since_change_s
+from harness.game.world import World
+
+
+@dataclass(frozen=True, kw_only=True)
+class BodyKind:
+    """A vehicle type, as far as contacts depend on it. The defaults are those of SUMO."""
+
+    length_m: float = 5.0
+    width_m: float = 1.8
+    vehicle_class: str = "passenger"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RecordedGame:
+    """A game from its trace, the constants of its scene, and the vehicle types (SUMO's default without an entry)."""
+
+    trace: pd.DataFrame
+    """Columns of `trace_file.SCHEMA`."""
+    world: World
+    kinds: Mapping[str, BodyKind]
+
+    # --- bodies ----------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def obstacles(self) -> tuple[str, ...]:
+        """The names of the obstacles, in the order of the scene."""
+        return tuple(f"obstacle_{number}" for number in range(1, len(self.world.hiding.obstacles) + 1))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """[B]"""
+        others = set(self.trace["player"]) - {*self.world.roles, *self.obstacles}
+        return (*self.world.roles, *sorted(others), *self.obstacles)
+
+    @cached_property
+    def body_kinds(self) -> tuple[BodyKind, ...]:
+        """[B] by the vehicle type in the trace; that of an absent body is the default."""
+        first = self.trace.drop_duplicates("player")
+        types = dict(zip(first["player"], first["vehicle_type"], strict=True))
+        return tuple(self.kinds.get(str(types.get(name)), BodyKind()) for name in self.names)
+
+    @cached_property
+    def bodies(self) -> Bodies:
+        """All bodies, [T, B]. A body that is not present in a step has no place there."""
+        sizes = np.array([(kind.length_m, kind.width_m) for kind in self.body_kinds])
+        present = self._present
+        length_m, width_m = (np.tile(column, (len(present), 1)) * present.any(0) for column in sizes.T)
+        x_m, y_m, heading_rad, speed_mps = map(self._filled, ("x_m", "y_m", "heading_rad", "speed_mps"))
+        return Bodies(x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
+
+    def box(self, step: int, body: int) -> Box:
+        """A body's box."""
+        return Box(*(float(getattr(self.bodies, name)[step, body]) for name in Box._fields))
+
+    def velocity_mps(self, step: int, body: int) -> FloatArray:
+        """[2] a body's velocity."""
+        heading = self.bodies.heading_rad[step, body]
+        return np.array([np.cos(heading), np.sin(heading)]) * self.bodies.speed_mps[step, body]
+
+    def nearest(self, step: int, player: int) -> int | None:
+        """The body that is nearest to a player by the distance of their boxes; None if no other is present."""
+        others = [body for body in np.flatnonzero(self.bodies.present[step]).tolist() if body != player]
+        own = self.box(step, player)
+        return min(others, key=lambda body: box_distance(own, self.box(step, body)), default=None)
+
+    # --- players ---------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def outcomes(self) -> tuple[Outcome, ...]:
+        """[P] how each player's game ended; `RUNNING` for a player that is absent or was still driving."""
+        ended = self.trace[self.trace["outcome"] != ""].drop_duplicates("player")
+        words = dict(zip(ended["player"], ended["outcome"], strict=True))
+        return tuple(_OUTCOMES[words.get(role, "")] for role in self.world.roles)
+
+    @cached_property
+    def drove(self) -> BoolArray:
+        """[T, P] whether a player was driving: present, and its game had not ended in an earlier step."""
+        players = len(self.world.roles)
+        running = self._filled("outcome", self.trace["outcome"].to_numpy() == "")[:, :players]
+        before = np.concatenate((np.ones((1, players), dtype=bool), running[:-1]))
+        return self._present[:, :players] & before
+
+    def last_step(self, player: int) -> int | None:
+        """The step in which a player's game ended; None for an absent player."""
+        steps = np.flatnonzero(self.drove[:, player])
+        return int(steps[-1]) if len(steps) else None
+
+    @cached_property
+    def steers(self) -> BoolArray:
+        """[P] whether the harness moved a player: the steering of SUMO's own models is not known."""
+        return np.asarray(self._filled("steers")[:, : len(self.world.roles)].any(0))
+
+    @cached_property
+    def payoff(self) -> FloatArray:
+        """[T, P] each player's payoff of the step."""
+        return self._filled("payoff")[:, : len(self.world.roles)]
+
+    @cached_property
+    def quantities(self) -> Quantities:
+        """The quantities of every step as they were when the game was played: among the bodies that a game considers
+        (the `NEAREST` others within `NOTICED_M` of a player)."""
+        state, routes = self._state, self.world.road.routes
+        before_m = np.concatenate((state.station_m[:1], state.station_m[:-1]))
+        state.station_m, offset_m = routes.locate(state.x_m, state.y_m, before_m)
+        bodies = self.bodies._replace(present=self.bodies.present & self._considered)
+        return Quantities(self.world, state, bodies, state.station_m - before_m, offset_m)
+
+    @cached_property
+    def _considered(self) -> BoolArray:
+        """[T, B]"""
+        bodies, players = self.bodies, len(self.world.roles)
+        others = slice(players, len(self.names) - len(self.obstacles))
+        result = np.ones(bodies.present.shape, dtype=bool)
+        away: FloatArray = np.full((len(result), others.stop - players), np.inf)
+        for player in range(players):
+            dx, dy = (each[:, others] - each[:, player, None] for each in (bodies.x_m, bodies.y_m))
+            away = np.where(bodies.present[:, player, None], np.minimum(away, np.hypot(dx, dy)), away)
+        away[~bodies.present[:, others]] = np.inf
+        rank = away.argsort(axis=1, kind="stable").argsort(axis=1)
+        result[:, others] = (away <= NOTICED_M) & (rank < NEAREST)
+        return result
+
+    @cached_property
+    def encounters(self) -> tuple[tuple[Encounter, ...], ...]:
+        """[P] the encounters of each player with other road users at junctions, near or far."""
+        q = self.quantities
+        everyone = Quantities(q.world, q.state, self.bodies, q.advanced_m, q.lateral_offset_m)
+        return tuple(tuple(encounters_of(everyone, player, drove)) for player, drove in enumerate(self.drove.T))
+
+    def while_driving(self, values: NDArray, player: int) -> NDArray:
+        """[N] the values [T, P] of a player in the steps that it drove, without the start."""
+        return np.asarray(values[1:][self.drove[1:, player], player])
+
+    # --- reading the trace -----------------------------------------------------------------------------------------
+
+    @cached_property
+    def _places(self) -> tuple[IntArray, IntArray]:
+        """The step and the body of each row."""
+        column = self.trace["player"].map({name: place for place, name in enumerate(self.names)})
+        return self.trace["step"].to_numpy(dtype=np.int64), column.to_numpy(dtype=np.int64)
+
+    def _filled(self, name: str, values: NDArray | None = None) -> NDArray:
+        """[T, B] a column of the trace, or other values of its rows; 0 where a body is absent."""
+        values = self.trace[name].to_numpy() if values is None else values
+        filled = np.zeros((int(self._places[0].max()) + 1, len(self.names)), dtype=values.dtype)
+        filled[self._places] = values
+        return filled
+
+    @cached_property
+    def _present(self) -> BoolArray:
+        return self._filled("", np.ones(len(self.trace), dtype=bool))
+
+    @cached_property
+    def _state(self) -> State:
+        players, links = len(self.world.roles), self.world.right_of_way.signal_links
+        state = State.empty(len(self._present), players, len(links))
+        for name in _PLAYERS:
+            setattr(state, name, self._filled(name)[:, :players].copy())
+        state.present = self._present[:, :players].copy()
+        steps = self.trace.drop_duplicates("step").sort_values("step")
+        state.step = np.arange(len(self._present))
+        state.friction, state.limit_share = steps["friction"].to_numpy(), steps["limit_share"].to_numpy()
+        if links:
+            state.signals = np.array([_states_of(str(text), tuple(links)) for text in steps["signals"]], dtype=np.int8)
+            state.signal_s = _since_s(state.signals, str(steps["signal_s"].iloc[0]), self.world.step_s)
+        return state
+
+
+_PLAYERS = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "station_m", "lapsed")
+_OUTCOMES = {outcome.word: outcome for outcome in Outcome}
+
+
+@lru_cache(maxsize=1024)
+def _states_of(text: str, links: tuple[tuple[str, int], ...]) -> tuple[int, ...]:
+    """The states of links in a cell of the trace, `id=state` of each light separated by spaces."""
+    lights = dict(each.rpartition("=")[::2] for each in text.split())  # an id may contain '='
+    letters = (lights.get(light, "")[link : link + 1] for light, link in links)
+    return tuple(int(SIGNALS.get(letter, Signal.OFF)) for letter in letters)
+
+
+def _since_s(signals: IntArray, at_start: str, step_s: float) -> FloatArray:
+    """[T, L] seconds since each signal changed, from its states [T, L] and the seconds at the start."""
+    seconds = np.zeros(signals.shape)
+    seconds[0] = [float(each) for each in at_start.split()]
+    for step in range(1, len(signals)):
+        before, now = slice(step - 1, step), slice(step, step + 1)
+        seconds[now] = since_change_s(signals[before], signals[now], seconds[before], step_s)
+    return seconds

@@ -1,0 +1,215 @@
+"""The cause of one failure of the ego: chosen among what the rules find in the game.
+
+The rules, in order:
+
+1. The other is the road user that the ego touches. Where the ego leaves the road, it is the player with which it was on
+   a collision course last, if that was within `SINCE_S` of the end (`Course.involved`); else the player that drifted
+   near it in that time.
+2. The event is the other's last entry into the ego's lane (`lane_entries`), if it began within `SINCE_S` of the end; or
+   the ego's change into the other's lane. A body that was in the ego's lane before brakes, stands or goes on ahead,
+   comes towards the ego, or hits it from behind: that begins with the last stretch at a time to collision of at most
+   `DANGER_TTC_S`.
+3. A rule of the road that the other broke in that time is the event instead, and is named with it. One that the ego
+   broke is named besides.
+4. The ego saw it if in some step from then to the end it was not in a lapse of attention and nothing hid the other.
+5. The ego reacted if it braked or swerved, from `BEFORE_S` before then on.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from harness.evaluation.rule_book import thresholds as at
+from harness.evaluation.rule_book.course import Course
+from harness.evaluation.rule_book.driving_rules import drifts, swerves
+from harness.evaluation.rule_book.junction_rules import RULES_OF_THE_ROAD
+from harness.evaluation.rule_book.lane_entries import WALKS, entries, in_lane, moves_of, words_of
+from harness.game.arrays import BoolArray
+from harness.game.geometry import box_distance
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO
+
+NO_REACTION = "no reaction"
+_SAY_IT_ALL = ("turns_across", "wrong_way")  # of the rules that are broken
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cause:
+    """Why the ego failed in one game: cells of `causes.csv`."""
+
+    other: str
+    event: str
+    deed: str
+    time_s: float
+    time_left_s: float
+    ego_saw: str
+    hidden_until_s: float
+    reaction: str
+    braking_mps2: float
+    ego_broke: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Event:
+    """What led to the failure, and the step in which it began."""
+
+    step: int
+    name: str
+    words: str
+
+
+def cause_of(course: Course) -> Cause | None:
+    """The cause of the ego's failure in a game; None if there is no ego, or it reached its goal."""
+    last = course.game.last_step(EGO)
+    if last is None or course.game.outcomes[EGO] in (Outcome.GOAL, Outcome.RUNNING):
+        return None
+    other, event = course.involved, None
+    if other is not None:
+        event = _event(course, other, last)
+    elif course.game.outcomes[EGO] is Outcome.RAIL:
+        other, event = _drifts_beside(course, last)
+    if other is None or event is None:
+        return _of_the_ego_alone(course, last)
+    players = course.drove.shape[1]
+    broke = {player: _broken(course, player, last) for player in {EGO, other} if player < players}
+    name, words = broke.get(other, ("", ""))
+    event = _Event(step=event.step, name=name or event.name, words=_joined(name, words, event.words))
+    seen = _seen(course, other, event.step, last)
+    reaction, braking_mps2 = _reaction(course, event.step, last)
+    return Cause(
+        other=course.game.names[other],
+        event=event.name,
+        deed=_subject(course, other) + event.words,
+        time_s=round(event.step * course.step_s, 6),
+        time_left_s=round((last - event.step) * course.step_s, 6),
+        ego_saw="yes" if seen.any() else "no",
+        hidden_until_s=_hidden_until_s(course, other, event.step, last),
+        reaction=reaction,
+        braking_mps2=braking_mps2,
+        ego_broke=broke[EGO][1],
+    )
+
+
+def _of_the_ego_alone(course: Course, last: int) -> Cause:
+    timeout = course.game.outcomes[EGO] is Outcome.TIMEOUT
+    reaction, braking_mps2 = _reaction(course, last, last)
+    return Cause(
+        other="",
+        event="late" if timeout else "leaves_road",
+        deed="the ego does not reach its goal in time" if timeout else "the ego leaves the road with no road user near",
+        time_s=round(last * course.step_s, 6),
+        time_left_s=0.0,
+        ego_saw="",
+        hidden_until_s=math.nan,
+        reaction=reaction,
+        braking_mps2=braking_mps2,
+        ego_broke="",
+    )
+
+
+def _subject(course: Course, other: int) -> str:
+    """Words for a road user that is not a person of the game; empty for a person."""
+    if other < course.drove.shape[1]:
+        return ""
+    return "an obstacle: " if course.game.names[other] in course.game.obstacles else "background traffic: "
+
+
+def _event(course: Course, other: int, last: int) -> _Event:
+    """What the other did about the ego's lane, or the ego about the other's."""
+    lane = in_lane(course, other, EGO)
+    first = max(last - course.steps(at.SINCE_S), 0)
+    if not lane.inside[last]:
+        return _Event(step=_danger(course, other, last), name="leaves_lane", words="the ego leaves its lane towards it")
+    outside = np.flatnonzero(~lane.inside[first:last])
+    entered = first + int(outside[-1]) + 1 if len(outside) else 0
+    if len(outside) and lane.changes_lane(entered):
+        words = f"the ego changes into its lane, to the {lane.side(entered)}"
+        return _Event(step=entered, name="changes_lane", words=words)
+    for name, span in reversed(list(entries(course, other, EGO))):
+        if first < span.first <= last:
+            return _Event(step=span.first, name=name, words=words_of(name, lane.side(span.first)))
+    name, words = _in_lane(course, other, last)
+    return _Event(step=_danger(course, other, last), name=name, words=words)
+
+
+def _drifts_beside(course: Course, last: int) -> tuple[int | None, _Event | None]:
+    """The player that drifted last near the ego, within `SINCE_S` of the end, and its drift."""
+    first, latest = last - course.steps(at.SINCE_S), -1
+    found: tuple[int | None, _Event | None] = None, None
+    for player in range(1, course.drove.shape[1]):
+        for span in drifts(course, player) if course.drove[:, player].any() else ():
+            step = min(span.last, last)
+            away_m = box_distance(course.game.box(step, EGO), course.game.box(step, player))
+            near = away_m <= at.CUT_IN_TIME_GAP_S * course.quantities.speed_mps[step, EGO]
+            if near and span.first > latest and span.last >= first:
+                latest, found = span.first, (player, _Event(step=span.first, name="drift", words=span.text))
+    return found
+
+
+def _in_lane(course: Course, other: int, last: int) -> tuple[str, str]:
+    """What a body does that has been in the ego's lane."""
+    if course.angle_rad(last, other, EGO) > at.ONCOMING_RAD:
+        return "oncoming", "comes towards the ego in its lane"
+    if course.ahead_m(other, EGO)[last] < 0.0:
+        return "from_behind", "hits the ego from behind"
+    speeds_mps = course.game.bodies.speed_mps[max(last - course.steps(at.SINCE_S), 0) : last + 1, other]
+    if speeds_mps[-1] < at.STANDS_MPS:
+        return "stands", "stands in the ego's lane"
+    moves = moves_of(course, other)
+    braking_mps2 = -np.diff(speeds_mps) / course.step_s
+    if moves != WALKS and len(braking_mps2) and braking_mps2.max() >= at.BRAKES_MPS2:
+        return "brakes_ahead", "brakes ahead of the ego"
+    return "ahead", f"{moves} ahead of the ego"
+
+
+def _danger(course: Course, other: int, last: int) -> int:
+    """The first step of the last stretch, up to the end, at a time to collision of at most `DANGER_TTC_S`."""
+    step, present = last, course.game.bodies.present[:, other]
+    while step > 0 and present[step - 1] and course.ttc_s(step - 1, other, EGO) <= at.DANGER_TTC_S:
+        step -= 1
+    return step
+
+
+def _broken(course: Course, player: int, last: int) -> tuple[str, str]:
+    """The gravest rule of the road that a player broke in the last `SINCE_S`, and words for it; empty if none."""
+    first = last - course.steps(at.SINCE_S)
+    if course.drove[:, player].any():
+        for name, (words, rule) in RULES_OF_THE_ROAD.items():
+            if any(span.first <= last and span.last >= first for span in rule(course, player)):
+                return name, words
+    return "", ""
+
+
+def _joined(name: str, broken: str, deed: str) -> str:
+    """What a road user did, with the rule that it broke. Some rules say it all."""
+    return deed if not name else broken if name in _SAY_IT_ALL else f"{broken} and {deed}"
+
+
+def _reaction(course: Course, begin: int, last: int) -> tuple[str, float]:
+    """What the ego did about it, and its strongest braking (m/s^2)."""
+    first = max(begin - course.steps(at.BEFORE_S), 1)
+    decelerations = -course.quantities.state.acceleration_mps2[first : last + 1, EGO]
+    braking_mps2 = max(0.0, float(decelerations.max(initial=0.0)))
+    swerved = any(span.last >= first and span.first <= last for span in swerves(course, EGO))
+    did = [word for word, done in (("brakes", braking_mps2 >= at.BRAKES_MPS2), ("swerves", swerved)) if done]
+    return " and ".join(did) or NO_REACTION, braking_mps2
+
+
+def _seen(course: Course, other: int, begin: int, last: int) -> BoolArray:
+    """[N] whether the ego looked and could see a body, from a step to the end."""
+    bodies, steps = course.game.bodies, slice(begin, last + 1)
+    away_m = np.hypot(*(each[steps, other] - each[steps, EGO] for each in (bodies.x_m, bodies.y_m)))
+    lapsed, hidden = course.quantities.state.lapsed[steps, EGO], course.quantities.hidden[steps, EGO, other]
+    return np.asarray(~lapsed & ~hidden & (away_m <= at.SEEN_M))
+
+
+def _hidden_until_s(course: Course, other: int, begin: int, last: int) -> float:
+    """Time before the end at which a body came into sight, if something hid it at the beginning; else NaN."""
+    hidden = course.quantities.hidden[begin : last + 1, EGO, other]
+    if not hidden[0]:
+        return math.nan
+    free = np.flatnonzero(~hidden)
+    return round((len(hidden) - 1 - int(free[0])) * course.step_s, 6) if len(free) else 0.0
