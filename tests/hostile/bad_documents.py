@@ -103,7 +103,7 @@ CAMPAIGNS = [
     *no_numbers(CAMPAIGN, "significance = 0.01", "assessment.significance"),
     *no_numbers(CAMPAIGN, "learning_rate = 1e-4", "training.learning_rate"),
     *no_numbers(CAMPAIGN, "alone_share = 0.25", "non_ego_training.alone_share"),
-    Bad("tiny.toml: a crowd for one person", edit(CAMPAIGN, "[assessment]", '[[crowd]]\nname = "mixed"\npersonas = ["anna", "anna"]\n[assessment]'), ("tiny.toml: crowd[0]", "one person")),
+    Bad("tiny.toml: a crowd for one person", edit(CAMPAIGN, "[assessment]", '[[crowd]]\nname = "mixed"\npersonas = ["anna", "anna"]\n[assessment]'), ("tiny.toml: crowd[0].personas", "people of the scene: 1")),
     Bad("tiny.toml: a crowd of one", edit(CAMPAIGN, "[assessment]", '[[crowd]]\nname = "mixed"\npersonas = ["anna"]\n[assessment]'), ("tiny.toml: crowd[0].personas",)),
     *(Bad(f"tiny.toml: named {way}", edit(CAMPAIGN, '"tiny"', f'"{name}"'), ("tiny.toml: name",)) for way, name in ODD_NAMES.items()),
     *odd_paths("scene", '"../networks/road"'),
