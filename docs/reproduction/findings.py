@@ -24,7 +24,7 @@ from harness.drivers.mixture import mixture_of
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.traffic.scene import open_scene
 
 ROOT = Path(__file__).parents[2]
@@ -185,7 +185,7 @@ def _play_lawful_driver(run: Path, seed: int, episodes: int) -> tuple[float, flo
     careful, speedy = (read_document(ROOT / "personas" / f"{n}.toml", Persona) for n in ("careful", "speedy"))
     naive = LearnedDriver(read_policy(run / "policies" / f"naive-seed{seed}"), careful.decisions == "sampled")
     drivers = (mixture_of(naive, careful), mixture_of(SumoDriver(), speedy))
-    arm = Arm(name="lawful", scene=scene, drivers=drivers, seed=seed)
+    arm = SeatedArm(name="lawful", scene=scene, drivers=drivers, seed=seed)
     payoffs = [game.record["non_ego_payoff"] for game in assess(arm, episodes)]
     routes = scene.world.road.routes
     return float(np.mean(payoffs)), float(routes.speed_limit_mps[routes.first_row[1]])

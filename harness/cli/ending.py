@@ -32,7 +32,7 @@ def show_result(outcome: RunResult, run: Path, console: Console, as_json: bool =
         print_plain([bound.text], console, "green" if bound.passed else "bold red")
     print_plain([f"Report: {run / 'report.html'}"], console)
     if as_json:
-        from harness.campaign.results.acceptance import RESULT
+        from harness.campaign.results.ci_files import RESULT
 
         result = json.loads((run / RESULT).read_text(encoding="utf-8"))
         print_json({"run": str(run), "report": str(run / "report.html"), **result})

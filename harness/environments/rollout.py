@@ -31,7 +31,7 @@ from harness.traffic.scene import OpenScene
 
 
 @dataclass(frozen=True, kw_only=True)
-class Arm:
+class SeatedArm:
     """A pairing to assess. Each player has one of the drivers of its mixture per game; None: it does not take part.
 
     Several people without an ego drive one at a time: in episode k, person k modulo their number (`present_in`).
@@ -74,7 +74,7 @@ class Game:
 
 
 def assess(
-    arm: Arm,
+    arm: SeatedArm,
     episodes: int | Iterable[int],
     on_start: Callable[[int], None] = lambda episode: None,
     abandoned: Mapping[int, str] = MappingProxyType({}),
@@ -113,7 +113,7 @@ def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
 
 def _play(
     arena: Arena,
-    arm: Arm,
+    arm: SeatedArm,
     start_distribution: StartDistribution,
     episode: int,
     start_from: Callable[[InitialState], InitialState],
@@ -135,12 +135,12 @@ def _play(
     return Game(played=_played(arm, episode, words), trace=trace.columns, scene=arm.scene)
 
 
-def _failed(arm: Arm, episode: int, error: str) -> Game:
+def _failed(arm: SeatedArm, episode: int, error: str) -> Game:
     words = [Outcome.ERROR.word if there else "" for there in arm.present_in(episode)]
     return Game(played=_played(arm, episode, words, error), trace=None, scene=arm.scene)
 
 
-def _played(arm: Arm, episode: int, outcomes: Sequence[str], error: str = "") -> dict[str, Any]:
+def _played(arm: SeatedArm, episode: int, outcomes: Sequence[str], error: str = "") -> dict[str, Any]:
     named = zip(arm.scene.world.roles, outcomes, strict=True)
     return {"episode": episode, **{f"{role}_outcome": outcome for role, outcome in named}, "error": error}
 
@@ -148,7 +148,7 @@ def _played(arm: Arm, episode: int, outcomes: Sequence[str], error: str = "") ->
 class _Trace:
     """The trace of one game, as columns."""
 
-    def __init__(self, arm: Arm, arena: Arena, episode: int) -> None:
+    def __init__(self, arm: SeatedArm, arena: Arena, episode: int) -> None:
         self._arm, self._arena, self._episode = arm, arena, episode
         self.columns: dict[str, list[Any]] = {name: [] for name in SCHEMA.names}
         self._steers = [driver is not None and driver.takes_over for driver in arm.drivers]

@@ -9,7 +9,7 @@ from types import TracebackType
 
 import numpy as np
 
-from harness.environments.rollout import Arm, Game, assess
+from harness.environments.rollout import Game, SeatedArm, assess
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
 from harness.traffic.scene import OpenScene
@@ -40,7 +40,7 @@ def start_at(
 class StartTrials:
     """Plays one episode of an arm as often as asked, each time from another start. SUMO runs in the `with` block."""
 
-    def __init__(self, arm: Arm, episode: int) -> None:
+    def __init__(self, arm: SeatedArm, episode: int) -> None:
         self._arm = arm
         self._next: FloatArray | None = None
         self._games: Iterator[Game] = assess(arm, repeat(episode), start_from=self._start)

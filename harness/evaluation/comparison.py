@@ -50,7 +50,7 @@ ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
-class Metric:
+class ComparedMetric:
     """A compared quantity and its direction: `sign[question] * (treatment - baseline)` is > 0 under H1."""
 
     name: str
@@ -59,8 +59,8 @@ class Metric:
 
 
 METRICS = (
-    Metric(name="failure", column="ego_failed", sign={"RQ1": +1, "RQ2": -1}),
-    Metric(name="mean_speed", column="ego_mean_speed_mps", sign={"RQ1": -1, "RQ2": +1}),
+    ComparedMetric(name="failure", column="ego_failed", sign={"RQ1": +1, "RQ2": -1}),
+    ComparedMetric(name="mean_speed", column="ego_mean_speed_mps", sign={"RQ1": -1, "RQ2": +1}),
 )
 
 
@@ -124,7 +124,7 @@ def rate_interval(successes: int, games: int) -> tuple[float, float]:
 
 
 def _row(
-    question: Question, metric: Metric, games: Mapping[Any, pd.DataFrame], closed: Gate | None
+    question: Question, metric: ComparedMetric, games: Mapping[Any, pd.DataFrame], closed: Gate | None
 ) -> dict[str, object]:
     baseline, treatment, left_out = pairs_of(
         games, question.seed, question.baseline, question.treatment, [metric.column]

@@ -36,7 +36,7 @@ from harness.drivers.mixture import Member, Mixture
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.protocol import Driver
-from harness.environments.rollout import Arm, assess, parts_of
+from harness.environments.rollout import SeatedArm, assess, parts_of
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict, gaps, nothing_to_gain
 from harness.evaluation.game_theory.records import Response
 from harness.evaluation.tables import table_of
@@ -353,7 +353,7 @@ class Coin:
         return Mixture(tuple(Member(driver=each, persona=self.personas[1]) for each in drivers))
 
     def games(self, arm: str, ego: Mixture, episodes: int = 40) -> pd.DataFrame:
-        played = assess(Arm(name=arm, scene=self.scene, drivers=(ego, self.player), seed=1), episodes)
+        played = assess(SeatedArm(name=arm, scene=self.scene, drivers=(ego, self.player), seed=1), episodes)
         rows = pd.DataFrame([{"arm": arm, "persona": "blind", "seed": 1, **game.record} for game in played])
         return table_of("episodes", rows.to_dict("records"))
 

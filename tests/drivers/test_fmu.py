@@ -17,7 +17,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.drivers.mixture import mixture_of
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
@@ -65,7 +65,7 @@ def problems(document: Fmu, file: Path) -> str:
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_fmu__drives_to_the_goal(fmi: int, twins: dict[int, Path], merge: OpenScene, car: Car) -> None:
     careful = read_document(CAREFUL, Persona)
-    arm = Arm(
+    arm = SeatedArm(
         name="naive_alone",
         scene=merge,
         drivers=(mixture_of(fmu_driver(document(), twins[fmi], car), careful), None),

@@ -22,7 +22,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.drivers.fmu_variables import INTEGERS
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
@@ -182,7 +182,7 @@ def test_reference_fmus__what_goes_in_comes_out(version: str, merge: OpenScene, 
     wanted = car.physical(view)[:, LAYOUT.index("speed_over_limit")]
     np.testing.assert_allclose(first_action(driver, view), car.actions(wanted, np.zeros(1), view), atol=1e-6)
     careful = read_document(CAREFUL, Persona)
-    arm = Arm(name="a", scene=merge, drivers=seated((driver, None), (careful, careful)), seed=1)
+    arm = SeatedArm(name="a", scene=merge, drivers=seated((driver, None), (careful, careful)), seed=1)
     games = [game.record for game in assess(arm, 3)]
     assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 3
 

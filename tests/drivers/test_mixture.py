@@ -15,7 +15,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.mixture import Member, Mixture, mixture_of
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.environments.rollout import Arm, Game, assess
+from harness.environments.rollout import Game, SeatedArm, assess
 from harness.evaluation.columns import TABLES
 from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray, IntArray
@@ -117,12 +117,12 @@ def test_assess__an_episode_is_that_of_its_member_alone(merge: OpenScene, people
         Member(driver=Steady(0.1), persona=careful, share=1.0),
         Member(driver=Steady(0.4), persona=speedy, share=1.0),
     )
-    mixed = Arm(name="mixed", scene=merge, drivers=(mixture_of(Steady(0.0), careful), Mixture(members)), seed=1)
+    mixed = SeatedArm(name="mixed", scene=merge, drivers=(mixture_of(Steady(0.0), careful), Mixture(members)), seed=1)
     alone = [
         records(
             list(
                 assess(
-                    Arm(
+                    SeatedArm(
                         name="alone",
                         scene=merge,
                         drivers=(mixture_of(Steady(0.0), careful), mixture_of(each.driver, each.persona)),
@@ -163,7 +163,7 @@ def test_by_who_drove__has_the_members_of_the_games(merge: OpenScene, people: di
     """Each row has the games in which its member was drawn, and their failures."""
     shares = {"careful": 1.0, "speedy": 1.0}
     members = tuple(Member(driver=Steady(0.2), persona=people[name], share=share) for name, share in shares.items())
-    arm = Arm(
+    arm = SeatedArm(
         name="naive_vs_town",
         scene=merge,
         drivers=(mixture_of(Steady(0.0), people["careful"]), Mixture(members)),

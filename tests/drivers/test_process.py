@@ -18,7 +18,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.process import ProcessDriver
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.errors import DriverError
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
@@ -185,7 +185,7 @@ def test_process__a_crash_costs_one_game(tmp_path: Path, merge: OpenScene, car: 
         "n == 2 and message['type'] == 'decide' and steps == 4 and sys.exit('flat tyre')"
     )
     mine, careful = driver(tmp_path, car, counts), read_document(CAREFUL, Persona)
-    arm = Arm(name="naive_alone", scene=merge, drivers=seated((mine, None), (careful, careful)), seed=1)
+    arm = SeatedArm(name="naive_alone", scene=merge, drivers=seated((mine, None), (careful, careful)), seed=1)
     games = [game.record for game in assess(arm, 4)]
     assert [game["ego_outcome"] == "error" for game in games] == [False, True, False, False]
     assert "DriverError" in games[1]["error"]
@@ -199,7 +199,7 @@ def test_process__the_example_in_perl_reaches_its_goal(merge: OpenScene, car: Ca
     games = [
         game.record
         for game in assess(
-            Arm(name="naive_alone", scene=merge, drivers=seated((mine, None), (careful, careful)), seed=1), 4
+            SeatedArm(name="naive_alone", scene=merge, drivers=seated((mine, None), (careful, careful)), seed=1), 4
         )
     ]
     assert [(game["error"], game["ego_outcome"]) for game in games] == [("", "goal")] * 4

@@ -22,7 +22,7 @@ from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.drivers.protocol import Driver
 from harness.drivers.rules_driver import RulesDriver, steering_rad
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.errors import UsageError
 from harness.game.bicycle import Requested, lateral_acceleration_mps2, move, requests
 from harness.game.observation_layout import LAYOUT
@@ -337,7 +337,7 @@ def play(repository: Path, scene: OpenScene, *, ego: str, other: Driver | None, 
     assert isinstance(document, Rules)
     careful = read_document(repository / "personas" / "careful.toml", Persona)
     driver = RulesDriver(document, car_of(scene.world, EGO))
-    arm = Arm(name="arm", scene=scene, drivers=seated((driver, other), (careful, careful)), seed=1)
+    arm = SeatedArm(name="arm", scene=scene, drivers=seated((driver, other), (careful, careful)), seed=1)
     return [game.record for game in assess(arm, games)]
 
 

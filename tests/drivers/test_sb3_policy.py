@@ -23,7 +23,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.external import find_driver
 from harness.drivers.sb3_policy import Sb3Driver
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
 from harness.traffic.scene import OpenScene
@@ -115,7 +115,7 @@ def test_saved__plays_games(name: str, saved: dict[str, Path], merge: OpenScene)
     careful = read_document(CAREFUL, Persona)
     driver = Sb3Driver(document(name), saved[name], sampled=False)
     (game,) = assess(
-        Arm(name="naive_alone", scene=merge, drivers=seated((driver, None), (careful, careful)), seed=1), 1
+        SeatedArm(name="naive_alone", scene=merge, drivers=seated((driver, None), (careful, careful)), seed=1), 1
     )
     assert game.record["error"] == ""
 

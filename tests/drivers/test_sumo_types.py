@@ -14,7 +14,7 @@ from harness.config.toml_reading import read_document
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import Arm, Game, assess
+from harness.environments.rollout import Game, SeatedArm, assess
 from harness.errors import UsageError
 from harness.traffic.scene import OpenScene, open_scene
 from tests.support.policies import some_policy
@@ -46,7 +46,9 @@ def play(scene: OpenScene, non_ego: Driver | None, episodes: int) -> list[Game]:
     careful = read_document(CAREFUL, Persona)
     return list(
         assess(
-            Arm(name="naive_alone", scene=scene, drivers=seated((SumoDriver(), non_ego), (careful, careful)), seed=1),
+            SeatedArm(
+                name="naive_alone", scene=scene, drivers=seated((SumoDriver(), non_ego), (careful, careful)), seed=1
+            ),
             episodes,
         )
     )

@@ -15,7 +15,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.environments.rollout import Arm, Game
+from harness.environments.rollout import Game, SeatedArm
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.evaluation.columns import TABLES
 from harness.evaluation.people import COLLIDED_WITH, columns_for
@@ -53,7 +53,7 @@ class Pedals:
 
 def played(scene: OpenScene, *drivers: Any, episodes: int = 1) -> list[Game]:
     careful = read_document(CAREFUL, Persona)
-    return play(Arm(name="any", scene=scene, drivers=seated(drivers, (careful,) * 4), seed=1), episodes)
+    return play(SeatedArm(name="any", scene=scene, drivers=seated(drivers, (careful,) * 4), seed=1), episodes)
 
 
 def table(games: list[Game]) -> pd.DataFrame:

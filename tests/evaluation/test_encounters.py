@@ -19,7 +19,7 @@ from harness.evaluation.encounters import Encounter
 from harness.evaluation.metrics import accepted_gap_s, min_pet_s, pet_priority
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.rule_book.course import Course
-from harness.evaluation.rule_book.manoeuvres import Manoeuvre, find_manoeuvres
+from harness.evaluation.rule_book.named_manoeuvres import Manoeuvre, find_manoeuvres
 from harness.game.arrays import FloatArray
 from harness.game.junctions import Control
 from harness.game.world import World

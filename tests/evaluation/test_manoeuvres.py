@@ -13,13 +13,13 @@ import pytest
 
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.rule_book import thresholds
 from harness.evaluation.rule_book.cause_lines import event_words
 from harness.evaluation.rule_book.causes import cause_of
 from harness.evaluation.rule_book.course import Course
-from harness.evaluation.rule_book.manoeuvres import NAMES, Manoeuvre, find_manoeuvres
+from harness.evaluation.rule_book.named_manoeuvres import NAMES, Manoeuvre, find_manoeuvres
 from harness.game.arrays import FloatArray, IntArray
 from harness.traffic.scene import OpenScene
 from tests.support.rollouts import seated
@@ -458,7 +458,7 @@ def test_paper__a_distracted_drift_an_egos_swerve_and_the_rail(repository: Path,
         read_document(repository / "personas" / f"{name}.toml", Persona) for name in ("careful", "distracted")
     )
     drivers = (Scripted([0.0] * 30 + [0.9] * 10), Scripted([0.0]))
-    arm = Arm(name="naive_vs_distracted", scene=merge, drivers=seated(drivers, (careful, distracted)), seed=1)
+    arm = SeatedArm(name="naive_vs_distracted", scene=merge, drivers=seated(drivers, (careful, distracted)), seed=1)
     stories = {}
     for played in assess(arm, 12):
         assert played.recorded is not None

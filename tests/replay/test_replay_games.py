@@ -13,7 +13,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.game.arrays import FloatArray, IntArray
 from harness.replay import write_replay
 from harness.traffic.scene import OpenScene, open_scene
@@ -64,7 +64,9 @@ def played(
     scene: OpenScene, persona: Persona, drivers: tuple[Driver, Driver], outcome: str, episodes: int = 8
 ) -> pd.DataFrame:
     """The trace of the first game with such an outcome of the ego."""
-    for game in assess(Arm(name="arm", scene=scene, drivers=seated(drivers, (persona, persona)), seed=1), episodes):
+    for game in assess(
+        SeatedArm(name="arm", scene=scene, drivers=seated(drivers, (persona, persona)), seed=1), episodes
+    ):
         if game.record["ego_outcome"] == outcome:
             assert game.trace is not None
             return pd.DataFrame(dict(game.trace))

@@ -12,7 +12,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.mixture import Mixture, mixture_of
 from harness.drivers.protocol import Driver
-from harness.environments.rollout import Arm, Game, assess
+from harness.environments.rollout import Game, SeatedArm, assess
 from harness.game.arrays import FloatArray, IntArray
 from harness.traffic.scene import OpenScene
 from tests.support.tiny import CAREFUL, SPEEDY
@@ -37,13 +37,13 @@ def seated(drivers: Sequence[Driver | None], personas: Sequence[Persona]) -> tup
     )
 
 
-def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: int = 1) -> Arm:
+def arm(merge: OpenScene, *drivers: Driver | None, persona: Any = SPEEDY, seed: int = 1) -> SeatedArm:
     """An arm in which a careful ego meets a driver of the persona."""
     careful, other = (read_document(file, Persona) for file in (CAREFUL, persona))
-    return Arm(name="naive_vs_someone", scene=merge, drivers=seated(drivers, (careful, other)), seed=seed)
+    return SeatedArm(name="naive_vs_someone", scene=merge, drivers=seated(drivers, (careful, other)), seed=seed)
 
 
-def play(assessed: Arm, episodes: int = 3) -> list[Game]:
+def play(assessed: SeatedArm, episodes: int = 3) -> list[Game]:
     """The first games of an arm."""
     return list(assess(assessed, episodes))
 

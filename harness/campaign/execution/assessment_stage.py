@@ -23,7 +23,7 @@ from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.versions import versions_of_numbers
-from harness.environments.rollout import Arm, Game, assess
+from harness.environments.rollout import Game, SeatedArm, assess
 from harness.errors import StageFailed
 from harness.evaluation.competence import goals_alone
 from harness.evaluation.tables import join_csv, table_of, write_csv
@@ -57,7 +57,9 @@ class Segment:
         errors = record.get("errors")
         return errors if isinstance(errors, int) else None
 
-    def play(self, games: Iterator[Game], labels: Mapping[str, Any], arm: Arm, on_game: Callable[[Game], None]) -> int:
+    def play(
+        self, games: Iterator[Game], labels: Mapping[str, Any], arm: SeatedArm, on_game: Callable[[Game], None]
+    ) -> int:
         """Play it; `games` yields its games next. Returns how many of them could not be played."""
         records = []
         with TraceWriter(self.file(_TRACES)) as traces:
@@ -99,7 +101,7 @@ def segments_of(folder: Path, episodes: int) -> list[Segment]:
     return [Segment(folder, range(first, min(first + SEGMENT_EPISODES, episodes))) for first in firsts]
 
 
-def play_segments(arm: Arm, segments: Sequence[Segment], labels: Mapping[str, Any], run: StageRun) -> int:
+def play_segments(arm: SeatedArm, segments: Sequence[Segment], labels: Mapping[str, Any], run: StageRun) -> int:
     """Play the games of an arm that are missing. Returns how many of all its games could not be played.
 
     `labels` are the cells that all records share. The run is told of each episode before that game is played, and of
@@ -129,7 +131,7 @@ def play_segments(arm: Arm, segments: Sequence[Segment], labels: Mapping[str, An
     return sum(found or 0 for found in errors.values())
 
 
-def _check_hope(arm: Arm, errors: Sequence[str]) -> None:
+def _check_hope(arm: SeatedArm, errors: Sequence[str]) -> None:
     """Raise StageFailed if these are the errors of an arm's first games, and all of one reason."""
     if len(errors) == HOPELESS_GAMES and all(errors) and len({reason_of(each) for each in errors}) == 1:
         what = f"{arm.name}: none of its first {HOPELESS_GAMES} games could be played, all for one reason"

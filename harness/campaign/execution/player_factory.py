@@ -38,7 +38,7 @@ from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.errors import StageFailed
 from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_shares
 from harness.game.roles import EGO
@@ -63,10 +63,10 @@ class PlayerFactory:
         """The factory of an attempt at a stage."""
         return cls(context=inputs.run.context, folder=inputs.run.folder, scene=inputs.scene)
 
-    def arm(self, stage: AssessmentStage) -> Arm:
+    def arm(self, stage: AssessmentStage) -> SeatedArm:
         """The arm of an assessment. A `BestOf` in it has to be `chosen` first."""
         drivers = (self.ego(stage.ego), *self.people(stage.non_ego))
-        return Arm(name=stage.name, scene=self.scene, drivers=drivers, seed=stage.seed)
+        return SeatedArm(name=stage.name, scene=self.scene, drivers=drivers, seed=stage.seed)
 
     def ego(self, side: Side) -> Mixture | None:
         """The ego's drivers."""

@@ -26,7 +26,7 @@ from harness.drivers.car import car_of
 from harness.drivers.mixture import mixture_of
 from harness.drivers.reference_drivers import REFERENCES, lane_width_of, reference_driver
 from harness.environments.conflict_replay import Chance, ConflictReplay, Takeover, collision_of
-from harness.environments.rollout import Arm, assess
+from harness.environments.rollout import SeatedArm, assess
 from harness.evaluation.competence import broken_by
 from harness.evaluation.tables import table_of, write_csv
 from harness.evaluation.trace_file import TraceReader
@@ -42,7 +42,7 @@ class _JudgedArm:
 
     stage: PreventabilityStage
     run: StageRun
-    arm: Arm
+    arm: SeatedArm
     """The arm with SUMO's driver in the ego's seat, which the reference drivers take."""
 
 

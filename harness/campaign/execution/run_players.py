@@ -32,7 +32,7 @@ from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
 from harness.drivers.mixture import mixture_of
 from harness.drivers.protocol import Driver
-from harness.environments.rollout import Arm, parts_of
+from harness.environments.rollout import SeatedArm, parts_of
 from harness.errors import UsageError
 from harness.files import content_of
 from harness.game.initial_state import draw_member
@@ -122,10 +122,10 @@ class RunPlayers:
         return SeatedDriver(driver=players.driver(planned), persona=persona, policy=policy)
 
 
-def seated_arm(scene: OpenScene, name: str, seed: int, seats: Sequence[SeatedDriver]) -> Arm:
+def seated_arm(scene: OpenScene, name: str, seed: int, seats: Sequence[SeatedDriver]) -> SeatedArm:
     """The arm of drivers in their seats, the ego's first."""
     drivers = tuple(mixture_of(each.driver, each.persona) for each in seats)
-    return Arm(name=name, scene=scene, drivers=drivers, seed=seed)
+    return SeatedArm(name=name, scene=scene, drivers=drivers, seed=seed)
 
 
 def _chosen(stage: AssessmentStage) -> bool:

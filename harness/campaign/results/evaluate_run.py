@@ -10,13 +10,13 @@ import pandas as pd
 
 from harness.campaign.plan.paper_rounds import questions
 from harness.campaign.plan.stages import AssessmentStage, TrainingStage, stage_id
-from harness.campaign.results.acceptance import checks_of
+from harness.campaign.results.ci_files import checks_of
 from harness.campaign.results.matchups import matchups_of
 from harness.campaign.results.population_summary import by_who_drove
 from harness.campaign.results.read_run import ReadRun
 from harness.campaign.storage.learned import judged
 from harness.campaign.storage.manifest import is_tuned
-from harness.evaluation.acceptance import Evidence, unanswered
+from harness.evaluation.acceptance_checks import Evidence, unanswered
 from harness.evaluation.comparison import compare, games_by_arm
 from harness.evaluation.competence import Goals, goals_alone
 from harness.evaluation.game_theory.findings import find

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from harness.campaign.results.acceptance import shown_lines
+from harness.campaign.results.ci_files import shown_lines
 from harness.campaign.results.kept_results import RunResult, ShownCheck, ShownVerdict
 from harness.campaign.storage.learned import did_not_learn
 from harness.campaign.storage.manifest import FINISHED

@@ -7,7 +7,7 @@ from dataclasses import replace
 from rich.console import Console
 
 from harness.campaign.plan.stages import stage_id
-from harness.campaign.results.acceptance import write_ci_files
+from harness.campaign.results.ci_files import write_ci_files
 from harness.campaign.results.evaluate_run import csv_tables
 from harness.campaign.results.kept_results import RunResult
 from harness.campaign.results.model_cards import write_model_cards

@@ -28,7 +28,7 @@ from harness.evaluation.measured_game import measured
 from harness.evaluation.people import people_in
 from harness.evaluation.rule_book.causes import cause_of
 from harness.evaluation.rule_book.course import Course
-from harness.evaluation.rule_book.manoeuvres import find_manoeuvres
+from harness.evaluation.rule_book.named_manoeuvres import find_manoeuvres
 from harness.evaluation.tables import read_csv, table_of, write_csv
 from harness.evaluation.trace_file import read_traces
 from harness.traffic.scene import OpenScene, open_scene

@@ -15,7 +15,7 @@ import harness.campaign.execution.assessment_stage
 from harness.campaign.execution.assessment_stage import Segment, join_segments, play_segments, segments_of
 from harness.campaign.execution.stage_run import Attempt, StageRun
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import Arm
+from harness.environments.rollout import SeatedArm
 from harness.errors import StageFailed
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_traces
@@ -36,7 +36,7 @@ def three_games(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def play(
-    assessed: Arm, folder: Path, attempt: Attempt = FIRST, on_start: Callable[[int], None] = lambda episode: None
+    assessed: SeatedArm, folder: Path, attempt: Attempt = FIRST, on_start: Callable[[int], None] = lambda episode: None
 ) -> tuple[int, list[int]]:
     """Errors, and the episodes that were played."""
     played: list[int] = []
@@ -57,12 +57,12 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.fixture(scope="module")
-def steady(merge: OpenScene) -> Arm:
+def steady(merge: OpenScene) -> SeatedArm:
     return arm(merge, Steady(), SumoDriver())
 
 
 @pytest.fixture(scope="module")
-def whole(steady: Arm, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole(steady: SeatedArm, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("whole")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(harness.campaign.execution.assessment_stage, "SEGMENT_EPISODES", 3)
@@ -75,7 +75,7 @@ class Killed(BaseException):
 
 
 @pytest.mark.parametrize("dies_in", [0, 2, 3, 6])
-def test_arm__killed_in_any_game_is_uninterrupted(dies_in: int, steady: Arm, whole: Path, tmp_path: Path) -> None:
+def test_arm__killed_in_any_game_is_uninterrupted(dies_in: int, steady: SeatedArm, whole: Path, tmp_path: Path) -> None:
     def die(episode: int) -> None:
         if episode == dies_in:
             raise Killed
@@ -92,7 +92,7 @@ def test_arm__has_every_game_once_in_order(whole: Path) -> None:
 
 
 def test_arm__a_game_that_is_given_up_is_an_error_and_the_others_are_played(
-    steady: Arm, whole: Path, tmp_path: Path
+    steady: SeatedArm, whole: Path, tmp_path: Path
 ) -> None:
     errors, played = play(steady, tmp_path, Attempt(first=False, abandoned={4: "the worker died of SIGSEGV"}))
     assert (errors, played) == (1, [0, 1, 2, 3, 5, 6])
@@ -160,7 +160,9 @@ def test_arm__ends_if_its_first_ten_games_fail_for_one_reason(merge: OpenScene, 
 
 @pytest.mark.parametrize("name", ["json", "episodes.csv", "manoeuvres.csv", "traces.parquet"])
 @pytest.mark.parametrize("gone", [True, False])
-def test_arm__a_torn_segment_is_played_again(name: str, gone: bool, steady: Arm, whole: Path, tmp_path: Path) -> None:
+def test_arm__a_torn_segment_is_played_again(
+    name: str, gone: bool, steady: SeatedArm, whole: Path, tmp_path: Path
+) -> None:
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     torn = Segment(tmp_path / "segments", range(3, 6)).file(name)
     torn.unlink() if gone else torn.write_bytes(torn.read_bytes()[:-10])
@@ -169,7 +171,7 @@ def test_arm__a_torn_segment_is_played_again(name: str, gone: bool, steady: Arm,
 
 
 def test_arm__segments_of_other_versions_are_played_again(
-    steady: Arm, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    steady: SeatedArm, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     shutil.copytree(whole, tmp_path, dirs_exist_ok=True)
     monkeypatch.setattr(harness.campaign.execution.assessment_stage, "versions_of_numbers", lambda: {"numpy": "99"})

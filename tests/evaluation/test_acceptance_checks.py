@@ -9,7 +9,7 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from harness.evaluation.acceptance import MEASURES, Evidence, judge, judged_ego, unanswered, worst_of_each
+from harness.evaluation.acceptance_checks import MEASURES, Evidence, judge, judged_ego, unanswered, worst_of_each
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,
