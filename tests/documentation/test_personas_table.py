@@ -12,10 +12,11 @@ import pytest
 
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import read_document
-from harness.evaluation.trace_file import SCHEMA, TraceWriter
+from harness.evaluation.trace_file import TraceWriter
 from harness.traffic.scene import OpenScene
 from tests.support.repository import REPOSITORY
 from tests.support.scripts import script
+from tests.support.traces import game
 
 LANE_0_M, LANE_1_M = -4.8, -1.6  # lane 0 ends at x = 100, lane 1 goes on; cars are 4.6 m long
 
@@ -32,11 +33,18 @@ def trace(*rows: dict[str, Any], ego_x_m: float | None = None) -> pd.DataFrame:
         if ego_x_m is not None:
             rows_of_game.append({**usual, "x_m": ego_x_m, "player": "ego", "vehicle_type": "ego_car", **of_step})
         rows_of_game.append({**usual, "x_m": 50.0 + step, **row, **of_step})
-    return pd.DataFrame(rows_of_game)[SCHEMA.names]
+    return pd.DataFrame(rows_of_game)
 
 
 def measured(name: str, scene: OpenScene, *traces: pd.DataFrame) -> float:
-    return float(getattr(table, name)([table.PersonGame.of(each, scene) for each in traces]))
+    return float(getattr(table, name)([table.PersonGame.of(game(scene.world, each).trace, scene) for each in traces]))
+
+
+def write(file: Path, scene: OpenScene, trace: pd.DataFrame) -> None:
+    """Write a file of traces with one game."""
+    file.parent.mkdir(exist_ok=True)
+    with TraceWriter(file) as traces:
+        traces.add(game(scene.world, trace).trace.to_dict("list"))
 
 
 def test_speed__is_the_mean_against_the_limit_while_it_drives(merge: OpenScene) -> None:
@@ -104,9 +112,8 @@ def episode(arm: str, persona: str, failed: Any, speed: float = 10.0, non_ego: s
 def run(tmp_path: Path, merge: OpenScene) -> Path:
     """A run folder with a tailgater and a persona without a characteristic against four egos."""
     shutil.copytree(merge.folder, tmp_path / "scene")
-    (tmp_path / "traces").mkdir()
-    with TraceWriter(tmp_path / "traces" / "naive_vs_tailgater-seed1.parquet") as traces:
-        traces.add(trace({"x_m": 60.0}, {"x_m": 60.0}, ego_x_m=70.0).to_dict("list"))
+    close = trace({"x_m": 60.0}, {"x_m": 60.0}, ego_x_m=70.0)
+    write(tmp_path / "traces" / "naive_vs_tailgater-seed1.parquet", merge, close)
     games = [
         episode("naive_alone", None, False),
         *(
@@ -150,12 +157,10 @@ def test_rows__have_the_results_of_the_run(run: Path) -> None:
 @pytest.mark.parametrize("with_careful", [True, False])
 def test_value__needs_the_baseline(with_careful: bool, tmp_path: Path, merge: OpenScene) -> None:
     shutil.copytree(merge.folder, tmp_path / "scene")
-    (tmp_path / "traces").mkdir()
     people = {"impaired": 0.2, "careful": 0.05} if with_careful else {"impaired": 0.2}
     for persona, side_m in people.items():  # alternately left and right: the standard deviation is side_m
         places = [{"x_m": 140.0 + k, "y_m": LANE_1_M + side_m * (-1) ** k} for k in range(6)]
-        with TraceWriter(tmp_path / "traces" / f"{persona}_alone-seed1.parquet") as traces:
-            traces.add(trace(*places).to_dict("list"))
+        write(tmp_path / "traces" / f"{persona}_alone-seed1.parquet", merge, trace(*places))
     games = [episode(f"{persona}_alone", persona, None) for persona in people]
     training = pd.DataFrame({"stage": [], "mean_payoff": []})
     run = table.Run(folder=tmp_path, seed=1, episodes=pd.DataFrame(games), training=training, scene=merge)
