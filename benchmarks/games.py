@@ -63,7 +63,7 @@ class CoastingGames:
 
     def __init__(self, scene: OpenScene, games: int, seed: int = 1) -> None:
         personas = [persona("careful"), persona("distracted")]
-        self.arena = Arena(scene, games, [Seat(driver=None, payoff=each.payoff) for each in personas], seed)
+        self.arena = Arena(scene, games, [Seat(driver=None, payoff=each.payoff) for each in personas], seed=seed)
         self._start_distribution = scene.start_distribution([each.human_factors for each in personas], [1.0, 1.0])
         self._auto_reset = AutoReset(self.arena, self._start_distribution, "benchmarks")
         noise = generator_of("benchmarks", "actions").standard_normal((_ACTIONS_KEPT, games, len(personas), ACTIONS))

@@ -51,7 +51,7 @@ def _read_as_arena(direct: bool) -> Callable[[list[str]], object]:
             numbers = (np.zeros(shape, dtype=np.int64), np.ones(shape), np.ones(shape), np.zeros(1))
             search = NearSearch(*numbers, no_player, no_player, no_player > 0.0, 1.0, 0, 1.0, 1, True)
             named, due = np.array([names], dtype=object), np.arange(len(names))
-            prepared.append(partial(read_near, search, named, record, due, direct))
+            prepared.append(partial(read_near, search, named, records=record, due=due, direct=direct))
         return prepared[0]()
 
     return read

@@ -131,7 +131,9 @@ def free_side(timer: LapTimer) -> None:
 
 def subprocess_side(timer: LapTimer, environments: int, policy: Path) -> None:
     """Training on so many of the harness's Gymnasium environments, each in a process of SB3's SubprocVecEnv."""
-    make_env = partial(DrivingEnv, MERGE, "ego", persona_file("careful"), policy, persona_file(_OPPONENT))
+    make_env = partial(
+        DrivingEnv, MERGE, "ego", persona_file("careful"), other=policy, other_persona=persona_file(_OPPONENT)
+    )
     default = Training()
     settings = endless_training(games=environments, buffer=default.buffer // environments * environments)
     with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=partial(_SubprocessVecEnv, make_env)):

@@ -84,6 +84,7 @@ class Arena(LiveSimulation):
         scene: OpenScene,
         games: int,
         seats: Sequence[Seat | Sequence[Seat]],
+        *,
         seed: int = 0,
         recorded: bool = False,
         simulation: Simulation | None = None,
@@ -167,7 +168,7 @@ class Arena(LiveSimulation):
             state.signal_s = since_change_s(before.signals, reading.signals, before.signal_s, self.world.step_s)
             state.signals = reading.signals
             self.signal_texts = list(reading.signal_texts or self.signal_texts)
-        read_sumo_players(state, reading, drove, self._taken_over, self.world.step_s)
+        read_sumo_players(state, reading, drove=drove, taken_over=self._taken_over, step_s=self.world.step_s)
         bodies = self._bodies(state)
         advanced_m, offset_m = self._locate()
         quantities = Quantities(
@@ -311,7 +312,9 @@ class Arena(LiveSimulation):
         return self.nearby.of(state, self.reading, games)
 
 
-def read_sumo_players(state: State, reading: Reading, drove: BoolArray, taken_over: BoolArray, step_s: float) -> None:
+def read_sumo_players(
+    state: State, reading: Reading, *, drove: BoolArray, taken_over: BoolArray, step_s: float
+) -> None:
     """Write the motion of the players that SUMO drives to `state`, in place.
 
     `drove` [G, P] marks the players that still drive, `taken_over` [P] those that the harness drives.

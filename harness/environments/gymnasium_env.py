@@ -93,6 +93,7 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
         scene: Place | OpenScene = SCENE,
         player: str = "ego",
         persona: Place = PERSONA,
+        *,
         other: Place | None = None,
         other_persona: Place | None = None,
         render_mode: str | None = None,
@@ -108,9 +109,17 @@ class DrivingEnv(LiveSimulation, gymnasium.Env[Any, Any]):
         as in a campaign ("merge", "speedy"). Raises UsageError for arguments that are wrong and files that can't be
         read, SimulationError if SUMO fails.
         """
-        seating = seating_of(scene, player, persona, other, other_persona, allow_code)
+        seating = seating_of(
+            scene, player, persona=persona, other=other, other_persona=other_persona, allow_code=allow_code
+        )
         self._player = seating.learner
-        self._game = SingleGame(seating.scene, seating.seats, seating.human_factors, seating.present, render_mode)
+        self._game = SingleGame(
+            seating.scene,
+            seating.seats,
+            human_factors=seating.human_factors,
+            present=seating.present,
+            render_mode=render_mode,
+        )
         self.metadata = {**self.metadata, "render_fps": round(1.0 / seating.scene.world.step_s)}
         self._running = False
         self.render_mode = render_mode
@@ -193,7 +202,9 @@ class ParallelDrivingEnv(LiveSimulation, ParallelEnv[str, FloatArray, FloatArray
         personas = [read_persona(each) for each in (ego_persona, *written)]
         seats = [Seat(None, each.payoff) for each in personas]
         factors = [each.human_factors for each in personas]
-        self._game = SingleGame(opened, seats, factors, [1.0] * len(personas), render_mode)
+        self._game = SingleGame(
+            opened, seats, human_factors=factors, present=[1.0] * len(personas), render_mode=render_mode
+        )
         self.metadata = {**self.metadata, "render_fps": round(1.0 / opened.world.step_s)}
         self._generator: np.random.Generator | None = None
         self.render_mode = render_mode

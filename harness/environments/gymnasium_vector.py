@@ -52,6 +52,7 @@ class VectorDrivingEnv(LiveSimulation, gymnasium.vector.VectorEnv[Any, Any, Any]
         num_envs: int = 1,
         scene: Place | OpenScene = SCENE,
         player: str = "ego",
+        *,
         persona: Place = PERSONA,
         other: Place | None = None,
         other_persona: Place | None = None,
@@ -60,7 +61,10 @@ class VectorDrivingEnv(LiveSimulation, gymnasium.vector.VectorEnv[Any, Any, Any]
     ) -> None:
         """Open the scene and load SUMO with `num_envs` games. The other arguments and errors are those of
         `DrivingEnv`."""
-        seating = _seating(num_envs, seating_of(scene, player, persona, other, other_persona, allow_code))
+        seating = _seating(
+            num_envs,
+            seating_of(scene, player, persona=persona, other=other, other_persona=other_persona, allow_code=allow_code),
+        )
         if render_mode is not None:
             remedy = "gymnasium.make draws a single environment"
             raise UsageError.of("VectorDrivingEnv", "render_mode", f"is {render_mode!r}: there are no pictures", remedy)

@@ -76,6 +76,7 @@ class Seating:
 def seating_of(
     scene: Place | OpenScene,
     player: str,
+    *,
     persona: Place,
     other: Place | None,
     other_persona: Place | None,

@@ -37,6 +37,7 @@ class SingleGame:
         self,
         scene: OpenScene,
         seats: Sequence[Seat],
+        *,
         human_factors: Sequence[HumanFactors],
         present: Sequence[float],
         render_mode: str | None = None,

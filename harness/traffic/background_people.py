@@ -84,7 +84,7 @@ class BackgroundPeople:
         names = [listed.names[k] for k in near.tolist()]
         heading = heading_rad_of(np.fromiter(map(_libsumo.person_getAngle, names), float, len(names)))
         speed = np.fromiter(map(_libsumo.person_getSpeed, names), float, len(names))
-        return _reading(listed, near, front_m[near], heading, speed, games=len(self._prefixes))
+        return _reading(listed, near, front_m=front_m[near], heading=heading, speed=speed, games=len(self._prefixes))
 
     def _points(self, listed: _List, near: IntArray) -> FloatArray:
         """[m, 3] where persons are, with their heights, in the coordinates of the net."""
@@ -118,7 +118,7 @@ def _metres(edge: str, place: str) -> float:
 
 
 def _reading(
-    listed: _List, near: IntArray, front_m: FloatArray, heading: FloatArray, speed: FloatArray, games: int
+    listed: _List, near: IntArray, *, front_m: FloatArray, heading: FloatArray, speed: FloatArray, games: int
 ) -> Reading:
     """The reading [G, M] of the persons `near` [n] with fronts [n, 2]."""
     of_game, (length, width) = listed.games[near], listed.sizes_m[near].T

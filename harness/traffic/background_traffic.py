@@ -163,7 +163,7 @@ class BackgroundTraffic:
             *(self._step, self._step_s, 1 if self._recorded else _LONGEST_WAIT, self._recorded),
         )
         direct = DIRECT and self._sumo_has_all(players_present)
-        places, motion = read_near(search, table.sumo_name, table.sumo_record, due, direct)
+        places, motion = read_near(search, table.sumo_name, records=table.sumo_record, due=due, direct=direct)
         if self._roads_m is not None and len(places):
             names, games = table.sumo_name.ravel()[places], places // table.due.shape[1]
             near = on_players_level(self._roads_m, self._points(names, games))

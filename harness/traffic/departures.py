@@ -59,6 +59,7 @@ def check_departures(
     players: set[str],
     net: Net,
     routes: RouteFile,
+    *,
     window_s: tuple[float, float] = _ALL_THE_TIME_S,
     roles: Sequence[str] = ROLES,
 ) -> None:
@@ -82,7 +83,7 @@ def check_departures(
             problems += [Problem(*where, *each) for each in _gaps(edges)]
             problems += _end_problems(*where, departure, first=edges[0], last=edges[-1], routes=routes)
             kind = routes.types[departure.vehicle_type].vehicle_class
-            problems += stop_problems(*where, departure.stops, edges, kind)
+            problems += stop_problems(*where, stops=departure.stops, edges=edges, vehicle_class=kind)
         if len(problems) >= _MOST_PROBLEMS:
             break
     if problems:
@@ -109,8 +110,20 @@ def _end_problems(
     factor = max(departure.speed_factor * _ROUNDED, 1.0) if departure.speed_factor else 1.0
     written = (departure.lane, departure.position, departure.speed)
     checks = [
-        *_checks("depart", first, min(first.getSpeed() * factor, most_mps), written, (LANES, POSITIONS, SPEEDS)),
-        *_checks("arrival", last, most_mps, departure.arrival, (ARRIVAL_LANES, ARRIVAL_POSITIONS, ARRIVAL_SPEEDS)),
+        *_checks(
+            "depart",
+            first,
+            fastest=min(first.getSpeed() * factor, most_mps),
+            written=written,
+            words=(LANES, POSITIONS, SPEEDS),
+        ),
+        *_checks(
+            "arrival",
+            last,
+            fastest=most_mps,
+            written=departure.arrival,
+            words=(ARRIVAL_LANES, ARRIVAL_POSITIONS, ARRIVAL_SPEEDS),
+        ),
     ]
     return [
         Problem(
@@ -125,7 +138,7 @@ _Check = tuple[str, str, Sequence[str], Callable[[float], bool], str]
 
 
 def _checks(
-    prefix: str, edge: Edge, fastest: float, written: Sequence[str], words: Sequence[Sequence[str]]
+    prefix: str, edge: Edge, *, fastest: float, written: Sequence[str], words: Sequence[Sequence[str]]
 ) -> list[_Check]:
     """For lane, position and speed: attribute, value, words, whether a number is possible, and which ones are."""
     lanes, length = edge.getLaneNumber(), edge.getLength()

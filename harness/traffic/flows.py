@@ -28,7 +28,7 @@ class FlowRate:
 
 
 def times_of(
-    rate: FlowRate, first_s: float, end_s: float, begin_s: float, density: float, generator: np.random.Generator
+    rate: FlowRate, *, first_s: float, end_s: float, begin_s: float, density: float, generator: np.random.Generator
 ) -> list[tuple[int, float]]:
     """The number and the time of each departure of a flow, which runs from `first_s` to `end_s`, from `begin_s` on.
 
@@ -47,7 +47,17 @@ def times_of(
     elif rate.mean_period_s is not None:
         skipped, times = 0, _random_times(max(first_s, begin_s), end_s, rate.mean_period_s / density, generator)
     else:
-        skipped, times = 0, _times_by_second(rate.probability_per_s or 0.0, first_s, end_s, begin_s, density, generator)
+        skipped, times = (
+            0,
+            _times_by_second(
+                rate.probability_per_s or 0.0,
+                first_s=first_s,
+                end_s=end_s,
+                begin_s=begin_s,
+                density=density,
+                generator=generator,
+            ),
+        )
     numbered = [(skipped + k, time) for k, time in enumerate(times.tolist())]
     return numbered if number is None else [each for each in numbered if each[0] < number]
 
@@ -71,7 +81,7 @@ def _random_times(begin_s: float, end_s: float, mean_period_s: float, generator:
 
 
 def _times_by_second(
-    probability: float, first_s: float, end_s: float, begin_s: float, density: float, generator: np.random.Generator
+    probability: float, *, first_s: float, end_s: float, begin_s: float, density: float, generator: np.random.Generator
 ) -> FloatArray:
     """In each second a vehicle departs with a probability. A probability above 1 is a vehicle for certain, and more."""
     first_s += max(ceil(begin_s - first_s), 0)

@@ -83,7 +83,7 @@ class LibsumoSimulation:
         return libsumo.isLoaded()
 
     def __init__(
-        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
+        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, *, recorded: bool = False
     ) -> None:
         """Load SUMO with a tile for each game. Raises SimulationError if SUMO refuses or is in use.
 

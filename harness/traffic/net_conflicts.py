@@ -47,7 +47,7 @@ def listed_conflicts(net: Net, junctions: Sequence[str]) -> list[ListedConflict]
     found: list[ListedConflict] = []
     for name in junctions:
         for first, second, place in _conflicts(net.getNode(name), feeders):
-            found.append(_listed(len(found) + 1, name, first, second, place))
+            found.append(_listed(len(found) + 1, name, one=first, other=second, place=place))
     return found
 
 
@@ -64,7 +64,7 @@ def _conflicts(node: Node, feeders: Feeders) -> Iterator[tuple[Connection, Conne
             yield one, other, place
 
 
-def _listed(number: int, junction: str, one: Connection, other: Connection, place: FloatArray) -> ListedConflict:
+def _listed(number: int, junction: str, *, one: Connection, other: Connection, place: FloatArray) -> ListedConflict:
     one_yields, first_come = yields_to(one, other)
     other_yields, _ = yields_to(other, one)
     first, second = (other, one) if one_yields and not first_come else (one, other)

@@ -48,7 +48,7 @@ def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route])
         name = f"obstacle_{number}"
         if each.outline is not None:
             outlines.append(np.array(each.outline, dtype=float))
-            collect(problems, partial(_check_building, file, name, outlines[-1], area, lines))
+            collect(problems, partial(_check_building, file, name, outlines[-1], area=area, ways=lines))
         elif (obstacle := collect(problems, partial(_obstacle, file, name, each, files.net))) is not None:
             found.append(obstacle)
             collect(problems, partial(_check_is_near, file, name, reach_of(obstacle), lines))
@@ -106,7 +106,7 @@ def _obstacle(file: Path, name: str, document: written.Obstacle, net: Net) -> Pl
         lane = network.find_lane(net, file, f"{name}.lane", document.lane)
         if document.kind == "closed_lane":
             width_m = lane.getWidth()
-        place = _on_lane(file, name, document, lane, length_m)
+        place = _on_lane(file, name, document, lane=lane, length_m=length_m)
     else:
         assert document.x_m is not None, "the document says that it has one of the two"
         assert document.y_m is not None, "x_m, y_m and heading_deg are given together"
@@ -118,7 +118,7 @@ def _obstacle(file: Path, name: str, document: written.Obstacle, net: Net) -> Pl
     )
 
 
-def _on_lane(file: Path, name: str, document: written.Obstacle, lane: Lane, length_m: float) -> OnLane:
+def _on_lane(file: Path, name: str, document: written.Obstacle, *, lane: Lane, length_m: float) -> OnLane:
     assert document.position_m is not None, "lane and position_m are given together"
     low_m, high_m = document.position_m
     closed = document.kind == "closed_lane"
@@ -154,7 +154,7 @@ def _check_straight(file: Path, name: str, place: OnLane, length_m: float) -> No
             raise UsageError.of(file, f"{name}.length_m", message, "close it with several shorter ones")
 
 
-def _check_building(file: Path, name: str, outline: FloatArray, area: BaseGeometry, ways: BaseGeometry) -> None:
+def _check_building(file: Path, name: str, outline: FloatArray, *, area: BaseGeometry, ways: BaseGeometry) -> None:
     shape = shapely.Polygon(outline) if len(outline) > 2 else shapely.LineString(outline)
     if not shape.is_valid:
         message = "its walls cross one another"

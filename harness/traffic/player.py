@@ -79,7 +79,7 @@ def open_player(role: str, files: SceneFiles, area: BaseGeometry) -> OpenPlayer:
     except ValueError as error:
         raise UsageError.of(routes.path, key, f"its route {error}", "correct the route's edges") from None
     vehicle_type = routes.types[vehicle.vehicle_type]
-    _check_room_beyond_goal(file, document, player, route, vehicle_type)
+    _check_room_beyond_goal(file, document, player=player, route=route, vehicle_type=vehicle_type)
     return OpenPlayer(route=route, edges=tuple(edge.getID() for edge in route_edges), vehicle_type=vehicle_type)
 
 
@@ -99,7 +99,7 @@ def _check_kind(routes: RouteFile, player: Player, vehicle: Departure, edges: Se
 
 
 def _check_room_beyond_goal(
-    file: Path, document: Scene, player: Player, route: Route, vehicle_type: VehicleType
+    file: Path, document: Scene, *, player: Player, route: Route, vehicle_type: VehicleType
 ) -> None:
     """Raise UsageError if the goal is too near to the end of the route.
 

@@ -62,7 +62,8 @@ class NamedRoutes:
 
 def ranged(path: Path, element: ElementTree.Element, name: str, default: float) -> float:
     """The number of an attribute in its range of `RANGES`. Raises UsageError."""
-    number = number_in(path, f"{element.tag} {element.get('id', '')}", element, name, *RANGES[name])
+    above, most = RANGES[name]
+    number = number_in(path, f"{element.tag} {element.get('id', '')}", element, name, above=above, most=most)
     return default if number is None else number
 
 
@@ -110,12 +111,12 @@ def route_in(path: Path, element: ElementTree.Element, places: Mapping[str, Stop
     """The route that an element writes out. Raises UsageError."""
     where = f"route {element.get('id')}" if element.get("id") else "route"
     edges = tuple(element.get("edges", "").split())
-    passes = 1 + int(number_in(path, where, element, "repeat", -0.001, 1e6) or 0)
+    passes = 1 + int(number_in(path, where, element, "repeat", above=-0.001, most=1e6) or 0)
     if len(edges) * passes > _MOST_EDGES:
         message = f"has {len(edges) * passes:,} edges, up to {_MOST_EDGES:,} are possible"
         raise UsageError.of(path, f"{where}.repeat", message, "choose fewer repetitions")
     stops = tuple(stop_in(path, where, each, places) for each in element.findall("stop"))
-    cycle_s = number_in(path, where, element, "cycleTime", 0.0, 1e6) or 0.0
+    cycle_s = number_in(path, where, element, "cycleTime", above=0.0, most=1e6) or 0.0
     return RouteChoice(
         share=_share(path, element),
         edges=edges * passes,
@@ -192,7 +193,7 @@ def _mix(
 
 
 def _share(path: Path, element: ElementTree.Element) -> float:
-    share = number_in(path, f"{element.tag} {element.get('id', '')}", element, "probability", -0.001, 1e9)
+    share = number_in(path, f"{element.tag} {element.get('id', '')}", element, "probability", above=-0.001, most=1e9)
     return 1.0 if share is None else share
 
 
@@ -201,7 +202,7 @@ def _shares(path: Path, where: str, element: ElementTree.Element) -> list[float]
     shares = []
     for text in element.get("probabilities", "").split():
         one.set("probabilities", text)
-        shares.append(number_in(path, where, one, "probabilities", -0.001, 1e9) or 0.0)
+        shares.append(number_in(path, where, one, "probabilities", above=-0.001, most=1e9) or 0.0)
     return shares
 
 

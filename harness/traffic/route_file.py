@@ -147,6 +147,7 @@ class RouteFile:
         excluded: set[str],
         until_s: float,
         generator: np.random.Generator,
+        *,
         begin_s: float = 0.0,
         density: float = 1.0,
     ) -> list[Departure]:
@@ -159,7 +160,14 @@ class RouteFile:
         if density != 1.0:
             due = self._repeated(due, density, generator)
         for flow in self.flows:
-            times = times_of(flow.rate, flow.departure.depart_s, min(flow.end_s, until_s), begin_s, density, generator)
+            times = times_of(
+                flow.rate,
+                first_s=flow.departure.depart_s,
+                end_s=min(flow.end_s, until_s),
+                begin_s=begin_s,
+                density=density,
+                generator=generator,
+            )
             due += [replace(flow.departure, name=f"{flow.departure.name}.{k}", depart_s=time) for k, time in times]
         drawn = [self._drawn(each, generator, begin_s) for each in due]
         return sorted(drawn, key=lambda each: (each.depart_s, each.name))

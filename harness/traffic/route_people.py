@@ -99,7 +99,7 @@ def person_in(path: Path, element: ElementTree.Element, types: Types) -> Departu
     if not edges and len(ends) != 2:
         raise problem(f"{where}.walk", "has no edges", "give its edges, or from and to")
     arrival = walk.get("arrivalPos", element.get("arrivalPos", "center"))
-    speed = number_in(path, f"{where}.walk", walk, "speed", 0.0, _FASTEST_MPS)
+    speed = number_in(path, f"{where}.walk", walk, "speed", above=0.0, most=_FASTEST_MPS)
     return Departure(
         name=required(path, element, "id"),
         vehicle_type=kind,

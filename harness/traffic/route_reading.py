@@ -155,7 +155,9 @@ def _trip(path: Path, where: str, element: ElementTree.Element, departure: Depar
 def _cut(path: Path, where: str, element: ElementTree.Element, choice: RouteChoice) -> RouteChoice:
     """The part of a route from departEdge to arrivalEdge."""
     most = len(choice.edges) - 1
-    first, last = (number_in(path, where, element, name, -0.001, most) for name in ("departEdge", "arrivalEdge"))
+    first, last = (
+        number_in(path, where, element, name, above=-0.001, most=most) for name in ("departEdge", "arrivalEdge")
+    )
     if first is None and last is None:
         return choice
     return replace(choice, edges=choice.edges[int(first or 0) : int(most if last is None else last) + 1])

@@ -92,7 +92,7 @@ class OpenScene:
         if self.document.warm_up_s:
             snapshot = self.warm_up[generator.integers(len(self.warm_up))]
             density, on_road = snapshot.density, snapshot.vehicles
-        return [*on_road, *self.routes.departures(players, end_s, generator, begin_s, density)]
+        return [*on_road, *self.routes.departures(players, end_s, generator, begin_s=begin_s, density=density)]
 
     @property
     def usual_starts(self) -> StartDistribution:

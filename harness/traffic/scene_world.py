@@ -75,7 +75,7 @@ def world_of(files: SceneFiles) -> SceneWorld:
         places=places,
         obstacles=obstacles,
         ways=ways,
-        world=_world(files, players, road, _right_of_way(files, ways, players), obstacles),
+        world=_world(files, players, road=road, rules=_right_of_way(files, ways, players), obstacles=obstacles),
     )
 
 
@@ -99,7 +99,9 @@ def _players(files: SceneFiles, own: Sequence[Edge], area: BaseGeometry, ground:
         for role, player in zip(document.roles, document.players, strict=True)
     ]
     vehicles, window_s = set(document.vehicles), document.traffic_window_s
-    collect(problems, partial(check_departures, vehicles, files.net, files.routes, window_s, document.roles))
+    collect(
+        problems, partial(check_departures, vehicles, files.net, files.routes, window_s=window_s, roles=document.roles)
+    )
     if problems:
         raise UsageError(problems)
     return [player for player in opened if player is not None]
@@ -126,7 +128,7 @@ def _right_of_way(files: SceneFiles, ways: Sequence[WalkersWay], players: Sequen
 
 
 def _world(
-    files: SceneFiles, players: Sequence[OpenPlayer], road: Road, rules: RightOfWay, obstacles: Obstacles
+    files: SceneFiles, players: Sequence[OpenPlayer], *, road: Road, rules: RightOfWay, obstacles: Obstacles
 ) -> World:
     document = files.document
     types = [player.vehicle_type for player in players]

@@ -99,7 +99,7 @@ def placed(stop: Stop, net: Net, vehicle_class: str) -> Stop:
 
 
 def stop_problems(
-    file: str, key: str, stops: Sequence[Stop], edges: Sequence[Edge], vehicle_class: str
+    file: str, key: str, *, stops: Sequence[Stop], edges: Sequence[Edge], vehicle_class: str
 ) -> list[Problem]:
     """The problems of placed stops with the route of their vehicle: SUMO would refuse them during a game."""
     names = [edge.getID() for edge in edges]

@@ -29,7 +29,7 @@ from harness.traffic.simulation import AtReset, Reading, Simulation
 
 
 def open_simulation(
-    scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
+    scene: OpenScene, games: int, taken_over: Sequence[bool], *, seed: int, recorded: bool = False
 ) -> Simulation:
     """Load SUMO with a tile for each game: in this process if its libsumo is free, otherwise in a child process.
 
@@ -56,7 +56,7 @@ class SubprocessSimulation:
     """A `LibsumoSimulation` in a child process. The child ends with `close`, or with this object."""
 
     def __init__(
-        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, recorded: bool = False
+        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, *, recorded: bool = False
     ) -> None:
         """Spawn the child and load SUMO in it. Raises SimulationError if either fails."""
         try:
@@ -189,7 +189,8 @@ def serve() -> None:
     def answer(first: Any, *arguments: Any) -> Any:
         nonlocal simulation
         if simulation is None:
-            simulation = LibsumoSimulation(first, *arguments)
+            *of_game, recorded = arguments
+            simulation = LibsumoSimulation(first, *of_game, recorded=recorded)
             return None
         return getattr(simulation, first)(*arguments)
 

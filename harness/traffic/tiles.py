@@ -34,7 +34,7 @@ _SHAPES = ("shape", "outlineShape")
 
 
 def write_tiles(
-    net_file: Path, file: Path, prefixes: Collection[str], offset_m: float, junctions: Collection[str] | None
+    net_file: Path, file: Path, *, prefixes: Collection[str], offset_m: float, junctions: Collection[str] | None
 ) -> None:
     """Write a net with a copy of a net for each prefix, each `offset_m` north of the one before.
 
@@ -187,7 +187,7 @@ def _merge(net_file: Path, games: int, scratch: Path, junctions: Collection[str]
     _log_merging(0, games)
     merged = scratch / "merged.net.xml"
     prefixes = [tile_prefix(game, games) for game in range(games)]
-    write_tiles(net_file, merged, prefixes, tile_offset_m(net_file, games), junctions)
+    write_tiles(net_file, merged, prefixes=prefixes, offset_m=tile_offset_m(net_file, games), junctions=junctions)
     _log_merging(games, games)
     return merged
 

@@ -65,7 +65,7 @@ def string_record(text: bytes) -> tuple[int, int, int, int]:
 
 
 def read_near(
-    search: NearSearch, names: NDArray[np.object_], records: NDArray[np.uint64], due: IntArray, direct: bool
+    search: NearSearch, names: NDArray[np.object_], *, records: NDArray[np.uint64], due: IntArray, direct: bool
 ) -> tuple[IntArray, FloatArray]:
     """The vehicles near a player among those at flat places `due` [n] of a table [G, N]: their places [m] and motion.
 

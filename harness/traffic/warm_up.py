@@ -72,7 +72,10 @@ def snapshots(document: Scene, routes: RouteFile, net_file: Path) -> tuple[Snaps
     with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
         for density, vehicles in zip(
             (density for density, _ in drawn),
-            threads.map(lambda k: _run(drawn[k][1], k, routes, net_file.resolve(), options), range(SNAPSHOTS)),
+            threads.map(
+                lambda k: _run(drawn[k][1], k, routes=routes, net_file=net_file.resolve(), options=options),
+                range(SNAPSHOTS),
+            ),
             strict=True,
         ):
             done.append(Snapshot(density=density, vehicles=tuple(vehicles)))
@@ -108,7 +111,9 @@ def _drawn(document: Scene, routes: RouteFile, players: set[str], k: int) -> tup
     varied = document.varies.traffic_density
     density = 1.0 if varied is None else between(varied, generator.random())
     begin_s = document.traffic_begin_s
-    return density, routes.departures(players, begin_s + document.warm_up_s, generator, begin_s, density)
+    return density, routes.departures(
+        players, begin_s + document.warm_up_s, generator, begin_s=begin_s, density=density
+    )
 
 
 def _options(document: Scene) -> tuple[str, ...]:
@@ -124,7 +129,7 @@ def _options(document: Scene) -> tuple[str, ...]:
 
 
 def _run(
-    departures: Sequence[Departure], k: int, routes: RouteFile, net_file: Path, options: Sequence[str]
+    departures: Sequence[Departure], k: int, *, routes: RouteFile, net_file: Path, options: Sequence[str]
 ) -> list[Departure]:
     """The vehicles on the road at the end of a warm-up with these departures."""
     if not departures:
@@ -164,7 +169,7 @@ def _vehicles(
         _person(each, person, routes) for each, person in walking if person.edges.count(each.get("edge", "")) == 1
     ]
     return people + [
-        _vehicle(state, moving[state.get("id", "")], departures[state.get("id", "")], routes, end_s)
+        _vehicle(state, moving[state.get("id", "")], departures[state.get("id", "")], routes=routes, end_s=end_s)
         for state in parse_xml(folder / "state.xml").findall("vehicle")
         if state.get("id") in moving and not _is_parked(state)
     ]
@@ -176,7 +181,7 @@ def _is_parked(state: ElementTree.Element) -> bool:
 
 
 def _vehicle(
-    state: ElementTree.Element, moving: ElementTree.Element, departure: Departure, routes: RouteFile, end_s: float
+    state: ElementTree.Element, moving: ElementTree.Element, departure: Departure, *, routes: RouteFile, end_s: float
 ) -> Departure:
     """The departure of a vehicle at the beginning of a game, from SUMO's state and its motion."""
     lane, passed = moving.attrib["lane"], int(state.attrib["state"].split()[2])

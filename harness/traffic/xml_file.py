@@ -109,7 +109,7 @@ def required(path: Path, element: ElementTree.Element, name: str) -> str:
 
 
 def number_in(
-    path: Path, where: str, element: ElementTree.Element, name: str, above: float = -inf, most: float = inf
+    path: Path, where: str, element: ElementTree.Element, name: str, *, above: float = -inf, most: float = inf
 ) -> float | None:
     """The number of an attribute, greater than `above` and up to `most`; None without the attribute.
 

@@ -245,8 +245,8 @@ def test_motion__a_car_that_the_harness_moves_follows_its_speed_to_a_millimetre(
 
 @pytest.mark.parametrize("name", ["x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad"])
 def test_motion__that_is_not_finite_is_named(name: str, merge: OpenScene, monkeypatch: pytest.MonkeyPatch) -> None:
-    def lose(state: State, *arguments: Any) -> None:
-        read_sumo_players(state, *arguments)
+    def lose(state: State, *arguments: Any, **others: Any) -> None:
+        read_sumo_players(state, *arguments, **others)
         if state.step[0] + 1 == STEP:
             getattr(state, name)[0, NON_EGO] = np.nan
 

@@ -296,21 +296,21 @@ def test_flow__a_window_and_the_rest_make_up_the_whole(
     begin_s: float, period_s: float, split_s: float, number: int | None
 ) -> None:
     rate = FlowRate(period_s=period_s, number=number)
-    draw = partial(times_of, rate, begin_s, density=1.0, generator=np.random.default_rng(0))
+    draw = partial(times_of, rate, first_s=begin_s, density=1.0, generator=np.random.default_rng(0))
     whole = draw(end_s=100.0, begin_s=0.0)
     assert draw(end_s=min(split_s, 100.0), begin_s=0.0) + draw(end_s=100.0, begin_s=split_s) == whole
 
 
 @given(st.floats(0.0, 5.0), st.floats(0.0, 60.0), st.integers(0, 1000))
 def test_departures__lie_within_the_game_and_have_names_of_their_own(density: float, begin_s: float, seed: int) -> None:
-    drawn = MANY.departures(set(), begin_s + 20.0, np.random.default_rng(seed), begin_s, density)
+    drawn = MANY.departures(set(), begin_s + 20.0, np.random.default_rng(seed), begin_s=begin_s, density=density)
     assert all(0.0 <= each.depart_s < 20.0 for each in drawn)
     assert [each.depart_s for each in drawn] == sorted(each.depart_s for each in drawn)
     assert len({each.name for each in drawn}) == len(drawn)
 
 
 def test_density__is_a_factor_on_all_traffic() -> None:
-    counts = [len(MANY.departures(set(), 60.0, np.random.default_rng(k), 0.0, 2.0)) for k in range(100)]
+    counts = [len(MANY.departures(set(), 60.0, np.random.default_rng(k), begin_s=0.0, density=2.0)) for k in range(100)]
     # at a density of 1: 20 + 30 vehicles of flows, 12 + 12 on average of random flows, and 6 single vehicles
     assert np.mean(counts) == pytest.approx(2 * 80, rel=0.03)
 

@@ -61,10 +61,10 @@ def ends(process: int, within_s: float = 300.0) -> bool:
 
 
 def test_open__one_simulation_at_a_time_is_local(scene: OpenScene) -> None:
-    first = open_simulation(scene, 1, (True, True), 1)
-    second = open_simulation(scene, 1, (True, True), 1)
+    first = open_simulation(scene, 1, (True, True), seed=1)
+    second = open_simulation(scene, 1, (True, True), seed=1)
     first.close()
-    third = open_simulation(scene, 1, (True, True), 1)
+    third = open_simulation(scene, 1, (True, True), seed=1)
     kinds = [type(each) for each in (first, second, third)]
     for each in (second, third):
         each.close()

@@ -87,7 +87,7 @@ def lanes_of(net: Net) -> dict[str, tuple[object, ...]]:
 
 @pytest.mark.parametrize("path", FOUND, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_tiles__have_the_lanes_of_the_net_exactly(path: Path, tmp_path: Path) -> None:
-    write_tiles(path, tmp_path / "two.net.xml", ["g0_", "g1_"], 5000.0, None)
+    write_tiles(path, tmp_path / "two.net.xml", prefixes=["g0_", "g1_"], offset_m=5000.0, junctions=None)
     original = lanes_of(readNet(str(path), withInternal=True))
     copies = lanes_of(readNet(str(tmp_path / "two.net.xml"), withInternal=True))
     assert len(copies) == 2 * len(original)
@@ -111,7 +111,7 @@ def test_cut__keeps_junctions_with_their_edges_connections_and_signals(
     assert kept is not None
     assert {"A0", "A1", "B1", "A2"} <= kept
     assert "F5" not in kept
-    write_tiles(path, cut, [""], 0.0, kept)
+    write_tiles(path, cut, prefixes=[""], offset_m=0.0, junctions=kept)
     check_net(cut)
     whole, part = lanes_of(readNet(str(path), withInternal=True)), lanes_of(readNet(str(cut), withInternal=True))
     assert len(part) < 0.6 * len(whole)

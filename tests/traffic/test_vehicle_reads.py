@@ -110,9 +110,9 @@ def test_reading__after_a_player_was_removed_and_a_game_reset(
     calls: list[bool] = []
     read_near = background_traffic.read_near
 
-    def spied(*arguments, **_):  # type: ignore[no-untyped-def]
-        calls.append(arguments[-1])
-        return read_near(*arguments)
+    def spied(*arguments, direct, **others):  # type: ignore[no-untyped-def]
+        calls.append(direct)
+        return read_near(*arguments, direct=direct, **others)
 
     monkeypatch.setattr(background_traffic, "read_near", spied)
     simulation.reset(0, placed(scene, (40, LEFT_Y, 0, 0), (20, LEFT_Y, 0, 0)), [van("third", 60), van("late", 5, 0.3)])

@@ -125,7 +125,7 @@ def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Cand
         seen.add(key)
         middle = np.array(overlap.centroid.coords[0])
         place = lane_line(one.getToLane())[0] if one.getToLane() is other.getToLane() else middle
-        yield _candidate(node, kind, one, other, place)
+        yield _candidate(node, kind, one=one, other=other, place=place)
 
 
 def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> CandidateKind | None:
@@ -146,7 +146,7 @@ def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> Can
     return CandidateKind.TURN_ACROSS if opposite and any(turns) else CandidateKind.CROSSING
 
 
-def _candidate(node: Node, kind: CandidateKind, one: Connection, other: Connection, place: FloatArray) -> Candidate:
+def _candidate(node: Node, kind: CandidateKind, *, one: Connection, other: Connection, place: FloatArray) -> Candidate:
     one_yields, first_come = yields_to(one, other)
     other_yields, _ = yields_to(other, one)
     signals = bool(one.getTLSID() or other.getTLSID())

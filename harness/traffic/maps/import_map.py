@@ -50,7 +50,7 @@ def import_map(path: Path, folder: Path, *, left_hand: bool) -> tuple[Path, Net]
     facts = facts_of(path, kind)
     is_left = left_hand if kind is MapKind.OSM else _is_left(path, facts, left_hand)
     file = folder / "converted.net.xml"
-    _convert(path, kind, facts, file, is_left)
+    _convert(path, kind, facts=facts, net_file=file, left_hand=is_left)
     try:
         check_net(file)
     except UsageError as error:  # about a file that the user does not know
@@ -84,7 +84,7 @@ def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
     return file, read_net(path)
 
 
-def _convert(path: Path, kind: MapKind, facts: MapFacts, net_file: Path, left_hand: bool) -> None:
+def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left_hand: bool) -> None:
     source = net_file.with_name("map.xml")  # netconvert splits names at commas and blanks
     with path.open("rb") as packed, source.open("wb") as plain:
         shutil.copyfileobj(gzip.GzipFile(fileobj=packed) if path.suffix.lower() == ".gz" else packed, plain)

@@ -22,7 +22,7 @@ def write_part(net: Net, net_file: Path, routes: Collection[str], file: Path) ->
     if junctions is None:
         shutil.copyfile(net_file, file)
         return False
-    write_tiles(net_file, file, [""], 0.0, junctions)
+    write_tiles(net_file, file, prefixes=[""], offset_m=0.0, junctions=junctions)
     root = parse_xml(file)
     location = root.find("location")
     if location is not None:

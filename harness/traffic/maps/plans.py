@@ -129,7 +129,9 @@ class Plans:
         if candidate.first.start.getEdge() is candidate.second.start.getEdge():
             merging = self._from_the_same_edge(candidate, number, ego_route, route)
             return merging or "too little road before it"
-        return _timed(candidate, number, ego_route, route, _NEAR_M) or self._shorter(candidate, number)
+        return _timed(candidate, number, ego_route=ego_route, route=route, within_m=_NEAR_M) or self._shorter(
+            candidate, number
+        )
 
     def _route(self, way: LaneWay, before_m: float | None = None) -> PlannedRoute | None:
         """The route over a way, with so much road before its junction that a game can start at speed."""
@@ -145,7 +147,7 @@ class Plans:
         for before_m in (80.0, 40.0):
             routes = [self._route(way, before_m) for way in (candidate.first, candidate.second)]
             if routes[0] is not None and routes[1] is not None:
-                plan = _timed(candidate, number, routes[0], routes[1], _NEAR_M)
+                plan = _timed(candidate, number, ego_route=routes[0], route=routes[1], within_m=_NEAR_M)
                 if plan is not None:
                     return plan
         return "too little road before it"
@@ -157,7 +159,7 @@ class Plans:
         assert candidate.second is not None, "both are cars"
         if ego_route.edges[0] != route.edges[0]:
             length_m = candidate.first.start.getLength()
-            plan = _timed(candidate, number, ego_route, route, length_m + _NEAR_M)
+            plan = _timed(candidate, number, ego_route=ego_route, route=route, within_m=length_m + _NEAR_M)
             if plan is not None:
                 return plan
         lanes, length_m = (candidate.first.start, candidate.second.start), candidate.first.start.getLength()
@@ -209,7 +211,7 @@ class Plans:
 
 
 def _timed(
-    candidate: Candidate, number: int, ego_route: PlannedRoute, route: PlannedRoute, within_m: float
+    candidate: Candidate, number: int, *, ego_route: PlannedRoute, route: PlannedRoute, within_m: float
 ) -> GamePlan | None:
     """The plan in which both arrive within `_APART_S` of each other; None if the routes leave no room for it."""
     found = meeting_near(ego_route, route, candidate.place, within_m)
