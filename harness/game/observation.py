@@ -4,11 +4,10 @@ An observation is in the player's own frame and holds only what a driver can see
 plans. `harness.game.observation_layout` has its entries; here a function writes each group of them.
 
 An error of estimated distances scales the distance of other bodies in their true direction. An error of closing speeds
-adds a radial velocity to theirs (`game.human_factors`).
-
-The free width at a distance ahead ends at the nearest surface on either side, rail or vehicle (paper, section 4.3.2:
-the ego "seeks to maintain a large distance between itself and nearby objects"). The other bodies are those that the
-player may meet first: by the time to the conflict of the two ways, or by their distance.
+adds a radial velocity to theirs (`game.human_factors`). The free width at a distance ahead ends at the nearest surface
+on either side, rail or vehicle (paper, section 4.3.2: the ego "seeks to maintain a large distance between itself and
+nearby objects"). The other bodies are those that the player may meet first: by the time to the conflict of the two
+ways, or by their distance.
 """
 
 from __future__ import annotations
@@ -128,10 +127,8 @@ def observe(q: Quantities) -> FloatArray:
 @compiled
 def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
     """One compiled pass over the columns of players, views, bodies, routes, the road at the players, stop lines and
-    meetings: for the few games of a reset, several calls would cost more than their work.
-
-    Each array that is passed to a function with a loop costs time at every call: the loops are here.
-    """
+    meetings: several calls would cost more than their work. A record of arrays costs time at every call of a function
+    with a loop: the loops are here."""
     players, views, bodies, routes = _Players(*tables[0]), _Views(*tables[1]), Bodies(*tables[2]), Routes(*tables[3])
     along, stop_lines, meetings = Along(*tables[4]), StopLines(*tables[5]), Meetings(*tables[6])
     observation, view = np.zeros((*players.present.shape, SIZE), dtype=np.float32), np.empty(SIZE)
@@ -153,7 +150,11 @@ def _observe(tables: tuple[tuple[Any, ...], ...]) -> FloatArray:
                 in_view, urgency_s[b] = _look(eye, body)
                 seen[b] = bodies.present[g, b] and b != p and in_view and not views.hidden[g, p, b]
                 if seen[b]:
-                    gap_m, relative_mps = _see_on_path(view, eye, body, routes)
+                    x_m = body.x_m + eye.distance_error * (body.x_m - eye.x_m)  # where the player takes it to be
+                    y_m = body.y_m + eye.distance_error * (body.y_m - eye.y_m)
+                    ahead_m, left_m, frame = point_along_route(place, routes, x_m, y_m)
+                    on_path = (ahead_m, left_m, routes.heading_rad[frame])
+                    gap_m, relative_mps = _see_on_path(view, eye, body, on_path)
                     if gap_m < leader_m:
                         leader_m, leader_mps = gap_m, relative_mps
             if leader_m < np.inf:  # else zeros: a learner that is always alone must not learn from its absence
@@ -290,16 +291,15 @@ def _look(eye: _Eye, body: _Body) -> tuple[bool, float]:
     return in_view and ahead_m >= eye.sight_cosine * distance_m, urgency_s
 
 
-@inlined
-def _see_on_path(view: FloatArray, eye: _Eye, body: _Body, routes: Routes) -> tuple[float, float]:
-    """Reduce the free widths by a body. If it is ahead in the player's way: the gap to it and its relative speed, else
-    an infinite gap."""
-    dx, dy, error = body.x_m - eye.x_m, body.y_m - eye.y_m, eye.distance_error
-    along, beside, frame = point_along_route(eye.place, routes, body.x_m + error * dx, body.y_m + error * dy)
+@compiled
+def _see_on_path(view: FloatArray, eye: _Eye, body: _Body, place: tuple[float, float, float]) -> tuple[float, float]:
+    """Reduce the free widths by a body at a place along the route and beside it, where the route has a heading. If it
+    is ahead in the player's way: the gap to it and its relative speed, else an infinite gap."""
+    along, beside, route_heading_rad = place
     extent = 0.5 * (body.length_m + body.width_m)  # at least the half extents, which take longer to compute
     if along + extent <= _EDGES[0] or along - extent >= _EDGES[-1]:
         return np.inf, 0.0
-    turned = body.heading_rad - routes.heading_rad[frame]
+    turned = body.heading_rad - route_heading_rad
     half_length, half_width = half_extents_m(turned, body.length_m, body.width_m)
     _narrow(view, (along - half_length, along + half_length), beside, half_width)
     if along <= 0.0 or abs(beside) >= half_width + 0.5 * eye.width_m:

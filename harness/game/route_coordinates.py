@@ -48,7 +48,7 @@ def row_ahead(place: OnRoute, k: int) -> int:
     return min(max(place.row + _PATH_ROWS[k], place.first_row), place.last_row)
 
 
-@inlined
+@compiled
 def point_along_route(place: OnRoute, routes: Routes, x_m: float, y_m: float) -> tuple[float, float, int]:
     """A point relative to a player: ahead and to the left (m), and the row of its frame, the nearest one of the route
     at `PATH_M`."""
