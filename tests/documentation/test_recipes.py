@@ -16,12 +16,14 @@ from typing import NamedTuple
 import pytest
 
 from tests.support.repository import REPOSITORY
+from tests.support.tiny import sumo_run
 
 PAGE = (REPOSITORY / "CONTRIBUTING.md").read_text(encoding="utf-8").partition("\n## Recipes\n")[2].partition("\n## ")[0]
 RECIPES = dict(re.findall(r"^### ([^\n]+)\n(.*?)(?=^### |\Z)", PAGE, re.DOTALL | re.MULTILINE))
 BLOCK = re.compile(
     r"(?:^`(?P<file>[^`\n]+)`[^\n]*\n\n)?^```(?P<language>\w+)\n(?P<text>.*?)^```", re.DOTALL | re.MULTILINE
 )
+RUN = "reports/mine"  # stands for a run of the reader's
 COPIED = ("harness", "tests", "docs", "networks", "personas", "policies", "campaigns", "egos", "pyproject.toml")
 
 
@@ -53,6 +55,8 @@ def test_recipe__works_as_it_is_written(name: str, tmp_path: Path) -> None:
         copy = shutil.copytree if (REPOSITORY / each).is_dir() else shutil.copyfile
         copy(REPOSITORY / each, tmp_path / each)
     (tmp_path / ".venv").symlink_to(sys.prefix)
+    if RUN in RECIPES[name]:
+        shutil.copytree(sumo_run(), tmp_path / RUN)
     # machine code is of no use to a copy that is thrown away
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"}
     blocks = blocks_of(RECIPES[name])
