@@ -19,8 +19,8 @@ import traci
 from sumolib.miscutils import getFreeSocketPort
 
 from benchmarks.games import CoastingGames
-from harness.traffic.scene import OpenScene
-from harness.traffic.tiles import tile_offset_m, tile_prefix, tiled_net
+from harness.road.net.tiles import tile_offset_m, tile_prefix, tiled_net
+from harness.road.scene.open_scene import OpenScene
 
 KEEP_ROUTE = 2  # of moveToXY: place the vehicle exactly as given, on the road or off it
 

@@ -28,7 +28,7 @@ def export(run: Path, stage: str, file: Path) -> None:
 
     from harness.environments.recorded import recorded_game
     from harness.evaluation.trace_file import read_traces
-    from harness.traffic.scene import open_scene
+    from harness.road.scene.open_scene import open_scene
 
     scene = open_scene(run / "scene")
     games = []

@@ -15,7 +15,7 @@ from harness.environments.auto_reset import AutoReset
 from harness.game.arrays import FloatArray
 from harness.game.observation_layout import SIZE
 from harness.game.seeding import generator_of
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 MERGE = REPOSITORY / "networks" / "merge"

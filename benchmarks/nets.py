@@ -20,9 +20,9 @@ from sumolib.net.edge import Edge
 
 from benchmarks.lane_followers import touches
 from harness.errors import UsageError
-from harness.traffic import network
-from harness.traffic.net_file import check_net
-from harness.traffic.route_table import route_table
+from harness.road.net import network
+from harness.road.net.net_file import check_net
+from harness.road.net.route_table import route_table
 
 _ROUTES = 12
 _EDGES = 4

@@ -22,10 +22,10 @@ import sumo
 from defusedxml import ElementTree
 
 from harness.errors import UsageError
-from harness.traffic import network
-from harness.traffic.departures import check_departures
-from harness.traffic.route_reading import read_route_file
-from harness.traffic.trips import with_routes
+from harness.road.demand.departures import check_departures
+from harness.road.demand.route_reading import read_route_file
+from harness.road.demand.trips import with_routes
+from harness.road.net import network
 
 _ENDINGS = (".rou.xml", ".rou.alt.xml", ".trips.xml", ".flows.xml")
 _LONGEST_REASON = 150

@@ -16,8 +16,8 @@ from benchmarks.games import GAMES, CoastingGames, merge_scene
 from benchmarks.profiler import Profiler
 from benchmarks.traffic import write_scene
 from harness.environments import arena as arena_module
-from harness.traffic.background_traffic import BackgroundTraffic
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
+from harness.sumo.background_traffic import BackgroundTraffic
 
 _MERGE_STEPS, _TRAFFIC_STEPS = 300, 100
 _PARTS = (

@@ -17,7 +17,7 @@ from benchmarks.budget import Budget
 from benchmarks.figures import Measured
 from benchmarks.games import GAMES, CoastingGames
 from benchmarks.sides import LapTimer, OnProgress, Side, best_rate, raw_numbers, take_turns
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 
 BACKGROUND_VEHICLES = (0, 10, 50, 200)
 _APPROACH_M, _TAPER_M, _EXIT_M = 1600.0, 30.0, 2400.0

@@ -16,7 +16,7 @@ from benchmarks.training import endless_training, training_spec
 from harness.drivers.policy import LearnedDriver
 from harness.environments.arena import Arena
 from harness.environments.auto_reset import AutoReset
-from harness.traffic.libsumo_simulation import LibsumoSimulation
+from harness.sumo.libsumo_simulation import LibsumoSimulation
 from harness.training import compiled_ppo
 from harness.training.ppo import train
 

@@ -30,7 +30,7 @@ from harness.environments.arena import Arena, Seat
 from harness.environments.auto_reset import AutoReset
 from harness.game.human_factors import HumanFactors
 from harness.game.seeding import generator_of
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 STEPS = 100
 PEOPLE = ("crossing", "zebra", "cyclist")

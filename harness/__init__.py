@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from harness.errors import HarnessError, SimulationError, UsageError
     from harness.game.outcome import Outcome
     from harness.library import Results, load, run
-    from harness.traffic.scene import OpenScene, open_scene
+    from harness.road.scene.open_scene import OpenScene, open_scene
 
 __all__ = [
     "Arena",
@@ -69,7 +69,7 @@ _MODULES = {
     "errors": ("HarnessError", "SimulationError", "UsageError"),
     "game.outcome": ("Outcome",),
     "library": ("Results", "load", "run"),
-    "traffic.scene": ("OpenScene", "open_scene"),
+    "road.scene.open_scene": ("OpenScene", "open_scene"),
 }
 
 

@@ -17,7 +17,7 @@ from harness.game.arrays import FloatArray
 from harness.game.quantities import Quantities
 from harness.game.state import Bodies, State
 from harness.game.world import World
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 from tests.support.shared import shared_folder
 from tests.support.slow import slow_tests

@@ -9,6 +9,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -20,9 +21,10 @@ from tests.support.slow import slow_tests
 from tests.support.sources import PACKAGE, SOURCES, label, tree_of
 
 # Which room may import which others, from the lowest floor to the highest. A room is a module or folder directly under
-# harness/, or a folder under harness/campaign/. A new arrow is a decision: add it here first. "harness" is the public
-# face, harness/__init__.py: no room imports it.
+# harness/, or a folder under harness/road/ or harness/campaign/. A new arrow is a decision: add it here first. "harness"
+# is the public face, harness/__init__.py: no room imports it.
 GROUND = {"errors", "files", "version", "shipped_documents", "game", "config"}
+ROAD = {"road.xml", "road.net", "road.demand", "road.scene"}
 CAMPAIGN = {"campaign", "campaign.plan", "campaign.storage", "campaign.execution", "campaign.results"}
 ROOMS: dict[str, set[str]] = {
     "errors": set(),
@@ -31,37 +33,38 @@ ROOMS: dict[str, set[str]] = {
     "shipped_documents": {"errors"},
     "game": set(),
     "config": {"errors", "files", "game"},
-    "traffic": GROUND,
-    "drivers": GROUND,
     "evaluation": {"errors", "files", "game"},
-    "environments": GROUND | {"traffic", "drivers", "evaluation"},
-    "replay": {"errors", "game", "traffic", "evaluation"},
-    "export": {"errors", "game", "traffic", "evaluation", "replay"},
+    "drivers": GROUND,
     "reports": GROUND | {"evaluation"},
-    "training": GROUND | {"traffic", "drivers", "environments"},
+    "road": set(),
+    "road.xml": GROUND,
+    "road.net": GROUND | {"road.xml"},
+    "road.demand": GROUND | {"road.xml", "road.net"},
+    "road.scene": GROUND | {"road.xml", "road.net", "road.demand"},
+    "maps": GROUND | {"road.xml", "road.net"},
+    "sumo": GROUND | ROAD,
+    "replay": {"errors", "game", "evaluation", "sumo"} | ROAD,
+    "export": {"errors", "game", "evaluation", "replay"} | ROAD,
+    "environments": GROUND | ROAD | {"drivers", "evaluation", "sumo"},
+    "assessment": GROUND | ROAD | {"drivers", "evaluation", "sumo", "environments"},
+    "training": GROUND | ROAD | {"drivers", "environments"},
     "campaign.plan": {"errors", "game", "config", "evaluation"},
-    "campaign.storage": {
-        "errors",
-        "files",
-        "version",
-        "config",
-        "traffic",
-        "evaluation",
-        "environments",
-        "campaign.plan",
-    },
-    "campaign": GROUND | {"traffic", "drivers", "campaign.plan"},  # preflight
+    "campaign.storage": {"errors", "files", "version", "config", "evaluation", "campaign.plan"}
+    | {"road.scene", "environments"},
+    "campaign": GROUND | {"road.scene", "drivers", "campaign.plan"},  # preflight
     "campaign.results": GROUND
-    | {"traffic", "drivers", "evaluation", "environments", "replay", "export", "reports"}
+    | {"road.net", "road.scene", "drivers", "evaluation", "environments", "replay", "export", "reports"}
     | {"campaign.plan", "campaign.storage"},
     "campaign.execution": GROUND
-    | {"traffic", "drivers", "evaluation", "environments", "reports", "training"}
+    | {"road.scene", "drivers", "evaluation", "assessment", "reports", "training"}
     | CAMPAIGN,
-    "cli": GROUND | {"traffic", "drivers", "environments", "export", "reports"} | CAMPAIGN,
+    "cli": GROUND | {"road.net", "road.scene", "maps", "drivers", "assessment", "export", "reports"} | CAMPAIGN,
     "library": GROUND | {"drivers", "evaluation"} | CAMPAIGN,
     "__main__": {"cli"},
-    "harness": GROUND | {"traffic", "drivers", "environments", "library"},
+    "harness": GROUND | {"road.scene", "drivers", "environments", "library"},
 }
+PARTED = ("campaign", "road")
+"""Rooms whose folders are rooms."""
 
 SUMO = {"libsumo", "sumo", "sumolib", "traci"}
 LEARNERS = {"torch", "stable_baselines3"}
@@ -85,6 +88,7 @@ FILE_ACCESS_CALLS = {
 }
 FORBIDDEN_WORDS = {"utils", "helpers", "common", "base", "core", "manager", "handler", "misc"}
 LONGEST = {".py": 350, ".jinja": 400, ".css": 400, ".js": 400}
+MOST_FLOORS, MOST_IMPORTS, MOST_NAMES = 8, 25, 4
 TESTS = sorted((REPOSITORY / "tests").rglob("*.py"))
 SEEDED_RANDOMNESS = {"Generator", "BitGenerator", "SeedSequence", "PCG64", "Philox", "default_rng"}
 
@@ -96,7 +100,7 @@ def module_of(path: Path) -> str:
 def room_of(module: str) -> str:
     """The room of a dotted module of the harness."""
     parts = module.split(".")[1:]
-    if parts[:1] == ["campaign"] and (PACKAGE / "campaign" / "/".join(parts[1:2])).is_dir():
+    if parts[:1] and parts[0] in PARTED and parts[1:] and (PACKAGE / parts[0] / parts[1]).is_dir():
         return ".".join(parts[:2])
     return parts[0] if parts else "harness"
 
@@ -169,9 +173,26 @@ def test_imports__run_in_no_circle(graph: str) -> None:
         pytest.fail("imports run in a circle: " + " -> ".join(error.args[1]))
 
 
-def test_imports__only_traffic_imports_sumo() -> None:
-    outside = [path for path in SOURCES if room_of(module_of(path)) != "traffic"]
+def test_imports__only_road_maps_and_sumo_import_sumo() -> None:
+    outside = [path for path in SOURCES if room_of(module_of(path)) not in {*ROAD, "maps", "sumo"}]
     assert [label(path) for path in outside if imported_packages(path) & SUMO] == []
+    without = [path for path in SOURCES if room_of(module_of(path)) != "sumo"]
+    assert [label(path) for path in without if "libsumo" in imported_packages(path)] == []
+
+
+def floors(room: str) -> dict[str, int]:
+    """The floor of each module of a room: 1 if it imports no other module of the room."""
+    modules = {module_of(path): path for path in in_room(room)}
+    inside = {name: imported_from_harness(path) & modules.keys() for name, path in modules.items()}
+    found: dict[str, int] = {}
+    for name in TopologicalSorter(inside).static_order():
+        found[name] = 1 + max((found[each] for each in inside[name]), default=0)
+    return found
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_room__has_few_floors_inside(room: str) -> None:
+    assert {name: floor for name, floor in floors(room).items() if floor > MOST_FLOORS} == {}
 
 
 def test_game__is_pure_numpy_and_opens_no_files() -> None:
@@ -281,6 +302,38 @@ def test_files__stay_short() -> None:
         if path.suffix in LONGEST
     }
     assert {label(path): lines for path, lines in lengths.items() if lines > LONGEST[path.suffix]} == {}
+
+
+def test_files__import_from_few_places() -> None:
+    """Without `from __future__`, which every file has."""
+    counts = {
+        label(path): sum(isinstance(node, ast.Import | ast.ImportFrom) for node in tree_of(path).body) - 1
+        for path in SOURCES
+    }
+    assert {name: count for name, count in counts.items() if count > MOST_IMPORTS} == {}
+
+
+def test_files__have_no_packed_lines() -> None:
+    """No statement gives values to many names at once; `ruff format` sees to the rest."""
+    packed = [
+        f"{label(path)}:{node.lineno}"
+        for path in SOURCES
+        for node in ast.walk(tree_of(path))
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Tuple) and len(node.value.elts) > MOST_NAMES
+        if any(isinstance(target, ast.Tuple) for target in node.targets)
+    ]
+    assert packed == []
+
+
+def test_names__of_files_and_public_classes_are_used_once() -> None:
+    files = Counter(path.stem for path in SOURCES if not path.stem.startswith("__"))
+    classes = Counter(
+        node.name
+        for path in SOURCES
+        for node in tree_of(path).body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    )
+    assert [name for name, count in (files + classes).items() if count > 1] == []
 
 
 # --- randomness ---

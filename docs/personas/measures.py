@@ -13,7 +13,7 @@ from harness.game.arrays import BoolArray, FloatArray
 from harness.game.quantities import Quantities
 from harness.game.roles import NON_EGO
 from harness.game.world import World
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 
 @dataclass(frozen=True, kw_only=True)

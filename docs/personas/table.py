@@ -26,7 +26,7 @@ from measures import (
 )
 
 from harness.evaluation.trace_file import read_traces
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 LEARNED = ("naive", "retrained", "robust")  # the egos that a campaign trains
 LAST_WINDOWS = 3  # windows of the learning curve for the payoff at the end

@@ -18,14 +18,14 @@ import numpy as np
 import pandas as pd
 import typer
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.mixture import mixture_of
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import SeatedArm, assess
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 
 ROOT = Path(__file__).parents[2]
 PERSONAS = ("speedy", "distracted")

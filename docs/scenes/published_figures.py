@@ -29,7 +29,7 @@ from harness.evaluation.trace_file import read_traces
 from harness.files import write_atomically
 from harness.game.arrays import FloatArray
 from harness.game.roles import NON_EGO
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, help=__doc__)
 HEADER = ("run", "persona", "quantity", "measured", "games", "published", "within", "source")

@@ -23,7 +23,7 @@ from harness.game.observation_layout import LAYOUT
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO, NON_EGO
 from harness.game.world import World
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 
 GAMES = 40
 _STOPS_WITHIN_M = 1.1

@@ -27,9 +27,9 @@ from harness.drivers.car import car_of
 from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import Problem, UsageError, collect
 from harness.game.roles import EGO
+from harness.road.scene.load_check import check_loads
+from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.shipped_documents import PACKAGE, Kind, find_document, is_name, missing_document
-from harness.traffic.load_check import check_loads
-from harness.traffic.scene import OpenScene, open_scene
 
 QUICK_STEPS = 262_144
 QUICK_SEGMENT_STEPS = 65_536

@@ -210,7 +210,7 @@ def check_driver(
     """
     from rich.console import Console
 
-    from harness.environments.conformance import check_named
+    from harness.assessment.conformance import check_named
 
     findings = check_named(driver, document_at(scene, "networks"), games, allow_code=allow_code)
     print_plain(findings.lines(), Console())

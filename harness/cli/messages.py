@@ -11,7 +11,7 @@ from rich.markup import escape
 if TYPE_CHECKING:
     from harness.campaign.plan.stages import Stage
     from harness.campaign.preflight import OpenCampaign
-    from harness.traffic.scene import OpenScene
+    from harness.road.scene.open_scene import OpenScene
 
 NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
 INTERRUPTED = "Interrupted. Finished work is kept: run the same command again to continue."

@@ -10,10 +10,10 @@ from harness.cli.net_tables import conflict_words
 from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
+from harness.maps.net_conflicts import ListedConflict
 from harness.reports.net_page import Drawing, DrawnShape
-from harness.traffic.net_conflicts import ListedConflict
-from harness.traffic.net_listing import ListedJunction, ListedLane
-from harness.traffic.scene import OpenScene
+from harness.road.net.net_listing import ListedJunction, ListedLane
+from harness.road.scene.open_scene import OpenScene
 
 
 def drawing_of(

@@ -8,10 +8,10 @@ from rich.table import Table
 from rich.text import Text
 
 from harness.errors import plain
-from harness.traffic.maps.candidates import CandidateKind
-from harness.traffic.maps.plans import GamePlan
-from harness.traffic.net_conflicts import ListedConflict, Priority
-from harness.traffic.net_listing import ListedLane
+from harness.maps.candidates import CandidateKind
+from harness.maps.game_plans import GamePlan
+from harness.maps.net_conflicts import ListedConflict, Priority
+from harness.road.net.net_listing import ListedLane
 
 _RULES = {Priority.FIRST: "the first", Priority.FIRST_TO_ARRIVE: "first to arrive", Priority.NONE: "no rule"}
 

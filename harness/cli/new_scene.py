@@ -17,8 +17,8 @@ from harness.errors import FAILED, UsageError, plain
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from harness.traffic.maps.open_map import OpenMap
-    from harness.traffic.maps.plans import GamePlan
+    from harness.maps.game_plans import GamePlan
+    from harness.maps.open_map import OpenMap
 
 _ROWS = 40
 
@@ -76,7 +76,7 @@ def new_scene(
     routes, starts from which they meet, goals, and a campaign.
     """
     from harness.cli.scene_writing import check_new
-    from harness.traffic.maps.open_map import open_map
+    from harness.maps.open_map import open_map
 
     if conflict is not None and every:
         raise UsageError.of("harness scene new", "--all", "--conflict and --all exclude each other", "give one of them")

@@ -17,13 +17,13 @@ from harness.cli import messages
 from harness.config.scene import Name
 from harness.errors import Problem, UsageError, plain
 from harness.files import make_folder, write_atomically
-from harness.traffic.load_check import check_loads
-from harness.traffic.maps.candidates import CandidateKind
-from harness.traffic.maps.net_part import write_part
-from harness.traffic.maps.open_map import OpenMap
-from harness.traffic.maps.plans import GamePlan
-from harness.traffic.network import KEPT_M
-from harness.traffic.scene import open_scene
+from harness.maps.candidates import CandidateKind
+from harness.maps.game_plans import GamePlan
+from harness.maps.net_part import write_part
+from harness.maps.open_map import OpenMap
+from harness.road.net.network import KEPT_M
+from harness.road.scene.load_check import check_loads
+from harness.road.scene.open_scene import open_scene
 
 _SCRATCH = ".part"
 _ON_ROADS = ("speedy", "distracted")

@@ -13,7 +13,7 @@ from harness.cli.output import console_of_any_encoding, print_plain
 from harness.shipped_documents import document_at
 
 if TYPE_CHECKING:
-    from harness.traffic.scene import OpenScene
+    from harness.road.scene.open_scene import OpenScene
 
 _ROWS = 100
 _STARTS = 60  # drawn for each player
@@ -53,10 +53,10 @@ def show_scene(
     goals.
     """
     from harness.cli.net_tables import conflict_table, lane_table
-    from harness.traffic.net_conflicts import listed_conflicts
-    from harness.traffic.net_file import check_net
-    from harness.traffic.net_listing import edges_near, listed_junctions, listed_lanes
-    from harness.traffic.network import read_net
+    from harness.maps.net_conflicts import listed_conflicts
+    from harness.road.net.net_file import check_net
+    from harness.road.net.net_listing import edges_near, listed_junctions, listed_lanes
+    from harness.road.net.network import read_net
 
     path = document_at(path, "networks")
     scene = _scene_of(path)
@@ -86,8 +86,8 @@ def show_scene(
 
 def check_scene(folder: Path) -> list[str]:
     """Check one scene, as a campaign that names it does; the lines to print. Raises UsageError with every problem."""
-    from harness.traffic.load_check import check_loads
-    from harness.traffic.scene import open_scene
+    from harness.road.scene.load_check import check_loads
+    from harness.road.scene.open_scene import open_scene
 
     scene = open_scene(folder)
     check_loads(scene)
@@ -104,7 +104,7 @@ def folder_of_scene(path: Path) -> Path | None:
 
 
 def _scene_of(path: Path) -> OpenScene | None:
-    from harness.traffic.scene import open_scene
+    from harness.road.scene.open_scene import open_scene
 
     folder = folder_of_scene(path)
     return open_scene(folder) if folder is not None else None

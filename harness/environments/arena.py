@@ -5,7 +5,7 @@
 | 1 | drivers decide from the observations of the step before; learners' actions are an argument | `drivers` |
 | 2 | reaction delay, limits of the controls and lapses of attention | `game.human_factors` |
 | 3 | the players move, on wheels or on foot | `game.bicycle`, `game.walking` |
-| 4 | their poses are sent to SUMO, SUMO moves the other vehicles, their state is read | `traffic.simulation` |
+| 4 | their poses are sent to SUMO, SUMO moves the other vehicles, their state is read | `sumo.simulation` |
 | 5 | contact, goal and time limit determine outcomes | `game.quantities` |
 | 6 | payoffs are computed | `game.payoff` |
 | 7 | a player at its goal is removed; a crashed player stays as an obstacle | this module |
@@ -41,10 +41,10 @@ from harness.game.state import Bodies, State
 from harness.game.terminations import terminations
 from harness.game.traffic_rules import since_change_s
 from harness.game.walking import walk
-from harness.traffic.route_file import Departure
-from harness.traffic.scene import OpenScene
-from harness.traffic.simulation import Reading, Simulation, with_game
-from harness.traffic.subprocess_simulation import open_simulation
+from harness.road.demand.route_file import Departure
+from harness.road.scene.open_scene import OpenScene
+from harness.sumo.simulation import Reading, Simulation, with_game
+from harness.sumo.subprocess_simulation import open_simulation
 
 
 class LiveSimulation:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from harness.environments.arena import Arena
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.seeding import generator_of
-from harness.traffic.route_file import Departure
+from harness.road.demand.route_file import Departure
 
 
 class AutoReset:

@@ -1,7 +1,7 @@
 """A Gymnasium environment for one player, and a PettingZoo environment for all.
 
 Each environment has its own arena with one game. A process may contain any number of environments: the first runs SUMO
-in the process itself, each further one in a process of its own (`harness.traffic.subprocess_simulation`).
+in the process itself, each further one in a process of its own (`harness.sumo.subprocess_simulation`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from harness.environments.single_game import RENDER_MODES, Info, SingleGame
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.observation_layout import SIZE
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 _PICTURES_PER_S = 10  # the steps of the shipped scenes; an environment has those of its own scene
 

@@ -20,7 +20,7 @@ from harness.game.arrays import BoolArray, FloatArray
 from harness.game.observation import observe
 from harness.game.outcome import Outcome
 from harness.game.state import State
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 _PARTS = "vector environment"
 _SEEDS = 2**31 - 1

@@ -10,7 +10,7 @@ from harness.game.near_players import NEAREST, NOTICED_M
 from harness.game.placed_obstacles import Obstacles
 from harness.game.state import Bodies, State
 from harness.game.world import World
-from harness.traffic.simulation import Reading
+from harness.sumo.simulation import Reading
 
 
 class NearbyBodies:

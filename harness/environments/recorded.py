@@ -10,7 +10,7 @@ import pandas as pd
 
 from harness.evaluation.recorded_game import BodyKind, RecordedGame
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 
 def recorded_game(trace: pd.DataFrame, scene: OpenScene) -> RecordedGame:

@@ -28,6 +28,6 @@ def named_game(options: Mapping[str, Any] | None, others: bool = False) -> tuple
             raise UsageError.of("reset", f"options[{key!r}]", f"is {value!r}", "give a whole number from 0 on")
     if EPISODE not in options:
         raise UsageError.of("reset", "options['episode']", "is missing", "name the episode of the campaign's seed")
-    from harness.environments.rollout import parts_of  # imports pandas
+    from harness.game.seeding import parts_of  # imports pandas
 
     return parts_of(options.get(CAMPAIGN_SEED, 1), options[EPISODE])

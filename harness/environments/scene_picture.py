@@ -11,9 +11,9 @@ from PIL import Image, ImageDraw
 from harness.errors import UsageError
 from harness.game.arrays import FloatArray
 from harness.game.state import Bodies
-from harness.traffic.drawing import goal_lines, lane_marks, surfaces
-from harness.traffic.network import read_net
-from harness.traffic.scene import OpenScene
+from harness.road.net.network import read_net
+from harness.road.scene.drawing import goal_lines, lane_marks, surfaces
+from harness.road.scene.open_scene import OpenScene
 
 SIZE_PX = (640, 320)
 WIDTH_M = 100.0  # of the road that is shown: a car of 4.6 m is 29 pixels long

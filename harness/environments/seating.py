@@ -18,8 +18,8 @@ from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution
 from harness.game.roles import ROLES
 from harness.game.world import World
+from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.shipped_documents import Kind, named_document
-from harness.traffic.scene import OpenScene, open_scene
 
 
 def external_opponent(other: str | Path | None, player: str, allow_code: bool) -> ExternalDriver | None:

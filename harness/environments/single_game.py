@@ -19,7 +19,7 @@ from harness.game.outcome import Outcome
 from harness.game.roles import EGO
 from harness.game.seeding import generator_of
 from harness.game.state import Bodies
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 if TYPE_CHECKING:
     from harness.environments.scene_picture import ScenePicture, Window

@@ -18,7 +18,7 @@ from harness.export.kinds import BUILDING, PERSON, ExportedKind, kind_of_shape
 from harness.game.arrays import FloatArray
 from harness.replay.scenery import changes_of_signals
 from harness.replay.vehicles import DrawnVehicle, types_of_vehicles
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 WHEELBASE_SHARE = 0.6
 """Wheelbase of a vehicle of the background traffic, as a share of its length; players have one in their scene."""

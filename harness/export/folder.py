@@ -23,7 +23,7 @@ from harness.export.exported_game import ExportedGame
 from harness.export.highd import highd_tables
 from harness.export.lane_courses import LaneCourses
 from harness.export.opendrive import ROAD_FILE, RoadFile, road_file
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 GAMES_FILE = "games.csv"
 _NEW = "name a new folder"

@@ -12,7 +12,7 @@ import shapely
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.replay.floating_car_data import Lanes
-from harness.traffic.xml_file import parse_xml
+from harness.road.xml.xml_file import parse_xml
 
 NONE = -1
 _WIDTH_M = 3.2

@@ -19,8 +19,8 @@ from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
 from harness.errors import HarnessError
-from harness.traffic.sumo_program import run_program
-from harness.traffic.xml_file import parse_xml
+from harness.road.xml.sumo_program import run_program
+from harness.road.xml.xml_file import parse_xml
 
 _NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 

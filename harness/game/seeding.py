@@ -18,6 +18,11 @@ def generator_of(*parts: str | int) -> np.random.Generator:
     return np.random.Generator(np.random.PCG64(seed_of(*parts)))
 
 
+def parts_of(seed: int, episode: int) -> tuple[str | int, ...]:
+    """The parts that name the random numbers of an episode, the same in every arm."""
+    return ("assessment", seed, "episode", episode)
+
+
 def between(bounds: tuple[float, float], share: float) -> float:
     """The point at a share, from 0 to 1, of the way between two bounds.
 

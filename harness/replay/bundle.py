@@ -25,7 +25,7 @@ from harness.replay.floating_car_data import Lanes, shown_at, write_recording, w
 from harness.replay.gui_settings import WINDOW_PX, choose_view, view_settings
 from harness.replay.scenery import painted, programmes, scenery, shapes_of
 from harness.replay.vehicles import legend, types_of_vehicles
-from harness.traffic.xml_file import xml_bytes
+from harness.road.xml.xml_file import xml_bytes
 
 
 def write_replay(

@@ -24,8 +24,8 @@ from harness.game.arrays import FloatArray
 from harness.replay.pictures import FORMATS, captioned, encode, encoding_problem, labels_at
 from harness.replay.sumo_gui import NO_SUMO_GUI, find_sumo_gui, find_xvfb, home_of, screen_problem, virtual_screen
 from harness.replay.vehicles import PLAYER_COLOURS, legend
-from harness.traffic.gui import WindowClosed, gui_environment, steered_gui
-from harness.traffic.xml_file import parse_xml
+from harness.road.xml.xml_file import parse_xml
+from harness.sumo.gui import WindowClosed, gui_environment, steered_gui
 
 SIZE_PX = (960, 480)
 WIDTH_M = 80.0  # of visible road: a car of 4.6 m is 55 pixels long

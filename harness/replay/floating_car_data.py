@@ -28,7 +28,7 @@ import shapely
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.replay.vehicles import DrawnVehicle
-from harness.traffic.xml_file import parse_xml
+from harness.road.xml.xml_file import parse_xml
 
 _NOT_FOR_VEHICLES = {"crossing", "walkingarea"}
 

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from harness.errors import HarnessError, Problem, UsageError
-from harness.traffic.gui import end_process
+from harness.sumo.gui import end_process
 
 FOLLOWED_M = (80.0, 40.0)  # of road around the ego: a car of 4.6 m is then 73 pixels long
 _EGO = "ego"
@@ -40,7 +40,7 @@ def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) 
     `opened` is called when the window is open. SUMO-GUI has no setting for the followed vehicle in a file, only a
     command over TraCI. Raises UsageError as `open_in_sumo_gui` does, SimulationError if SUMO-GUI can't start.
     """
-    from harness.traffic.gui import WindowClosed, gui_environment, steered_gui
+    from harness.sumo.gui import WindowClosed, gui_environment, steered_gui
 
     program = _gui_for(folder)
     configuration = folder / "scene.sumocfg"

@@ -10,9 +10,9 @@ from pathlib import Path
 import pandas as pd
 
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles, PlacedObstacle
-from harness.traffic.route_file import CAR_SIZE_M, SIZES_M
-from harness.traffic.walker_vehicle import WALKER_ATTRIBUTES, WALKER_TYPE
-from harness.traffic.xml_file import parse_xml
+from harness.road.demand.route_file import CAR_SIZE_M, SIZES_M
+from harness.road.demand.walker_vehicle import WALKER_ATTRIBUTES, WALKER_TYPE
+from harness.road.xml.xml_file import parse_xml
 
 PLAYER_COLOURS = {
     "ego": "31,119,255",  # blue and orange, as in the paper's figure 2

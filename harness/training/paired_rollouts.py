@@ -18,7 +18,7 @@ from harness.game.initial_state import draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
 from harness.game.seeding import generator_of, seed_of
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 
 @dataclass(frozen=True, kw_only=True)

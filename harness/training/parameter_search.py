@@ -29,7 +29,7 @@ from harness.errors import SimulationError, StageFailed, is_of_memory
 from harness.files import write_atomically
 from harness.game.roles import EGO
 from harness.game.seeding import seed_of
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from harness.training.paired_rollouts import PairedRollouts
 
 

@@ -13,7 +13,7 @@ from harness.environments.seats import seats_of
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.initial_state import StartDistribution
 from harness.game.seeding import seed_of
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 ALONG_ROUTE_SHARE = 0.7
 """Share of the games without another player that start anywhere along the route, at any legal speed: a learner that

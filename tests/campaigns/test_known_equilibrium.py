@@ -29,6 +29,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import car_of
@@ -36,7 +37,6 @@ from harness.drivers.mixture import Member, Mixture
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.protocol import Driver
-from harness.environments.rollout import SeatedArm, assess, parts_of
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict, gaps, nothing_to_gain
 from harness.evaluation.game_theory.records import Response
 from harness.evaluation.tables import table_of
@@ -45,7 +45,8 @@ from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO, ROLES
-from harness.traffic.scene import OpenScene, open_scene
+from harness.game.seeding import parts_of
+from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.training.ppo import train
 from harness.training.training_games import LearningPlace, TrainingSpec
 from tests.support.scenes import build_scene

@@ -25,12 +25,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from harness.assessment.rollout import assess
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.environments.rollout import assess
 from harness.evaluation.summary import summarise
 from harness.evaluation.tables import table_of, typed
 from harness.evaluation.trace_file import SCHEMA, TraceWriter
@@ -38,7 +38,7 @@ from harness.game.arrays import FloatArray, IntArray
 from harness.game.outcome import Outcome
 from harness.replay.selection import MOST_FAILURES_PER_ARM, choose_games, replay_name
 from harness.reports.manoeuvres import MOST_LISTED
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.chromium import launched, opener, ready_s, until
 from tests.support.pages import campaign, rendered
 from tests.support.rollouts import Steady, arm, play

@@ -25,7 +25,7 @@ from harness.evaluation.research_questions import Question
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace
 from harness.replay import replay_name
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 from tests.support.tiny import (
     BY_SUMO,
     CAREFUL,

@@ -18,9 +18,9 @@ from harness.cli.main import app
 from harness.cli.scene_writing import write_scenes
 from harness.errors import UsageError
 from harness.game.initial_state import draw_initial_state
-from harness.traffic.maps.candidates import CandidateKind
-from harness.traffic.maps.open_map import OpenMap, open_map
-from harness.traffic.scene import OpenScene, open_scene
+from harness.maps.candidates import CandidateKind
+from harness.maps.open_map import OpenMap, open_map
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.esmini import require_esmini
 from tests.support.repository import REPOSITORY
 

@@ -13,7 +13,7 @@ import pytest
 from harness.config.campaign import Campaign
 from harness.config.toml_reading import read_document
 from harness.evaluation.trace_file import TraceWriter
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.repository import REPOSITORY
 from tests.support.scripts import script
 from tests.support.traces import game

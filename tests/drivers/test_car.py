@@ -13,7 +13,7 @@ from harness.game.bicycle import requests
 from harness.game.observation import observe
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 
 @pytest.fixture(scope="module")

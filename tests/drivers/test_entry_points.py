@@ -16,7 +16,7 @@ from harness.drivers.external import ExternalDriver, find_driver
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import EXAMPLE, install
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import harness, write_campaign

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 from pythonfmu import FmuBuilder
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.driver import Fmu
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.drivers.mixture import mixture_of
-from harness.environments.rollout import SeatedArm, assess
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import fmu_example
 from tests.support.tiny import CAREFUL
 

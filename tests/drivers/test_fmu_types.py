@@ -16,17 +16,17 @@ from typing import Any
 import numpy as np
 import pytest
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.driver import Fmu
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.fmu import fmu_driver, unconnected_inputs, wiring
 from harness.drivers.fmu_variables import INTEGERS
-from harness.environments.rollout import SeatedArm, assess
 from harness.errors import UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import fmu_example
 from tests.support.rollouts import seated
 from tests.support.tiny import CAREFUL

@@ -18,7 +18,7 @@ from harness.environments.arena import Arena, Seat
 from harness.game.arrays import FloatArray
 from harness.game.outcome import Outcome
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.observations import observation_of
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import drawn

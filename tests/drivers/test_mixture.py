@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.assessment.rollout import Game, SeatedArm, assess
 from harness.campaign.results.population_summary import by_who_drove
 from harness.config.campaign import Campaign, Population
 from harness.config.persona import Persona
@@ -15,13 +16,12 @@ from harness.config.toml_reading import read_document
 from harness.drivers.mixture import Member, Mixture, mixture_of
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.environments.rollout import Game, SeatedArm, assess
 from harness.evaluation.columns import TABLES
 from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import Attention, HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02))
 

@@ -24,7 +24,7 @@ from harness.drivers.sb3_policy import Sb3Driver
 from harness.errors import DriverError, UsageError
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.external_drivers import document, find
 from tests.support.policies import some_policy
 from tests.support.random_observations import Recorded

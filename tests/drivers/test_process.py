@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.car import Car, car_of
 from harness.drivers.process import ProcessDriver
-from harness.environments.rollout import SeatedArm, assess
 from harness.errors import DriverError
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.processes import driver, is_running, started
 from tests.support.repository import REPOSITORY
 from tests.support.rollouts import seated
@@ -156,7 +156,7 @@ def test_process__ends_when_the_harness_is_killed(tmp_path: Path) -> None:
     script = f"""
 import pathlib, numpy as np, sys, time
 sys.path.insert(0, {str(REPOSITORY)!r})
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 from harness.drivers.car import car_of
 from tests.support.processes import started
 mine, pid = started(pathlib.Path({str(tmp_path)!r}),

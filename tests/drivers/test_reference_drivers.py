@@ -20,7 +20,7 @@ from harness.drivers.reference_drivers import (
 )
 from harness.environments.arena import Arena, Seat
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import Steady
 from tests.support.scenes import placed
 

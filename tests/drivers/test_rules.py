@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.driver import read_driver
 from harness.config.persona import Persona
 from harness.config.rule_driver import REACTIONS, Cruise, LaneKeeping, Rules
@@ -22,14 +23,13 @@ from harness.drivers.perception import Encounters, OwnMotion, perceive
 from harness.drivers.protocol import Driver
 from harness.drivers.rules_driver import RulesDriver, steering_rad
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import SeatedArm, assess
 from harness.errors import UsageError
 from harness.game.bicycle import Requested, lateral_acceleration_mps2, move, requests
 from harness.game.observation_layout import LAYOUT
 from harness.game.road import AHEAD_M
 from harness.game.roles import EGO
 from harness.game.state import State
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.observations import observation_of
 from tests.support.rollouts import seated
 from tests.support.scenes import build_scene

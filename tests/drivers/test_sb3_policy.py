@@ -18,15 +18,15 @@ import torch
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
 import harness
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.driver import StableBaselines3
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.external import find_driver
 from harness.drivers.sb3_policy import Sb3Driver
-from harness.environments.rollout import SeatedArm, assess
 from harness.errors import UsageError
 from harness.game.observation_layout import SIZE
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.random_observations import Recorded
 from tests.support.rollouts import seated
 from tests.support.tiny import CAREFUL

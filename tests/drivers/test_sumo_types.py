@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from harness.assessment.rollout import Game, SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import Game, SeatedArm, assess
 from harness.errors import UsageError
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.policies import some_policy
 from tests.support.rollouts import seated
 from tests.support.tiny import CAREFUL, MERGE

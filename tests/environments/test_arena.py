@@ -19,8 +19,8 @@ from harness.game.initial_state import InitialState
 from harness.game.observation_layout import LAYOUT, SIZE
 from harness.game.outcome import Outcome
 from harness.game.payoff import Payoff
-from harness.traffic.route_file import Departure
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.demand.route_file import Departure
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.scenes import (
     CROSSING_EDGES,
     CROSSING_NODES,

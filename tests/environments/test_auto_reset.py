@@ -14,8 +14,8 @@ from harness.environments.auto_reset import AutoReset
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.seeding import generator_of
-from harness.traffic.route_file import Departure
-from harness.traffic.scene import OpenScene
+from harness.road.demand.route_file import Departure
+from harness.road.scene.open_scene import OpenScene
 from tests.support.scenes import build_scene
 
 TILES = 4

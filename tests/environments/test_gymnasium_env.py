@@ -36,9 +36,9 @@ from harness.drivers.policy_file import Policy, write_policy
 from harness.drivers.sumo import SumoDriver
 from harness.game.human_factors import HumanFactors
 from harness.game.observation_layout import LAYOUT
-from harness.traffic.libsumo_simulation import LibsumoSimulation
-from harness.traffic.scene import OpenScene
-from harness.traffic.subprocess_simulation import SubprocessSimulation
+from harness.road.scene.open_scene import OpenScene
+from harness.sumo.libsumo_simulation import LibsumoSimulation
+from harness.sumo.subprocess_simulation import SubprocessSimulation
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
 

@@ -15,7 +15,7 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 import harness
 from harness import Outcome, UsageError, VectorDrivingEnv, make_vec
 from harness.game.observation_layout import LAYOUT, SIZE
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.scenes import build_scene
 
 GAMES = 4

@@ -13,7 +13,7 @@ from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
 from harness.game.observation_layout import LAYOUT
 from harness.game.outcome import Outcome
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.scenes import LEFT_Y, RIGHT_Y, build_scene, placed
 
 VAN = '[[obstacle]]\nkind = "van"\nlane = "road_0"\nposition_m = {}\n'

@@ -15,7 +15,7 @@ from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.roles import NON_EGO
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.repository import REPOSITORY
 
 

@@ -11,11 +11,11 @@ import pandas as pd
 import pytest
 
 from harness import DrivingEnv, ParallelDrivingEnv, UsageError
+from harness.assessment.rollout import Game, SeatedArm
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.environments.rollout import Game, SeatedArm
 from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.evaluation.columns import TABLES
 from harness.evaluation.people import COLLIDED_WITH, columns_for
@@ -23,7 +23,7 @@ from harness.evaluation.tables import typed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.rollouts import play, seated, trace
 from tests.support.scenes import LEFT_Y, RIGHT_Y, THREE_PEOPLE, build_scene, placed
 from tests.support.tiny import CAREFUL

@@ -20,7 +20,7 @@ from harness.environments.scene_picture import SIZE_PX, WIDTH_M
 from harness.game.initial_state import draw_initial_state
 from harness.replay.sumo_gui import find_xvfb, virtual_screen
 from harness.replay.vehicles import PLAYER_COLOURS
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 from tests.support.repository import REPOSITORY
 
 BLUE, ORANGE = (tuple(map(int, PLAYER_COLOURS[name].split(","))) for name in ("ego", "non_ego"))

@@ -26,9 +26,9 @@ from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import StartDistribution, draw_initial_state
 from harness.game.outcome import Outcome
 from harness.game.seeding import generator_of
-from harness.traffic import background_traffic
-from harness.traffic.scene import OpenScene, open_scene
-from harness.traffic.vehicle_reads import DIRECT
+from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.sumo import background_traffic
+from harness.sumo.vehicle_reads import DIRECT
 from tests.support.repository import REPOSITORY
 from tests.support.scenes import build_scene
 

@@ -23,7 +23,7 @@ from harness.evaluation.rule_book.named_manoeuvres import Manoeuvre, find_manoeu
 from harness.game.arrays import FloatArray
 from harness.game.junctions import Control
 from harness.game.world import World
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.conflicts import CROSSING, with_conflicts
 from tests.support.traces import game
 

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
-from harness.environments.rollout import SeatedArm, assess
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.rule_book import thresholds
 from harness.evaluation.rule_book.cause_lines import event_words
@@ -21,7 +21,7 @@ from harness.evaluation.rule_book.causes import cause_of
 from harness.evaluation.rule_book.course import Course
 from harness.evaluation.rule_book.named_manoeuvres import NAMES, Manoeuvre, find_manoeuvres
 from harness.game.arrays import FloatArray, IntArray
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.rollouts import seated
 from tests.support.scenes import LEFT_Y, RIGHT_Y, STRAIGHT, STRAIGHT_NODES, build_scene
 from tests.support.traces import game

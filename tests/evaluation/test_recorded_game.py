@@ -12,7 +12,7 @@ from harness.evaluation.recorded_game import BodyKind
 from harness.game.near_players import NEAREST, NOTICED_M
 from harness.game.outcome import Outcome
 from harness.game.sight import Hiding
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.traces import along, drawn, game, rows
 
 KINDS = {"ego_car": BodyKind(length_m=4.6), "truck": BodyKind(length_m=12.0, width_m=2.5, vehicle_class="truck")}

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from harness.export.folder import Formats, write_games
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.esmini import largest_difference_m, play
 from tests.support.exports import bicycle_game, exported, merge_with_vans, signals_game, walker_game
 from tests.support.replays import GAMES, STEP_S

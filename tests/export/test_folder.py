@@ -11,7 +11,7 @@ from harness.errors import HarnessError, UsageError
 from harness.export import folder as folder_module
 from harness.export.exported_game import ExportedGame
 from harness.export.folder import Formats, write_games
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.exports import exported
 from tests.support.replays import clean_game, collision_game
 

@@ -14,7 +14,7 @@ import pytest
 
 from harness.export.highd import highd_tables
 from harness.export.lane_courses import LaneCourses
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.exports import exported, signals_game
 from tests.support.replays import drive, game, straight
 

@@ -16,7 +16,7 @@ import xmlschema
 from harness.export.exported_game import ExportedGame
 from harness.export.opendrive import RoadFile
 from harness.export.openscenario import scenario_file
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.exports import bicycle_game, exported, merge_with_vans, signals_game, walker_game
 from tests.support.replays import GAMES, STEP_S, busy_game, collision_game, drive, game, straight
 

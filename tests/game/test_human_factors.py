@@ -35,7 +35,7 @@ from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.quantities import Quantities
 from harness.game.state import State
 from harness.game.world import World
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.scenes import build_scene, drawn
 
 Moment = Callable[..., Quantities]

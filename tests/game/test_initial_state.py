@@ -13,7 +13,7 @@ from harness.game.human_factors import Attention, HumanFactors
 from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
 from harness.game.seeding import seed_of
 from harness.game.start_range import OnLine, StartRange
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 TEXTING = HumanFactors(attention=Attention(mean_attentive_s=2.0, lapse_s=(1.0, 2.0), crown_steering_rad=0.02))
 

@@ -16,7 +16,7 @@ from harness.game.junctions import Signal
 from harness.game.meetings import Meetings
 from harness.game.quantities import Quantities
 from harness.game.world import World
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.conflicts import CROSSING, with_conflicts
 
 Moment = Callable[..., Quantities]

@@ -19,7 +19,7 @@ from harness.game.quantities import Quantities
 from harness.game.rails import Rails
 from harness.game.road import AHEAD_M, MARGIN_M, SPACING_M, Road, Route, Routes
 from harness.game.world import World
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 Moment = Callable[..., Quantities]
 

@@ -19,7 +19,7 @@ from harness.game.payoff import Payoff, Weighted
 from harness.game.payoff_terms import GROUPS, TERMS
 from harness.game.quantities import Quantities
 from harness.game.world import World
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 Moment = Callable[..., Quantities]
 

@@ -17,7 +17,7 @@ from harness.game.quantities import REACH_M, Quantities
 from harness.game.rails import Rails
 from harness.game.road import MARGIN_M, SPACING_M, Road, Route, Routes
 from harness.game.world import World
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 Moment = Callable[..., Quantities]
 LANE_0_M, LANE_1_M = -4.8, -1.6

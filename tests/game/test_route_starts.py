@@ -13,7 +13,7 @@ from harness.game.human_factors import Attention, HumanFactors, Reaction
 from harness.game.initial_state import InitialState, draw_initial_state
 from harness.game.road import Routes
 from harness.game.start_range import draw_along_route
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.roads import arc, straight
 
 LENGTH_M = np.array([4.6, 4.6])

@@ -40,8 +40,8 @@ from harness.game.quantities import Quantities
 from harness.game.roles import EGO, NON_EGO, ROLES
 from harness.game.sanity_checks import ImpossibleNumber, check_observation
 from harness.game.state import Bodies, State
-from harness.traffic.libsumo_simulation import LibsumoSimulation
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
+from harness.sumo.libsumo_simulation import LibsumoSimulation
 from tests.support.rollouts import Steady, arm, play, records
 from tests.support.scenes import build_scene
 from tests.support.tiny import CAREFUL, MERGE, SPEEDY, write_campaign

@@ -17,7 +17,7 @@ from harness.game.observation_layout import LAYOUT
 from harness.game.quantities import Quantities
 from harness.game.sight import NOTHING_HIDES, Hiding, box_cuts
 from harness.game.world import World
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 Moment = Callable[..., Quantities]
 VAN = {"length_m": 6.5, "width_m": 2.16, "speed_mps": 0.0}

@@ -20,7 +20,7 @@ from harness.game.payoff_terms import GROUPS
 from harness.game.quantities import Quantities
 from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 Moment = Callable[..., Quantities]
 LINE_M, LIMIT_MPS, HALF_M = 90.0, 13.89, 2.3

@@ -18,8 +18,8 @@ from harness.config.scene import Scene
 from harness.config.toml_reading import Document, read_document, tomllib
 from harness.drivers.policy_file import read_policy, write_policy
 from harness.errors import UsageError
-from harness.traffic.scene import open_scene
-from harness.traffic.tiles import tile_offset_m
+from harness.road.net.tiles import tile_offset_m
+from harness.road.scene.open_scene import open_scene
 from tests.hostile.inputs import CAMPAIGN_TEXT, NET, PERSONA_TEXT, ROUTES, SCENE, write_project
 from tests.support.policies import some_policy
 from tests.support.repository import REPOSITORY

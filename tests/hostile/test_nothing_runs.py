@@ -31,11 +31,11 @@ METHODS = {"read_pickle", "loads_pickle", "unsafe_load", "full_load", "run_path"
 LOADERS = {"torch.load", "PPO.load", "np.load", "numpy.load", "joblib.load", "yaml.load"}
 EXCEPTIONS = {
     # its stream is a pipe to a child that it started itself: no file, no address, nobody else's
-    "harness/traffic/subprocess_simulation.py": {"pickle"},
+    "harness/sumo/subprocess_simulation.py": {"pickle"},
     # VecNormalize saves pickles: read with the permission to run code alone (--allow-code)
     "harness/drivers/sb3_file.py": {"pickle"},
     # its stream is a pipe to a child that it started itself
-    "harness/environments/repeated_game.py": {"pickle"},
+    "harness/assessment/repeated_game.py": {"pickle"},
     # hands on what Python itself found, when Gymnasium is imported
     "harness/__init__.py": {"exec_module"},
 }

@@ -18,7 +18,7 @@ from harness.replay.floating_car_data import Lanes
 from harness.replay.gui_settings import choose_view
 from harness.replay.selection import MOST_FAILURES_PER_ARM
 from harness.replay.vehicles import types_of_vehicles
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 from tests.support.replays import (
     GAMES,
     RAILS,

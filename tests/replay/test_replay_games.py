@@ -9,14 +9,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import SeatedArm, assess
 from harness.game.arrays import FloatArray, IntArray
 from harness.replay import write_replay
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.replays import assert_plays
 from tests.support.rollouts import seated
 from tests.support.scenes import CARS, build_scene

@@ -14,7 +14,7 @@ from defusedxml import ElementTree
 from harness.drivers.sumo import SumoDriver
 from harness.replay import write_replay
 from harness.replay.scenery import programmes
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 from tests.support.replays import STEP_S, drive, straight, sumo_program
 from tests.support.repository import REPOSITORY
 from tests.support.rollouts import arm, play, trace

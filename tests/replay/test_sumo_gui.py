@@ -20,7 +20,7 @@ from harness.replay.contacts import contacts
 from harness.replay.gui_settings import choose_view
 from harness.replay.sumo_gui import find_sumo_gui, find_xvfb, virtual_screen
 from harness.replay.vehicles import types_of_vehicles
-from harness.traffic import gui
+from harness.sumo import gui
 from tests.support.pictures import blue, orange, require_gui
 from tests.support.replays import GAMES, RAILS, STEP_S, collision_game, write
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 
 from harness.export.exported_game import ExportedGame, exported_game
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.replays import drive, game, straight
 from tests.support.repository import REPOSITORY
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.assessment.rollout import Game, SeatedArm, assess
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.mixture import Mixture, mixture_of
 from harness.drivers.protocol import Driver
-from harness.environments.rollout import Game, SeatedArm, assess
 from harness.game.arrays import FloatArray, IntArray
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.tiny import CAREFUL, SPEEDY
 
 

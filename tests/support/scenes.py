@@ -14,7 +14,7 @@ import sumo
 
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import InitialState, draw_initial_state
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from tests.support.stations import nearest_station_m
 
 STRAIGHT_NODES = '<node id="a" x="0" y="0"/><node id="b" x="300" y="0"/>'

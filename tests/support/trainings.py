@@ -10,7 +10,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.mixture import Mixture
 from harness.game.roles import EGO, NON_EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from harness.training.ppo import TrainingResult, train
 from harness.training.training_games import LearningPlace, TrainingSpec
 from tests.support.tiny import CAREFUL, settings

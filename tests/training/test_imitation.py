@@ -11,7 +11,7 @@ import pytest
 from harness.config.training import Training
 from harness.drivers.policy_file import Policy
 from harness.game.roles import NON_EGO
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.training.imitation import returns_of
 from tests.support.tiny import settings
 from tests.support.trainings import beside, in_one_go, naive_ego

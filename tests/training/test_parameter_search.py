@@ -24,7 +24,7 @@ from harness.drivers.protocol import Driver
 from harness.errors import StageFailed
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.training.paired_rollouts import PairedRollouts
 from harness.training.parameter_search import SearchSpec, Trial, best, propose, read_trials, run_search, write_trials
 from tests.support.external_drivers import document, find, fmu_example

@@ -26,7 +26,7 @@ from harness.game.observation_layout import OF_OTHERS, SIZE
 from harness.game.payoff_terms import TERMS
 from harness.game.quantities import Quantities
 from harness.game.roles import EGO, NON_EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from harness.training.checkpoint import Progress
 from harness.training.ppo import TrainingResult, train
 from harness.training.training_games import TrainingSpec

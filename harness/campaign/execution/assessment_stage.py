@@ -17,13 +17,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+from harness.assessment.rollout import Game, SeatedArm, assess
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.checksums import mismatches, read_checksums, write_checksums
 from harness.campaign.storage.versions import versions_of_numbers
-from harness.environments.rollout import Game, SeatedArm, assess
 from harness.errors import StageFailed
 from harness.evaluation.competence import goals_alone
 from harness.evaluation.tables import join_csv, table_of, write_csv

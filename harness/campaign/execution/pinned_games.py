@@ -18,14 +18,13 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from harness.assessment.start_trials import StartTrials
 from harness.campaign.execution.run_players import RunPlayers, SeatedDriver, seated_arm
 from harness.campaign.plan.stages import AssessmentStage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.persona import Persona
 from harness.config.pinned_game import FORMAT, PinnedGame, PinnedPerson, PinnedStart
 from harness.drivers.policy_file import policy_files
-from harness.environments.rollout import parts_of
-from harness.environments.start_trials import StartTrials
 from harness.errors import UsageError
 from harness.evaluation.minimising import minimise
 from harness.evaluation.rule_book.cause_lines import causes_in_words
@@ -35,6 +34,7 @@ from harness.files import make_folder, write_atomically
 from harness.game.arrays import FloatArray
 from harness.game.human_factors import HumanFactors
 from harness.game.initial_state import draw_initial_state
+from harness.game.seeding import parts_of
 
 TOLERANCE_M, TOLERANCE_MPS = 0.05, 0.05
 """How close the two starts found are to each other in every position and speed."""

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from harness.assessment.rollout import SeatedArm, assess
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.stage_run import StageInputs
 from harness.campaign.plan.planned_drivers import (
@@ -38,11 +39,10 @@ from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import read_policy
 from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import SeatedArm, assess
 from harness.errors import StageFailed
 from harness.evaluation.game_theory.nash import NoEquilibrium, equilibrium_shares
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 DRIVER = "driver.toml"
 """The file of the driver that a search found, in the folder of its stage."""

@@ -14,6 +14,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from harness.assessment.conflict_replay import Chance, ConflictReplay, Takeover, collision_of
+from harness.assessment.rollout import SeatedArm, assess
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.stage_run import Made, StageInputs, StageRun
 from harness.campaign.plan.planned_drivers import SumoDriven
@@ -25,8 +27,6 @@ from harness.campaign.storage.versions import versions_of_numbers
 from harness.drivers.car import car_of
 from harness.drivers.mixture import mixture_of
 from harness.drivers.reference_drivers import REFERENCES, lane_width_of, reference_driver
-from harness.environments.conflict_replay import Chance, ConflictReplay, Takeover, collision_of
-from harness.environments.rollout import SeatedArm, assess
 from harness.evaluation.competence import broken_by
 from harness.evaluation.tables import table_of, write_csv
 from harness.evaluation.trace_file import TraceReader

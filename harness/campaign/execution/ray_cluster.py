@@ -20,7 +20,7 @@ from typing import Any
 from harness.campaign.execution.worker_pool import cores
 from harness.errors import UsageError
 
-OPTION, LOCAL, AUTO = "--ray", "local", "auto"
+LOCAL, AUTO = "local", "auto"
 _ANSWER_S = 5.0  # the time that a cluster has to accept a connection; Ray itself waits for minutes
 _OBJECTS_BYTES = 80_000_000  # the smallest object store: stages exchange files, and /dev/shm of a container is small
 _QUIET = {"include_dashboard": False, "log_to_driver": False, "logging_level": "ERROR"}

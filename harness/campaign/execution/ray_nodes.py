@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from harness.campaign.execution.ray_cluster import OPTION
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.storage.locks import is_held
 from harness.campaign.storage.run_folder import RunFolder

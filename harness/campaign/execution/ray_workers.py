@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
-from harness.campaign.execution.ray_cluster import OPTION
-from harness.campaign.execution.ray_nodes import Node, Nodes, pinned, token_file
+from harness.campaign.execution.ray_nodes import OPTION, Node, Nodes, pinned, token_file
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.execution.run_stage import carry_out
 from harness.campaign.execution.stage_events import Event, StageJob

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from harness.assessment.start_trials import StartTrials
 from harness.campaign.execution.run_players import SeatedDriver, seated_arm
 from harness.config.campaign import SUMO, resolve
 from harness.config.persona import Persona
@@ -20,11 +21,10 @@ from harness.drivers.external import ExternalDriver, find_driver
 from harness.drivers.policy import LearnedDriver
 from harness.drivers.policy_file import policy_files, read_policy
 from harness.drivers.sumo import SumoDriver
-from harness.environments.start_trials import StartTrials
 from harness.errors import Problem, UsageError, collect
 from harness.files import content_of
 from harness.game.roles import EGO
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 _MOST_BYTES = 1_000_000_000
 

@@ -12,10 +12,10 @@ import hashlib
 import json
 from pathlib import Path
 
+from harness.assessment.repeated_game import difference_when_repeated
 from harness.campaign.preflight import OpenCampaign
 from harness.campaign.storage.run_folder import RunFolder
 from harness.drivers.external import ExternalDriver
-from harness.environments.repeated_game import difference_when_repeated
 from harness.files import make_folder, write_atomically
 
 CHECKING = "playing a game twice"

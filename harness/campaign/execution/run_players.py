@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
+from harness.assessment.rollout import SeatedArm
 from harness.campaign.execution.player_factory import PlayerFactory
 from harness.campaign.execution.run_context import RunContext
 from harness.campaign.plan.plan import plan
@@ -32,13 +33,13 @@ from harness.drivers.car import car_of
 from harness.drivers.external import find_driver
 from harness.drivers.mixture import mixture_of
 from harness.drivers.protocol import Driver
-from harness.environments.rollout import SeatedArm, parts_of
 from harness.errors import UsageError
 from harness.files import content_of
 from harness.game.initial_state import draw_member
 from harness.game.roles import EGO
+from harness.game.seeding import parts_of
+from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.shipped_documents import shipped
-from harness.traffic.scene import OpenScene, open_scene
 
 _FILES = ("policy.json", "policy.safetensors")
 _MOST_BYTES = 1_000_000_000

@@ -22,7 +22,7 @@ from harness.campaign.plan.stages import (
     TrainingStage,
 )
 from harness.campaign.storage.run_folder import RunFolder
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 
 
 def carry_out(stage: Stage, run: StageRun) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from harness.campaign.plan.stages import Stage
 from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.files import write_atomically
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 OnProgress: TypeAlias = Callable[[int, int], None]
 """Called with what is done of a stage, and with its total: steps, games or trials."""

@@ -18,7 +18,7 @@ from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import FAILURES, worst_first
 from harness.export import ExportedGame, Formats, check_folder, check_formats, exported_game, write_games
 from harness.replay import replay_name
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 
 @dataclass(frozen=True, kw_only=True)

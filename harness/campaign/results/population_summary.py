@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import pandas as pd
 
 from harness.config.campaign import Campaign, Population
-from harness.environments.rollout import parts_of
 from harness.evaluation.columns import TABLES
 from harness.evaluation.people import people_in
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, ReconfiguredEgo, RetrainedEgo
@@ -15,6 +14,7 @@ from harness.evaluation.summary import summarise
 from harness.evaluation.tables import joined
 from harness.game.initial_state import draw_member
 from harness.game.roles import NON_EGO
+from harness.game.seeding import parts_of
 
 _SUMMARY_COLUMNS = [name for name in TABLES["populations"] if name not in ("arm", "population", "seed", "persona")]
 

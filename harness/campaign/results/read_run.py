@@ -18,7 +18,7 @@ from harness.config.campaign import Campaign
 from harness.errors import UsageError
 from harness.evaluation.tables import is_of_a_search, joined, read_csv
 from harness.evaluation.trace_file import check_traces
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 
 @dataclass(frozen=True, kw_only=True)

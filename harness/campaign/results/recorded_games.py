@@ -20,9 +20,9 @@ from harness.replay import choose_games
 from harness.replay.contacts import contacts
 from harness.replay.vehicles import types_of_vehicles
 from harness.reports.player_data import GameTracks, PlayerTrack, SceneDrawing, Touch, Track
-from harness.traffic import drawing
-from harness.traffic.network import read_net
-from harness.traffic.scene import OpenScene
+from harness.road.net.network import read_net
+from harness.road.scene import drawing
+from harness.road.scene.open_scene import OpenScene
 
 TAKE_TURNS = 20  # games of an arm and seed in turn, so that a page without room for all has some of each
 

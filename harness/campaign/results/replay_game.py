@@ -28,7 +28,7 @@ from harness.evaluation.trace_file import read_trace
 from harness.evaluation.worst_first import FAILURES, severities, worst_first
 from harness.replay import follow_in_sumo_gui, names_in_pictures, replay_name, write_film, write_replay
 from harness.replay.vehicles import legend
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 _OTHERS = "--page, --rows, --outcome and ARM choose others"
 FAILURE = "failure"

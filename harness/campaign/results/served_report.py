@@ -23,7 +23,7 @@ from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import game_text
 from harness.reports.manoeuvres import marks_of
 from harness.reports.page_template import served_page
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 
 HOST = "127.0.0.1"
 """Only programs of this machine reach the server."""

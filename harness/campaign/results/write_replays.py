@@ -16,7 +16,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import worst_first
 from harness.replay import choose_games, names_in_pictures, replay_name, write_replay
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 
 WRITING_REPLAYS = "writing replays"
 

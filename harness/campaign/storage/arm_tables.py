@@ -31,10 +31,10 @@ from harness.evaluation.rule_book.course import Course
 from harness.evaluation.rule_book.named_manoeuvres import find_manoeuvres
 from harness.evaluation.tables import read_csv, table_of, write_csv
 from harness.evaluation.trace_file import read_traces
-from harness.traffic.scene import OpenScene, open_scene
+from harness.road.scene.open_scene import OpenScene, open_scene
 
 PLAYED = "played.csv"
-_READ_BY = ("environments/recorded.py", "evaluation", "game", "traffic")
+_READ_BY = ("environments/recorded.py", "evaluation", "game", "road")
 
 
 @dataclass(frozen=True, kw_only=True)

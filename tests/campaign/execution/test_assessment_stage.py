@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 
 import harness.campaign.execution.assessment_stage
+from harness.assessment.rollout import SeatedArm
 from harness.campaign.execution.assessment_stage import Segment, join_segments, play_segments, segments_of
 from harness.campaign.execution.stage_run import Attempt, StageRun
 from harness.drivers.sumo import SumoDriver
-from harness.environments.rollout import SeatedArm
 from harness.errors import StageFailed
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_traces
 from harness.game.arrays import FloatArray, IntArray
-from harness.traffic.scene import OpenScene
+from harness.road.scene.open_scene import OpenScene
 from tests.support.plans import empty_context
 from tests.support.repository import REPOSITORY
 from tests.support.rollouts import Steady, arm
@@ -183,7 +183,7 @@ import resource, sys
 from itertools import repeat
 from pathlib import Path
 from harness.campaign.execution import assessment_stage as segments
-from harness.environments.rollout import Game
+from harness.assessment.rollout import Game
 from harness.campaign.execution.stage_run import StageRun
 from tests.support.plans import empty_context
 from harness.evaluation.trace_file import SCHEMA

@@ -7,7 +7,7 @@ import pytest
 from harness.campaign.plan.persona_remarks import crash_cost, persona_remarks, waiting_cost
 from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
-from harness.traffic.scene import open_scene
+from harness.road.scene.open_scene import open_scene
 from tests.support.repository import REPOSITORY
 
 

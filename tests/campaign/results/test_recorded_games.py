@@ -6,9 +6,9 @@ import pytest
 
 from harness.campaign.results.recorded_games import TAKE_TURNS, scene_drawing, tracks_of, watching_order
 from harness.evaluation.strategies import NaiveEgo, ReconfiguredEgo, RetrainedEgo, against_persona
-from harness.traffic.drawing import lane_marks
-from harness.traffic.network import read_net
-from harness.traffic.scene import open_scene
+from harness.road.net.network import read_net
+from harness.road.scene.drawing import lane_marks
+from harness.road.scene.open_scene import open_scene
 from tests.support.traces import game
 
 NAIVE, RETRAINED, RECONFIGURED = NaiveEgo(), RetrainedEgo(against="speedy"), ReconfiguredEgo(against="speedy")

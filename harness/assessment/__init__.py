@@ -1,0 +1,1 @@
+"""Judging by games: seeded rollouts, recorded courses, conflicts replayed, checks of drivers."""

@@ -1,0 +1,189 @@
+"""Assessment of one arm: its seeded games, one after the other, as records and traces.
+
+SUMO is reloaded for each game with a seed that depends on the episode only: episode k has the same initial state in
+every arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from harness.drivers.mixture import Mixture, factors_of, shares_of
+from harness.environments.arena import Arena, Step
+from harness.environments.recorded import recorded_game
+from harness.environments.seats import seats_of
+from harness.evaluation.measured_game import measured
+from harness.evaluation.recorded_game import RecordedGame
+from harness.evaluation.trace_file import SCHEMA
+from harness.game.arrays import BoolArray
+from harness.game.initial_state import InitialState, StartDistribution, draw_initial_state
+from harness.game.outcome import Outcome
+from harness.game.roles import EGO
+from harness.game.seeding import generator_of, parts_of
+from harness.road.scene.open_scene import OpenScene
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeatedArm:
+    """A pairing to assess. Each player has one of the drivers of its mixture per game; None: it does not take part.
+
+    Several people without an ego drive one at a time: in episode k, person k modulo their number (`present_in`).
+    """
+
+    name: str
+    scene: OpenScene
+    drivers: tuple[Mixture | None, ...]
+    """[P], ego first."""
+    seed: int
+
+    def present_in(self, episode: int) -> list[bool]:
+        """[P] which players take part in an episode."""
+        present = [driver is not None for driver in self.drivers]
+        if present[EGO] or sum(present) < 2:
+            return present
+        people = [player for player, there in enumerate(present) if there]
+        return [player == people[episode % len(people)] for player in range(len(present))]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Game:
+    """A played game: its log."""
+
+    played: Mapping[str, Any]
+    """Cells of the table `played`: outcomes, and the error of a game that could not be played."""
+    trace: Mapping[str, Sequence[Any]] | None
+    """Columns; None if it could not be played."""
+    scene: OpenScene
+
+    @cached_property
+    def recorded(self) -> RecordedGame | None:
+        """The game as its trace tells it."""
+        return recorded_game(pd.DataFrame(self.trace), self.scene) if self.trace is not None else None
+
+    @cached_property
+    def record(self) -> dict[str, Any]:
+        """The cells of its row of episodes.csv, computed from the trace."""
+        return {**self.played, **(measured(self.recorded) if self.recorded is not None else {})}
+
+
+def assess(
+    arm: SeatedArm,
+    episodes: int | Iterable[int],
+    on_start: Callable[[int], None] = lambda episode: None,
+    abandoned: Mapping[int, str] = MappingProxyType({}),
+    start_from: Callable[[InitialState], InitialState] = lambda drawn: drawn,
+) -> Iterator[Game]:
+    """Play episodes: numbers 0 to `episodes` - 1, or the given numbers. A game that can't be played, or that has
+    impossible numbers, is a record with outcome `error`.
+
+    `on_start` gets each episode number before that game is played. Episodes in `abandoned` are not played; their record
+    has the reason as its error. `start_from` may change the start that is drawn for a game.
+    Raises SimulationError if SUMO can't load the scene.
+    """
+    factors, shares = [factors_of(each) for each in arm.drivers], [shares_of(each) for each in arm.drivers]
+    start_distribution = arm.scene.start_distribution(factors, [1.0] * len(factors), shares)
+    arena = Arena(arm.scene, 1, [seats_of(each, paid=True) for each in arm.drivers], recorded=True)
+    try:
+        for episode in range(episodes) if isinstance(episodes, int) else episodes:
+            if episode in abandoned:
+                yield _failed(arm, episode, abandoned[episode])
+                continue
+            on_start(episode)
+            try:
+                yield _play(arena, arm, start_distribution, episode, start_from)
+            except MemoryError:
+                raise
+            except Exception as error:  # a driver may raise any exception: the other games are played
+                yield _failed(arm, episode, f"{type(error).__name__}: {error}")
+    finally:
+        arena.close()
+
+
+def _play(
+    arena: Arena,
+    arm: SeatedArm,
+    start_distribution: StartDistribution,
+    episode: int,
+    start_from: Callable[[InitialState], InitialState],
+) -> Game:
+    parts = parts_of(arm.seed, episode)
+    present = [float(each) for each in arm.present_in(episode)]
+    start = start_from(draw_initial_state(replace(start_distribution, present_share=present), *parts))
+    arena.reload(start.seed)
+    arena.reset({0: start}, {0: arm.scene.departures(generator_of(*parts, "others"))})
+    trace = _Trace(arm, arena, episode)
+    trace.add_players(arena.state.present[0])
+    trace.add_others()
+    while arena.state.running.any():
+        present = arena.state.present[0].copy()
+        trace.add_players(present, arena.step())
+        trace.add_others()
+    outcomes = zip(arena.state.outcome[0].tolist(), arm.present_in(episode), strict=True)
+    words = [Outcome(outcome).word if there else "" for outcome, there in outcomes]
+    return Game(played=_played(arm, episode, words), trace=trace.columns, scene=arm.scene)
+
+
+def _failed(arm: SeatedArm, episode: int, error: str) -> Game:
+    words = [Outcome.ERROR.word if there else "" for there in arm.present_in(episode)]
+    return Game(played=_played(arm, episode, words, error), trace=None, scene=arm.scene)
+
+
+def _played(arm: SeatedArm, episode: int, outcomes: Sequence[str], error: str = "") -> dict[str, Any]:
+    named = zip(arm.scene.world.roles, outcomes, strict=True)
+    return {"episode": episode, **{f"{role}_outcome": outcome for role, outcome in named}, "error": error}
+
+
+class _Trace:
+    """The trace of one game, as columns."""
+
+    def __init__(self, arm: SeatedArm, arena: Arena, episode: int) -> None:
+        self._arm, self._arena, self._episode = arm, arena, episode
+        self.columns: dict[str, list[Any]] = {name: [] for name in SCHEMA.names}
+        self._steers = [driver is not None and driver.takes_over for driver in arm.drivers]
+
+    def add_players(self, present: BoolArray, step: Step | None = None) -> None:
+        """A row for each player in `present` [P], with its outcome so far."""
+        state = step.quantities.state if step is not None else self._arena.state
+        for player in np.flatnonzero(present).tolist():
+            self._add(
+                player=self._arm.scene.world.roles[player],
+                vehicle_type=self._arm.scene.vehicle(player).vehicle_type,
+                **{name: float(getattr(state, name)[0, player]) for name in _MOTION},
+                lapsed=bool(state.lapsed[0, player]),
+                steers=self._steers[player],
+                payoff=float(step.payoff[0, player]) if step is not None else 0.0,
+                outcome=Outcome(int(state.outcome[0, player])).word,
+            )
+
+    def add_others(self) -> None:
+        """A row for each vehicle of the background traffic, and for each obstacle."""
+        reading = self._arena.reading
+        for slot in np.flatnonzero(reading.present[0]).tolist() if reading is not None else ():
+            assert reading is not None
+            pose = {name: float(getattr(reading, name)[0, slot]) for name in _MOTION[:4]}
+            self._add(player=reading.names[0, slot], vehicle_type=reading.types[0, slot], **pose)
+        for pose, obstacle in zip(self._arena.nearby.poses[0].tolist(), self._arm.scene.obstacles.each, strict=True):
+            place = dict(zip(_MOTION[:3], pose, strict=True))
+            self._add(player=obstacle.name, vehicle_type=obstacle.vehicle_type, **place)
+
+    def _add(self, **cells: Any) -> None:
+        state = self._arena.state
+        step = int(state.step[0])
+        row = {**_NEITHER, **cells, "episode": self._episode, "step": step}
+        row |= {"time_s": step * self._arm.scene.world.step_s, "signals": self._arena.signal_texts[0]}
+        row |= {"friction": float(state.friction[0]), "limit_share": float(state.limit_share[0])}
+        row["signal_s"] = " ".join(map(repr, state.signal_s[0].tolist())) if step == 0 else ""
+        for name, column in self.columns.items():
+            column.append(row[name])
+
+
+_MOTION = ("x_m", "y_m", "heading_rad", "speed_mps", "acceleration_mps2", "steering_rad", "station_m")
+_NEITHER = dict.fromkeys((*_MOTION, "payoff"), 0.0) | {"lapsed": False, "steers": False, "outcome": ""}
+"""Cells of a road user that is no player."""

@@ -1,0 +1,251 @@
+"""Candidates for games on a net: places where the ways of two road users cross or merge, from the net's right of way.
+
+Connections of the same two pairs of edges are one candidate, whatever their lanes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+from itertools import combinations
+
+import numpy as np
+import shapely
+from shapely.ops import substring
+from sumolib.net import Net
+from sumolib.net.connection import Connection
+from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
+from sumolib.net.node import Node
+
+from harness.game.arrays import FloatArray
+from harness.maps.net_conflicts import Priority
+from harness.road.net.network import car_lanes, lane_line
+from harness.road.net.right_of_way_table import foes_of, overlap_of, yields_to
+from harness.road.net.route_table import line_over_junction
+from harness.road.net.stream import TURNAROUNDS, Feeders, Stream
+
+_OPPOSITE = -0.7  # cosine of the angle between two approaches that come towards each other
+_STRAIGHT = 0.87  # of the angle by which a way over a junction turns
+_FORK = 3  # arms of a junction at which all ways may turn; elsewhere, two ways that turn make no scene
+_BESIDE_M = 6.0  # of a junction, in which a crossing may be
+
+
+class CandidateKind(Enum):
+    """The kinds of candidates, in the order in which they are numbered."""
+
+    TURN_ACROSS = "turn across"
+    CROSSING = "crossing"
+    ROUNDABOUT = "roundabout entry"
+    MERGE = "merge"
+    LANE_END = "lane end"
+    ZEBRA = "zebra crossing"
+    FOLLOWING = "following"
+
+
+@dataclass(frozen=True, kw_only=True)
+class LaneWay:
+    """A way of cars over a junction, between two lanes."""
+
+    start: Lane
+    end: Lane
+
+    @property
+    def edges(self) -> tuple[str, str]:
+        """The edges before and behind the junction."""
+        return self.start.getEdge().getID(), self.end.getEdge().getID()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Candidate:
+    """A place where two ways meet. The first is the ego's: the one with priority, if a vehicle has it."""
+
+    kind: CandidateKind
+    junction: str
+    first: LaneWay
+    second: LaneWay | None  # None at a zebra crossing: the second is on foot
+    priority: Priority
+    with_signals: bool
+    place: FloatArray  # [2]
+    footway: FloatArray | None = None  # [2, 2] middle line of a zebra crossing
+
+    @property
+    def order(self) -> tuple[int, str, tuple[str, ...], tuple[str, ...]]:
+        """By kind, then by name."""
+        second = self.second.edges if self.second is not None else ()
+        return list(CandidateKind).index(self.kind), self.junction, self.first.edges, second
+
+
+def candidates(net: Net) -> list[Candidate]:
+    """The places where two ways meet on a net, in the order of their numbers."""
+    feeders, rings = Feeders(net), {name for each in net.getRoundabouts() for name in each.getEdges()}
+    found: dict[tuple[object, ...], Candidate] = {}
+    for node in sorted(net.getNodes(), key=lambda node: str(node.getID())):
+        for each in _at_junction(node, feeders, rings):
+            found.setdefault(each.order, each)
+    for crossing in (edge for edge in net.getEdges(withInternal=True) if edge.getFunction() == "crossing"):
+        for each in _zebra(net, crossing):
+            found.setdefault(each.order, each)
+    for edge in net.getEdges(withInternal=False):
+        for each in _lane_ends(edge):
+            found.setdefault(each.order, each)
+    return sorted(found.values(), key=lambda each: each.order)
+
+
+def for_cars(links: Iterable[Connection]) -> list[Connection]:
+    """The connections that cars may use, without turnarounds."""
+    return [
+        link
+        for link in links
+        if link.getDirection() not in TURNAROUNDS
+        and link.getFromLane().allows("passenger")
+        and link.getToLane().allows("passenger")
+        and not link.getFrom().isSpecial()
+        and not link.getTo().isSpecial()
+    ]
+
+
+def _at_junction(node: Node, feeders: Feeders, rings: set[str]) -> Iterator[Candidate]:
+    links = for_cars(node.getConnections())
+    if len(links) < 2:
+        return
+    arms = len({link.getFrom() for link in links})
+    foes = {link: set(foes_of(link)) for link in links}
+    streams = {link: Stream(link, feeders) for link in links}
+    seen: set[tuple[object, ...]] = set()
+    for one, other in combinations(links, 2):
+        key = (one.getFrom(), one.getTo(), other.getFrom(), other.getTo(), one.getToLane() is other.getToLane())
+        if key in seen or one not in foes[other] or other not in foes[one]:
+            continue
+        kind = _kind(one, other, rings, arms)
+        overlap = overlap_of(streams[one], streams[other]) if kind is not None else None
+        if kind is None or overlap is None:
+            continue
+        seen.add(key)
+        middle = np.array(overlap.centroid.coords[0])
+        place = lane_line(one.getToLane())[0] if one.getToLane() is other.getToLane() else middle
+        yield _candidate(node, kind, one=one, other=other, place=place)
+
+
+def _kind(one: Connection, other: Connection, rings: set[str], arms: int) -> CandidateKind | None:
+    """The kind of a conflict of two connections of a junction with so many arms; None for one that makes no scene."""
+    if one.getFromLane() is other.getFromLane():
+        return None
+    if one.getFrom() is other.getFrom():
+        return CandidateKind.LANE_END if one.getToLane() is other.getToLane() else None
+    in_ring = [link.getFrom().getID() in rings for link in (one, other)]
+    if any(in_ring):
+        return None if all(in_ring) else CandidateKind.ROUNDABOUT
+    turns = [float(_out(link) @ _into(link)) < _STRAIGHT for link in (one, other)]
+    if all(turns) and arms > _FORK:
+        return None
+    if one.getToLane() is other.getToLane():
+        return CandidateKind.MERGE
+    opposite = float(_into(one) @ _into(other)) < _OPPOSITE
+    return CandidateKind.TURN_ACROSS if opposite and any(turns) else CandidateKind.CROSSING
+
+
+def _candidate(node: Node, kind: CandidateKind, *, one: Connection, other: Connection, place: FloatArray) -> Candidate:
+    one_yields, first_come = yields_to(one, other)
+    other_yields, _ = yields_to(other, one)
+    signals = bool(one.getTLSID() or other.getTLSID())
+    has_priority = (one_yields or other_yields) and not first_come
+    turning = float(_out(one) @ _into(one)) < float(_out(other) @ _into(other))
+    swapped = one_yields if has_priority else turning  # of equal ones, the straighter way is the ego's
+    first, second = (other, one) if swapped else (one, other)
+    rule = Priority.FIRST if has_priority else Priority.FIRST_TO_ARRIVE if first_come else Priority.NONE
+    ways = [LaneWay(start=link.getFromLane(), end=link.getToLane()) for link in (first, second)]
+    return Candidate(
+        kind=kind,
+        junction=node.getID(),
+        first=ways[0],
+        second=ways[1],
+        priority=rule,
+        with_signals=signals,
+        place=place,
+    )
+
+
+def _lane_ends(edge: Edge) -> Iterator[Candidate]:
+    """Lanes that end at the end of an edge beside one that goes on."""
+    lanes = car_lanes(edge)
+    onward = {lane: for_cars(lane.getOutgoing()) for lane in lanes}
+    for lane in lanes:
+        beside = [each for each in lanes if abs(each.getIndex() - lane.getIndex()) == 1 and onward[each]]
+        if onward[lane] or not beside:
+            continue
+        through = onward[beside[-1]][0]
+        first = LaneWay(start=through.getFromLane(), end=through.getToLane())
+        yield Candidate(
+            kind=CandidateKind.LANE_END,
+            junction=edge.getToNode().getID(),
+            first=first,
+            second=LaneWay(start=lane, end=through.getToLane()),
+            priority=Priority.FIRST,
+            with_signals=False,
+            place=lane_line(lane)[-1],
+        )
+
+
+def _zebra(net: Net, crossing: Edge) -> Iterator[Candidate]:
+    """The ways of cars, as straight as there are, over a crossing for people on foot that has no signals."""
+    node, line = crossing.getFromNode(), lane_line(crossing.getLane(0))
+    if "traffic_light" in node.getType() or "rail" in node.getType():
+        return
+    for edge in node.getIncoming():
+        links = for_cars(link for links in edge.getOutgoing().values() for link in links)
+        link = max(links, key=lambda link: float(_out(link) @ _into(link)), default=None)
+        if link is not None and shapely.intersects(shapely.LineString(line), _over(net, link)):
+            yield Candidate(
+                kind=CandidateKind.ZEBRA,
+                junction=node.getID(),
+                first=LaneWay(start=link.getFromLane(), end=link.getToLane()),
+                second=None,
+                priority=Priority.NONE,
+                with_signals=False,
+                place=line.mean(axis=0),
+                footway=np.stack((line[0], line[-1])),
+            )
+
+
+def _over(net: Net, link: Connection) -> shapely.LineString:
+    """The line of a connection with some metres before and behind it."""
+    before = substring(shapely.LineString(lane_line(link.getFromLane())), -_BESIDE_M, 0.0)
+    behind = substring(shapely.LineString(lane_line(link.getToLane())), 0.0, _BESIDE_M)
+    ends = [shapely.get_coordinates(each) for each in (before, behind)]
+    return shapely.LineString(np.concatenate((ends[0], line_over_junction(net, link), ends[1])))
+
+
+def following(net: Net) -> Iterator[Candidate]:
+    """The longest roads of a net, on which one player may follow the other."""
+    edges = [edge for edge in net.getEdges(withInternal=False) if car_lanes(edge)]
+    for edge in sorted(edges, key=lambda edge: (-edge.getLength(), edge.getID()))[:10]:
+        lane = car_lanes(edge)[0]
+        way = LaneWay(start=lane, end=lane)
+        line = lane_line(lane)
+        yield Candidate(
+            kind=CandidateKind.FOLLOWING,
+            junction=edge.getToNode().getID(),
+            first=way,
+            second=way,
+            priority=Priority.NONE,
+            with_signals=False,
+            place=line.mean(axis=0),
+        )
+
+
+def _into(link: Connection) -> FloatArray:
+    """[2] the unit direction in which a connection enters its junction."""
+    line = lane_line(link.getFromLane())
+    return _unit(line[-1] - line[-2])
+
+
+def _out(link: Connection) -> FloatArray:
+    """[2] the unit direction in which it leaves the junction."""
+    line = lane_line(link.getToLane())
+    return _unit(line[1] - line[0])
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    return np.asarray(vector / max(float(np.hypot(*vector)), 1e-9))

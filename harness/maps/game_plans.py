@@ -1,0 +1,287 @@
+"""Starts, speeds and goals of a game at a candidate, such that both players reach the place at about the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+from sumolib.net import Net
+
+from harness.game.arrays import FloatArray
+from harness.game.road import SPACING_M
+from harness.maps.candidates import Candidate, CandidateKind, LaneWay, candidates, following
+from harness.maps.footways import way_over
+from harness.maps.planned_routes import PlannedRoute, following_m, meeting_near, planned_route
+from harness.road.net.meeting import meeting_of_lines
+
+Range = tuple[float, float]
+
+_SHARES = (0.65, 0.95)  # of the speed limit, at the start
+_SLOWER = (1.0, 0.8, 0.65, 0.5)
+_SLOWEST_MPS = 4.0
+_SECONDS = (6.5, 5.5, 5.0, 4.5, 4.0)  # from the farthest start of the ego to the place, at its highest speed
+_START_RANGE_S = 1.5
+_APART_S = 1.5  # between the arrivals, at most
+_WALK_MPS, _WALK_APART_S = (1.0, 1.4), 2.0
+_FIRST_START_M = 6.0  # the front of a car whose body is on its route
+_BEFORE_S = 12.0  # of road before the place, at the highest speed of a start
+_NARROWEST_M = 2.5
+_NEAR_M = 25.0  # between the place of a candidate and that where the routes meet
+_BESIDE_M = 8.0
+_LEAST_FOLLOWING = 0.7
+_EXAMPLE = ", such as "
+_SPARE_S = 8.0
+_TIME_LIMITS_S = (30.0, 300.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """A player's start: one of the three keys of a scene."""
+
+    key: str  # route_m, arrival_after_ego_s, or lane with position_m or beside_ego_m
+    range: Range
+    speed_mps: Range
+    first_m: float  # the farthest start, along the route
+    lane: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class GamePlan:
+    """Routes and starts of both players of a game at a candidate."""
+
+    number: int
+    candidate: Candidate
+    ego_route: PlannedRoute
+    ego: Start
+    person: Start
+    person_route: PlannedRoute | None = None
+    way: FloatArray | None = None  # [n, 2] of a person on foot
+
+    @property
+    def way_points(self) -> list[list[float]]:
+        """The way of a person on foot, in centimetres' precision."""
+        return [] if self.way is None else [[round(float(each), 2) for each in point] for point in self.way]
+
+    @property
+    def edges(self) -> set[str]:
+        """The edges of the players' routes."""
+        return {name for route in (self.ego_route, self.person_route) if route is not None for name in route.edges}
+
+    def time_limit_s(self, reds_s: Mapping[str, float]) -> float:
+        """Time enough for both from their farthest starts, at the speed of the slowest, and for the longest red of each
+        traffic light on their ways, by its id."""
+        starts = [(self.ego_route, self.ego)]
+        starts += [(self.person_route, self.person)] if self.person_route is not None else []
+        longest_s = max(_seconds(route, start.first_m, reds_s) for route, start in starts)
+        if self.way is not None:
+            longest_s = max(longest_s, shapely.LineString(self.way).length / _WALK_MPS[0])
+        return float(np.clip(5.0 * np.ceil((longest_s + _SPARE_S) / 5.0), *_TIME_LIMITS_S))
+
+
+def _seconds(route: PlannedRoute, from_m: float, reds_s: Mapping[str, float]) -> float:
+    """Time from a station to the goal, at the lowest share of the speed limit and through red lights."""
+    way_m = len(route.line) * SPACING_M - from_m
+    return way_m / (_SHARES[0] * route.limit_mps) + sum(reds_s[name] for at_m, name in route.lights if at_m > from_m)
+
+
+class Plans:
+    """The candidates of a net of which a scene can be made, numbered from 1, and why the others are left out."""
+
+    def __init__(self, net: Net) -> None:
+        self.net = net
+        self.left_out: dict[str, int] = {}
+        self._routes: dict[tuple[LaneWay, float], PlannedRoute | None] = {}
+        self._rings = {name for each in net.getRoundabouts() for name in each.getEdges()}
+
+    @cached_property
+    def all(self) -> list[GamePlan]:
+        """A plan of each candidate. A net on which no two ways meet has the longest roads instead."""
+        found: list[GamePlan] = []
+        reasons: dict[str, str] = {}  # the first of each with its example
+        for group in (candidates, following):
+            for candidate in group(self.net) if not found else ():
+                plan = self._plan(candidate, len(found) + 1)
+                if isinstance(plan, GamePlan):
+                    found.append(plan)
+                else:
+                    reason = reasons.setdefault(plan.partition(_EXAMPLE)[0], plan)
+                    self.left_out[reason] = self.left_out.get(reason, 0) + 1
+        return found
+
+    def _plan(self, candidate: Candidate, number: int) -> GamePlan | str:
+        """The plan of a candidate, or the reason why it has none."""
+        ways = [way for way in (candidate.first, candidate.second) if way is not None]
+        if narrow := _narrow(ways):
+            return narrow
+        ego_route = self._route(candidate.first)
+        if ego_route is None:
+            return "no room for a goal behind it"
+        if candidate.second is None:
+            return self._on_foot(candidate, number, ego_route)
+        if candidate.kind is CandidateKind.FOLLOWING:
+            return _one_behind_the_other(candidate, number, ego_route)
+        route = self._route(candidate.second)
+        if route is None:
+            return "no room for a goal behind it"
+        if candidate.first.start.getEdge() is candidate.second.start.getEdge():
+            merging = self._from_the_same_edge(candidate, number, ego_route, route)
+            return merging or "too little road before it"
+        return _timed(candidate, number, ego_route=ego_route, route=route, within_m=_NEAR_M) or self._shorter(
+            candidate, number
+        )
+
+    def _route(self, way: LaneWay, before_m: float | None = None) -> PlannedRoute | None:
+        """The route over a way, with so much road before its junction that a game can start at speed."""
+        wanted_m = before_m or _BEFORE_S * _SHARES[1] * float(way.start.getSpeed())
+        key = (way, wanted_m)
+        if key not in self._routes:
+            self._routes[key] = planned_route(self.net, way, wanted_m, self._rings)
+        return self._routes[key]
+
+    def _shorter(self, candidate: Candidate, number: int) -> GamePlan | str:
+        """The plan with the routes' last metres only: longer ones may meet before the place."""
+        assert candidate.second is not None, "both are cars"
+        for before_m in (80.0, 40.0):
+            routes = [self._route(way, before_m) for way in (candidate.first, candidate.second)]
+            if routes[0] is not None and routes[1] is not None:
+                plan = _timed(candidate, number, ego_route=routes[0], route=routes[1], within_m=_NEAR_M)
+                if plan is not None:
+                    return plan
+        return "too little road before it"
+
+    def _from_the_same_edge(
+        self, candidate: Candidate, number: int, ego_route: PlannedRoute, route: PlannedRoute
+    ) -> GamePlan | None:
+        """Both on one edge, on two lanes that become one: by time if they come from different roads, else abreast."""
+        assert candidate.second is not None, "both are cars"
+        if ego_route.edges[0] != route.edges[0]:
+            length_m = candidate.first.start.getLength()
+            plan = _timed(candidate, number, ego_route=ego_route, route=route, within_m=length_m + _NEAR_M)
+            if plan is not None:
+                return plan
+        lanes, length_m = (candidate.first.start, candidate.second.start), candidate.first.start.getLength()
+        for slower in _SLOWER:
+            speed = _speeds(lanes[0].getSpeed(), slower)
+            low_m, high_m = length_m - 6.0 * speed[1], length_m - 4.0 * speed[1]
+            if low_m - _BESIDE_M >= 1.0:
+                return GamePlan(
+                    number=number,
+                    candidate=candidate,
+                    ego_route=ego_route,
+                    person_route=route,
+                    ego=Start(
+                        key="position_m",
+                        range=_rounded(low_m, high_m),
+                        speed_mps=speed,
+                        first_m=ego_route.junction_m - length_m + low_m,
+                        lane=lanes[0].getID(),
+                    ),
+                    person=Start(
+                        key="beside_ego_m",
+                        range=(-_BESIDE_M, _BESIDE_M),
+                        speed_mps=speed,
+                        first_m=route.junction_m - length_m + low_m - _BESIDE_M,
+                        lane=lanes[1].getID(),
+                    ),
+                )
+        return None
+
+    def _on_foot(self, candidate: Candidate, number: int, ego_route: PlannedRoute) -> GamePlan | str:
+        for slower, seconds in _tries():
+            speed = _speeds(ego_route.limit_mps, slower)
+            most_s = seconds * speed[1] / speed[0] + _WALK_APART_S
+            way = way_over(candidate, _WALK_MPS[1] * most_s + 2.0)
+            if way is None:
+                return "no pavement on a side of it"
+            walked = shapely.segmentize(shapely.LineString(way), SPACING_M)
+            line = _every(walked)
+            found = meeting_of_lines(ego_route.line, line)
+            if found is None:
+                continue
+            start = _ego_start(found.ego_m, speed, seconds)
+            if start.range[0] >= _FIRST_START_M and found.other_m >= _WALK_MPS[1] * most_s:
+                person = _arriving(_WALK_APART_S, _WALK_MPS, found.other_m - _WALK_MPS[1] * most_s)
+                return GamePlan(
+                    number=number, candidate=candidate, ego_route=ego_route, ego=start, person=person, way=way
+                )
+        return "too little road or pavement before it"
+
+
+def _timed(
+    candidate: Candidate, number: int, *, ego_route: PlannedRoute, route: PlannedRoute, within_m: float
+) -> GamePlan | None:
+    """The plan in which both arrive within `_APART_S` of each other; None if the routes leave no room for it."""
+    found = meeting_near(ego_route, route, candidate.place, within_m)
+    if found is None:
+        return None
+    for slower, seconds in _tries():
+        speed, other = _speeds(ego_route.limit_mps, slower), _speeds(route.limit_mps, slower)
+        start = _ego_start(found.ego_m, speed, seconds)
+        most_s = seconds * speed[1] / speed[0] + _APART_S
+        first_m = found.other_m - other[1] * most_s
+        if min(start.first_m, first_m) >= _FIRST_START_M:
+            return GamePlan(
+                number=number,
+                candidate=candidate,
+                ego_route=ego_route,
+                person_route=route,
+                ego=start,
+                person=_arriving(_APART_S, other, first_m),
+            )
+    return None
+
+
+def _one_behind_the_other(candidate: Candidate, number: int, route: PlannedRoute) -> GamePlan | str:
+    speed = _speeds(route.limit_mps, 1.0)
+    length_m, needed_m = len(route.line) * SPACING_M, _LEAST_FOLLOWING * following_m(route.limit_mps)
+    if length_m < needed_m:
+        return f"too short a road: {length_m:.0f} m of {needed_m:.0f} m"
+    return GamePlan(
+        number=number,
+        candidate=candidate,
+        ego_route=route,
+        person_route=route,
+        ego=Start(key="route_m", range=(10.0, 30.0), speed_mps=speed, first_m=10.0),
+        person=Start(key="route_m", range=(55.0, 75.0), speed_mps=speed, first_m=55.0),
+    )
+
+
+def _tries() -> Iterator[tuple[float, float]]:
+    """Factors on the speeds and seconds before the place, the best first."""
+    for slower in _SLOWER:
+        for seconds in _SECONDS:
+            yield slower, seconds
+
+
+def _ego_start(meeting_m: float, speed: Range, seconds: float) -> Start:
+    farthest, nearest = (meeting_m - speed[1] * each for each in (seconds, seconds - _START_RANGE_S))
+    return Start(key="route_m", range=_rounded(farthest, nearest), speed_mps=speed, first_m=farthest)
+
+
+def _arriving(apart_s: float, speed: Range, first_m: float) -> Start:
+    return Start(key="arrival_after_ego_s", range=(-apart_s, apart_s), speed_mps=speed, first_m=first_m)
+
+
+def _speeds(limit_mps: float, slower: float) -> Range:
+    low, high = (max(share * slower * limit_mps, _SLOWEST_MPS) for share in _SHARES)
+    return _rounded(low, max(high, low + 1.0))
+
+
+def _narrow(ways: list[LaneWay]) -> str:
+    """The reason against a way on a lane that is too narrow for a car; empty if there is none."""
+    for lane in (lane for way in ways for lane in (way.start, way.end)):
+        if lane.getWidth() < _NARROWEST_M:
+            return f"lanes narrower than {_NARROWEST_M:g} m{_EXAMPLE}{lane.getID()} of {lane.getWidth():.2f} m"
+    return ""
+
+
+def _every(line: shapely.LineString) -> FloatArray:
+    stations = np.arange(0.0, line.length + 1e-6, SPACING_M)
+    return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(line, stations)))
+
+
+def _rounded(low: float, high: float) -> Range:
+    return round(low, 1), round(high, 1)

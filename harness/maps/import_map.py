@@ -1,0 +1,150 @@
+"""Converting a map to a SUMO net with netconvert and the type maps of the installed SUMO."""
+
+from __future__ import annotations
+
+import errno
+import gzip
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import sumo
+from sumolib.net import Net
+from sumolib.net.edge import Edge
+
+from harness.errors import UsageError
+from harness.files import check_file
+from harness.maps.map_file import MOST_BYTES, MapFacts, MapKind, facts_of, kind_of
+from harness.road.net.net_file import check_net
+from harness.road.net.network import lane_line, read_net
+from harness.road.xml.sumo_program import run_program
+from harness.road.xml.xml_file import parse_xml, xml_bytes
+
+_PATIENCE_S = 900.0
+_LAYER_M = 6.0  # of height between a road and the one that it passes over
+_NO_ROAD = ("has no road that cars may use and that meets another", "export an area with junctions of roads for cars")
+_CUT = "cut out a part: netconvert -s FILE --keep-edges.in-boundary XMIN,YMIN,XMAX,YMAX -o part.net.xml"
+_OSM_TYPES = ("osmNetconvert", "osmNetconvertUrbanDe")
+_LIGHTS = ("--tls.cycle.time", "40")  # maps do not time their lights: red is short, so that games are
+_OSM_OPTIONS = (
+    *("--geometry.remove", "--ramps.guess", "--junctions.join", "--no-turnarounds", "--remove-edges.isolated"),
+    *("--tls.guess-signals", "--tls.discard-simple", "--tls.join", "--output.street-names"),
+    *("--osm.turn-lanes", "--osm.sidewalks", "--osm.crossings", "--walkingareas"),
+    *("--keep-edges.by-vclass", "passenger"),
+)
+_OPENDRIVE_OPTIONS = ("--no-turnarounds", "--geometry.max-grade.fix", "false")
+
+
+def import_map(path: Path, folder: Path, *, left_hand: bool) -> tuple[Path, Net]:
+    """The net of a map, and its file in `folder`: a net as it is, another map converted.
+
+    `left_hand`: traffic in an OpenStreetMap file keeps to the left; other maps say it themselves.
+
+    Raises UsageError for a map that can't be used.
+    """
+    kind = kind_of(path)
+    if kind is MapKind.NET:
+        return _copied(path, folder, left_hand)
+    facts = facts_of(path, kind)
+    is_left = left_hand if kind is MapKind.OSM else _is_left(path, facts, left_hand)
+    file = folder / "converted.net.xml"
+    _convert(path, kind, facts=facts, net_file=file, left_hand=is_left)
+    try:
+        check_net(file)
+    except UsageError as error:  # about a file that the user does not know
+        raise UsageError(replace(problem, file=str(path)) for problem in error.problems) from None
+    try:
+        net = read_net(file)
+    except UsageError:
+        raise UsageError.of(path, "", *_NO_ROAD) from None
+    _check_rotation(path, net, is_left)
+    return file, net
+
+
+def _copied(path: Path, folder: Path, left_hand: bool) -> tuple[Path, Net]:
+    """A net in the folder, unpacked, and its content."""
+    try:
+        check_file(path, MOST_BYTES)
+    except OSError as error:
+        if error.errno == errno.EFBIG:
+            raise UsageError.of(path, "", str(error.strerror), _CUT) from None
+    check_net(path)
+    root = parse_xml(path)
+    says_left = root.get("lefthand") in ("true", "1")
+    if left_hand and not says_left:
+        message = "is a net with right-hand traffic"
+        raise UsageError.of(path, "net.lefthand", message, "leave out --left-hand, or build it with --lefthand")
+    if not root.findall("junction/request") and len(root.findall("connection")) > 1:
+        message = "has no right of way: its junctions have no element request"
+        raise UsageError.of(path, "junction", message, "build it again with netconvert or netedit")
+    file = folder / "converted.net.xml"
+    file.write_bytes(xml_bytes(path))
+    return file, read_net(path)
+
+
+def _convert(path: Path, kind: MapKind, *, facts: MapFacts, net_file: Path, left_hand: bool) -> None:
+    source = net_file.with_name("map.xml")  # netconvert splits names at commas and blanks
+    with path.open("rb") as packed, source.open("wb") as plain:
+        shutil.copyfileobj(gzip.GzipFile(fileobj=packed) if path.suffix.lower() == ".gz" else packed, plain)
+    options = ["--xml-validation", "never", "--output-file", net_file.name, "--aggregate-warnings", "1", *_LIGHTS]
+    if kind is MapKind.OSM:
+        types = Path(sumo.SUMO_HOME) / "data" / "typemap"
+        files = ",".join(str(types / f"{name}.typ.xml") for name in _OSM_TYPES)
+        options += ["--osm-files", source.name, "--type-files", files, *_OSM_OPTIONS]
+        options += ["--osm.layer-elevation", f"{_LAYER_M:g}"] if facts.has_layers else []
+    else:
+        options += ["--opendrive-files", source.name, *_OPENDRIVE_OPTIONS]
+    options += ["--lefthand"] if left_hand else []
+    finished = run_program("netconvert", options, net_file.parent, _PATIENCE_S)
+    source.unlink()
+    if finished is None:
+        raise UsageError.of(path, "", f"netconvert takes longer than {_PATIENCE_S:g} s", "cut out a smaller part")
+    if "No edges loaded" in finished.stderr:
+        raise UsageError.of(path, "", *_NO_ROAD)
+    if finished.returncode or not net_file.is_file():
+        errors = re.findall(r"^Error: (.*)$", finished.stderr, re.MULTILINE) or ["it gives no reason"]
+        message = f"netconvert can't convert it: {errors[0].replace(source.name, path.name)}"
+        raise UsageError.of(path, "", message, "repair the map, or export it again")
+
+
+def _is_left(path: Path, facts: MapFacts, left_hand: bool) -> bool:
+    """Whether traffic of an OpenDRIVE file keeps to the left. Raises UsageError if netconvert can't keep that."""
+    if len(facts.rules) > 1:
+        message = "has roads with left-hand and roads with right-hand traffic"
+        raise UsageError.of(path, "road.rule", message, "use maps with one of them")
+    is_left = facts.rules == {"LHT"}
+    if left_hand and not is_left:
+        message = "is a map with right-hand traffic"
+        raise UsageError.of(path, "road.rule", message, 'leave out --left-hand, or give its roads rule="LHT"')
+    if is_left and facts.uneven:
+        message = "has left-hand traffic and different lanes in its two directions, which netconvert swaps"
+        raise UsageError.of(path, f"road {facts.uneven}", message, "convert the map to a .net.xml by other means")
+    return is_left
+
+
+def _check_rotation(path: Path, net: Net, left_hand: bool) -> None:
+    """Raise UsageError if traffic in most roundabouts runs the other way round than on the stated side of the road."""
+    turns = [turn for turn in map(_turn, _rings(net)) if turn]
+    if turns and (np.mean(turns) > 0.0) == left_hand and np.mean(turns):
+        sense, side = ("counter-clockwise", "right") if left_hand else ("clockwise", "left")
+        remedy = "leave out --left-hand" if left_hand else "give --left-hand"
+        message = f"its roundabouts run {sense}: traffic keeps to the {side}"
+        raise UsageError.of(path, "junction=roundabout", message, remedy)
+
+
+def _rings(net: Net) -> list[list[Edge]]:
+    return [[net.getEdge(name) for name in each.getEdges()] for each in net.getRoundabouts()]
+
+
+def _turn(ring: list[Edge]) -> float:
+    """1 for a counter-clockwise ring, -1 for a clockwise one, 0 without a turn."""
+    points = np.concatenate([lane_line(edge.getLane(0)) for edge in ring])
+    centre = points.mean(axis=0)
+    turned = [_cross(line[0] - centre, line[-1] - centre) for line in (lane_line(edge.getLane(0)) for edge in ring)]
+    return float(np.sign(sum(turned)))
+
+
+def _cross(first: np.ndarray, second: np.ndarray) -> float:
+    return float(first[0] * second[1] - first[1] * second[0])

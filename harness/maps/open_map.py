@@ -1,0 +1,74 @@
+"""A map that was read: its net, and the games that can be made on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from html import unescape
+from pathlib import Path
+
+from sumolib.net import Net
+
+from harness.errors import UsageError
+from harness.game.arrays import FloatArray
+from harness.maps.game_plans import GamePlan, Plans
+from harness.maps.import_map import import_map
+from harness.maps.lights import longest_reds_s
+from harness.road.net.net_listing import ListedJunction, ListedLane, edges_near, listed_junctions, listed_lanes
+from harness.road.net.network import car_lanes, lane_line
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenMap:
+    """A map and the games on it, numbered from 1."""
+
+    source: Path
+    net_file: Path
+    plans: Sequence[GamePlan]
+    left_out: dict[str, int]  # reason and number of conflicts of which no scene can be made
+    reds_s: dict[str, float]  # the longest red of each traffic light
+    net: Net = field(repr=False)
+
+    def near(self, edge: str | None, within_m: float) -> list[GamePlan]:
+        """The plans at junctions near an edge, or all. Raises UsageError if there is no such edge."""
+        if edge is None:
+            return list(self.plans)
+        edges = edges_near(self.net, self.source, edge, within_m)
+        junctions = {node.getID() for each in edges for node in (each.getFromNode(), each.getToNode())}
+        return [plan for plan in self.plans if plan.candidate.junction in junctions]
+
+    def place_of(self, plan: GamePlan) -> str:
+        """Where a conflict is: the names of its streets, or its junction, and its coordinates in the net."""
+        candidate = plan.candidate
+        ways = [way for way in (candidate.first, candidate.second) if way is not None]
+        # netconvert escapes names twice
+        names = [unescape(self.net.getEdge(name).getName() or "") for way in ways for name in way.edges]
+        streets = " / ".join(dict.fromkeys(name for name in names if name)) or f"junction {candidate.junction}"
+        return f"{streets} ({candidate.place[0]:.0f}, {candidate.place[1]:.0f})"
+
+    def roads(self) -> list[FloatArray]:
+        """The lines [n, 2] of the lanes for cars."""
+        return [lane_line(lane) for edge in self.net.getEdges(withInternal=False) for lane in car_lanes(edge)]
+
+    def listed(self) -> tuple[list[ListedLane], list[ListedJunction]]:
+        """Lanes and junctions, for a drawing."""
+        edges = self.net.getEdges(withInternal=False)
+        return listed_lanes(edges), listed_junctions(edges)
+
+
+def open_map(source: Path, folder: Path, *, left_hand: bool) -> OpenMap:
+    """Read a map, converted into `folder`. Raises UsageError for one on which no game can be made."""
+    net_file, net = import_map(source, folder, left_hand=left_hand)
+    plans = Plans(net)
+    if not plans.all:
+        reasons = "; ".join(f"{reason}: {count}" for reason, count in sorted(plans.left_out.items()))
+        message = "has no conflict of which a scene can be made" + (f" ({reasons})" if reasons else "")
+        raise UsageError.of(source, "", message, "choose an area with junctions and longer roads before them")
+    return OpenMap(
+        source=source,
+        net_file=net_file,
+        net=net,
+        plans=plans.all,
+        left_out=plans.left_out,
+        reds_s=longest_reds_s(net_file),
+    )

@@ -1,0 +1,143 @@
+"""Routes through a candidate: enough road before it for a start at speed, and a goal behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from sumolib.net import Net
+from sumolib.net.connection import Connection
+from sumolib.net.edge import Edge
+
+from harness.game.arrays import FloatArray
+from harness.game.road import SPACING_M
+from harness.maps.candidates import LaneWay, for_cars
+from harness.road.net.meeting import Meeting, meeting_of_lines
+from harness.road.net.route_table import route_line
+
+BEYOND_M = 45.0  # of the goal behind the junction
+_ROOM_M = 8.0  # behind a goal, at the end of the last edge
+_NEAREST_GOAL_M = 12.0
+_MOST_EDGES = 40
+_FOLLOWING_S, _AHEAD_M = 15.0, 75.0  # from the farthest start of the player ahead
+_BEND_COST, _YIELD_COST, _RING_COST = 2.0, 1.0, 3.0
+_SLOWER = 0.9
+_FREE_STATES = "MO"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedRoute:
+    """A player's route, the place of its junction, and its goal."""
+
+    edges: tuple[str, ...]
+    line: FloatArray  # [n, 2] points every `SPACING_M` up to the goal
+    junction_m: float  # station of the end of the edge before the junction
+    goal_edge: str
+    goal_position_m: float
+    limit_mps: float  # the lowest speed limit of the edges before the junction
+    lights: tuple[tuple[float, str], ...]  # up to the junction: station and id of each traffic light
+
+
+def planned_route(net: Net, way: LaneWay, before_m: float, rings: Collection[str]) -> PlannedRoute | None:
+    """A route over a way with at least `before_m` of road before its junction, if there is as much; None if there is
+    no room for a goal behind it. On the way back, straight roads with priority are preferred."""
+    edges = [way.start.getEdge()]
+    while sum(edge.getLength() for edge in edges) < before_m and len(edges) < _MOST_EDGES:
+        link = _previous(way if len(edges) == 1 else None, edges, rings)
+        if link is None:
+            break
+        edges.insert(0, link.getFrom())
+    place = len(edges) - 1
+    if way.end.getEdge() is not way.start.getEdge():
+        edges.append(way.end.getEdge())
+    beyond_m = edges[-1].getLength() if place < len(edges) - 1 else 0.0
+    while beyond_m < BEYOND_M + _ROOM_M and len(edges) < _MOST_EDGES:
+        following = _next(edges, rings)
+        if following is None:
+            break
+        edges.append(following)
+        beyond_m += following.getLength()
+    return _with_goal(net, edges, place)
+
+
+def following_m(limit_mps: float) -> float:
+    """The station of the goal on a road without a junction, where one player follows the other."""
+    return _FOLLOWING_S * limit_mps + _AHEAD_M
+
+
+def _with_goal(net: Net, edges: Sequence[Edge], place: int) -> PlannedRoute | None:
+    """The route along edges whose junction is behind the one in `place`, with its goal."""
+    try:
+        points, starts = route_line(net, edges)
+    except ValueError:
+        return None
+    line = shapely.LineString(points)
+    ends = [*starts[1::2], line.length]  # of the edges
+    has_junction = place + 1 < len(edges)
+    begin_m = starts[2 * place + 2] if has_junction else 0.0
+    before = edges[: place + 1]
+    limit_mps = min(edge.getSpeed() for edge in before)
+    goal_m = min(begin_m + BEYOND_M if has_junction else following_m(limit_mps), line.length - _ROOM_M)
+    if goal_m < begin_m + _NEAREST_GOAL_M:
+        return None
+    k = next(index for index, end_m in enumerate(ends) if goal_m <= end_m)
+    goal_m = max(goal_m, starts[2 * k] + 1.0)  # a goal is on an edge
+    share = (goal_m - starts[2 * k]) / max(ends[k] - starts[2 * k], 1e-9)
+    return PlannedRoute(
+        edges=tuple(edge.getID() for edge in edges),
+        line=_sampled(line, goal_m),
+        junction_m=ends[place],
+        goal_edge=edges[k].getID(),
+        goal_position_m=float(np.floor(10.0 * share * edges[k].getLength()) / 10.0),
+        limit_mps=limit_mps,
+        lights=tuple((ends[k], name) for k, edge in enumerate(before) for name in _lights(edge)),
+    )
+
+
+def _sampled(line: shapely.LineString, until_m: float) -> FloatArray:
+    stations = np.arange(0.0, until_m + 1e-6, SPACING_M)
+    return np.asarray(shapely.get_coordinates(shapely.line_interpolate_point(line, stations)))
+
+
+def meeting_near(ego: PlannedRoute, other: PlannedRoute, place: FloatArray, within_m: float) -> Meeting | None:
+    """Where two routes meet first; None if that is not within a distance of a place."""
+    found = meeting_of_lines(ego.line, other.line)
+    if found is None:
+        return None
+    point = ego.line[min(round(found.ego_m / SPACING_M), len(ego.line) - 1)]
+    return found if float(np.hypot(*(point - place))) <= within_m else None
+
+
+def _previous(way: LaneWay | None, edges: Sequence[Edge], rings: Collection[str]) -> Connection | None:
+    """The connection over which a route comes to its first edge: straight, with priority, not along a roundabout."""
+    first = edges[0]
+    links = for_cars(link for incoming in first.getIncoming().values() for link in incoming)
+    if way is not None and any(link.getToLane() is way.start for link in links):
+        links = [link for link in links if link.getToLane() is way.start]
+    links = [link for link in links if link.getFrom() not in edges]
+    return min(links, key=lambda link: _cost(link, link.getFrom(), rings), default=None)
+
+
+def _next(edges: Sequence[Edge], rings: Collection[str]) -> Edge | None:
+    links = [link for link in _onward(edges[-1]) if link.getTo() not in edges]
+    best = min(links, key=lambda link: _cost(link, link.getTo(), rings), default=None)
+    return best.getTo() if best is not None else None
+
+
+def _cost(link: Connection, edge: Edge, rings: Collection[str]) -> tuple[float, str]:
+    bend = {"s": 0.0, "L": 0.5, "R": 0.5}.get(link.getDirection(), 1.0)
+    must_yield = link.getState() not in _FREE_STATES or bool(link.getTLSID())
+    other = link.getTo() if edge is link.getFrom() else link.getFrom()
+    slow = edge.getSpeed() < _SLOWER * other.getSpeed()
+    cost = _BEND_COST * bend + _YIELD_COST * must_yield + 0.5 * slow + _RING_COST * (edge.getID() in rings)
+    return cost, edge.getID()
+
+
+def _lights(edge: Edge) -> list[str]:
+    return sorted({link.getTLSID() for link in _onward(edge) if link.getTLSID()})
+
+
+def _onward(edge: Edge) -> list[Connection]:
+    return for_cars(link for links in edge.getOutgoing().values() for link in links)

@@ -1,0 +1,1 @@
+"""The road of a scene: SUMO's files, its net, its traffic and its players, checked and opened."""

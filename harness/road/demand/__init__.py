@@ -1,0 +1,1 @@
+"""The road users of route files: types, routes, flows, departures and the warm-up."""

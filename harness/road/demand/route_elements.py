@@ -1,0 +1,212 @@
+"""Vehicle types, routes and their distributions in a route file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from xml.etree import ElementTree
+
+from harness.config.toml_reading import nearest
+from harness.errors import Problem, UsageError, collect
+from harness.road.demand.flows import LEAST_PERIOD_S
+from harness.road.demand.route_file import (
+    CAR_SIZE_M,
+    DEFAULT_TYPE,
+    DESIRED_SPEEDS_MPS,
+    SIZES_M,
+    Mix,
+    RouteChoice,
+    VehicleType,
+)
+from harness.road.demand.stops import Stop, StopPlace, stop_in
+from harness.road.xml.xml_file import number_in, required
+
+_MOST_EDGES = 10_000
+# the range of each number: above the first value, up to the second
+RANGES = {
+    "length": (0.0, 100.0),
+    "width": (0.0, 10.0),
+    "maxSpeed": (0.0, 200.0),
+    "desiredMaxSpeed": (0.0, 200.0),
+    "vehsPerHour": (0.0, 3600.0 / LEAST_PERIOD_S),
+    "personsPerHour": (0.0, 3600.0 / LEAST_PERIOD_S),
+    "perHour": (0.0, 3600.0 / LEAST_PERIOD_S),
+    "period": (LEAST_PERIOD_S * 0.999, 1e7),
+    "probability": (-0.001, 1.0),
+    "speedFactor": (0.0, 10.0),
+    "number": (-0.001, 1e7),
+}
+
+
+@dataclass(frozen=True)
+class Types:
+    """The vehicle types of a file, and their distributions."""
+
+    types: Mapping[str, VehicleType]
+    mixes: Mapping[str, Mix]
+
+    def names(self) -> set[str]:
+        """All names that a vehicle may give as its type."""
+        return set(self.types) | set(self.mixes)
+
+
+@dataclass(frozen=True)
+class NamedRoutes:
+    """The routes and route distributions of a file by name, each as the routes to choose from, and its bus stops."""
+
+    routes: Mapping[str, tuple[RouteChoice, ...]]
+    places: Mapping[str, StopPlace]
+
+
+def ranged(path: Path, element: ElementTree.Element, name: str, default: float) -> float:
+    """The number of an attribute in its range of `RANGES`. Raises UsageError."""
+    above, most = RANGES[name]
+    number = number_in(path, f"{element.tag} {element.get('id', '')}", element, name, above=above, most=most)
+    return default if number is None else number
+
+
+def read_types(path: Path, root: ElementTree.Element, problems: list[Problem]) -> Types:
+    """The vehicle types of a file; mistakes are added to `problems`."""
+    types = {DEFAULT_TYPE: VehicleType(name=DEFAULT_TYPE)}
+    weights: dict[str, float] = {}
+    for element in root.iter("vType"):
+        if element.get("refId") is not None:
+            continue
+        vehicle_type = collect(problems, partial(_vehicle_type, path, element))
+        if vehicle_type is not None:
+            types[vehicle_type.name] = vehicle_type
+            weights[vehicle_type.name] = collect(problems, partial(_share, path, element)) or 0.0
+    mixes = {}
+    for element in root.iter("vTypeDistribution"):
+        mix = collect(problems, partial(_mix, path, element, types, weights))
+        if mix is not None:
+            mixes[required(path, element, "id")] = mix
+    return Types({name: each for name, each in types.items() if name not in mixes}, mixes)
+
+
+def read_routes(path: Path, root: ElementTree.Element, problems: list[Problem]) -> NamedRoutes:
+    """The routes, route distributions and bus stops of a file; mistakes are added to `problems`."""
+    places = {
+        element.get("id", ""): place
+        for element in root
+        if element.tag == "busStop"
+        if (place := collect(problems, partial(_place, path, element))) is not None
+    }
+    routes: dict[str, tuple[RouteChoice, ...]] = {}
+    for element in [*root.findall("route"), *root.findall("routeDistribution/route")]:
+        if element.get("id") and element.get("edges") is not None:
+            route = collect(problems, partial(route_in, path, element, places))
+            if route is not None:
+                routes[required(path, element, "id")] = (route,)
+    for element in root.findall("routeDistribution"):
+        choices = collect(problems, partial(choices_in, path, element, NamedRoutes(routes, places)))
+        if choices is not None:
+            routes[required(path, element, "id")] = choices
+    return NamedRoutes(routes, places)
+
+
+def route_in(path: Path, element: ElementTree.Element, places: Mapping[str, StopPlace]) -> RouteChoice:
+    """The route that an element writes out. Raises UsageError."""
+    where = f"route {element.get('id')}" if element.get("id") else "route"
+    edges = tuple(element.get("edges", "").split())
+    passes = 1 + int(number_in(path, where, element, "repeat", above=-0.001, most=1e6) or 0)
+    if len(edges) * passes > _MOST_EDGES:
+        message = f"has {len(edges) * passes:,} edges, up to {_MOST_EDGES:,} are possible"
+        raise UsageError.of(path, f"{where}.repeat", message, "choose fewer repetitions")
+    stops = tuple(stop_in(path, where, each, places) for each in element.findall("stop"))
+    cycle_s = number_in(path, where, element, "cycleTime", above=0.0, most=1e6) or 0.0
+    return RouteChoice(
+        share=_share(path, element),
+        edges=edges * passes,
+        stops=tuple(_in_pass(stop, k * cycle_s) for k in range(passes) for stop in stops),
+    )
+
+
+def choices_in(path: Path, element: ElementTree.Element, named: NamedRoutes) -> tuple[RouteChoice, ...]:
+    """The routes of a route distribution. Raises UsageError."""
+    where = f"routeDistribution {element.get('id')}" if element.get("id") else "routeDistribution"
+    shares = _shares(path, where, element)
+    choices: list[RouteChoice] = []
+    for k, name in enumerate(element.get("routes", "").split()):
+        choices += _shared(_named(path, where, name, named), shares[k] if k < len(shares) else None)
+    for child in element.findall("route"):
+        if child.get("edges") is None:
+            share = _share(path, child) if child.get("probability") else None
+            choices += _shared(_named(path, where, child.get("refId", ""), named), share)
+        else:
+            choices.append(route_in(path, child, named.places))
+    choices = [each for each in choices if each.share > 0.0]
+    if not choices:
+        raise UsageError.of(path, where, "has no route with a probability above 0", "give it routes")
+    return tuple(choices)
+
+
+def _in_pass(stop: Stop, later_s: float) -> Stop:
+    return stop.later(later_s)
+
+
+def _named(path: Path, where: str, name: str, named: NamedRoutes) -> tuple[RouteChoice, ...]:
+    if name not in named.routes:
+        raise UsageError.of(path, where, f"unknown route {name!r}", nearest(name, named.routes))
+    return named.routes[name]
+
+
+def _shared(choices: tuple[RouteChoice, ...], share: float | None) -> list[RouteChoice]:
+    return [each if share is None else replace(each, share=share) for each in choices]
+
+
+def _vehicle_type(path: Path, element: ElementTree.Element) -> VehicleType:
+    vehicle_class = element.get("vClass", VehicleType.vehicle_class)
+    length_m, width_m = SIZES_M.get(element.get("vClass", ""), CAR_SIZE_M)
+    desired_mps = DESIRED_SPEEDS_MPS.get(vehicle_class, VehicleType.desired_speed_mps)
+    return VehicleType(
+        name=required(path, element, "id"),
+        length_m=ranged(path, element, "length", length_m),
+        width_m=ranged(path, element, "width", width_m),
+        max_speed_mps=ranged(path, element, "maxSpeed", VehicleType.max_speed_mps),
+        desired_speed_mps=ranged(path, element, "desiredMaxSpeed", desired_mps),
+        lane_changes=element.get("laneChangeModel", ""),
+        vehicle_class=vehicle_class,
+    )
+
+
+def _mix(
+    path: Path, element: ElementTree.Element, types: Mapping[str, VehicleType], weights: Mapping[str, float]
+) -> Mix:
+    where = f"vTypeDistribution {required(path, element, 'id')}"
+    shares = _shares(path, where, element)
+    names = element.get("vTypes", "").split()
+    members = [(name, shares[k] if k < len(shares) else weights.get(name, 1.0)) for k, name in enumerate(names)]
+    for child in element.findall("vType"):
+        reference = child.get("refId")
+        name = reference if reference is not None else required(path, child, "id")
+        members.append((name, weights.get(name, 1.0) if child.get("probability") is None else _share(path, child)))
+    for name, _ in members:
+        if name not in types:
+            raise UsageError.of(path, where, f"unknown vehicle type {name!r}", nearest(name, types))
+    members = [each for each in members if each[1] > 0.0]
+    if not members:
+        raise UsageError.of(path, where, "has no vehicle type with a probability above 0", "give it vehicle types")
+    return Mix(types=tuple(name for name, _ in members), shares=tuple(share for _, share in members))
+
+
+def _share(path: Path, element: ElementTree.Element) -> float:
+    share = number_in(path, f"{element.tag} {element.get('id', '')}", element, "probability", above=-0.001, most=1e9)
+    return 1.0 if share is None else share
+
+
+def _shares(path: Path, where: str, element: ElementTree.Element) -> list[float]:
+    one = ElementTree.Element("share")
+    shares = []
+    for text in element.get("probabilities", "").split():
+        one.set("probabilities", text)
+        shares.append(number_in(path, where, one, "probabilities", above=-0.001, most=1e9) or 0.0)
+    return shares
+
+
+def _place(path: Path, element: ElementTree.Element) -> StopPlace:
+    where = f"busStop {required(path, element, 'id')}"
+    start, end = (number_in(path, where, element, name) for name in ("startPos", "endPos"))
+    return StopPlace(lane=required(path, element, "lane"), start_m=start, end_m=end)

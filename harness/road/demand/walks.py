@@ -1,0 +1,106 @@
+"""Checks of persons' walks against the net: what SUMO 1.28 does not carry safely is found before a game.
+
+libsumo may die of a segmentation fault with persons in nets with crossings or walking areas. In nets without them SUMO
+moves a person over a junction along the connection of its lanes; without a connection, it moves the person from lane
+to lane at once, however far they are apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from sumolib.net import Net
+from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
+
+from harness.road.demand.route_file import Departure
+from harness.road.demand.route_people import PLACES
+from harness.road.net.network import lane_line
+from harness.road.xml.xml_file import number_of
+
+MOST_JUMP_M = 5.0
+"""Our own: around the corner of a block a person may be moved this far at once, on its side of the roads."""
+_SHARES = {"base": 0.0, "center": 0.5, "max": 1.0}
+_UNSAFE = ("crossing", "walkingarea")
+
+
+def unsafe_net(net: Net) -> tuple[str, str] | None:
+    """Message and remedy if persons may crash SUMO in this net."""
+    if not any(edge.getFunction() in _UNSAFE for edge in net.getEdges(withInternal=True)):
+        return None
+    return (
+        "persons are not possible in this net: libsumo 1.28 may die of a segmentation fault with persons in nets with "
+        "crossings or walking areas (SUMO's issues 17257, 15223)",
+        "rebuild the net without crossings and walking areas, or remove the persons; "
+        'a player may be on foot, with kind = "pedestrian"',
+    )
+
+
+def with_places_in_metres(person: Departure, net: Net) -> Departure:
+    """A person whose places along its first and last edge are numbers, where they are not random."""
+    ends = ((person.position, person.edges[0]), (person.arrival[1], person.edges[-1]))
+    first, last = (
+        f"{_SHARES[place] * net.getEdge(edge).getLength():.2f}" if place in _SHARES and net.hasEdge(edge) else place
+        for place, edge in ends
+    )
+    return replace(person, position=first, arrival=("", last, ""))
+
+
+def walk_problems(person: Departure, edges: Sequence[Edge]) -> Iterator[tuple[str, str]]:
+    """Message and remedy for each reason why SUMO can't move a person along edges."""
+    pavements = [lane_on_foot(edge) for edge in edges]
+    for edge, lane in zip(edges, pavements, strict=True):
+        if lane is None:
+            message = f"walks on edge {edge.getID()!r}, none of whose lanes allows pedestrians"
+            yield message, "choose other edges, or allow pedestrians on a lane"
+            return
+    lanes = [lane for lane in pavements if lane is not None]
+    courses = [course for course in (_course(edges, True), _course(edges, False)) if course is not None]
+    if not courses:
+        yield "consecutive edges of its walk do not meet", "correct the walk's edges"
+        return
+    jumps = [jump for course in courses for jump in _jumps(lanes, course)]
+    longest_m, k = max(jumps, default=(0.0, 0))
+    if longest_m > MOST_JUMP_M:
+        first, second = edges[k].getID(), edges[k + 1].getID()
+        message = (
+            f"SUMO moves it {longest_m:.1f} m at once, from edge {first!r} to {second!r}: no connection leads there"
+        )
+        yield message, "end the walk before, or connect the lanes for pedestrians"
+    for name, place, edge in (("departPos", person.position, edges[0]), ("arrivalPos", person.arrival[1], edges[-1])):
+        if place not in PLACES and abs(number_of(place)) > edge.getLength():
+            yield f"its {name} {place} lies beyond the edge's end", f"give up to {edge.getLength():g} m"
+
+
+def lane_on_foot(edge: Edge) -> Lane | None:
+    """The lane of an edge on which SUMO's persons walk; None if none allows them."""
+    return next((lane for lane in edge.getLanes() if lane.allows("pedestrian")), None)
+
+
+def _course(edges: Sequence[Edge], forwards: bool) -> list[bool] | None:
+    """Whether a walk goes along each edge in its direction; None if it can't begin with this direction."""
+    course = [forwards]
+    for edge, following in pairwise(edges):
+        at = edge.getToNode() if course[-1] else edge.getFromNode()
+        if at not in (following.getFromNode(), following.getToNode()):
+            return None
+        course.append(at is following.getFromNode())
+    return course
+
+
+def _jumps(lanes: Sequence[Lane], course: Sequence[bool]) -> Iterator[tuple[float, int]]:
+    """For each two consecutive lanes without a connection: how far SUMO moves a person at once, and the index of the
+    first."""
+    for k, (lane, following) in enumerate(pairwise(lanes)):
+        ahead, ahead_then = course[k], course[k + 1]
+        if ahead == ahead_then and _is_connected(*((lane, following) if ahead else (following, lane))):
+            continue
+        leaves, enters = lane_line(lane)[-1 if ahead else 0], lane_line(following)[0 if ahead_then else -1]
+        yield float(np.hypot(*(enters - leaves))), k
+
+
+def _is_connected(lane: Lane, following: Lane) -> bool:
+    return any(link.getToLane() is following for link in lane.getOutgoing())

@@ -1,0 +1,241 @@
+"""The warm-up: background traffic that is on the road when a game begins.
+
+SUMO runs the background traffic alone for the time of the warm-up, several times with different seeds, in separate
+processes. The vehicles at the end of each run are a snapshot. A game draws one of them and puts its vehicles on the
+road at once, each with its lane, place, speed, speed factor, remaining route and remaining stops. Vehicles that wait to
+depart, and parked ones, are left out. A person enters the traffic in the first step of the game, on its edge, with the
+rest of its walk. The snapshots are the same in training and in assessment, and are cached.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.metadata
+import json
+import logging
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import platformdirs
+
+from harness.config.scene import Scene
+from harness.errors import SimulationError, UsageError
+from harness.files import write_atomically
+from harness.game.arrays import FloatArray
+from harness.game.initial_state import InitialState
+from harness.game.seeding import between, generator_of, seed_of
+from harness.road.demand.route_file import Departure, Motion, RouteFile
+from harness.road.demand.route_writing import traveller_element
+from harness.road.demand.stops import Stop
+from harness.road.xml.angles import heading_rad_of
+from harness.road.xml.sumo_program import run_program
+from harness.road.xml.xml_file import parse_xml
+
+SNAPSHOTS = 20
+CLEAR_M, CLEAR_S, CLEAR_AROUND_M = 10.0, 2.0, 2.0
+"""Room at a player's start: no vehicle on its lane nearer than the first or than the way that the one behind drives in
+the second, and none nearer than the third anywhere."""
+LANE_CHANGE_S = 2.0
+"""Duration of a lane change of background traffic."""
+_LANE_M = 3.0
+_ENDING = ".warm"  # of a vehicle's name: a flow numbers its later vehicles anew
+_PATIENCE_S = 300.0
+_LOGGER = logging.getLogger("harness.preparation")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Snapshot:
+    """The background traffic at the end of a warm-up, and the density that it had."""
+
+    density: float
+    vehicles: tuple[Departure, ...]
+
+
+def snapshots(document: Scene, routes: RouteFile, net_file: Path) -> tuple[Snapshot, ...]:
+    """The snapshots of a scene, from the cache if it has them. Raises SimulationError if SUMO fails."""
+    players = set(document.vehicles)
+    drawn = [_drawn(document, routes, players, k) for k in range(SNAPSHOTS)]
+    version = importlib.metadata.version("eclipse-sumo")
+    options = _options(document)
+    key = net_file.read_bytes() + repr((version, options, routes.types_xml, drawn)).encode()
+    cache = Path(platformdirs.user_cache_dir("harness")) / "warm-up" / f"{hashlib.sha256(key).hexdigest()[:24]}.json"
+    if cache.exists():
+        return tuple(map(_from_json, json.loads(cache.read_text(encoding="utf-8"))))
+    done: list[Snapshot] = []
+    with ThreadPoolExecutor(os.cpu_count() or 1) as threads:
+        for density, vehicles in zip(
+            (density for density, _ in drawn),
+            threads.map(
+                lambda k: _run(drawn[k][1], k, routes=routes, net_file=net_file.resolve(), options=options),
+                range(SNAPSHOTS),
+            ),
+            strict=True,
+        ):
+            done.append(Snapshot(density=density, vehicles=tuple(vehicles)))
+            extra = {"done": len(done), "total": SNAPSHOTS}
+            _LOGGER.info("warming up the background traffic, once per scene", extra=extra)
+    cache.parent.mkdir(parents=True, exist_ok=True)
+    write_atomically(cache, json.dumps([asdict(each) for each in done]).encode())
+    return tuple(done)
+
+
+def clear_of_players(departures: Sequence[Departure], start: InitialState, length_m: FloatArray) -> list[Departure]:
+    """The departures without vehicles of the warm-up that are too near to a player's start (`CLEAR_M` and the others).
+
+    `length_m` [P] are the players' lengths. Players that take no part count too: arms have the same traffic.
+    """
+    return [each for each in departures if each.motion is None or not _is_near(each.motion, start, length_m)]
+
+
+def _is_near(motion: Motion, start: InitialState, length_m: FloatArray) -> bool:
+    dx = motion.x_m - 0.5 * motion.length_m * np.cos(motion.heading_rad) - start.x_m
+    dy = motion.y_m - 0.5 * motion.length_m * np.sin(motion.heading_rad) - start.y_m
+    cos, sin = np.cos(start.heading_rad), np.sin(start.heading_rad)
+    ahead, beside = dx * cos + dy * sin, np.abs(dy * cos - dx * sin)
+    bodies = 0.5 * (motion.length_m + length_m)
+    behind_mps = np.where(ahead > 0.0, start.speed_mps, motion.speed_mps)
+    on_lane = (beside < _LANE_M) & (np.abs(ahead) - bodies < np.maximum(CLEAR_M, CLEAR_S * behind_mps))
+    return bool((on_lane | (np.hypot(dx, dy) - bodies < CLEAR_AROUND_M)).any())
+
+
+def _drawn(document: Scene, routes: RouteFile, players: set[str], k: int) -> tuple[float, list[Departure]]:
+    """The density of a snapshot and the departures of its warm-up."""
+    generator = generator_of("warm-up", k)
+    varied = document.varies.traffic_density
+    density = 1.0 if varied is None else between(varied, generator.random())
+    begin_s = document.traffic_begin_s
+    return density, routes.departures(
+        players, begin_s + document.warm_up_s, generator, begin_s=begin_s, density=density
+    )
+
+
+def _options(document: Scene) -> tuple[str, ...]:
+    step_s = document.step_length_s
+    end_s = round(document.warm_up_s / step_s) * step_s
+    return (
+        *("--step-length", str(step_s), "--collision.action", "none", "--time-to-teleport", "-1"),
+        *("--lanechange.duration", str(LANE_CHANGE_S), "--end", f"{end_s + step_s:.3f}"),
+        *("--save-state.times", f"{end_s:.3f}", "--save-state.files", "state.xml", "--save-state.precision", "6"),
+        *("--fcd-output", "motion.xml", "--device.fcd.begin", f"{end_s - step_s:.3f}", "--precision", "6"),
+        *("--no-step-log", "--no-warnings", "--xml-validation", "never"),
+    )
+
+
+def _run(
+    departures: Sequence[Departure], k: int, *, routes: RouteFile, net_file: Path, options: Sequence[str]
+) -> list[Departure]:
+    """The vehicles on the road at the end of a warm-up with these departures."""
+    if not departures:
+        return []
+    with tempfile.TemporaryDirectory(prefix="harness-warm-up-") as name:
+        folder = Path(name)
+        (folder / "types.rou.xml").write_text(routes.types_xml, encoding="utf-8")
+        root = ElementTree.Element("routes")
+        root.extend(traveller_element(each, each.name, each.depart_s) for each in departures)
+        ElementTree.ElementTree(root).write(folder / "vehicles.rou.xml", encoding="utf-8", xml_declaration=True)
+        files = ("--net-file", str(net_file), "--route-files", "types.rou.xml,vehicles.rou.xml")
+        _run_sumo([*files, *options, "--seed", str(seed_of("warm-up", k) % 2**31)], folder)
+        try:
+            return _vehicles(folder, {each.name: each for each in departures}, routes, options)
+        except (UsageError, KeyError, ValueError, IndexError) as error:
+            raise SimulationError(f"SUMO's state after the warm-up could not be read: {error!r}") from error
+
+
+def _run_sumo(options: Sequence[str], folder: Path) -> None:
+    run = run_program("sumo", options, folder, _PATIENCE_S)
+    if run is None:
+        raise SimulationError(f"SUMO did not finish the warm-up within {_PATIENCE_S:.0f} s")
+    if run.returncode:
+        raise SimulationError(f"SUMO failed in the warm-up: {run.stderr.strip()[-300:]}")
+
+
+def _vehicles(
+    folder: Path, departures: Mapping[str, Departure], routes: RouteFile, options: Sequence[str]
+) -> list[Departure]:
+    steps = parse_xml(folder / "motion.xml").findall("timestep")
+    end_s = float(options[options.index("--save-state.times") + 1])
+    first_s = float(options[options.index("--device.fcd.begin") + 1])
+    seen = [each for step in steps if abs(float(step.get("time", "nan")) - first_s) < 1e-6 for each in step]
+    moving = {each.get("id", ""): each for each in seen if each.tag == "vehicle"}
+    walking = [(each, departures[each.get("id", "")]) for each in seen if each.tag == "person"]
+    people = [
+        _person(each, person, routes) for each, person in walking if person.edges.count(each.get("edge", "")) == 1
+    ]
+    return people + [
+        _vehicle(state, moving[state.get("id", "")], departures[state.get("id", "")], routes=routes, end_s=end_s)
+        for state in parse_xml(folder / "state.xml").findall("vehicle")
+        if state.get("id") in moving and not _is_parked(state)
+    ]
+
+
+def _is_parked(state: ElementTree.Element) -> bool:
+    stop = state.find("stop")
+    return stop is not None and stop.get("started") is not None and stop.get("parking") is not None
+
+
+def _vehicle(
+    state: ElementTree.Element, moving: ElementTree.Element, departure: Departure, *, routes: RouteFile, end_s: float
+) -> Departure:
+    """The departure of a vehicle at the beginning of a game, from SUMO's state and its motion."""
+    lane, passed = moving.attrib["lane"], int(state.attrib["state"].split()[2])
+    edges = departure.edges[passed:]
+    if not lane.startswith(":") and lane.rpartition("_")[0] != edges[0]:
+        raise ValueError(f"vehicle {departure.name} is on lane {lane}, not on edge {edges[0]}")
+    waiting = state.findall("stop")
+    stops = tuple(stop.later(-end_s) for stop in departure.stops[len(departure.stops) - len(waiting) :])
+    if stops and waiting[0].get("started") is not None:
+        stops = (replace(stops[0], duration_s=float(waiting[0].get("duration", "0"))), *stops[1:])
+    return replace(
+        departure,
+        name=departure.name + _ENDING,
+        edges=edges,
+        depart_s=0.0,
+        lane=lane,
+        position=moving.attrib["pos"],
+        speed="0",
+        speed_factor=float(state.attrib["speedFactor"]),
+        lateral="",
+        stops=stops,
+        motion=_motion(moving, departure, routes),
+    )
+
+
+def _person(moving: ElementTree.Element, departure: Departure, routes: RouteFile) -> Departure:
+    """The departure of a person at the beginning of a game, from its motion on an edge that it walks along once."""
+    return replace(
+        departure,
+        name=departure.name + _ENDING,
+        edges=departure.edges[departure.edges.index(moving.attrib["edge"]) :],
+        depart_s=0.0,
+        position=moving.attrib["pos"],
+        motion=_motion(moving, departure, routes),
+    )
+
+
+def _motion(moving: ElementTree.Element, departure: Departure, routes: RouteFile) -> Motion:
+    kind = routes.types[departure.vehicle_type]
+    return Motion(
+        x_m=float(moving.attrib["x"]),
+        y_m=float(moving.attrib["y"]),
+        heading_rad=float(heading_rad_of(float(moving.attrib["angle"]))),
+        speed_mps=float(moving.attrib["speed"]),
+        length_m=kind.length_m,
+        width_m=kind.width_m,
+    )
+
+
+def _from_json(content: Mapping[str, Any]) -> Snapshot:
+    return Snapshot(density=content["density"], vehicles=tuple(map(_departure_from_json, content["vehicles"])))
+
+
+def _departure_from_json(content: Mapping[str, Any]) -> Departure:
+    several = {name: tuple(content[name]) for name in ("edges", "arrival", "trip")}
+    stops = tuple(Stop(**stop) for stop in content["stops"])
+    return Departure(**{**content, **several, "stops": stops, "choices": (), "motion": Motion(**content["motion"])})

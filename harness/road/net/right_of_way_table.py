@@ -1,0 +1,223 @@
+"""Conflicts and control at the junctions on the players' routes, from the net: foes, right of way, stop lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+from sumolib.net import Net
+from sumolib.net.connection import Connection
+from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
+
+from harness.game.arrays import FloatArray
+from harness.game.junctions import Conflicts, Control, RightOfWay, StopLines, Streams
+from harness.road.net.network import car_lanes, lane_line
+from harness.road.net.own_lanes import LanesOf
+from harness.road.net.route_table import JunctionOnRoute, junctions_on_route
+from harness.road.net.stream import Feeders, Stream, carries_traffic, samples_of
+
+_MERGING_M = 10.0  # length of the zone of a stream that joins the route
+_LEAST_AREA_M2 = 0.5
+_STEP_M = 0.5
+_ALIKE = float(np.cos(np.pi / 4.0))
+_STRAIGHT = float(np.cos(np.pi / 6.0))
+_CONTROL = {"m": Control.GIVE_WAY, "=": Control.GIVE_WAY, "s": Control.STOP, "w": Control.ALL_WAY_STOP}
+_MAJOR = "MO"  # states of links with the right of way
+
+
+def right_of_way(net: Net, routes: Sequence[Sequence[Edge]], lanes_of: Sequence[LanesOf] | None = None) -> RightOfWay:
+    """Conflicts and stop lines of players with routes along connected edges, in the order of the players. The route of
+    a player on foot has no edges. `lanes_of` are the lanes that each player may use; None: those of cars."""
+    users = lanes_of or [car_lanes] * len(routes)
+    return _Builder(net).build([junctions_on_route(net, *each) for each in zip(routes, users, strict=True)])
+
+
+def control_of(link: Connection) -> Control:
+    """What controls the entry into a junction by a link."""
+    return Control.SIGNAL if link.getTLSID() else _CONTROL.get(link.getState(), Control.NONE)
+
+
+class _OwnLink(NamedTuple):
+    """A link of a junction on a player's route, and the range of lateral offsets in which a car is on its lane."""
+
+    link: Connection
+    right_m: float
+    left_m: float
+
+
+class _Builder:
+    def __init__(self, net: Net) -> None:
+        self._feeders = Feeders(net)
+        self._streams: dict[Connection, Stream] = {}
+        self._numbers: dict[Connection, int] = {}  # of the streams with conflicts
+        self._columns: dict[tuple[str, int], int] = {}  # of the table of signals
+
+    def build(self, junctions: Sequence[Sequence[JunctionOnRoute]]) -> RightOfWay:
+        lines = [
+            (player, junction.begin_m, control_of(junction.link), self._column(junction.link))
+            for player, on_route in enumerate(junctions)
+            for junction in on_route
+        ]
+        rows = [
+            row
+            for player, on_route in enumerate(junctions)
+            for junction in on_route
+            for row in self._conflicts(player, junction)
+        ]
+        conflicts = Conflicts.of(rows)
+        samples = samples_of([self._stream(link) for link in self._numbers])
+        return RightOfWay(
+            conflicts=conflicts,
+            streams=Streams.of(*samples, conflicts, players=len(junctions)),
+            stop_lines=StopLines.of(lines),
+            signal_links=tuple(self._columns),
+            stream_lanes=tuple((link.getFromLane().getID(), link.getToLane().getID()) for link in self._numbers),
+        )
+
+    def _stream(self, link: Connection) -> Stream:
+        return self._streams.setdefault(link, Stream(link, self._feeders))
+
+    def _column(self, link: Connection) -> int:
+        """The column of a link in the table of signals; -1 if it has no signal."""
+        if not link.getTLSID():
+            return -1
+        return self._columns.setdefault((link.getTLSID(), link.getTLLinkIndex()), len(self._columns))
+
+    def _conflicts(self, player: int, junction: JunctionOnRoute) -> Iterator[dict[str, Any]]:
+        """The rows of `Conflicts` of a junction on a player's route."""
+        for own in _own_links(junction):
+            for foe in foes_of(own.link):
+                zone = self._zone(junction, own.link, foe)
+                if zone is not None:
+                    yields, first_come = yields_to(own.link, foe)
+                    yield {
+                        "player": player,
+                        "stream": self._numbers.setdefault(foe, len(self._numbers)),
+                        "yields": yields,
+                        "first_come": first_come,
+                        "stop_m": junction.begin_m,
+                        "wait_m": junction.begin_m + self._wait_m(own.link, zone["begin_m"] - junction.begin_m),
+                        "right_m": own.right_m,
+                        "left_m": own.left_m,
+                        "own_link": self._column(own.link),
+                        "other_link": self._column(foe),
+                        "across": zone["crossing"] and self._turns_across(own.link, foe),
+                        **zone,
+                    }
+
+    def _wait_m(self, own: Connection, zone_m: float) -> float:
+        """Where a car on a link waits for the traffic of a zone, both in metres behind the stop line."""
+        inside_m = self._stream(own).inner_wait_m
+        return inside_m if inside_m < zone_m else 0.0
+
+    def _turns_across(self, own: Connection, foe: Connection) -> bool:
+        """Whether a link turns, and a foe comes from the opposite direction."""
+        way, stream = self._stream(own), self._stream(foe)
+        begin_rad = _heading_rad(way.onward, 0.0)
+        turned = np.cos(_heading_rad(way.onward, way.length_m) - begin_rad) < _STRAIGHT
+        return bool(turned and np.cos(_heading_rad(stream.onward, 0.0) - begin_rad) < -_ALIKE)
+
+    def _zone(self, junction: JunctionOnRoute, own: Connection, foe: Connection) -> dict[str, float | bool] | None:
+        """Where the lanes of two links overlap, in the columns of `Conflicts`; None if they do not."""
+        way, stream = self._stream(own), self._stream(foe)
+        joins, overlap = own.getToLane() is foe.getToLane(), overlap_of(way, stream)
+        if overlap is None:
+            return None
+        begin_m, end_m = _extent(self._stream(junction.link).onward, overlap)
+        zone_m, zone_end_m = _extent(stream.onward, overlap)
+        from_m, until_m = _apart(stream, way, zone_m)
+        return {
+            "crossing": not joins,
+            "begin_m": junction.begin_m + begin_m,
+            "end_m": junction.begin_m + (begin_m + _MERGING_M if joins else end_m),
+            "zone_m": zone_m,
+            "length_m": _MERGING_M if joins else zone_end_m - zone_m,
+            "from_m": from_m,
+            "until_m": until_m,
+        }
+
+
+def overlap_of(way: Stream, other: Stream) -> BaseGeometry | None:
+    """The area that cars on both ways need; None if it is negligible. Ways to the same lane share its beginning too."""
+    joins = way.link.getToLane() is other.link.getToLane()
+    overlap = way.swept(joins).intersection(other.swept(joins))
+    return None if overlap.area < _LEAST_AREA_M2 else overlap
+
+
+def _heading_rad(line: shapely.LineString, place_m: float) -> float:
+    return float(_points_and_headings(line, np.array([place_m]))[1][0])
+
+
+def _own_links(junction: JunctionOnRoute) -> list[_OwnLink]:
+    """The links of a junction on a route, each with the bounds of its lane: halfway to the next lane of the route."""
+    end = lane_line(junction.link.getFromLane())[-2:]
+    along = (end[1] - end[0]) / max(float(np.linalg.norm(end[1] - end[0])), 1e-9)
+    left = np.array([-along[1], along[0]])
+    lanes: dict[Lane, float] = {
+        link.getFromLane(): float((lane_line(link.getFromLane())[-1] - end[1]) @ left) for link in junction.links
+    }
+    offsets = sorted(lanes.values())
+    bounds = [-np.inf, *((a + b) / 2.0 for a, b in pairwise(offsets)), np.inf]
+    places = [offsets.index(lanes[link.getFromLane()]) for link in junction.links]
+    return [_OwnLink(link, bounds[k], bounds[k + 1]) for link, k in zip(junction.links, places, strict=True)]
+
+
+def foes_of(own: Connection) -> list[Connection]:
+    """The links of the junction whose traffic may be in conflict with that of a link."""
+    node = own.getJunction()
+    links = [link for link in node.getConnections() if carries_traffic(link) and link is not own]
+    try:
+        index = node.getLinkIndex(own)
+        return [link for link in links if node.areFoes(index, node.getLinkIndex(link))]
+    except (KeyError, IndexError):  # the net has no rules for the junction
+        return [link for link in links if link.getFromLane() is not own.getFromLane()]
+
+
+def yields_to(own: Connection, foe: Connection) -> tuple[bool, bool]:
+    """Whether a link must yield to a foe while no signal says otherwise, and whether the first to come has priority.
+
+    With signals, SUMO lets major links regard vehicles that wait inside the junction: that is no duty to yield.
+    """
+    node = own.getJunction()
+    try:
+        own_yields, foe_yields = node.forbids(foe, own), node.forbids(own, foe)
+    except (KeyError, IndexError):
+        return False, False
+    if not (own_yields and foe_yields):
+        return own_yields, False
+    own_major, foe_major = own.getState() in _MAJOR, foe.getState() in _MAJOR
+    return (True, True) if own_major == foe_major else (foe_major, False)
+
+
+def _extent(line: shapely.LineString, overlap: BaseGeometry) -> tuple[float, float]:
+    """The first and the last position along a line of the points of an area."""
+    places = shapely.line_locate_point(line, shapely.points(shapely.get_coordinates(overlap)))
+    return float(places.min()), float(places.max())
+
+
+def _apart(stream: Stream, way: Stream, zone_m: float) -> tuple[float, float]:
+    """The part of a stream around its zone on which it is not on the player's own way: positions along the stream."""
+    line, begin_m = stream.nearby
+    other, _ = way.nearby
+    places = np.arange(0.0, line.length, _STEP_M)
+    points, headings = _points_and_headings(line, places)
+    nearest = shapely.line_locate_point(other, shapely.points(points))
+    on_way, headings_on_way = _points_and_headings(other, nearest)
+    near = np.hypot(*(points - on_way).T) < 0.5 * stream.width_m
+    shared = places[near & (np.cos(headings - headings_on_way) > _ALIKE)] + begin_m
+    before, after = shared[shared < zone_m], shared[shared >= zone_m]
+    return before.max(initial=-np.inf), after.min(initial=np.inf)
+
+
+def _points_and_headings(line: shapely.LineString, places: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points [N, 2] and headings [N] of a line at places [N] along it."""
+    low = np.clip(places - _STEP_M, 0.0, line.length)
+    high = np.clip(places + _STEP_M, 0.0, line.length)
+    first, last = (shapely.get_coordinates(shapely.line_interpolate_point(line, each)) for each in (low, high))
+    points = shapely.get_coordinates(shapely.line_interpolate_point(line, places))
+    return points, np.arctan2(*(last - first).T[::-1])

@@ -1,0 +1,297 @@
+"""The game's table of a SUMO route: its line, and the lanes and edges of the road at every station.
+
+The line follows the lanes that lead to the route's end. If a route has to change lanes on an edge, its line moves over
+gradually. If a net has no lanes inside a junction, a curve replaces them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+from sumolib.net import Net
+from sumolib.net.connection import Connection
+from sumolib.net.edge import Edge
+from sumolib.net.lane import Lane
+
+from harness.game.arrays import FloatArray
+from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.road.net.network import car_lanes, lane_line
+from harness.road.net.own_lanes import LanesOf, own_side
+from harness.road.net.surface import curve_between
+
+_FAR_SIDE_M = 50.0
+_ON_POINT_M = 0.1
+_FEW_POINTS, _AT_ONCE = 400, 100  # of an area that is cut as a whole; stations otherwise
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Piece:
+    """A section of a route's line: over one of its edges, or over the junction after it."""
+
+    line: FloatArray  # [n, 2]
+    lanes: list[tuple[FloatArray, Lane]]  # lines [m, 2] side by side, with the lane that each belongs to
+    edge: int  # index of the route's edge with these lanes
+    speed_mps: float
+    is_junction: bool = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class JunctionOnRoute:
+    """The junction between two edges of a route."""
+
+    link: Connection  # that the route's line follows
+    links: list[Connection]  # all that cars may take from the one edge to the other
+    begin_m: float  # stations of the route's line
+    end_m: float
+
+
+def junctions_on_route(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -> list[JunctionOnRoute]:
+    """The junctions of a route along connected edges, in order, with the stations of its table. `lanes_of` are the
+    lanes that the player may use."""
+    if len(edges) < 2:
+        return []
+    starts = _join([piece.line for piece in _pieces(net, edges, lanes_of)])[1].tolist()
+    return [
+        JunctionOnRoute(
+            link=link,
+            links=_links_between(edges[k], edges[k + 1], lanes_of),
+            begin_m=starts[2 * k + 1],
+            end_m=starts[2 * k + 2],
+        )
+        for k, link in enumerate(_links(edges, lanes_of))
+    ]
+
+
+def route_line(net: Net, edges: Sequence[Edge], lanes_of: LanesOf = car_lanes) -> tuple[FloatArray, list[float]]:
+    """[n, 2] the line of a route's table, and the stations of the starts of its edges and of the junctions between.
+
+    Raises ValueError if consecutive edges are not connected.
+    """
+    points, starts = _join([piece.line for piece in _pieces(net, edges, lanes_of)])
+    return points, starts.tolist()
+
+
+def line_over_junction(net: Net, link: Connection) -> FloatArray:
+    """[n, 2] line of a link over its junction."""
+    return _over_junction(net, link)[0]
+
+
+def route_table(
+    net: Net,
+    area: BaseGeometry,
+    edges: Sequence[Edge],
+    *,
+    goal: Edge,
+    goal_position_m: float,
+    lanes_of: LanesOf = car_lanes,
+) -> Route:
+    """The table of a route along connected edges; `area` is the net's drivable area, `lanes_of` are the lanes that the
+    player may use.
+
+    Raises ValueError if consecutive edges are not connected or the goal's edge is not on the route.
+    """
+    if goal not in edges:
+        raise ValueError(f"does not pass the goal's edge {goal.getID()!r}")
+    pieces = _pieces(net, edges, lanes_of)
+    points, starts = _join([piece.line for piece in pieces])
+    line = shapely.LineString(points)
+    stations = np.arange(-MARGIN_M, line.length + MARGIN_M + SPACING_M, SPACING_M)
+    points, headings = sampled(line, stations)
+    piece_at = np.clip(np.searchsorted(starts, stations, side="right") - 1, 0, len(pieces) - 1)
+
+    ends = _lane_ends(edges, lanes_of, [starts[2 * k] + _length(pieces[2 * k].line) for k in range(len(edges))])
+    most = max(len(piece.lanes) for piece in pieces)
+    offsets = np.full((len(stations), most), np.nan)
+    lane_ends = np.full((len(stations), most), np.inf)
+    for k, piece in enumerate(pieces):
+        rows = np.flatnonzero(piece_at == k)
+        for column, (lane_points, lane) in enumerate(piece.lanes):
+            offsets[rows, column] = _offsets(points[rows], headings[rows], lane_points)
+            lane_ends[rows, column] = ends[piece.edge][lane.getID()]
+    left, right = road_edges(area, points, headings)
+    widths = np.array([max((lane.getWidth() for _, lane in piece.lanes), default=0.0) for piece in pieces])[piece_at]
+    on_edge = ~np.array([piece.is_junction for piece in pieces])[piece_at]
+    own_left, own_right = own_side(net, points, headings, offsets_m=offsets, width_m=widths, on_edge=on_edge)
+    inside = (stations >= 0.0) & (stations <= line.length)
+    row = 2 * list(edges).index(goal)
+    return Route(
+        x_m=points[:, 0],
+        y_m=points[:, 1],
+        heading_rad=headings,
+        left_edge_m=extended(left, inside),
+        right_edge_m=extended(right, inside),
+        own_left_m=extended(own_left, inside),
+        own_right_m=extended(own_right, inside),
+        speed_limit_mps=np.array([pieces[k].speed_mps for k in piece_at]),
+        lane_offset_m=offsets,
+        lane_end_m=lane_ends,
+        length_m=line.length,
+        goal_m=starts[row] + goal_position_m / goal.getLength() * _length(pieces[row].line),
+    )
+
+
+# --- the line --------------------------------------------------------------------------------------------------------
+
+
+def _pieces(net: Net, edges: Sequence[Edge], lanes_of: LanesOf) -> list[_Piece]:
+    """The pieces of a route: edge, junction, edge, ..., edge."""
+    links = _links(edges, lanes_of)
+    entries = [link.getToLane() for link in links]
+    exits = [link.getFromLane() for link in links]
+    entries.insert(0, exits[0] if exits else lanes_of(edges[0])[-1])
+    exits.append(entries[-1])
+    pieces = []
+    for k, edge in enumerate(edges):
+        lanes = [(lane_line(lane), lane) for lane in lanes_of(edge)]
+        line = _between(entries[k], exits[k])
+        pieces.append(_Piece(line=line, lanes=lanes, edge=k, speed_mps=entries[k].getSpeed()))
+        if k < len(links):
+            line, speed = _over_junction(net, links[k])
+            between = _links_between(edge, edges[k + 1], lanes_of)
+            lanes = [(_over_junction(net, link)[0], link.getToLane()) for link in between]
+            pieces.append(_Piece(line=line, lanes=lanes, edge=k + 1, speed_mps=speed, is_junction=True))
+    return pieces
+
+
+def _links_between(edge: Edge, following: Edge, lanes_of: LanesOf) -> list[Connection]:
+    starts, ends = lanes_of(edge), lanes_of(following)
+    return [
+        link for link in edge.getConnections(following) if link.getFromLane() in starts and link.getToLane() in ends
+    ]
+
+
+def _links(edges: Sequence[Edge], lanes_of: LanesOf) -> list[Connection]:
+    """The connections of a route, one between each two edges: the leftmost ones that lead to its end.
+
+    A greedy search from the end of the route keeps the number of lane changes small.
+    """
+    chosen: list[Connection] = []
+    target = (lanes_of(edges[-1]) or edges[-1].getLanes())[-1]
+    for edge, following in zip(reversed(edges[:-1]), reversed(edges[1:]), strict=True):
+        links = _links_between(edge, following, lanes_of)
+        if not links:
+            raise ValueError(f"has no connection from edge {edge.getID()!r} to {following.getID()!r}")
+        best = min(
+            links,
+            key=lambda link: (abs(link.getToLane().getIndex() - target.getIndex()), -link.getFromLane().getIndex()),
+        )
+        chosen.insert(0, best)
+        target = best.getFromLane()
+    return chosen
+
+
+def _between(entry: Lane, exit_: Lane) -> FloatArray:
+    """[n, 2] line over an edge from its entry lane to its exit lane, with a smooth transition."""
+    if entry is exit_:
+        return lane_line(entry)
+    steps = max(int(np.ceil(entry.getLength())), 2)
+    share = np.linspace(0.0, 1.0, steps + 1)
+    lines = [shapely.LineString(lane_line(lane)) for lane in (entry, exit_)]
+    first, second = (
+        shapely.get_coordinates(shapely.line_interpolate_point(line, share, normalized=True)) for line in lines
+    )
+    blend = (share**2 * (3.0 - 2.0 * share))[:, None]
+    return first + blend * (second - first)
+
+
+def _over_junction(net: Net, link: Connection) -> tuple[FloatArray, float]:
+    """[n, 2] line over the junction from one lane to the next, and its speed limit (m/s)."""
+    before, after = lane_line(link.getFromLane()), lane_line(link.getToLane())
+    inner: list[Lane] = []
+    via = link.getViaLaneID()
+    while via:
+        inner.append(net.getLane(via))
+        links = inner[-1].getOutgoing()
+        via = next((each.getViaLaneID() for each in links if each.getViaLaneID()), "")
+    if inner:
+        return _join([lane_line(lane) for lane in inner])[0], inner[0].getSpeed()
+    return curve_between(before[-2:], after[:2]), link.getToLane().getSpeed()
+
+
+def _length(line: FloatArray) -> float:
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
+def _join(lines: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
+    """[n, 2] the lines joined, without repeated points, and the stations [len(lines)] of their starts."""
+    points = np.concatenate(lines)
+    steps = np.hypot(*np.diff(points, axis=0, prepend=points[:1]).T)
+    first = np.cumsum([0, *(len(line) for line in lines[:-1])])
+    keep = steps > 0.0
+    keep[0] = True
+    return points[keep], np.cumsum(steps)[first]
+
+
+def sampled(line: shapely.LineString, stations: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points [N, 2] and headings [N] of a line at stations [N], extended straight at both ends."""
+    within = np.clip(stations, 0.0, line.length)
+
+    def at(station: FloatArray) -> FloatArray:
+        return shapely.get_coordinates(shapely.line_interpolate_point(line, station))
+
+    chord = at(np.minimum(within + SPACING_M, line.length)) - at(np.maximum(within - SPACING_M, 0.0))
+    headings = np.arctan2(chord[:, 1], chord[:, 0])
+    beyond = stations - within
+    return at(within) + beyond[:, None] * np.stack((np.cos(headings), np.sin(headings)), axis=1), headings
+
+
+# --- lanes and road edges --------------------------------------------------------------------------------------------
+
+
+def _lane_ends(edges: Sequence[Edge], lanes_of: LanesOf, end_of_edge_m: Sequence[float]) -> list[dict[str, float]]:
+    """For each edge of the route: the station where each lane stops leading along the route; inf if it never does."""
+    ends = [{lane.getID(): np.inf for lane in lanes_of(edges[-1])}]
+    for k in reversed(range(len(edges) - 1)):
+        links, following = _links_between(edges[k], edges[k + 1], lanes_of), ends[0]
+        lane_ends = {}
+        for lane in lanes_of(edges[k]):
+            reached = [following[link.getToLane().getID()] for link in links if link.getFromLane() is lane]
+            lane_ends[lane.getID()] = max(reached, default=end_of_edge_m[k])
+        ends.insert(0, lane_ends)
+    return ends
+
+
+def _offsets(points: FloatArray, headings: FloatArray, lane_points: FloatArray) -> FloatArray:
+    """[N] lateral offsets of a line [n, 2] from points [N, 2] with headings [N], left positive."""
+    line = shapely.LineString(lane_points if len(lane_points) > 1 else np.repeat(lane_points, 2, axis=0))
+    nearest = shapely.line_interpolate_point(line, shapely.line_locate_point(line, shapely.points(points)))
+    dx, dy = (shapely.get_coordinates(nearest) - points).T
+    return dy * np.cos(headings) - dx * np.sin(headings)
+
+
+def road_edges(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """[N] lateral offsets of the drivable area's left (positive) and right (negative) edges from each point."""
+    if shapely.get_num_coordinates(area) <= _FEW_POINTS:
+        return _edges_of(area, points, headings)
+    sides = []
+    for first in range(0, len(points), _AT_ONCE):  # a ray is slow to cut with a large area
+        rows = slice(first, first + _AT_ONCE)
+        low, high = points[rows].min(0) - _FAR_SIDE_M - 1.0, points[rows].max(0) + _FAR_SIDE_M + 1.0
+        sides.append(_edges_of(shapely.intersection(area, shapely.box(*low, *high)), points[rows], headings[rows]))
+    left, right = zip(*sides, strict=True)
+    return np.concatenate(left), np.concatenate(right)
+
+
+def _edges_of(area: BaseGeometry, points: FloatArray, headings: FloatArray) -> tuple[FloatArray, FloatArray]:
+    shapely.prepare(area)
+    left = np.stack((-np.sin(headings), np.cos(headings)), axis=1)
+    sides = []
+    for sign in (1.0, -1.0):
+        rays = shapely.linestrings(np.stack((points, points + sign * _FAR_SIDE_M * left), axis=1))
+        parts, row = shapely.get_parts(shapely.intersection(rays, area), return_index=True)
+        starts_at_point = shapely.distance(parts, shapely.points(points)[row]) < _ON_POINT_M
+        reach = np.zeros(len(points))
+        np.maximum.at(reach, row, np.where(starts_at_point, shapely.length(parts), 0.0))
+        sides.append(sign * reach)
+    return sides[0], sides[1]
+
+
+def extended(values: FloatArray, inside: FloatArray) -> FloatArray:
+    """[N] values whose entries before the start and beyond the end of the route repeat those at its start and end."""
+    rows = np.flatnonzero(inside)
+    first, last = rows[0] + 1, rows[-1] - 1
+    return values[np.clip(np.arange(len(values)), first, last)]

@@ -1,0 +1,195 @@
+"""Conflicts between players on foot and traffic: a walker's way crosses lanes, and vehicles' routes cross its way.
+
+A lane that a way crosses is a stream for the walker, with the lanes that lead to it; inside a junction, each link that
+a marked crossing crosses. The way is a stream for every player whose route crosses it. On a marked crossing the vehicle
+must yield, elsewhere the walker.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import shapely
+from sumolib.net import Net
+
+from harness.config.road_user import WALKER_WIDTH_M
+from harness.config.scene import Scene
+from harness.game.arrays import FloatArray
+from harness.game.junctions import KERB_M, Conflicts, Control, RightOfWay, StopLines, Streams
+from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.road.net.network import lane_line
+from harness.road.net.route_table import line_over_junction
+from harness.road.net.stream import CORRIDOR_M, USERS, Feeders, Piece, Stream, carries_traffic, samples_on
+from harness.road.net.zebra import follows_crossing
+
+WALKERS_STREAM_M = 3.0
+"""Width of a way: a walker that is farther beside it is not in its stream."""
+_WALKER_M = WALKER_WIDTH_M + 0.5  # what a walker needs
+_NEAR_M = 10.0  # lines that are farther apart have no corridors that overlap
+_BEFORE_CROSSING_M = 1.0  # a vehicle waits this far before a way
+_CORRIDOR_STYLE: dict[str, Any] = {"cap_style": "flat", "join_style": "mitre"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkersWay:
+    """The way of a player on foot."""
+
+    player: int
+    line: shapely.LineString
+    marked: bool
+    """Whether it follows a crossing of the net."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Crossing:
+    """Where two lines cross: begin and length of the zone on each, in metres along it."""
+
+    own_m: float
+    own_end_m: float
+    other_m: float
+    other_end_m: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Crossed:
+    """A stream of traffic that a way crosses."""
+
+    name: tuple[str, str]  # the lanes at both ends of its stop line
+    samples: FloatArray  # [N, 7]
+    place: _Crossing
+    width_m: float
+
+
+def ways_of(document: Scene, net: Net) -> list[WalkersWay]:
+    """The ways of a scene's players on foot."""
+    return [
+        WalkersWay(player=k, line=line, marked=follows_crossing(net, line))
+        for k, player in enumerate(document.players)
+        if player.way is not None and (line := shapely.LineString(player.way))
+    ]
+
+
+def with_walkers_conflicts(
+    right_of_way: RightOfWay, net: Net, routes: Sequence[Route], ways: Sequence[WalkersWay]
+) -> RightOfWay:
+    """The table with the conflicts of players on foot added; `routes` [P] are those of all players."""
+    if not ways:
+        return right_of_way
+    conflicts, streams = right_of_way.conflicts, right_of_way.streams
+    rows = [dict(zip(Conflicts._fields, row, strict=True)) for row in zip(*conflicts, strict=True)]
+    lines = list(zip(*right_of_way.stop_lines, strict=True))
+    samples, lanes = [streams.samples], list(right_of_way.stream_lanes)
+    numbers = [streams.stream]
+    feeders = Feeders(net)
+    walkers = {way.player for way in ways}
+
+    def add(found: FloatArray, name: tuple[str, str]) -> int:
+        samples.append(found)
+        numbers.append(np.full(len(found), len(lanes), dtype=np.int64))
+        lanes.append(name)
+        return len(lanes) - 1
+
+    for way in ways:
+        for crossed in (*_lanes_crossed(feeders, way.line), *_links_crossed(feeders, way)):
+            stream = add(crossed.samples, crossed.name)
+            kerb_m = KERB_M + max(0.5 * (crossed.width_m - CORRIDOR_M), 0.0)
+            rows.append(_row(way.player, stream, crossed.place, yields=not way.marked, before_m=kerb_m))
+        stream = add(samples_on(Piece(0.0, shapely.get_coordinates(way.line), WALKERS_STREAM_M)), ("", ""))
+        for player, route in enumerate(routes):
+            if player in walkers:
+                continue
+            for crossing in _crossings(_line_of(route), CORRIDOR_M, way.line, _WALKER_M):
+                rows.append(_row(player, stream, crossing, yields=way.marked, before_m=_BEFORE_CROSSING_M))
+                if way.marked:
+                    lines.append((player, crossing.own_m - _BEFORE_CROSSING_M, Control.GIVE_WAY, -1))
+    table = Conflicts.of(rows)
+    return RightOfWay(
+        conflicts=table,
+        streams=Streams.of(np.concatenate(samples), np.concatenate(numbers), table, players=len(routes)),
+        stop_lines=StopLines.of(lines),
+        signal_links=right_of_way.signal_links,
+        stream_lanes=tuple(lanes),
+    )
+
+
+def _lanes_crossed(feeders: Feeders, way: shapely.LineString) -> Iterator[_Crossed]:
+    """The lanes of traffic that a way crosses, in the order of the net."""
+    for edge in feeders.net.getEdges(withInternal=False):
+        for lane in edge.getLanes():
+            if not any(lane.allows(user) for user in USERS):
+                continue
+            line = shapely.LineString(lane_line(lane))
+            for place in _crossings(way, _WALKER_M, line, min(CORRIDOR_M, lane.getWidth())):
+                pieces = feeders.approaches(lane, line.length - place.other_m)
+                yield _Crossed(
+                    name=(lane.getID(), lane.getID()),
+                    samples=np.concatenate([samples_on(piece) for piece in pieces]),
+                    place=replace(place, other_m=0.0, other_end_m=place.other_end_m - place.other_m),
+                    width_m=lane.getWidth(),
+                )
+
+
+def _links_crossed(feeders: Feeders, way: WalkersWay) -> Iterator[_Crossed]:
+    """The links of junctions that a marked way crosses inside them, in the order of the net."""
+    if not way.marked:
+        return
+    for node in feeders.net.getNodes():
+        for link in filter(carries_traffic, node.getConnections()):
+            stream = Stream(link, feeders)
+            inner = shapely.LineString(line_over_junction(feeders.net, link))
+            for place in _crossings(way.line, _WALKER_M, inner, min(CORRIDOR_M, stream.width_m)):
+                name = (link.getFromLane().getID(), link.getToLane().getID())
+                yield _Crossed(name=name, samples=stream.samples, place=place, width_m=stream.width_m)
+
+
+def _crossings(
+    own: shapely.LineString, own_width_m: float, other: shapely.LineString, other_width_m: float
+) -> Iterator[_Crossing]:
+    """Where the corridors of two lines overlap."""
+    if not shapely.dwithin(own, other, _NEAR_M):  # for large nets: quicker than the areas of corridors
+        return
+    needed = own.buffer(0.5 * own_width_m, **_CORRIDOR_STYLE)
+    overlap = needed.intersection(other.buffer(0.5 * other_width_m, **_CORRIDOR_STYLE))
+    for part in shapely.get_parts(overlap):
+        if part.area > 0.0 and part.intersects(own) and part.intersects(other):
+            corners = shapely.points(shapely.get_coordinates(part))
+            along, beside = (shapely.line_locate_point(line, corners) for line in (own, other))
+            yield _Crossing(
+                own_m=float(along.min()),
+                own_end_m=float(along.max()),
+                other_m=float(beside.min()),
+                other_end_m=float(beside.max()),
+            )
+
+
+def _line_of(route: Route) -> shapely.LineString:
+    first = round(MARGIN_M / SPACING_M)
+    points: FloatArray = np.stack((route.x_m[first:-first], route.y_m[first:-first]), axis=1)
+    return shapely.LineString(points)
+
+
+def _row(player: int, stream: int, crossing: _Crossing, *, yields: bool, before_m: float) -> dict[str, Any]:
+    """A row of `Conflicts`."""
+    return {
+        "player": player,
+        "stream": stream,
+        "begin_m": crossing.own_m,
+        "end_m": crossing.own_end_m,
+        "crossing": True,
+        "yields": yields,
+        "first_come": False,
+        "stop_m": crossing.own_m - before_m,
+        "wait_m": crossing.own_m - before_m,
+        "right_m": -np.inf,
+        "left_m": np.inf,
+        "own_link": -1,
+        "other_link": -1,
+        "from_m": -np.inf,
+        "until_m": np.inf,
+        "zone_m": crossing.other_m,
+        "length_m": crossing.other_end_m - crossing.other_m,
+        "across": False,
+    }

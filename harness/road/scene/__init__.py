@@ -1,0 +1,1 @@
+"""Opening a scene: its document, net and routes, checked against one another."""

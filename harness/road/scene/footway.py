@@ -1,0 +1,165 @@
+"""A player on foot: its way, and the surface on which it walks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+from sumolib.net import Net
+from sumolib.net.node import Node
+
+from harness.config.road_user import WALKER_LENGTH_M, WALKER_WIDTH_M, WALKING_MPS
+from harness.config.scene import Scene
+from harness.errors import UsageError
+from harness.game.arrays import FloatArray
+from harness.game.rails import RASTER_M, Raster
+from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.road.net import surface
+from harness.road.net.network import lane_line
+from harness.road.net.route_table import extended, road_edges, sampled
+from harness.road.net.stream import USERS
+from harness.road.net.zebra import follows_crossing
+from harness.road.scene.open_player import OpenPlayer
+from harness.road.scene.scene_files import SceneFiles
+
+_LEAST_M, _MOST_M = 2.0, 150.0  # of a way
+_STRAYS_M = 30.0  # beside a way, within which the carriageway is known
+_ROOM_M = 0.5 * (WALKER_LENGTH_M**2 + WALKER_WIDTH_M**2) ** 0.5  # a walker's centre keeps from the surface's edge
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ground:
+    """Where players on foot walk."""
+
+    surface: BaseGeometry
+    """Carriageway, pavements, walking areas and crossings."""
+    carriageway: BaseGeometry
+    """The part of it that cars can drive on."""
+    near_m: FloatArray
+    """[4] bounds of the surroundings of the ways: least x and y, greatest x and y."""
+    rail_lines: tuple[FloatArray, ...]
+    """The edges of the surface as polylines [n, 2]."""
+
+    @cached_property
+    def raster(self) -> Raster:
+        """The carriageway's cells around the ways."""
+        low, high = self.near_m[:2] - RASTER_M, self.near_m[2:] + RASTER_M
+        counts = np.ceil((high - low) / RASTER_M).astype(int)
+        x_m, y_m = (low[k] + RASTER_M * (np.arange(counts[k]) + 0.5) for k in range(2))
+        cells = shapely.contains_xy(self.carriageway, *np.meshgrid(x_m, y_m, indexing="ij"))
+        return Raster(origin_m=low, cells=cells)
+
+
+def opened_ground(document: Scene, net: Net, carriageway: BaseGeometry) -> Ground | None:
+    """The ground around the ways of a scene's players on foot; None without any. `carriageway` is the net's drivable
+    area."""
+    ways = [np.array(player.way, dtype=float) for player in document.players if player.way is not None]
+    lines = [shapely.LineString(way) for way in ways if np.ptp(way, axis=0).any()]
+    if not lines:
+        return None
+    around = shapely.union_all(lines)
+    parts = [each for each in _pavements(net) if each.intersects(around.buffer(MARGIN_M))]
+    area = surface.without_slits(surface.joined([carriageway, *parts]))
+    return Ground(
+        surface=area,
+        carriageway=carriageway,
+        near_m=np.array(around.buffer(_STRAYS_M).bounds),
+        rail_lines=tuple(_outlines(area)),
+    )
+
+
+def _outlines(area: BaseGeometry) -> list[FloatArray]:
+    outlines = shapely.get_parts(shapely.get_rings(shapely.get_parts(area)))
+    return [shapely.get_coordinates(each) for each in outlines]
+
+
+def _pavements(net: Net) -> list[BaseGeometry]:
+    """The areas for pedestrians: lanes, crossings and walking areas."""
+    shapes: list[BaseGeometry] = []
+    for edge in net.getEdges(withInternal=True):
+        for lane in edge.getLanes():
+            line = lane_line(lane)
+            if edge.getFunction() == "walkingarea":
+                if len(line) > 2:
+                    shapes.append(shapely.Polygon(line).buffer(0))
+            elif lane.allows("pedestrian") and np.ptp(line, axis=0).any():
+                shapes.append(surface.lane_shape(line, lane.getWidth()))
+    return shapes
+
+
+def open_walker(role: str, files: SceneFiles, ground: Ground | None) -> OpenPlayer:
+    """The player of a name (`Scene.roles`) who is on foot. Raises UsageError with every problem found."""
+    document, net, routes = files.document, files.net, files.routes
+    way = np.array(document.player(role).way, dtype=float)
+    problem = partial(UsageError.of, files.file, f"{role}.way")
+    length_m = float(np.hypot(*np.diff(way, axis=0).T).sum())
+    if not _LEAST_M <= length_m <= _MOST_M:
+        message = f"is {length_m:.1f} m long, {_LEAST_M:g} to {_MOST_M:g} m are possible"
+        raise problem(message, "move its points")
+    assert ground is not None, "a scene with a way has a ground"
+    line = shapely.LineString(way)
+    outside = line.difference(ground.surface.buffer(-_ROOM_M, join_style="mitre"))
+    if not outside.is_empty:
+        x_m, y_m = shapely.get_coordinates(outside)[0]
+        message = f"leaves the surface for people on foot near [{x_m:.1f}, {y_m:.1f}]"
+        raise problem(message, f"keep it {_ROOM_M:.2f} m within pavements and roads, or add pavements to the net")
+    if shapely.intersects(ground.carriageway, shapely.Point(way[-1])):
+        message = f"ends on the carriageway, at [{way[-1][0]:.1f}, {way[-1][1]:.1f}]"
+        raise problem(message, "end it on a pavement")
+    junction = _junction_crossed(net, line, marked=follows_crossing(net, line))
+    if junction is not None:
+        message = f"crosses the road inside junction {junction!r}, where priority and signals on foot are not known"
+        remedy = "let it cross the lanes before or behind the junction, or on a crossing of the net without signals"
+        raise problem(message, remedy)
+    vehicle = routes.vehicles[document.vehicles[document.roles.index(role)]]
+    return OpenPlayer(
+        route=way_table(way, ground.surface),
+        edges=vehicle.edges,
+        vehicle_type=routes.types[vehicle.vehicle_type],
+    )
+
+
+def _junction_crossed(net: Net, way: shapely.LineString, *, marked: bool) -> str | None:
+    """The first junction inside which a way crosses a lane of traffic; None if there is none. A marked crossing may lie
+    in a junction without signals: the walker has priority there, whichever way a vehicle goes."""
+    for edge in net.getEdges(withInternal=True):
+        if edge.getFunction() != "internal" or (marked and not _has_signals(edge.getFromNode())):
+            continue
+        for lane in edge.getLanes():
+            line = lane_line(lane)
+            is_road = any(lane.allows(user) for user in USERS) and np.ptp(line, axis=0).any()
+            if is_road and way.intersects(shapely.LineString(line)):
+                return str(edge.getFromNode().getID())
+    return None
+
+
+def _has_signals(node: Node) -> bool:
+    return any(link.getTLSID() for link in node.getConnections())
+
+
+def way_table(way: FloatArray, area: BaseGeometry) -> Route:
+    """The table of a way [n, 2] over a surface: a single lane along the way, whose limit is a comfortable walk. The
+    goal is its end."""
+    line = shapely.LineString(way)
+    stations = np.arange(-MARGIN_M, line.length + MARGIN_M + SPACING_M, SPACING_M)
+    points, headings = sampled(line, stations)
+    left, right = road_edges(area, points, headings)
+    inside = (stations >= 0.0) & (stations <= line.length)
+    count = len(stations)
+    return Route(
+        x_m=points[:, 0],
+        y_m=points[:, 1],
+        heading_rad=headings,
+        left_edge_m=extended(left, inside),
+        right_edge_m=extended(right, inside),
+        own_left_m=np.full(count, np.inf),
+        own_right_m=np.full(count, -np.inf),
+        speed_limit_mps=np.full(count, WALKING_MPS),
+        lane_offset_m=np.zeros((count, 1)),
+        lane_end_m=np.full((count, 1), np.inf),
+        length_m=line.length,
+        goal_m=line.length,
+    )

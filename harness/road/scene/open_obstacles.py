@@ -1,0 +1,189 @@
+"""The obstacles of a scene, checked against its net, its roads and the players' starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import product
+from math import radians
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
+from sumolib.net import Net
+from sumolib.net.lane import Lane
+
+from harness.config import obstacle as written
+from harness.config.scene import Scene
+from harness.errors import Problem, UsageError, collect
+from harness.game.arrays import FloatArray
+from harness.game.geometry import Box, box_distance
+from harness.game.near_players import NOTICED_M
+from harness.game.placed_obstacles import AtPoint, Obstacles, OnLane, PlacedObstacle
+from harness.game.road import Route
+from harness.game.sight import TALL_WIDTH_M, Hiding
+from harness.road.demand.departures import background_departures
+from harness.road.demand.route_file import Departure, Motion, RouteFile, VehicleType
+from harness.road.demand.warm_up import CLEAR_M, CLEAR_S
+from harness.road.net import network
+from harness.road.scene.scene_files import SceneFiles
+
+_BENT_M = 0.5  # a closed lane is straight: its lane may leave the middle of the box by this much
+_SHARES = (0.0, 0.5, 1.0)
+
+
+def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route]) -> Obstacles:
+    """The obstacles of a scene. Raises UsageError with every problem found.
+
+    `area` is the net's drivable area, `ways` are the players' routes.
+    """
+    file, routes = files.file, files.routes
+    problems: list[Problem] = []
+    lines = shapely.union_all([shapely.LineString(np.stack((way.x_m, way.y_m), axis=1)) for way in ways])
+    found: list[PlacedObstacle] = []
+    outlines: list[FloatArray] = []
+    for number, each in enumerate(files.document.obstacle, start=1):
+        name = f"obstacle_{number}"
+        if each.outline is not None:
+            outlines.append(np.array(each.outline, dtype=float))
+            collect(problems, partial(_check_building, file, name, outlines[-1], area=area, ways=lines))
+        elif (obstacle := collect(problems, partial(_obstacle, file, name, each, files.net))) is not None:
+            found.append(obstacle)
+            collect(problems, partial(_check_is_near, file, name, reach_of(obstacle), lines))
+    taken = {each.name for each in found} & {*routes.vehicles, *(flow.departure.name for flow in routes.flows)}
+    for name in sorted(taken):
+        problems.append(Problem(str(routes.path), name, "is the name of an obstacle of the scene", "rename it"))
+    if problems:
+        raise UsageError(problems)
+    return Obstacles(each=tuple(found), outlines=tuple(outlines))
+
+
+def clear_of_obstacles(departures: Iterable[Departure], obstacles: Box) -> list[Departure]:
+    """The departures without vehicles of a warm-up that are on an obstacle, or would have to brake hard before it."""
+    boxes = boxes_of(obstacles)
+    return [
+        each
+        for each in departures
+        if each.motion is None or all(box_distance(_way(each.motion), box) > 0.0 for box in boxes)
+    ]
+
+
+def _way(motion: Motion) -> Box:
+    """The body of a vehicle and the room before it that it needs."""
+    room_m = max(CLEAR_M, CLEAR_S * motion.speed_mps)
+    ahead_m = 0.5 * (room_m - motion.length_m)  # a motion is that of the front bumper
+    x_m, y_m = motion.x_m + ahead_m * np.cos(motion.heading_rad), motion.y_m + ahead_m * np.sin(motion.heading_rad)
+    return Box(float(x_m), float(y_m), motion.heading_rad, motion.length_m + room_m, motion.width_m)
+
+
+def boxes_of(boxes: Box) -> list[Box]:
+    """The boxes of a box with arrays [N], one by one."""
+    return [Box(*each) for each in np.array(boxes, dtype=float).T.tolist()]
+
+
+def polygon_of(box: Box) -> shapely.Polygon:
+    """A box as a polygon."""
+    along = 0.5 * box.length_m * np.array([np.cos(box.heading_rad), np.sin(box.heading_rad)])
+    across = 0.5 * box.width_m * np.array([-np.sin(box.heading_rad), np.cos(box.heading_rad)])
+    centre = np.array([box.x_m, box.y_m])
+    return shapely.Polygon([centre + u * along + v * across for u, v in ((1, 1), (-1, 1), (-1, -1), (1, -1))])
+
+
+def reach_of(obstacle: PlacedObstacle) -> BaseGeometry:
+    """About the area in which an obstacle may stand."""
+    poses = [obstacle.place.pose(shares) for shares in product(_SHARES, _SHARES, _SHARES)]
+    boxes = [Box(x, y, heading, obstacle.length_m, obstacle.width_m) for x, y, heading in poses]
+    return shapely.union_all([polygon_of(box) for box in boxes])
+
+
+def _obstacle(file: Path, name: str, document: written.Obstacle, net: Net) -> PlacedObstacle:
+    length_m, width_m = written.USUAL_SIZE_M.get(document.kind, (0.0, 0.0))
+    length_m, width_m = document.length_m or length_m, document.width_m or width_m
+    place: OnLane | AtPoint
+    if document.lane is not None:
+        lane = network.find_lane(net, file, f"{name}.lane", document.lane)
+        if document.kind == "closed_lane":
+            width_m = lane.getWidth()
+        place = _on_lane(file, name, document, lane=lane, length_m=length_m)
+    else:
+        assert document.x_m is not None, "the document says that it has one of the two"
+        assert document.y_m is not None, "x_m, y_m and heading_deg are given together"
+        assert document.heading_deg is not None, "x_m, y_m and heading_deg are given together"
+        low_deg, high_deg = document.heading_deg
+        place = AtPoint(x_m=document.x_m, y_m=document.y_m, heading_rad=(radians(low_deg), radians(high_deg)))
+    return PlacedObstacle(
+        name=name, kind=document.kind, length_m=length_m, width_m=width_m, hides=document.is_hiding, place=place
+    )
+
+
+def _on_lane(file: Path, name: str, document: written.Obstacle, *, lane: Lane, length_m: float) -> OnLane:
+    assert document.position_m is not None, "lane and position_m are given together"
+    low_m, high_m = document.position_m
+    closed = document.kind == "closed_lane"
+    inside_m = 0.5 * length_m if closed else 0.0
+    if low_m < inside_m or high_m > lane.getLength() - inside_m:
+        message = f"reaches from {low_m - inside_m:g} to {high_m + inside_m:g} m, off lane {lane.getID()!r}"
+        remedy = f"keep it between {inside_m:g} and {lane.getLength() - inside_m:g} m"
+        raise UsageError.of(file, f"{name}.position_m", f"{message} of {lane.getLength():g} m", remedy)
+    line = network.lane_line(lane)
+    scale = float(np.hypot(*np.diff(line, axis=0).T).sum()) / lane.getLength()
+    place = OnLane(
+        line=line,
+        position_m=document.position_m,
+        offset_m=document.offset_m,
+        turned_rad=document.turned_rad,
+        scale=scale,
+    )
+    if closed:
+        _check_straight(file, name, place, length_m)
+    return place
+
+
+def _check_straight(file: Path, name: str, place: OnLane, length_m: float) -> None:
+    """Raise UsageError if a lane bends too much to be closed by one box."""
+    lane = shapely.LineString(place.line)
+    for share in (0.0, 0.5, 1.0):
+        x, y, heading = place.pose((share, 0.5, 0.5))
+        reach = np.array([0.5 * length_m * np.cos(heading), 0.5 * length_m * np.sin(heading)])
+        axis = shapely.LineString(np.array([x, y]) + np.array([-1.0, 1.0])[:, None] * reach)
+        bent_m = max(lane.distance(shapely.Point(point)) for point in axis.segmentize(1.0).coords)
+        if bent_m > _BENT_M:
+            message = f"its lane bends away from a straight box of {length_m:g} m by {bent_m:.1f} m"
+            raise UsageError.of(file, f"{name}.length_m", message, "close it with several shorter ones")
+
+
+def _check_building(file: Path, name: str, outline: FloatArray, *, area: BaseGeometry, ways: BaseGeometry) -> None:
+    shape = shapely.Polygon(outline) if len(outline) > 2 else shapely.LineString(outline)
+    if not shape.is_valid:
+        message = "its walls cross one another"
+        raise UsageError.of(file, f"{name}.outline", message, "give its corners in order, each once")
+    if shape.intersects(area):
+        message = "stands on the road, where contact with it would go unnoticed"
+        raise UsageError.of(file, f"{name}.outline", message, "move it off the road, or make it a wall")
+    _check_is_near(file, name, shape, ways)
+
+
+def _check_is_near(file: Path, name: str, shape: BaseGeometry, ways: BaseGeometry) -> None:
+    distance_m = shape.distance(ways)
+    if distance_m > NOTICED_M:
+        message = f"stands {distance_m:.0f} m from the nearest route of a player, and has no effect"
+        raise UsageError.of(file, name, message, "correct its place, or leave it out")
+
+
+def with_types(routes: RouteFile, obstacles: Obstacles) -> RouteFile:
+    """The route file with a vehicle type for each obstacle, as traces name them."""
+    sizes = {
+        each.vehicle_type: VehicleType(name=each.vehicle_type, length_m=each.length_m, width_m=each.width_m)
+        for each in obstacles.each
+    }
+    return replace(routes, types={**routes.types, **sizes}) if sizes else routes
+
+
+def hiding_in(obstacles: Obstacles, routes: RouteFile, document: Scene) -> Hiding:
+    """What hides road users in a scene. A vehicle type counts if a vehicle of the route file may have it."""
+    players = [routes.vehicles[name] for name in document.vehicles]
+    departures = [*players, *background_departures(routes, {each.name for each in players})]
+    tall = any(routes.types[each.vehicle_type].width_m >= TALL_WIDTH_M for each in departures)
+    return Hiding(obstacles=obstacles.hides, walls=obstacles.walls, vehicles=tall)

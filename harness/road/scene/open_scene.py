@@ -1,0 +1,181 @@
+"""Opening a scene: its document, net and routes, checked against one another, in the form that the game uses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from harness.config.scene import Scene
+from harness.game.arrays import FloatArray
+from harness.game.human_factors import HumanFactors
+from harness.game.initial_state import Conditions, StartDistribution
+from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
+from harness.game.seeding import between
+from harness.game.start_range import StartRange
+from harness.game.world import World
+from harness.road.demand.departures import background_departures
+from harness.road.demand.route_file import Departure, RouteFile
+from harness.road.demand.warm_up import Snapshot, snapshots
+from harness.road.net import network
+from harness.road.net.levels import heights_of_players_roads
+from harness.road.net.zebra import stripes
+from harness.road.scene.blocked_lanes import LaneStrip, strips_near
+from harness.road.scene.open_obstacles import with_types
+from harness.road.scene.scene_files import SceneFiles, read_scene
+from harness.road.scene.scene_world import SceneWorld, world_of
+from harness.road.scene.start_overlaps import check_clear_starts, check_starts, start_warnings
+from harness.shipped_documents import named_document
+
+
+@dataclass(frozen=True, kw_only=True)
+class OpenScene:
+    """A scene that was read completely and has no problems.
+
+    >>> import harness
+    >>> scene = harness.open_scene("merge")
+    >>> scene.world.roles, scene.world.step_s
+    (('ego', 'non_ego'), 0.1)
+    """
+
+    folder: Path
+    document: Scene
+    world: World
+    routes: RouteFile
+    places: tuple[StartRange, ...]
+    edges: tuple[tuple[str, ...], ...]  # each player's route, from its start edge on
+    rail_lines: tuple[FloatArray, ...]
+    junctions: frozenset[str] | None = None  # those that games need; None: all of the net
+    obstacles: Obstacles = NO_OBSTACLES
+    lane_strips: tuple[LaneStrip, ...] = ()  # lanes that an obstacle may block
+    stripes: tuple[FloatArray, ...] = ()  # [5, 2] each, of the marked crossings
+    roads_m: FloatArray | None = None  # [n, 3] points of the players' roads; None: no other road passes over or under
+
+    @property
+    def net_file(self) -> Path:
+        """The scene's net."""
+        return self.folder / self.document.net
+
+    @property
+    def route_files(self) -> list[Path]:
+        """The scene's route file and additional files."""
+        return [self.folder / each for each in (self.document.routes, *self.document.additional)]
+
+    @cached_property
+    def has_background_traffic(self) -> bool:
+        """Whether vehicles other than the players may depart."""
+        players = set(self.document.vehicles)
+        return bool(self.routes.flows) or bool(set(self.routes.vehicles) - players)
+
+    @cached_property
+    def warm_up(self) -> tuple[Snapshot, ...]:
+        """The background traffic with which games begin. Raises SimulationError if SUMO fails."""
+        return snapshots(self.document, self.routes, self.net_file)
+
+    def vehicle(self, player: int) -> Departure:
+        """A player's vehicle in the route file."""
+        return self.routes.vehicles[self.document.vehicles[player]]
+
+    def departures(self, generator: np.random.Generator) -> list[Departure]:
+        """The background vehicles that depart during a game. What is random about them is drawn from the generator."""
+        if not self.has_background_traffic:
+            return []
+        players = set(self.document.vehicles)
+        begin_s, end_s = self.document.game_window_s
+        varied = self.document.varies.traffic_density
+        density = 1.0 if varied is None else between(varied, generator.random())
+        on_road: tuple[Departure, ...] = ()
+        if self.document.warm_up_s:
+            snapshot = self.warm_up[generator.integers(len(self.warm_up))]
+            density, on_road = snapshot.density, snapshot.vehicles
+        return [*on_road, *self.routes.departures(players, end_s, generator, begin_s=begin_s, density=density)]
+
+    @property
+    def usual_starts(self) -> StartDistribution:
+        """The distribution of initial states of attentive players, who all take part."""
+        players = len(self.places)
+        return self.start_distribution([HumanFactors()] * players, [1.0] * players)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is no mistake but makes games void: a sentence for each two players who may start in one another."""
+        return start_warnings(self.usual_starts, self.world)
+
+    def start_distribution(
+        self,
+        human_factors: Sequence[HumanFactors | Sequence[HumanFactors]],
+        present_share: Sequence[float],
+        shares: Sequence[Sequence[float]] | None = None,
+        along_route_share: float = 0.0,
+    ) -> StartDistribution:
+        """The distribution of initial states for players with these human factors and probabilities of taking part.
+
+        A player with several drivers has the human factors of each, and the `shares` [P][n] of the games of each. In
+        `along_route_share` of the games, players start anywhere along their routes.
+        """
+        varies = self.document.varies
+        factors_of = [[each] if isinstance(each, HumanFactors) else list(each) for each in human_factors]
+        return StartDistribution(
+            places=self.places,
+            length_m=self.world.length_m,
+            max_speed_mps=self.world.actuators.max_speed_mps,
+            human_factors=factors_of,
+            shares=shares or [[1.0] * len(each) for each in factors_of],
+            present_share=present_share,
+            steps=self.world.steps,
+            step_s=self.world.step_s,
+            routes=self.world.road.routes,
+            conditions=Conditions(
+                friction=varies.friction or (self.document.friction, self.document.friction),
+                limit_share=varies.speed_limit_share or (1.0, 1.0),
+            ),
+            along_route_share=along_route_share,
+            obstacles=self.obstacles,
+        )
+
+
+def open_scene(folder: str | Path, ego_type: str | None = None) -> OpenScene:
+    """Read a scene's folder. Raises UsageError with every problem found in it.
+
+    A text may also be the name of a shipped scene. `ego_type` is a vehicle type of the route file that replaces the
+    type of the ego's vehicle.
+
+    >>> open_scene("merge").document.name
+    'merge'
+    """
+    folder = named_document(folder, "networks") if isinstance(folder, str) else folder
+    files = read_scene(folder, ego_type)
+    found = world_of(files)
+    scene = _recorded(files, found)
+    check_starts(files.file, scene.usual_starts, scene.world)
+    check_clear_starts(files.file, scene.usual_starts, scene.world)
+    return scene
+
+
+def _recorded(files: SceneFiles, found: SceneWorld) -> OpenScene:
+    """The scene as games need it: without the objects of its net."""
+    net, vehicles = files.net, set(files.document.vehicles)
+    background = {name for each in background_departures(files.routes, vehicles) for name in each.edges}
+    edges = [
+        *found.own,
+        *(net.getEdge(name) for name in sorted(background)),
+    ]  # background traffic needs its whole routes
+    crossings = [shapely.get_coordinates(way.line) for way in found.ways if way.marked]
+    return OpenScene(
+        folder=files.folder,
+        document=files.document,
+        world=found.world,
+        routes=with_types(files.routes, found.obstacles),
+        obstacles=found.obstacles,
+        lane_strips=strips_near(net, edges, found.obstacles),
+        places=found.places,
+        edges=tuple(player.edges for player in found.players),
+        rail_lines=found.rail_lines,
+        junctions=network.junctions_near(net, edges),
+        stripes=tuple(stripes(crossings, found.area)),
+        roads_m=heights_of_players_roads(net, found.own),
+    )

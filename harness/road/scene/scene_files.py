@@ -1,0 +1,99 @@
+"""The files of a scene, read and checked one by one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from pydantic import ConfigDict
+from sumolib.net import Net
+
+from harness.config.scene import PlainFile, Scene, scene_file
+from harness.config.toml_reading import Document, nearest, read_document
+from harness.errors import Problem, UsageError, collect
+from harness.files import leads_out
+from harness.road.demand.route_file import RouteFile
+from harness.road.demand.route_reading import read_route_file
+from harness.road.demand.trips import with_routes
+from harness.road.demand.walker_vehicle import with_walkers
+from harness.road.net import network
+from harness.road.net.net_file import check_net
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneFiles:
+    """The contents of a scene's files. All trips of vehicles that may take part in a game have routes."""
+
+    folder: Path
+    document: Scene
+    net: Net
+    routes: RouteFile
+
+    @property
+    def file(self) -> Path:
+        """The scene's document, which problems name."""
+        return scene_file(self.folder)
+
+
+class NamedFiles(Document):
+    """The files that a scene names. They are checked even if the rest of the document is invalid."""
+
+    model_config = ConfigDict(extra="ignore")
+    net: PlainFile
+    routes: PlainFile
+    additional: tuple[PlainFile, ...] = ()
+
+
+def read_scene(folder: Path, ego_type: str | None) -> SceneFiles:
+    """Read the files of a scene. Raises UsageError with every problem found.
+
+    `ego_type` is a vehicle type of the route file that replaces the type of the ego's vehicle.
+    """
+    problems: list[Problem] = []
+    file = scene_file(folder)
+    _check_within(file, folder)
+    document = collect(problems, lambda: read_document(file, Scene))
+    named = document or collect([], lambda: read_document(file, NamedFiles))
+    if named is None:
+        raise UsageError(problems)
+    net_file, route_files = folder / named.net, [folder / each for each in (named.routes, *named.additional)]
+    net = collect(problems, lambda: _net(net_file, folder))
+    routes = collect(problems, lambda: _routes(route_files, folder, document, ego_type))
+    if document is None or net is None or routes is None:
+        raise UsageError(problems)
+    routes = with_walkers(routes, document, net)
+    players = [routes.vehicles[name] for name in document.vehicles if name in routes.vehicles]
+    needed = [*players, *routes.within(*document.traffic_window_s)]
+    routed = collect(problems, partial(with_routes, routes, net_file, net, needed))
+    if routed is None or problems:
+        raise UsageError(problems)
+    return SceneFiles(folder=folder, document=document, net=net, routes=routed)
+
+
+def _net(path: Path, folder: Path) -> Net:
+    _check_within(path, folder)
+    check_net(path)
+    return network.read_net(path)
+
+
+def _routes(paths: Sequence[Path], folder: Path, document: Scene | None, ego_type: str | None) -> RouteFile:
+    """The route files of a scene as one, the ego with another vehicle type if one is given."""
+    for path in paths:
+        _check_within(path, folder)
+    routes = read_route_file(*paths)
+    if ego_type is None or document is None or document.ego.vehicle not in routes.vehicles:
+        return routes
+    if ego_type not in routes.types:
+        message, remedy = f"has no vehicle type {ego_type!r} for the ego", nearest(ego_type, routes.types)
+        raise UsageError.of(routes.path, "vType", message, remedy)
+    ego = replace(routes.vehicles[document.ego.vehicle], vehicle_type=ego_type)
+    return replace(routes, vehicles={**routes.vehicles, document.ego.vehicle: ego})
+
+
+def _check_within(path: Path, folder: Path) -> None:
+    """Raise UsageError if a path is a link that leads out of the folder."""
+    if leads_out(path, folder):
+        message = "is a link that leads out of the scene's folder"
+        raise UsageError.of(path, "", message, "replace the link by a copy of its target")

@@ -1,0 +1,93 @@
+"""The range of a player's start, checked against its lane, its route and its goal."""
+
+from __future__ import annotations
+
+import numpy as np
+from sumolib.net.lane import Lane
+
+from harness.errors import UsageError
+from harness.game.road import SPACING_M, Route
+from harness.game.start_range import ArrivesAfterEgo, BesideEgo, OnLine, StartRange
+from harness.road.net import network
+from harness.road.net.meeting import meeting, route_points
+from harness.road.scene.scene_files import SceneFiles
+
+
+def start_range(role: str, *, files: SceneFiles, route: Route, ego_route: Route) -> StartRange:
+    """The range of a player's start. `route` begins at the edge of its start. Raises UsageError if it is impossible."""
+    file, player = files.file, files.document.player(role)
+    if player.lane is not None:
+        return _on_lane(role, files, network.find_lane(files.net, file, f"{role}.lane", player.lane), route)
+    line = route_points(route)[: int(route.length_m / SPACING_M) + 1]
+    if player.route_m is not None:
+        low, high = player.route_m
+        if low < 0.0 or high >= route.goal_m:
+            message = f"reaches from {low:g} to {high:g} m, and the goal is at {route.goal_m:.1f} m of the route"
+            raise UsageError.of(file, f"{role}.route_m", message, f"keep it from 0 to below {route.goal_m:.1f} m")
+        return StartRange(line=line, place=OnLine(player.route_m), speed_mps=player.speed_mps)
+    place = _arrival(role, files, route, ego_route)
+    return StartRange(line=line, place=place, speed_mps=player.speed_mps)
+
+
+def _on_lane(role: str, files: SceneFiles, lane: Lane, route: Route) -> StartRange:
+    file, player = files.file, files.document.player(role)
+    place: OnLine | BesideEgo
+    if player.beside_ego_m is not None:
+        reach, name = _beside_ego(role, files, lane), "beside_ego_m"
+        place = BesideEgo(player.beside_ego_m)
+    else:
+        assert player.position_m is not None, "a start on a lane has one of the two"
+        reach, name = player.position_m, "position_m"
+        place = OnLine(reach)
+    key, text = f"{role}.{name}", f"reaches from {reach[0]:g} to {reach[1]:g} m,"
+    if reach[0] < 0.0 or reach[1] > lane.getLength():
+        message = f"{text} off lane {lane.getID()!r} of {lane.getLength():g} m"
+        remedy = f"keep it between 0 and {lane.getLength():g} m, or give route_m instead of lane"
+        raise UsageError.of(file, key, message, remedy)
+    line = network.lane_line(lane)
+    scale = float(np.hypot(*np.diff(line, axis=0).T).sum()) / lane.getLength()
+    if reach[1] * scale >= route.goal_m:
+        message = f"{text} and the goal is at {route.goal_m / scale:g} m"
+        raise UsageError.of(file, key, message, "start before the goal")
+    return StartRange(line=line, place=place, speed_mps=player.speed_mps, scale=scale)
+
+
+def _beside_ego(role: str, files: SceneFiles, lane: Lane) -> tuple[float, float]:
+    """The range of positions along its lane of a player that starts beside the ego."""
+    file, document = files.file, files.document
+    ego_m, ego_lane_name = document.ego.position_m, document.ego.lane
+    assert ego_m is not None, "the document says that the ego has a position"
+    assert ego_lane_name is not None, "a position is along a lane"
+    ego_lane = network.find_lane(files.net, file, "ego.lane", ego_lane_name)
+    if ego_lane.getEdge() is not lane.getEdge():
+        message = "needs both to start on the same edge"
+        raise UsageError.of(file, f"{role}.beside_ego_m", message, "give position_m instead")
+    beside_ego_m = document.player(role).beside_ego_m
+    assert beside_ego_m is not None, "the start is of this kind"
+    return ego_m[0] + beside_ego_m[0], ego_m[1] + beside_ego_m[1]
+
+
+def _arrival(role: str, files: SceneFiles, route: Route, ego_route: Route) -> ArrivesAfterEgo:
+    """The start of a player that is timed by its arrival at the place where its route meets the ego's."""
+    file, player, ego = files.file, files.document.player(role), files.document.ego
+    key = f"{role}.arrival_after_ego_s"
+    ego_m = ego.position_m or ego.route_m
+    assert player.arrival_after_ego_s is not None, "the start is of this kind"
+    assert ego_m is not None, "the document says that the ego has a position"
+    place = meeting(ego_route, route)
+    if place is None:
+        raise UsageError.of(file, key, "its route never meets the ego's", "give route_m, or another route")
+    if place.ego_m <= ego_m[1]:
+        message = f"its route meets the ego's at {place.ego_m:g} m, and the ego starts at up to {ego_m[1]:g} m"
+        raise UsageError.of(file, key, message, "start the ego before that, or give position_m or route_m")
+    least_s = (place.ego_m - ego_m[1]) / ego.speed_mps[1] + player.arrival_after_ego_s[0]
+    most_s = (place.ego_m - ego_m[0]) / max(ego.speed_mps[0], 0.1) + player.arrival_after_ego_s[1]
+    first_m, last_m = place.other_m - player.speed_mps[1] * most_s, place.other_m - player.speed_mps[0] * least_s
+    if last_m >= place.other_m:
+        message = f"it may start after the place where the routes meet, at {place.other_m:g} m of its route"
+        raise UsageError.of(file, key, message, "let it arrive later, or start the ego farther away")
+    if first_m < 0.0:
+        message = f"it would have to start up to {-first_m:.0f} m before its route"
+        remedy = "let it arrive earlier or drive more slowly, start the ego nearer, or add edges before its route"
+        raise UsageError.of(file, key, message, remedy)
+    return ArrivesAfterEgo(after_s=player.arrival_after_ego_s, meeting_m=place.other_m, ego_meeting_m=place.ego_m)

@@ -1,0 +1,1 @@
+"""SUMO's XML files and programs."""

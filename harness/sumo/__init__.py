@@ -1,0 +1,1 @@
+"""SUMO simulations of opened scenes, and SUMO-GUI. The only room that imports libsumo."""

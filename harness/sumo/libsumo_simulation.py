@@ -1,0 +1,298 @@
+"""The SUMO simulation of this process. libsumo allows one per process.
+
+A player that the harness drives is placed with moveToXY, exactly at the arena's pose, on the road or off it. A player
+that SUMO drives is inserted here, and its state is read back. This module converts headings to SUMO's angles, and the
+reference point from the body's centre to the front bumper.
+
+Removing a vehicle from SUMO's traffic and adding it again takes as long as ten of its steps. A vehicle that is only
+moved back to its start loses its route in SUMO. If SUMO drives no vehicle, the lost route has no effect. In this case
+players stay in the traffic from game to game, SUMO looks for their lanes along their routes only, and SUMO's driver
+models are disabled for them. SUMO then has the poses of the players, but not always their speeds.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import weakref
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import repeat
+from pathlib import Path
+
+import libsumo
+import numpy as np
+from libsumo import _libsumo  # the same functions without Python wrappers, for frequent calls
+
+from harness.errors import SimulationError
+from harness.game.arrays import FloatArray
+from harness.game.initial_state import InitialState
+from harness.road.demand.route_file import Departure
+from harness.road.demand.warm_up import LANE_CHANGE_S, clear_of_players
+from harness.road.net.tiles import tile_offset_m, tile_prefix, tiled_net
+from harness.road.scene.open_obstacles import clear_of_obstacles
+from harness.road.scene.open_scene import OpenScene
+from harness.road.xml.angles import compass_deg_of, heading_rad_of
+from harness.sumo.background_traffic import BackgroundTraffic
+from harness.sumo.insertion import Insertion
+from harness.sumo.road_signals import Signals, SpeedLimits
+from harness.sumo.simulation import NO_SIGNALS, AtReset, Reading
+from harness.sumo.standing_vehicles import TYPE_XML, StandingVehicles
+
+# Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
+# exactly, on the road or off it. Its bit 1 limits the search to lanes of the car's route.
+_ON_ANY_LANE = (2, 100.0)  # SUMO's default distance
+_ON_ITS_ROUTE = (2 | 1, 10.0)
+_ANY_EDGE, _ANY_LANE = repeat(""), repeat(-1)
+_NO_ACTIONS_S = 1e6  # an action step longer than any game: disables SUMO's driver model for a car
+_LATERAL_RESOLUTION_M = 0.8  # as in SUMO's documentation of the sublane model: a quarter of a lane
+_ANY_SPEED = 100.0  # a speed factor: other vehicles see at most the speed limit times this
+_FAILURES = (libsumo.TraCIException, libsumo.FatalTraCIError)
+
+
+class _SumoCall:
+    """A block of calls: libsumo's errors in it become a SimulationError that names the action."""
+
+    def __init__(self, release: weakref.finalize[..., LibsumoSimulation], action: str) -> None:
+        self._release, self._action = release, action
+
+    def __enter__(self) -> None:
+        if not self._release.alive:
+            raise SimulationError(f"SUMO can't {self._action}: this simulation was closed")
+
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
+        if isinstance(error, _FAILURES):
+            raise SimulationError(f"SUMO could not {self._action}: {error}") from error
+
+
+@dataclass(kw_only=True)
+class _Tile:
+    """The part of the simulation that belongs to one game."""
+
+    prefix: str
+    offset_m: float
+    inside: set[int] = field(default_factory=set)  # players in SUMO's traffic
+
+
+class LibsumoSimulation:
+    """The SUMO simulation of this process. `close`, or the end of this object, releases libsumo."""
+
+    @staticmethod
+    def in_use() -> bool:
+        """Whether libsumo is in use in this process, by the harness or by other code."""
+        return libsumo.isLoaded()
+
+    def __init__(
+        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, *, recorded: bool = False
+    ) -> None:
+        """Load SUMO with a tile for each game. Raises SimulationError if SUMO refuses or is in use.
+
+        The arguments are those of `open_simulation`.
+        """
+        if self.in_use():
+            raise SimulationError("this process has a libsumo simulation already")
+        self._scene, self._games, self._taken_over = scene, games, tuple(taken_over)
+        self._recorded = recorded
+        self._players_only = all(self._taken_over) and not scene.has_background_traffic  # SUMO drives no vehicle
+        self._move_options = _ON_ITS_ROUTE if self._players_only else _ON_ANY_LANE
+        self._half_length = 0.5 * scene.world.length_m
+        offset = tile_offset_m(scene.net_file, games)
+        self._offsets = offset * np.arange(games)
+        folder = tempfile.TemporaryDirectory(prefix="harness-sumo-")
+        types = Path(folder.name) / "types.rou.xml"
+        types.write_text(scene.routes.types_xml.replace("</routes>", f"{TYPE_XML}</routes>"), encoding="utf-8")
+        document = scene.document
+        # SUMO 1.28 may crash (SIGSEGV) if a placed car leaves a junction's lanes and lane changes take time: they take
+        # time only if SUMO drives a vehicle.
+        duration_s = 0.0 if self._players_only else LANE_CHANGE_S
+        lateral = ["--lanechange.duration", str(duration_s)]
+        if self._needs_sublanes():
+            lateral = ["--lateral-resolution", str(_LATERAL_RESOLUTION_M)]  # SUMO accepts one of the two options
+        self._options = [
+            *("--net-file", str(tiled_net(scene.net_file, games, scene.junctions)), "--route-files", str(types)),
+            *("--step-length", str(document.step_length_s), "--collision.action", "none"),
+            *lateral,
+            *("--time-to-teleport", "-1", "--no-step-log", "--no-warnings", "--xml-validation", "never"),
+        ]
+        self._release = weakref.finalize(self, _release, folder)
+        try:
+            self._load(["sumo", *self._options, "--seed", str(seed)], libsumo.start)
+        except SimulationError:
+            self.close()
+            raise
+
+    def _needs_sublanes(self) -> bool:
+        """Whether a player that SUMO drives has the lane-change model SL2015, which requires sublanes."""
+        types = self._scene.routes.types
+        kinds = [
+            types[self._scene.vehicle(player).vehicle_type] for player in np.flatnonzero(~np.array(self._taken_over))
+        ]
+        return any(kind.lane_changes == "SL2015" for kind in kinds)
+
+    def _load(self, options: list[str], load: Callable[[list[str]], object]) -> None:
+        with _SumoCall(self._release, f"load scene {self._scene.document.name!r}"):
+            load(options)
+        self._tiles = [
+            _Tile(prefix=tile_prefix(game, self._games), offset_m=float(self._offsets[game]))
+            for game in range(self._games)
+        ]
+        self._traffic = Insertion()
+        self._placed: dict[str, int] = {}  # players placed by the arena, by name in SUMO: index in a flat [G, P]
+        self._sumo_driven: dict[str, tuple[int, int]] = {}  # players that SUMO drives: game and player
+        self._present = np.zeros((self._games, len(self._taken_over)), dtype=bool)
+        self._insertions = [self._insertion(player) for player in range(len(self._taken_over))]
+        world = self._scene.world
+        prefixes = [tile.prefix for tile in self._tiles]
+        self._signals = Signals(prefixes, world.right_of_way.signal_links)
+        self._speed_limits = SpeedLimits(prefixes) if self._scene.document.varies.speed_limit_share else None
+        blocks = bool(self._scene.obstacles.each) and not self._players_only
+        self._standing = StandingVehicles(self._scene, prefixes, self._traffic) if blocks else None
+        self._background = BackgroundTraffic(
+            prefixes=prefixes,
+            offsets_m=self._offsets,
+            step_s=world.step_s,
+            fastest_player_mps=float(world.actuators.max_speed_mps.max()),
+            recorded=self._recorded,
+            insertion=self._traffic,
+            roads_m=self._scene.roads_m,
+        )
+
+    def reload(self, seed: int) -> None:
+        """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
+        self._load([*self._options, "--seed", str(seed)], libsumo.load)
+
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
+        tile = self._tiles[game]
+        with _SumoCall(self._release, f"reset game {game}"):
+            taking_part = {player for player, present in enumerate(start.present.tolist()) if present}
+            staying = tile.inside & taking_part if self._players_only else set()
+            for player in tile.inside - staying:
+                self._remove_vehicle(game, player)
+            for player in sorted(taking_part - staying):
+                self._add_player(game, player, start)
+            departures = clear_of_players(departures, start, self._scene.world.length_m)
+            if self._standing is not None:
+                self._standing.reset(game, *start.parts)
+                self._background.standing = self._standing.count
+                departures = clear_of_obstacles(departures, self._scene.obstacles.boxes(*start.parts))
+            background = self._background.reset(game, departures)
+            if self._speed_limits is not None:
+                self._speed_limits.reset(game, start.limit_share)
+            at_reset = self._signals.reset(game, start.signal_place) if self._signals else NO_SIGNALS
+            return at_reset if background is None else at_reset._replace(background=background)
+
+    def halt(self, game: int, player: int) -> None:
+        """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
+        if self._taken_over[player]:
+            return
+        name = self._name(game, player)
+        self._sumo_driven.pop(name, None)
+        self._placed[name] = game * len(self._taken_over) + player
+
+    def remove(self, game: int, player: int) -> None:
+        """Remove a player from the traffic. If SUMO drives no vehicle, it stays in place until the next reset."""
+        if not self._players_only:
+            with _SumoCall(self._release, f"remove a player from game {game}"):
+                self._remove_vehicle(game, player)
+
+    def _remove_vehicle(self, game: int, player: int) -> None:
+        name = self._name(game, player)
+        libsumo.vehicle.remove(name)
+        self._tiles[game].inside.discard(player)
+        self._present[game, player] = False
+        self._sumo_driven.pop(name, None)
+        self._placed.pop(name, None)
+
+    def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
+        """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
+        seats = list(self._placed.values())
+        front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel()[seats].tolist()
+        front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel()[seats].tolist()
+        angle = compass_deg_of(heading_rad).ravel()[seats].tolist()
+        with _SumoCall(self._release, "step"):
+            targets = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._move_options))
+            deque(map(_libsumo.vehicle_moveToXY, self._placed, *targets), maxlen=0)  # faster than a loop
+            _libsumo.simulation_step()
+            self._background.advance()
+            players = self._read_players()
+            if players is not None:
+                x_m = np.where(np.isnan(players[..., 0]), x_m, players[..., 0])
+                y_m = np.where(np.isnan(players[..., 1]), y_m, players[..., 1])
+            reading = self._background.read(x_m, y_m, self._present)
+            if players is None and not self._signals:
+                return reading
+            if not self._signals:
+                return replace(reading, players=players)
+            texts = self._signals.texts() if self._recorded else None
+            return replace(reading, players=players, signals=self._signals.read(), signal_texts=texts)
+
+    def close(self) -> None:
+        """Release libsumo. A second call has no effect."""
+        self._release()
+
+    def _name(self, game: int, player: int) -> str:
+        return self._tiles[game].prefix + self._scene.world.roles[player]
+
+    def _add_player(self, game: int, player: int, start: InitialState) -> None:
+        tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
+        vehicle_type, lane, fastest = self._insertions[player]
+        on_lane = lane is not None and not np.isnan(start.position_m[player])
+        self._traffic.add(
+            tile.prefix,
+            name,
+            edges=self._scene.edges[player],
+            vehicle_type=vehicle_type,
+            lane=str(lane) if on_lane else "best",
+            position=str(start.position_m[player]) if on_lane else "base",
+            speed=str(min(speed, fastest)),
+        )
+        tile.inside.add(player)
+        self._present[game, player] = True
+        ahead = self._half_length[player]
+        if self._taken_over[player]:
+            self._placed[name] = game * len(self._taken_over) + player
+            if self._players_only:
+                libsumo.vehicle.setActionStepLength(name, _NO_ACTIONS_S)
+            else:
+                libsumo.vehicle.setSpeedFactor(name, _ANY_SPEED)
+        else:
+            self._sumo_driven[name] = (game, player)
+            ahead += speed * self._scene.world.step_s  # SUMO does not move a vehicle in the step of its insertion
+        heading = float(start.heading_rad[player])
+        x = float(start.x_m[player] + ahead * np.cos(heading))
+        y = float(start.y_m[player] + ahead * np.sin(heading) + tile.offset_m)
+        options = self._move_options if self._taken_over[player] else _ON_ITS_ROUTE
+        # moveToXY puts the vehicle in the traffic at once; without it, the vehicle would wait for free space
+        libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), *options)
+
+    def _insertion(self, player: int) -> tuple[str, str | None, float]:
+        """A player's vehicle type, its start lane (None: its start is along its route), and the largest speed at which
+        SUMO inserts it: the speed limit for its type, or the speed that its type desires."""
+        routes, types = self._scene.world.road.routes, libsumo.vehicletype
+        vehicle_type = self._scene.vehicle(player).vehicle_type
+        desired = self._scene.routes.types[vehicle_type].desired_speed_mps
+        lane = self._scene.document.players[player].lane
+        legal = float(routes.speed_limit_mps[routes.first_row[player]])
+        obeyed = min(legal, desired) * min(1.0, types.getSpeedFactor(vehicle_type))
+        return vehicle_type, lane and lane.rsplit("_", 1)[1], float(min(obeyed, types.getMaxSpeed(vehicle_type)))
+
+    def _read_players(self) -> FloatArray | None:
+        """[G, P, 4] x_m, y_m, heading_rad and speed_mps of the players that SUMO drives; None if it drives none."""
+        if all(self._taken_over):
+            return None
+        players = np.full((*self._present.shape, 4), np.nan)
+        for name, seat in self._sumo_driven.items():
+            x, y = libsumo.vehicle.getPosition(name)
+            if x < -1e6:
+                raise SimulationError(f"SUMO has not inserted {name!r}")
+            players[seat] = (x, y, libsumo.vehicle.getAngle(name), libsumo.vehicle.getSpeed(name))
+        players[..., 2] = heading_rad_of(players[..., 2])
+        players[..., 0] -= self._half_length * np.cos(players[..., 2])
+        players[..., 1] -= self._half_length * np.sin(players[..., 2]) + self._offsets[:, None]
+        return players
+
+
+def _release(folder: tempfile.TemporaryDirectory[str]) -> None:
+    libsumo.close()
+    folder.cleanup()

@@ -1,0 +1,213 @@
+"""A simulation in a child process, used if libsumo of this process is in use: one message each way per call.
+
+The child runs this module as a program. A user's script therefore does not have to be importable. The child's standard
+input and output carry pickles, each preceded by its length; they are trusted, because the child is our own. Output that
+SUMO prints goes to standard error. The child ends at the end of its input, and so with its parent.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pickle
+import signal
+import struct
+import subprocess
+import sys
+import weakref
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import IO, Any
+
+from harness.errors import SimulationError
+from harness.game.arrays import FloatArray
+from harness.game.initial_state import InitialState
+from harness.road.demand.route_file import Departure
+from harness.road.scene.open_scene import OpenScene
+from harness.sumo.simulation import AtReset, Reading, Simulation
+
+
+def open_simulation(
+    scene: OpenScene, games: int, taken_over: Sequence[bool], *, seed: int, recorded: bool = False
+) -> Simulation:
+    """Load SUMO with a tile for each game: in this process if its libsumo is free, otherwise in a child process.
+
+    `taken_over` [P] marks the players that the harness drives. With `recorded`, every background vehicle is read in
+    every step, near a player or not; reading a vehicle costs as much time as SUMO's own work on it.
+
+    Both kinds of simulation give the same numbers. A child process needs one message each way per call. Raises
+    SimulationError if SUMO can't load the scene.
+    """
+    from harness.sumo.libsumo_simulation import LibsumoSimulation
+
+    if not LibsumoSimulation.in_use():
+        return LibsumoSimulation(scene, games, taken_over, seed, recorded=recorded)
+    from harness.sumo.subprocess_simulation import SubprocessSimulation
+
+    return SubprocessSimulation(scene, games, taken_over, seed, recorded=recorded)
+
+
+_LENGTH = struct.Struct("<Q")
+_PATIENCE_S = 10.0  # time limit for a child to end
+
+
+class SubprocessSimulation:
+    """A `LibsumoSimulation` in a child process. The child ends with `close`, or with this object."""
+
+    def __init__(
+        self, scene: OpenScene, games: int, taken_over: Sequence[bool], seed: int, *, recorded: bool = False
+    ) -> None:
+        """Spawn the child and load SUMO in it. Raises SimulationError if either fails."""
+        try:
+            self._child = _spawn_child()
+        except OSError as error:
+            raise SimulationError(f"the process of another simulation could not be started: {error}") from error
+        self._finalizer = weakref.finalize(self, _end_child, self._child)
+        try:
+            self._call(replace(scene, folder=scene.folder.resolve()), games, tuple(taken_over), seed, recorded)
+        except BaseException:
+            self.close()
+            raise
+
+    def reload(self, seed: int) -> None:
+        """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
+        self._call("reload", seed)
+
+    def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
+        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
+        at_reset: AtReset = self._call("reset", game, start, departures)
+        return at_reset
+
+    def halt(self, game: int, player: int) -> None:
+        """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
+        self._call("halt", game, player)
+
+    def remove(self, game: int, player: int) -> None:
+        """Remove a player from the traffic."""
+        self._call("remove", game, player)
+
+    def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
+        """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
+        reading: Reading = self._call("step", x_m, y_m, heading_rad)
+        return reading
+
+    def close(self) -> None:
+        """End the child. A second call has no effect."""
+        self._finalizer()
+
+    def _call(self, *message: Any) -> Any:
+        """The child's answer to a message. An interrupted exchange ends the child: its next answer would be old."""
+        if not self._finalizer.alive:
+            raise SimulationError("this simulation was closed")
+        if self._child.poll() is not None:  # an old answer may still be in the pipe
+            raise SimulationError(f"SUMO's process {_ending_of(self._child)}")
+        assert self._child.stdin is not None
+        assert self._child.stdout is not None
+        try:
+            _send(self._child.stdin, message)
+            answer, refusal = _receive(self._child.stdout)
+        except (EOFError, OSError):
+            raise SimulationError(f"SUMO's process {_ending_of(self._child)}") from None
+        except BaseException:
+            self._child.kill()
+            self._child.wait()
+            raise
+        if refusal is not None:
+            raise SimulationError(refusal)
+        return answer
+
+
+def _spawn_child() -> subprocess.Popen[bytes]:
+    top = Path(__file__).resolve().parents[2]  # where `python -m` looks first
+    path = os.pathsep.join(str(Path(each).resolve()) for each in sys.path)
+    return subprocess.Popen(
+        [sys.executable, "-m", "harness.sumo.subprocess_simulation"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        cwd=top,
+        env={**os.environ, "PYTHONPATH": path},
+        start_new_session=True,  # only the parent handles Ctrl-C
+    )
+
+
+def _end_child(child: subprocess.Popen[bytes]) -> None:
+    assert child.stdin is not None
+    assert child.stdout is not None
+    with contextlib.suppress(OSError):  # the child may have died with input left
+        child.stdin.close()
+    try:
+        child.wait(_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        child.wait()
+    child.stdout.close()
+
+
+def _ending_of(child: subprocess.Popen[bytes]) -> str:
+    try:
+        code = child.wait(_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        child.kill()
+        return "stopped answering"
+    if code < 0:
+        return f"died of {signal.Signals(-code).name}"
+    return f"ended with exit code {code}"
+
+
+def _send(stream: IO[bytes], message: Any) -> None:
+    content = pickle.dumps(message, pickle.HIGHEST_PROTOCOL)
+    stream.write(_LENGTH.pack(len(content)) + content)
+    stream.flush()
+
+
+def _receive(stream: IO[bytes]) -> Any:
+    """The next message. Raises EOFError at the end of the stream."""
+    (length,) = _LENGTH.unpack(_read(stream, _LENGTH.size))
+    return pickle.loads(_read(stream, length))
+
+
+def _read(stream: IO[bytes], count: int) -> bytes:
+    content = stream.read(count)
+    if len(content) < count:
+        raise EOFError
+    return content
+
+
+# --- in the child -----------------------------------------------------------------------------------------------------
+
+
+def serve() -> None:
+    """Serve the parent: the first message has the arguments of a `LibsumoSimulation`, each other one a method call."""
+    from harness.sumo.libsumo_simulation import LibsumoSimulation
+
+    incoming = sys.stdin.buffer
+    outgoing = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    simulation: LibsumoSimulation | None = None
+
+    def answer(first: Any, *arguments: Any) -> Any:
+        nonlocal simulation
+        if simulation is None:
+            *of_game, recorded = arguments
+            simulation = LibsumoSimulation(first, *of_game, recorded=recorded)
+            return None
+        return getattr(simulation, first)(*arguments)
+
+    with contextlib.suppress(EOFError, BrokenPipeError):  # the parent has closed this simulation, or has ended
+        while True:
+            message = _receive(incoming)
+            result, refusal = None, None
+            try:
+                result = answer(*message)
+            except SimulationError as error:
+                refusal = str(error)
+            except Exception as error:
+                refusal = f"{type(error).__name__}: {error}"
+            _send(outgoing, (result, refusal))
+    if simulation is not None:
+        simulation.close()
+
+
+if __name__ == "__main__":
+    serve()

@@ -1,1 +1,0 @@
-"""The SUMO simulation and its files. Only this package imports SUMO."""

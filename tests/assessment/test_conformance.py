@@ -1,0 +1,246 @@
+"""`harness check-driver`: each violation of the driver protocol is found and named."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.assessment import conformance
+from harness.assessment.conformance import check_conformance, difference_of
+from harness.config.campaign import LEARNED, SUMO
+from harness.drivers.car import Car, car_of
+from harness.drivers.sumo import SumoDriver
+from harness.environments.arena import Arena
+from harness.game.arrays import FloatArray, IntArray
+from harness.game.initial_state import InitialState, draw_initial_state
+from harness.game.observation_layout import LAYOUT
+from harness.game.roles import EGO
+from harness.road.scene.open_scene import OpenScene
+from tests.support.repository import REPOSITORY
+from tests.support.tiny import harness
+
+
+class Good:
+    """Holds its speed, and brakes softly from its tenth decision on; its state is kept per game, as required."""
+
+    takes_over = True
+
+    def __init__(self) -> None:
+        self.steps: dict[int, int] = {}
+
+    def reset(self, games: IntArray) -> None:
+        self.steps |= dict.fromkeys(games.tolist(), 0)
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        actions = np.zeros((len(games), 2))
+        for row, game in enumerate(games.tolist()):
+            actions[row, 0] = -0.01 if self.steps[game] >= 10 else 0.0
+            self.steps[game] += 1
+        return actions
+
+
+class OneDimensional(Good):
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return np.zeros(2)
+
+
+class ListReturning(Good):
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return [[0.0, 0.0]]  # type: ignore[return-value]
+
+
+class NotFinite(Good):
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return np.full((len(games), 2), np.nan)
+
+
+class OutOfBounds(Good):
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return np.full((len(games), 2), 1.5)
+
+
+class Writing(Good):
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        observation *= 2.0
+        return np.zeros((len(games), 2))
+
+
+class Raising(Good):
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        if observation[0, LAYOUT.index("speed_mps")] >= 0.0:
+            raise KeyError("no such lane")
+        return super().decide(games, observation, noise)
+
+
+class WrongUnits(Good):
+    """Asks for 1e9 m/s²."""
+
+    def __init__(self, car: Car) -> None:
+        super().__init__()
+        self.car = car
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return self.car.actions(np.full(len(games), 1e9), np.zeros(len(games)), observation)
+
+
+class Stale(Good):
+    """Ignores resets: its second game continues the state of the first."""
+
+    def reset(self, games: IntArray) -> None:
+        for game in games.tolist():
+            self.steps.setdefault(game, 0)
+
+
+class Random(Good):
+    def __init__(self) -> None:
+        super().__init__()
+        self.chance = np.random.default_rng(1)
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return 0.01 * self.chance.standard_normal((len(games), 2)).clip(-1.0, 1.0)
+
+
+class Sharing(Good):
+    """One state for all games."""
+
+    def reset(self, games: IntArray) -> None:
+        self.steps = {-1: 0}
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        actions = super().decide(np.array([-1]), observation, noise)
+        return np.repeat(actions, len(games), axis=0)
+
+
+class Averaging(Good):
+    """Acts on the observations of all games."""
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        return np.repeat(0.01 * observation.mean(axis=0, keepdims=True)[:, :2], len(games), axis=0).astype(float)
+
+
+def test_check__a_conforming_driver_passes(merge: OpenScene) -> None:
+    found = check_conformance(Good(), merge, 2)
+    assert found.violations == []
+    assert len(found.passed) == 3
+    assert len(found.outcomes) == 2
+    assert min(found.seconds) >= 0.0
+
+
+@pytest.mark.parametrize(
+    ("driver", "message"),
+    [
+        (OneDimensional, "it decided an array [2], not [1, 2]"),
+        (ListReturning, "it decided list, not a NumPy array"),
+        (NotFinite, "not finite"),
+        (OutOfBounds, "pedals and wheel are in -1 to 1"),
+        (Writing, "it modified the observation"),
+        (Raising, "playing, game 0, decision 0: it raised KeyError: 'no such lane'"),
+        (Stale, "it is not deterministic: in decision 0 of game 0"),
+        (Random, "it is not deterministic"),
+        (Sharing, "its games are not independent"),
+        (Averaging, "its games are not independent"),
+    ],
+)
+def test_check__a_violation_is_named(driver: type[Good], message: str, merge: OpenScene) -> None:
+    (violation,) = check_conformance(driver(), merge, 2).violations
+    assert message in violation
+
+
+def test_check__an_implausible_request_is_named_with_its_unit(merge: OpenScene) -> None:
+    (violation,) = check_conformance(WrongUnits(car_of(merge.world, EGO)), merge, 2).violations
+    assert "it decided an acceleration of 1e+09 m/s², which is beyond ±100: is the unit right?" in violation
+
+
+def test_repeats__a_driver_that_varies_is_told_and_others_are_not(merge: OpenScene) -> None:
+    assert difference_of(Good(), merge) == ""
+    assert "it is not deterministic: in decision 0 of game 0" in difference_of(Random(), merge)
+    assert difference_of(Raising(), merge) == "", "games that can't be played are told by the arms"
+
+
+def write(folder: Path, change: str = "") -> Path:
+    (folder / "drive.py").write_text(f"""
+import json, sys
+step = 0
+for line in sys.stdin:
+    message = json.loads(line)
+    step += 1
+    decided = {{"actions": [[0, 0]] * len(message.get("games", []))}}
+    answer = {{"hello": {{"protocol": 2}}, "reset": {{}}, "decide": decided}}[message["type"]]
+    {change}
+    print(json.dumps(answer), flush=True)
+""")
+    (folder / "mine.toml").write_text('kind = "process"\ncommand = ["python3", "drive.py"]\ndeadline_s = 20.0\n')
+    return folder / "mine.toml"
+
+
+def test_command__reports_passed_checks_and_violations(tmp_path: Path) -> None:
+    good = harness("check-driver", write(tmp_path), "--allow-code", "--games", 2)
+    assert good.returncode == 0, good.stdout + good.stderr
+    assert "the same games again: the same actions, bit for bit" in good.stdout
+    assert "ms per decision" in good.stdout
+    change = 'if "actions" in answer: answer["actions"] = [[0.001 * step, 0]] * len(message["games"])'
+    bad = harness("check-driver", write(tmp_path, change), "--allow-code", "--games", 2)
+    assert bad.returncode == 1
+    assert "it is not deterministic" in bad.stdout
+
+
+def test_command__runs_no_program_without_permission(tmp_path: Path) -> None:
+    refused = harness("check-driver", write(tmp_path, 'open("ran", "w").close()'))
+    assert refused.returncode == 2
+    assert len(refused.stderr.splitlines()) == 1
+    assert "--allow-code" in refused.stderr
+    assert not (tmp_path / "ran").exists()
+
+
+def test_command__checks_a_rule_based_driver() -> None:
+    done = harness("check-driver", REPOSITORY / "egos" / "adas.toml", "--games", 2)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_check__sumos_driver_passes_without_decisions(merge: OpenScene) -> None:
+    found = check_conformance(SumoDriver(), merge, 2)
+    assert found.violations == []
+    assert [line for line in found.passed if "SUMO's own models move the ego" in line]
+    assert found.passed[-1] == "the same games again: the same motion, bit for bit"
+    assert len(found.outcomes) == 2
+    assert found.seconds == []
+
+
+def test_check__another_motion_of_sumos_driver_is_a_violation(
+    merge: OpenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seeds = iter(range(4))
+    reload = Arena.reload
+    monkeypatch.setattr(Arena, "reload", lambda arena, seed: reload(arena, next(seeds)))
+    monkeypatch.setattr(conformance, "draw_initial_state", different_states())
+    (violation,) = check_conformance(SumoDriver(), merge, 2).violations
+    assert "it is not deterministic: game 0" in violation
+
+
+def different_states() -> Callable[..., InitialState]:
+    """`draw_initial_state` with another state at each call."""
+    count = itertools.count()
+    return lambda distribution, *parts: draw_initial_state(distribution, *parts, next(count))
+
+
+@pytest.mark.parametrize("form", ["name", "document"])
+def test_command__checks_sumos_driver(form: str, tmp_path: Path) -> None:
+    (tmp_path / "car.toml").write_text('kind = "sumo"\nvehicle_type = "ego_car"\n')
+    driver = SUMO if form == "name" else tmp_path / "car.toml"
+    done = harness("check-driver", driver, "--games", 2)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert f"SUMO's own models of vehicle type ego_car ({driver}), on merge" in done.stdout
+    assert "the same games again: the same motion, bit for bit" in done.stdout
+    assert "games  goal, goal" in done.stdout
+
+
+def test_command__has_nothing_to_check_before_the_training() -> None:
+    refused = harness("check-driver", LEARNED)
+    assert refused.returncode == 2
+    assert len(refused.stderr.splitlines()) == 1
+    assert "'learned' is trained by a campaign: before the training there is no driver to check" in refused.stderr
+    assert "name the folder of a trained policy" in refused.stderr

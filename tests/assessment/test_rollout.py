@@ -1,0 +1,255 @@
+"""Assessment: the same games in every arm, and an error ends only its own game."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from harness.drivers.policy import LearnedDriver
+from harness.drivers.sumo import SumoDriver
+from harness.environments.arena import Arena, Step
+from harness.errors import SimulationError
+from harness.evaluation.column import NUMBER
+from harness.evaluation.columns import TABLES
+from harness.evaluation.tables import table_of
+from harness.evaluation.trace_file import SCHEMA
+from harness.game.arrays import FloatArray, IntArray
+from harness.road.scene.open_scene import OpenScene, open_scene
+from tests.support.policies import some_policy
+from tests.support.rollouts import Steady, arm, play, records, trace
+from tests.support.tiny import DISTRACTED
+
+RANDOM = LearnedDriver(some_policy(), sampled=True)
+MEASURED = [name for name, column in TABLES["episodes"].items() if column.dtype == NUMBER]
+POSE = ["x_m", "y_m", "heading_rad", "speed_mps"]
+
+
+class Failing(Steady):
+    """Raises in the third step of every second game."""
+
+    def __init__(self, error: Exception) -> None:
+        self.error, self.games, self.steps = error, 0, 0
+
+    def reset(self, games: IntArray) -> None:
+        self.games, self.steps = self.games + 1, 0
+
+    def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
+        self.steps += 1
+        if self.games % 2 == 0 and self.steps == 3:
+            raise self.error
+        return np.zeros((len(games), 2))
+
+
+def test_assess__twice_is_the_same(merge: OpenScene) -> None:
+    first, second = (play(arm(merge, RANDOM, SumoDriver())) for _ in range(2))
+    assert records(first) == records(second)
+    for one, other in zip(first, second, strict=True):
+        pd.testing.assert_frame_equal(trace(one), trace(other), check_exact=True)
+
+
+def test_assess__a_game_does_not_depend_on_the_number_of_games(merge: OpenScene) -> None:
+    many, one = play(arm(merge, Steady(), SumoDriver()), 3), play(arm(merge, Steady(), SumoDriver()), 1)
+    assert records(many[:1]) == records(one)
+
+
+def test_assess__episodes_and_seeds_give_different_games(merge: OpenScene) -> None:
+    games = [*play(arm(merge, Steady(), None)), *play(arm(merge, Steady(), None, seed=2))]
+    starts = {tuple(trace(game).loc[0, POSE]) for game in games}
+    assert len(starts) == 6
+
+
+def test_assess__an_episode_has_the_same_start_in_every_arm(merge: OpenScene) -> None:
+    arms = [
+        arm(merge, Steady(), None),
+        arm(merge, RANDOM, SumoDriver()),
+        arm(merge, SumoDriver(), RANDOM),
+        arm(merge, None, RANDOM),
+        arm(merge, RANDOM, RANDOM, persona=DISTRACTED),
+    ]
+    starts = []
+    for each in arms:
+        frames = [trace(game) for game in play(each)]
+        starts.append(
+            {
+                (row.episode, row.player): tuple(getattr(row, name) for name in POSE)
+                for frame in frames
+                for row in frame[frame["step"] == 0].itertuples()
+            }
+        )
+    both_players = starts[1]
+    assert set(both_players) == {(k, player) for k in range(3) for player in ("ego", "non_ego")}
+    for each in starts:
+        assert each == {player: both_players[player] for player in each}
+
+
+def test_assess__lapses_depend_on_the_episode_and_not_on_the_arm(merge: OpenScene) -> None:
+    arms = [play(arm(merge, ego, Steady(), persona=DISTRACTED), 6) for ego in (Steady(), None)]
+    lapses = []
+    for games in arms:
+        frames = [trace(game) for game in games]
+        of_non_ego = [frame[frame["player"] == "non_ego"].set_index("step")["lapsed"] for frame in frames]
+        lapses.append(of_non_ego)
+    assert any(each.any() for each in lapses[0])
+    for one, other in zip(*lapses, strict=True):
+        both = one.index.intersection(other.index)[:20]  # before the players can influence each other
+        assert one[both].equals(other[both])
+
+
+# --- records ----------------------------------------------------------------------------------------------------------
+
+
+def test_record__cells_of_an_absent_player_are_empty(merge: OpenScene) -> None:
+    (game, *_) = play(arm(merge, SumoDriver(), None), 1)
+    assert game.record["non_ego_outcome"] == ""
+    assert all(game.record[name] is None for name in MEASURED if name.startswith("non_ego_"))
+    assert game.record["ego_failed"] in (0, 1)
+    (game, *_) = play(arm(merge, None, SumoDriver()), 1)
+    assert game.record["ego_outcome"] == ""
+    assert game.record["ego_failed"] is None
+    assert all(game.record[name] is None for name in MEASURED if name.startswith("ego_"))
+    assert game.record["non_ego_outcome"] != ""
+    assert game.record["non_ego_mean_speed_mps"] > 0.0
+
+
+def test_record__the_ego_failed_unless_it_reached_the_goal(merge: OpenScene) -> None:
+    games = [*play(arm(merge, SumoDriver(), None), 2), *play(arm(merge, RANDOM, None), 2)]
+    outcomes = {game.record["ego_outcome"] for game in games}
+    assert "goal" in outcomes
+    assert outcomes & {"rail", "timeout"}
+    for game in games:
+        assert game.record["ego_failed"] == int(game.record["ego_outcome"] != "goal")
+        assert (game.record["ego_time_to_goal_s"] is not None) == (game.record["ego_outcome"] == "goal")
+
+
+def test_record__agrees_with_the_trace(merge: OpenScene) -> None:
+    for game in play(arm(merge, Steady(), SumoDriver()), 3):
+        recorded, frame = game.record, trace(game)
+        ego = frame[(frame["player"] == "ego") & (frame["step"] > 0)]
+        ended = ego.index[ego["outcome"] != ""]
+        drove = ego.loc[: ended[0]]
+        assert recorded["ego_outcome"] == drove["outcome"].iloc[-1]
+        assert recorded["ego_mean_speed_mps"] == pytest.approx(drove["speed_mps"].mean())
+        assert recorded["ego_max_deceleration_mps2"] == pytest.approx(max(0.0, -drove["acceleration_mps2"].min()))
+        if recorded["ego_outcome"] == "goal":
+            assert recorded["ego_time_to_goal_s"] == pytest.approx(drove["time_s"].iloc[-1])
+        assert recorded["duration_s"] == pytest.approx(frame["time_s"].max())
+
+
+def test_records__make_a_table_of_episodes(merge: OpenScene) -> None:
+    games = play(arm(merge, Failing(KeyError("x")), None), 2)
+    rows = [{**game.record, "arm": "naive_alone", "persona": "", "seed": 1} for game in games]
+    table = table_of("episodes", rows)
+    assert table["ego_failed"].isna().tolist() == [False, True]
+    assert table["ego_outcome"].tolist()[1] == "error"
+
+
+# --- errors -----------------------------------------------------------------------------------------------------------
+
+ERRORS = [RuntimeError("out of ideas"), KeyError("goal"), TypeError("no"), ZeroDivisionError("x / 0"), OSError("gone")]
+
+
+@pytest.mark.parametrize("error", [*ERRORS, SimulationError("died")], ids=lambda error: type(error).__name__)
+def test_assess__an_exception_of_a_driver_ends_only_its_game(error: Exception, merge: OpenScene) -> None:
+    games = play(arm(merge, Failing(error), SumoDriver()), 4)
+    without_errors = play(arm(merge, Steady(), SumoDriver()), 4)
+    assert [game.record["ego_outcome"] == "error" for game in games] == [False, True, False, True]
+    for game in games[1::2]:
+        assert game.record["error"] == f"{type(error).__name__}: {error}"
+        assert game.record["non_ego_outcome"] == "error"
+        assert game.trace is None
+        assert set(game.record) == {"episode", "ego_outcome", "non_ego_outcome", "error"}
+    assert [game.record["episode"] for game in games] == [0, 1, 2, 3]
+    assert records(games[::2]) == records(without_errors[::2])
+
+
+def test_assess__an_interrupt_is_raised(merge: OpenScene) -> None:
+    class Interrupted(Steady):
+        def decide(self, *_: Any) -> FloatArray:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        play(arm(merge, Interrupted(), None))
+    assert len(play(arm(merge, Steady(), None), 1)) == 1  # SUMO was closed
+
+
+def test_assess__actions_that_are_not_finite_are_an_error(merge: OpenScene) -> None:
+    class NotFinite(Steady):
+        def decide(self, games: IntArray, *_: Any) -> FloatArray:
+            return np.full((len(games), 2), np.nan)
+
+    (game,) = play(arm(merge, NotFinite(), None), 1)
+    assert game.record["ego_outcome"] == "error"
+    assert game.record["error"]
+
+
+# --- the log --------------------------------------------------------------------------------------------------------
+
+
+def test_trace__has_every_step_of_every_player(merge: OpenScene) -> None:
+    for episode, game in enumerate(play(arm(merge, Steady(), SumoDriver()), 3)):
+        frame = trace(game)
+        assert list(frame.columns) == SCHEMA.names
+        assert set(frame["episode"]) == {episode}
+        assert np.array_equal(frame["time_s"], frame["step"] * merge.world.step_s)
+        for player, rows in frame.groupby("player"):
+            steps = rows["step"].tolist()
+            assert steps == list(range(len(steps)))  # from the start, without a gap
+            outcome = game.record[f"{player}_outcome"]
+            reached = rows.index[rows["outcome"] != ""]
+            assert set(rows.loc[reached, "outcome"]) == {outcome}
+            if outcome == "goal":
+                assert len(reached) == 1  # then it is removed
+                assert rows["outcome"].iloc[-1] == "goal"
+            else:
+                assert steps[-1] == frame["step"].max()
+                wreck = rows.loc[reached[1:]]
+                assert (wreck["speed_mps"] == 0.0).all()
+                assert len(wreck[["x_m", "y_m", "heading_rad"]].drop_duplicates()) <= 1
+        assert frame["step"].max() * merge.world.step_s == pytest.approx(game.record["duration_s"])
+        assert frame.equals(frame.sort_values(["step", "player"], kind="stable"))
+
+
+def test_trace__vehicle_types_are_those_of_the_route_file(merge: OpenScene) -> None:
+    (game,) = play(arm(merge, Steady(), SumoDriver()), 1)
+    kinds = trace(game).groupby("player")["vehicle_type"].unique()
+    assert {player: kind.tolist() for player, kind in kinds.items()} == {
+        "ego": [merge.vehicle(0).vehicle_type],
+        "non_ego": [merge.vehicle(1).vehicle_type],
+    }
+
+
+def test_assess__metrics_that_need_a_steering_angle_are_empty_for_sumo(merge: OpenScene) -> None:
+    (game, *_) = play(arm(merge, SumoDriver(), SumoDriver()), 1)
+    assert game.record["ego_max_lateral_acceleration_mps2"] is None
+    assert game.trace is not None
+    assert set(game.trace["steering_rad"]) == {0.0}  # otherwise lane changes would be reported as swerves
+
+
+@pytest.mark.parametrize("scene", ["merge", "red_light", "roundabout", "zebra"])
+def test_log__has_every_quantity_of_the_live_game(scene: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    live: list[Step] = []
+    step = Arena.step
+    monkeypatch.setattr(Arena, "step", lambda arena: live.append(step(arena)) or live[-1])
+    (game,) = play(arm(open_scene(scene), Steady(), SumoDriver() if scene == "merge" else Steady()), 1)
+    recorded = game.recorded
+    assert recorded is not None
+    names = (
+        "speed_mps",
+        "leader_gap_m",
+        "time_to_collision_s",
+        "lateral_acceleration_mps2",
+        "goal_m",
+        "front_m",
+        "gap_s",
+    )
+    names += ("passed_red_s", "wrong_way", "advanced_m", "speed_over_permitted", "clearance_m", "lateral_offset_m")
+    for t, now in enumerate(live, start=1):
+        drove = now.drove[0]
+        assert drove.tolist() == recorded.drove[t].tolist()
+        assert now.payoff[0] == pytest.approx(recorded.payoff[t], abs=0.0)
+        for name in names:
+            found = getattr(recorded.quantities, name)[t, drove]
+            assert getattr(now.quantities, name)[0, drove].tolist() == found.tolist(), (t, name)

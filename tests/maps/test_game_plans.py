@@ -1,0 +1,96 @@
+"""Starts and goals on a map: both players reach the place of the conflict at about the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.game.road import SPACING_M
+from harness.maps.candidates import CandidateKind
+from harness.maps.game_plans import GamePlan, Plans
+from harness.maps.import_map import import_map
+from harness.road.net.network import read_net
+from tests.support.repository import REPOSITORY
+from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES
+
+MAPS = REPOSITORY / "tests" / "data" / "maps"
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory: pytest.TempPathFactory) -> Plans:
+    return Plans(import_map(MAPS / "town.osm", tmp_path_factory.mktemp("town"), left_hand=False)[1])
+
+
+def of_kind(plans: Plans, kind: CandidateKind) -> list[GamePlan]:
+    return [plan for plan in plans.all if plan.candidate.kind is kind]
+
+
+def test_plans__of_the_town_exist_for_every_conflict(town: Plans) -> None:
+    assert town.left_out == {}
+    assert [plan.number for plan in town.all] == list(range(1, len(town.all) + 1))
+
+
+# a start at 9.0 to 13.2 m/s under a limit of 13.89 m/s: 65 to 95 %
+def test_plans__start_the_ego_seconds_before_the_place_below_its_limit(town: Plans) -> None:
+    plan = next(plan for plan in of_kind(town, CandidateKind.TURN_ACROSS) if plan.candidate.with_signals)
+    assert plan.ego.speed_mps == (9.0, 13.2)
+    low_m, high_m = plan.ego.range
+    line = plan.ego_route.line
+    place_m = SPACING_M * int(np.argmin(np.hypot(*(line - plan.candidate.place).T)))
+    assert (place_m - low_m) / 13.2 == pytest.approx(6.5, abs=0.5)
+    assert (place_m - high_m) / 13.2 == pytest.approx(5.0, abs=0.5)
+    assert plan.person.key == "arrival_after_ego_s"
+
+
+def test_plans__the_ego_of_a_roundabout_comes_from_an_arm_and_leaves_it(town: Plans) -> None:
+    ring = {name for each in town.net.getRoundabouts() for name in each.getEdges()}
+    for plan in of_kind(town, CandidateKind.ROUNDABOUT):
+        assert plan.ego_route.edges[0] not in ring
+        assert plan.ego_route.edges[-1] not in ring
+
+
+def test_plans__a_person_on_a_zebra_crossing_comes_along_the_pavement(town: Plans) -> None:
+    for plan in of_kind(town, CandidateKind.ZEBRA):
+        assert plan.way is not None
+        assert plan.person_route is None
+        along, across = plan.way[1] - plan.way[0], plan.way[3] - plan.way[2]
+        assert abs(along @ across) < 0.2 * np.hypot(*along) * np.hypot(*across)
+
+
+def test_plans__of_a_ramp_let_the_person_come_from_it(town: Plans) -> None:
+    (plan,) = of_kind(town, CandidateKind.LANE_END)
+    assert plan.person_route is not None
+    assert plan.person_route.edges[0] != plan.ego_route.edges[0]
+
+
+@pytest.mark.parametrize(
+    ("edges", "reason"),
+    [
+        (CROSSING_EDGES.replace("/>", ' width="2.2"/>'), "lanes narrower than 2.5 m, such as"),
+        (CROSSING_EDGES.replace("13.89", "50"), "too little road before it"),
+    ],
+)
+def test_plans__what_is_left_out_has_a_reason(edges: str, reason: str, build_net: Callable[..., Path]) -> None:
+    plans = Plans(read_net(build_net(CROSSING_NODES, edges, "", "--no-turnarounds")))
+    assert plans.all == []
+    assert [each for each in plans.left_out if each.startswith(reason)]
+
+
+STUBS = (
+    '<node id="a" x="0" y="0"/><node id="b" x="600" y="0"/><node id="c" x="600" y="-15"/><node id="d" x="615" y="0"/>'
+)
+TO_STUBS = '<edge id="{0}{1}" from="{0}" to="{1}" speed="13.89"/>'
+
+
+# 15 s at the limit of 13.89 m/s, and 75 m from the farthest start of the player ahead
+def test_plans__on_a_road_without_conflicts_one_follows_the_other(build_net: Callable[..., Path]) -> None:
+    edges = "".join(TO_STUBS.format(*each) for each in ("ab", "cb", "bd"))
+    plans = Plans(read_net(build_net(STUBS, edges, "", "--no-turnarounds")))
+    assert [plan.candidate.kind for plan in plans.all] == [CandidateKind.FOLLOWING]
+    assert "no room for a goal behind it" in plans.left_out  # of the merge before the short road
+    (plan,) = plans.all
+    assert plan.ego_route.goal_position_m == pytest.approx(283.3, abs=0.1)
+    assert plan.time_limit_s({}) == 40.0  # 273 m at 65 % of the limit, and 8 s

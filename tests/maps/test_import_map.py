@@ -1,0 +1,128 @@
+"""Maps become nets that keep what the map says: lanes, heights, projection and the side of the road."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from sumolib.net import Net
+
+from harness.errors import UsageError
+from harness.maps.import_map import import_map
+from tests.support.repository import REPOSITORY
+
+MAPS = REPOSITORY / "tests" / "data" / "maps"
+TOWN, JUNCTION = MAPS / "town.osm", MAPS / "t_junction.xodr"
+CROSS = REPOSITORY / "networks" / "priority_crossing" / "priority_crossing.net.xml"
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory: pytest.TempPathFactory) -> Net:
+    return import_map(TOWN, tmp_path_factory.mktemp("town"), left_hand=False)[1]
+
+
+def written(folder: Path, name: str, text: str) -> Path:
+    (folder / name).write_text(text, encoding="utf-8")
+    return folder / name
+
+
+def test_import__of_openstreetmap_keeps_names_widths_and_limits(town: Net) -> None:
+    main = next(edge for edge in town.getEdges() if edge.getName() == "Hauptstraße")
+    driving = [lane for lane in main.getLanes() if lane.allows("passenger")]
+    assert [lane.getWidth() for lane in driving] == [3.5]  # the file gives 7 m for both directions
+    assert main.getSpeed() == pytest.approx(50.0 / 3.6, abs=0.01)
+    assert len(town.getRoundabouts()) == 1
+    assert any(edge.getFunction() == "crossing" for edge in town.getEdges())
+
+
+def test_import__of_openstreetmap_keeps_the_projection(tmp_path: Path) -> None:
+    file, _ = import_map(TOWN, tmp_path, left_hand=False)
+    assert 'projParameter="+proj=utm +zone=32' in file.read_text(encoding="utf-8")
+
+
+def test_import__of_opendrive_keeps_widths_and_heights(tmp_path: Path) -> None:
+    _, net = import_map(JUNCTION, tmp_path, left_hand=False)
+    west = net.getEdge("-1").getLane(0)
+    assert west.getWidth() == 3.25
+    assert [round(point[2], 2) for point in west.getShape3D()] == [0.0, 3.0]  # 200 m with a slope of 1.5 %
+
+
+def test_import__a_net_stays_as_it_is(tmp_path: Path) -> None:
+    file, _ = import_map(CROSS, tmp_path, left_hand=False)
+    assert file.read_bytes() == CROSS.read_bytes()
+
+
+def mirrored(text: str) -> str:
+    """The town in a mirror: its roundabout runs clockwise."""
+    return re.sub(r'lat="([\d.]+)"', lambda found: f'lat="{104.0 - float(found[1]):.7f}"', text)
+
+
+def test_import__left_hand_traffic_of_openstreetmap_must_be_said(tmp_path: Path) -> None:
+    left = written(tmp_path, "left.osm", mirrored(TOWN.read_text(encoding="utf-8")))
+    file, _ = import_map(left, tmp_path, left_hand=True)
+    assert 'lefthand="true"' in file.read_text(encoding="utf-8")
+    with pytest.raises(UsageError, match=r"run clockwise: traffic keeps to the left \(give --left-hand\)"):
+        import_map(left, tmp_path, left_hand=False)
+    with pytest.raises(UsageError, match=r"run counter-clockwise.*\(leave out --left-hand\)"):
+        import_map(TOWN, tmp_path, left_hand=True)
+
+
+def test_import__left_hand_traffic_of_opendrive_is_kept_or_refused(tmp_path: Path) -> None:
+    text = JUNCTION.read_text(encoding="utf-8")
+    straight = text[: text.index('  <road name="" ')] + "</OpenDRIVE>"  # without the roads inside the junction
+    two_way = written(tmp_path, "two_way.xodr", straight.replace("RHT", "LHT"))
+    file, net = import_map(two_way, tmp_path, left_hand=False)
+    assert 'lefthand="true"' in file.read_text(encoding="utf-8")
+    eastward, westward = (net.getEdge(name).getLane(0).getShape()[0][1] for name in ("-1", "1"))
+    assert eastward > westward
+    for text_of, message in (
+        (text.replace("RHT", "LHT"), r"road 11: has left-hand traffic and different lanes in its two directions"),
+        (text.replace("RHT", "LHT", 1), r"road\.rule: has roads with left-hand and roads with right-hand traffic"),
+    ):
+        with pytest.raises(UsageError, match=message):
+            import_map(written(tmp_path, "bad.xodr", text_of), tmp_path, left_hand=False)
+    with pytest.raises(UsageError, match="is a map with right-hand traffic"):
+        import_map(JUNCTION, tmp_path, left_hand=True)
+
+
+def test_import__what_netconvert_refuses_is_one_line(tmp_path: Path) -> None:
+    text = JUNCTION.read_text(encoding="utf-8").replace(' connectingRoad="11"', "")
+    with pytest.raises(UsageError, match=r"broken\.xodr: netconvert can't convert it: .*connectingRoad") as error:
+        import_map(written(tmp_path, "broken.xodr", text), tmp_path, left_hand=False)
+    assert len(str(error.value).splitlines()) == 1
+
+
+def test_import__a_net_without_right_of_way_is_refused(tmp_path: Path) -> None:
+    text = re.sub(r"<request .*/>", "", CROSS.read_text(encoding="utf-8"))
+    with pytest.raises(UsageError, match=r"has no right of way.*build it again"):
+        import_map(written(tmp_path, "bare.net.xml", text), tmp_path, left_hand=False)
+
+
+def test_import__roads_that_forbid_cars_are_no_roads(tmp_path: Path) -> None:
+    text = TOWN.read_text(encoding="utf-8").replace('k="maxspeed"', 'k="access" v="no"/><tag k="maxspeed"')
+    with pytest.raises(UsageError, match="has no road that cars may use"):
+        import_map(written(tmp_path, "quiet.osm", text), tmp_path, left_hand=False)
+
+
+def test_import__a_map_of_a_country_is_refused_by_its_own_name(tmp_path: Path) -> None:
+    text = JUNCTION.read_text(encoding="utf-8")
+    road = re.search(r"<road .*?</road>", text, re.DOTALL)
+    assert road is not None
+    copy = re.sub(r"<link>.*?</link>", "", road[0], flags=re.DOTALL).replace(' id="1"', ' id="99"')
+    far = text.replace("</OpenDRIVE>", copy.replace('x="-210"', 'x="-200000"') + "</OpenDRIVE>")
+    with pytest.raises(UsageError, match=r"wide\.xodr: is too large for a scene: .* km \(cut out the part"):
+        import_map(written(tmp_path, "wide.xodr", far), tmp_path, left_hand=False)
+
+
+def test_import__a_name_with_commas_and_blanks_is_one_name(tmp_path: Path) -> None:
+    odd = written(tmp_path, "a, b=<c>.xodr", JUNCTION.read_text(encoding="utf-8"))
+    assert import_map(odd, tmp_path, left_hand=False)[1].hasEdge("-1")
+
+
+def test_import__500_mb_of_a_net_are_refused_by_their_size(tmp_path: Path) -> None:
+    large = tmp_path / "country.net.xml"
+    with large.open("wb") as sparse:
+        sparse.truncate(500_000_000)
+    with pytest.raises(UsageError, match=r"too large: 500 MB.*keep-edges\.in-boundary"):
+        import_map(large, tmp_path, left_hand=False)

@@ -1,0 +1,130 @@
+"""What a map file says of itself, and the files that are refused before anything converts them."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import pytest
+
+from harness.errors import UsageError
+from harness.maps import map_file
+from harness.maps.map_file import MapKind, facts_of, kind_of
+from tests.support.repository import REPOSITORY
+
+MAPS = REPOSITORY / "tests" / "data" / "maps"
+ROAD = '<way id="1"><nd ref="1"/><nd ref="2"/><tag k="highway" v="residential"/>{}</way>'
+
+
+def osm(inside: str) -> str:
+    return f'<?xml version="1.0"?><osm version="0.6">{inside}</osm>'
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("a.net.xml", MapKind.NET),
+        ("a.net.xml.gz", MapKind.NET),
+        ("a.osm", MapKind.OSM),
+        ("A.OSM.XML.GZ", MapKind.OSM),
+        ("a.xodr", MapKind.OPENDRIVE),
+    ],
+)
+def test_kind__is_told_by_the_end_of_the_name(name: str, kind: MapKind) -> None:
+    assert kind_of(Path(name)) is kind
+
+
+@pytest.mark.parametrize(("name", "remedy"), [("a.osm.pbf", "osmium cat"), ("a.txt", "ends with .net.xml")])
+def test_kind__of_another_file_is_refused_with_a_remedy(name: str, remedy: str) -> None:
+    with pytest.raises(UsageError, match=remedy):
+        kind_of(Path(name))
+
+
+def test_facts__count_the_roads_for_cars_and_see_layers(tmp_path: Path) -> None:
+    file = tmp_path / "a.osm"
+    path = '<way id="2"><tag k="highway" v="footway"/><tag k="layer" v="1"/></way>'
+    file.write_text(osm(ROAD.format("") + path))
+    facts = facts_of(file, MapKind.OSM)
+    assert (facts.roads, facts.has_layers) == (1, False)
+    file.write_text(osm(ROAD.format('<tag k="layer" v="-1"/>')))
+    assert facts_of(file, MapKind.OSM).has_layers
+
+
+def test_facts__are_those_of_the_file_when_it_is_compressed(tmp_path: Path) -> None:
+    packed, content = tmp_path / "town.osm.gz", (MAPS / "town.osm").read_bytes()
+    packed.write_bytes(gzip.compress(content[:999]) + gzip.compress(content[999:]))  # of two members
+    assert facts_of(packed, MapKind.OSM) == facts_of(MAPS / "town.osm", MapKind.OSM)
+
+
+def test_facts__of_opendrive_name_the_side_of_the_road(tmp_path: Path) -> None:
+    text = (MAPS / "t_junction.xodr").read_text()
+    assert facts_of(MAPS / "t_junction.xodr", MapKind.OPENDRIVE).rules == {"RHT"}
+    file = tmp_path / "left.xodr"
+    file.write_text(text.replace("RHT", "LHT"))
+    facts = facts_of(file, MapKind.OPENDRIVE)
+    assert (facts.rules, facts.uneven) == ({"LHT"}, "11")  # the first road with a lane in one direction only
+
+
+@pytest.mark.parametrize(
+    ("sound", "broken", "message"),
+    [
+        ('length="200"', 'length="nan"', r"road 1: length of its road is 'nan', not a number"),
+        (' a="3.25"', ' a="wide"', r"road 1: a of its width is 'wide', not a number"),
+        ('<junction id="100"', '<junction id="9"', r"road 11: it lies in junction '100', which the map does not have"),
+    ],
+)
+def test_facts__what_netconvert_would_take_for_sound_is_refused(
+    sound: str, broken: str, message: str, tmp_path: Path
+) -> None:
+    text = (MAPS / "t_junction.xodr").read_text()
+    assert sound in text
+    file = tmp_path / "broken.xodr"
+    file.write_text(text.replace(sound, broken))
+    with pytest.raises(UsageError, match=message):
+        facts_of(file, MapKind.OPENDRIVE)
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (osm('<way id="1"><tag k="waterway" v="river"/></way>'), "has no road for cars"),
+        (osm(ROAD.format(""))[:-9], "is not readable XML"),
+        ('<!DOCTYPE osm [<!ENTITY x SYSTEM "file:///etc/hostname">]>' + osm(ROAD.format("")), "document type"),
+        ("<net/>", "its root is not osm"),
+        ("", "is not readable XML"),
+    ],
+)
+def test_facts__of_a_file_that_is_no_map_of_roads(content: str, message: str, tmp_path: Path) -> None:
+    file = tmp_path / "bad.osm"
+    file.write_text(content)
+    with pytest.raises(UsageError, match=message):
+        facts_of(file, MapKind.OSM)
+
+
+def test_facts__500_mb_are_refused_by_their_size_before_they_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "country.osm"
+    with file.open("wb") as sparse:
+        sparse.truncate(500_000_000)
+    with pytest.raises(UsageError, match=r"too large: 500 MB, at most 100 MB.*osmium extract"):
+        facts_of(file, MapKind.OSM)
+
+
+def test_facts__a_compressed_file_is_read_up_to_its_limit_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(map_file, "MOST_BYTES", 3_000_000)
+    packed = tmp_path / "bomb.osm.gz"
+    packed.write_bytes(gzip.compress(osm("<!-- " + " " * 4_000_000 + " -->").encode()))
+    with pytest.raises(UsageError, match=r"holds more than 3 MB.*osmium extract"):
+        facts_of(packed, MapKind.OSM)
+
+
+@pytest.mark.parametrize(("content", "message"), [(b"no gzip", "is not a gzip file"), (None, "is cut off")])
+def test_facts__of_a_broken_compressed_file(content: bytes | None, message: str, tmp_path: Path) -> None:
+    packed = tmp_path / "broken.osm.gz"
+    packed.write_bytes(content or gzip.compress((MAPS / "town.osm").read_bytes())[:-20])
+    with pytest.raises(UsageError, match=message):
+        facts_of(packed, MapKind.OSM)
+
+
+def test_facts__of_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="there is no such file"):
+        facts_of(tmp_path / "no.osm", MapKind.OSM)

@@ -1,0 +1,381 @@
+"""Roads of SUMO nets: the merge scene compared with its geometry, and nets of many kinds built here.
+
+Properties of every net: the drivable area has no holes at its seams, a car on a route's line touches no rail, there are
+rails on both sides of the line, and the road is open at the ends of the scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from shapely.geometry.base import BaseGeometry
+from sumolib.net import Net
+from sumolib.net.edge import Edge
+
+from harness.errors import UsageError
+from harness.game.arrays import FloatArray
+from harness.game.geometry import Box
+from harness.game.rails import Rails
+from harness.game.road import MARGIN_M, SPACING_M, Route
+from harness.road.net import network
+from harness.road.net.route_table import route_table
+from harness.road.scene.open_scene import OpenScene, open_scene
+
+Build = Callable[..., Path]
+
+CROSSING = '<node id="c" x="0" y="0"/>' + "".join(
+    f'<node id="{name}" x="{x}" y="{y}"/>' for name, x, y in (("n", 0, 80), ("s", 0, -80), ("e", 80, 0), ("w", -80, 0))
+)
+ARMS = "".join(
+    f'<edge id="{arm}c" from="{arm}" to="c" numLanes="{lanes}"/>'
+    f'<edge id="c{arm}" from="c" to="{arm}" numLanes="{lanes}"/>'
+    for arm, lanes in (("n", 1), ("s", 2), ("e", 1), ("w", 2))
+)
+CURVE = (
+    '<node id="a" x="0" y="0"/><node id="b" x="200" y="200"/>',
+    '<edge id="e" from="a" to="b" numLanes="2" shape="0,0 100,0 130,10 160,30 180,60 195,100 200,200"/>',
+)
+TWO_WAY = (
+    '<node id="a" x="0" y="0"/><node id="b" x="150" y="0"/>',
+    '<edge id="ab" from="a" to="b" numLanes="2"/><edge id="ba" from="b" to="a"/>',
+)
+ROUNDABOUT = (
+    "".join(
+        f'<node id="r{k}" x="{20 * np.cos(k * np.pi / 2):.2f}" y="{20 * np.sin(k * np.pi / 2):.2f}"/>'
+        f'<node id="o{k}" x="{80 * np.cos(k * np.pi / 2):.2f}" y="{80 * np.sin(k * np.pi / 2):.2f}"/>'
+        for k in range(4)
+    ),
+    "".join(
+        f'<edge id="r{k}" from="r{k}" to="r{(k + 1) % 4}" shape="'
+        + " ".join(
+            f"{20 * np.cos(k * np.pi / 2 + t * np.pi / 12):.2f},{20 * np.sin(k * np.pi / 2 + t * np.pi / 12):.2f}"
+            for t in range(7)
+        )
+        + f'"/><edge id="i{k}" from="o{k}" to="r{k}"/><edge id="o{k}" from="r{k}" to="o{k}"/>'
+        for k in range(4)
+    ),
+)
+# The entry has one lane, which leads to the right lane of the middle edge; the left exit starts from its left lane.
+CHANGE = (
+    '<node id="a" x="0" y="-80"/><node id="b" x="80" y="0"/><node id="c" x="180" y="0"/>'
+    '<node id="d" x="180" y="80"/><node id="e" x="180" y="-80"/>',
+    '<edge id="in" from="a" to="b"/><edge id="middle" from="b" to="c" numLanes="3"/>'
+    '<edge id="left" from="c" to="d"/><edge id="right" from="c" to="e"/>',
+    '<connection from="in" to="middle" fromLane="0" toLane="0"/>'
+    '<connection from="middle" to="left" fromLane="2" toLane="0"/>'
+    '<connection from="middle" to="right" fromLane="0" toLane="0"/>',
+)
+NETS = {
+    "curve": CURVE,
+    "crossing": (CROSSING, ARMS),
+    "crossing without lanes inside": (CROSSING, ARMS, "", "--no-internal-links"),
+    "crossing with sidewalks": (CROSSING, ARMS, "", "--sidewalks.guess", "--crossings.guess"),
+    "crossing of left-hand traffic": (CROSSING, ARMS, "", "--lefthand"),
+    "two-way street": TWO_WAY,
+    "roundabout": ROUNDABOUT,
+    "change of lanes": CHANGE,
+}
+GENERATED = {
+    "grid": ("--grid", "--grid.number", "2", "--grid.attach-length", "60"),
+    "grid with turn lanes": ("--grid", "--grid.number", "2", "-L", "2", "--turn-lanes", "1"),
+    "random": ("--rand", "--rand.iterations", "8", "--seed", "3"),
+}
+
+
+@dataclass
+class Read:
+    """A net as the harness reads it, with some routes through it."""
+
+    net: Net
+
+    @cached_property
+    def area(self) -> BaseGeometry:
+        return network.drivable_area(self.net)
+
+    @cached_property
+    def rail_lines(self) -> list[FloatArray]:
+        return network.rail_lines(self.net, self.area)
+
+    @cached_property
+    def rails(self) -> Rails:
+        return network.rails(self.rail_lines, 20.0)
+
+    @cached_property
+    def tables(self) -> list[Route]:
+        return [
+            route_table(self.net, self.area, edges, goal=edges[-1], goal_position_m=1.0)
+            for edges in routes_through(self.net, 8)
+        ]
+
+    def table(self, *names: str, goal_position_m: float = 1.0) -> Route:
+        edges = [self.net.getEdge(name) for name in names]
+        return route_table(self.net, self.area, edges, goal=edges[-1], goal_position_m=goal_position_m)
+
+
+@pytest.fixture(scope="module")
+def nets(build_net: Build, generate_net: Build) -> dict[str, Read]:
+    built = {name: build_net(*sources) for name, sources in NETS.items()}
+    built |= {name: generate_net(*options) for name, options in GENERATED.items()}
+    return {name: Read(network.read_net(path)) for name, path in built.items()}
+
+
+EVERY_NET = pytest.mark.parametrize("name", [*NETS, *GENERATED])
+
+
+def routes_through(net: Net, most: int) -> list[list[Edge]]:
+    """Routes of up to three edges for cars, without turnarounds."""
+    found: list[list[Edge]] = []
+    for edge in net.getEdges(withInternal=False):
+        ways = [[edge]]
+        for _ in range(2):
+            ways = [[*way, following] for way in ways for following in onward(way[-1]) if following not in way] or ways
+        found += ways if edge.allows("passenger") else []
+    return found[:: max(1, len(found) // most)]
+
+
+def onward(edge: Edge) -> list[Edge]:
+    return [
+        following
+        for following, links in edge.getOutgoing().items()
+        if any(link.getDirection() not in "tT" and link.getToLane().allows("passenger") for link in links)
+    ]
+
+
+def stations(route: Route) -> FloatArray:
+    return np.arange(len(route.x_m)) * SPACING_M - MARGIN_M
+
+
+def clearance(rails: Rails, route: Route, offset_m: float = 0.0) -> FloatArray:
+    """Distance to the rails of a car at all stations of the route, at a lateral offset."""
+    along = stations(route)
+    inside = (along >= 2.5) & (along <= route.length_m - 2.5)
+    heading = route.heading_rad[inside]
+    x = route.x_m[inside] - offset_m * np.sin(heading)
+    y = route.y_m[inside] + offset_m * np.cos(heading)
+    cars = Box(x[:, None], y[:, None], heading[:, None], np.array([4.6]), np.array([1.8]))
+    return rails.distance_m(cars, 10.0)
+
+
+# --- the merge scene -------------------------------------------------------------------------------------------------
+
+
+def test_merge__rails_are_in_their_places(merge: OpenScene) -> None:
+    lines = sorted(merge.rail_lines, key=lambda line: line[:, 1].mean())
+    assert len(lines) == 2
+    low, high = (shapely.LineString(line) for line in lines)
+    # the right rail: straight, the taper from (100, -6.4) to (130, -3.2), straight; the openings take 0.3 m
+    assert low.hausdorff_distance(shapely.LineString([(0.3, -6.4), (100, -6.4), (130, -3.2), (219.7, -3.2)])) < 0.02
+    assert high.hausdorff_distance(shapely.LineString([(0.3, 0), (219.7, 0)])) < 0.02
+
+
+@pytest.mark.parametrize(
+    ("station", "left", "right"),
+    # the line is in the middle of lane 1, y = -1.6; the taper falls 3.2 m in 30 m: at 115 m the edge is at y = -4.8
+    [(20.0, 1.6, -4.8), (99.0, 1.6, -4.8), (115.0, 1.6, -3.2), (140.0, 1.6, -1.6), (219.0, 1.6, -1.6)],
+)
+def test_merge__edges_by_station(merge: OpenScene, station: float, left: float, right: float) -> None:
+    routes = merge.world.road.routes
+    for player in range(2):
+        row = routes.first_row[player] + round((station + MARGIN_M) / SPACING_M)
+        assert routes.left_edge_m[row] == pytest.approx(left, abs=0.02)
+        assert routes.right_edge_m[row] == pytest.approx(right, abs=0.02)
+
+
+def test_merge__lane_0_ends_at_100_m_and_lane_1_continues(merge: OpenScene) -> None:
+    routes = merge.world.road.routes
+    row = routes.first_row[0] + round((50.0 + MARGIN_M) / SPACING_M)
+    assert routes.lane_offset_m[row].tolist() == pytest.approx([-3.2, 0.0])
+    assert routes.lane_end_m[row].tolist() == [100.0, np.inf]
+
+
+def test_merge__goal_and_limit(merge: OpenScene) -> None:
+    routes = merge.world.road.routes
+    assert routes.goal_m.tolist() == [175.0, 175.0]  # 100 m approach, 30 m junction, 45 m along the exit
+    assert (routes.speed_limit_mps == 13.89).all()
+
+
+# --- the shipped scene -----------------------------------------------------------------------------------------------
+
+
+def test_shipped_merge__has_a_drivable_shoulder_and_a_taper_on_the_left(repository: Path) -> None:
+    scene = open_scene(repository / "networks" / "merge")
+    low, high = (shapely.LineString(line) for line in sorted(scene.rail_lines, key=lambda line: line[:, 1].mean()))
+    assert low.hausdorff_distance(shapely.LineString([(0.3, -6.2), (219.7, -6.2)])) < 0.02
+    assert high.hausdorff_distance(shapely.LineString([(0.3, 3.2), (100, 3.2), (130, 0), (219.7, 0)])) < 0.02
+    routes = scene.world.road.routes
+    row = routes.first_row[0] + round((50.0 + MARGIN_M) / SPACING_M)
+    assert routes.lane_offset_m[row].tolist() == pytest.approx([0.0, 3.2])  # the shoulder is not a lane of the route
+    assert routes.lane_end_m[row].tolist() == [np.inf, 100.0]
+
+
+# --- any net ---------------------------------------------------------------------------------------------------------
+
+
+@EVERY_NET
+def test_area__has_no_holes_at_seams(nets: dict[str, Read], name: str) -> None:
+    area = nets[name].area
+    assert area.is_valid
+    for part in getattr(area, "geoms", [area]):
+        for ring in part.interiors:  # a hole is a block between streets, not a gap at a seam
+            assert not shapely.Polygon(ring).buffer(-1.0).is_empty
+
+
+@EVERY_NET
+def test_area__covers_every_lane(nets: dict[str, Read], name: str) -> None:
+    area = nets[name].area.buffer(0.05)
+    for edge in nets[name].net.getEdges(withInternal=False):
+        for lane in network.car_lanes(edge):
+            half = 0.5 * lane.getWidth() - 0.05
+            assert area.covers(shapely.LineString(network.lane_line(lane)).buffer(half, cap_style="flat"))
+
+
+@EVERY_NET
+def test_route__a_car_on_its_line_touches_no_rail(nets: dict[str, Read], name: str) -> None:
+    assert nets[name].tables
+    for table in nets[name].tables:
+        assert clearance(nets[name].rails, table).min() > 0.0
+
+
+@EVERY_NET
+def test_route__its_line_has_no_jumps(nets: dict[str, Read], name: str) -> None:
+    for table in nets[name].tables:
+        steps = np.hypot(np.diff(table.x_m), np.diff(table.y_m))
+        assert steps.max() <= SPACING_M + 1e-6
+        assert steps.min() > 0.3 * SPACING_M
+        turned = np.abs((np.diff(table.heading_rad) + np.pi) % (2.0 * np.pi) - np.pi)
+        assert turned.max() < 0.8
+
+
+@EVERY_NET
+def test_route__has_rails_on_both_sides(nets: dict[str, Read], name: str) -> None:
+    read = nets[name]
+    for table in read.tables:
+        assert (table.left_edge_m > 0.9).all()
+        assert (table.right_edge_m < -0.9).all()
+        row = stations(table).searchsorted(15.0)  # on the first edge, outside junctions
+        for offset in (table.left_edge_m[row], table.right_edge_m[row]):
+            x = np.array([table.x_m[row] - offset * np.sin(table.heading_rad[row])])
+            y = np.array([table.y_m[row] + offset * np.cos(table.heading_rad[row])])
+            point = Box(x[:, None], y[:, None], np.zeros((1, 1)), np.array([0.1]), np.array([0.1]))
+            assert read.rails.distance_m(point, 10.0) < 0.05
+
+
+@pytest.mark.parametrize("name", ["curve", "crossing", "crossing of left-hand traffic", "two-way street", "roundabout"])
+def test_fringe__is_open(nets: dict[str, Read], name: str) -> None:
+    read = nets[name]
+    outer = [edge.getID() for edge in read.net.getEdges(withInternal=False) if not onward(edge)]
+    assert outer
+    for edge in outer:
+        table = read.table(edge)
+        last = np.flatnonzero(stations(table) <= table.length_m)[-1]
+        for row in range(last - 6, last + 12):  # from the road to beyond its end
+            place = (np.array([[each]]) for each in (table.x_m[row], table.y_m[row], table.heading_rad[row]))
+            assert read.rails.distance_m(Box(*place, np.array([4.6]), np.array([1.8])), 10.0) > 0.0
+
+
+def test_fringe__a_ring_has_none(build_net: Build) -> None:
+    square = [(0, 0), (60, 0), (60, 60), (0, 60)]
+    nodes = "".join(f'<node id="{k}" x="{x}" y="{y}"/>' for k, (x, y) in enumerate(square))
+    edges = "".join(f'<edge id="e{k}" from="{k}" to="{(k + 1) % 4}"/>' for k in range(4))
+    lines = Read(network.read_net(build_net(nodes, edges))).rail_lines
+    assert len(lines) == 2  # the inner and the outer rail, each closed
+    for line in lines:
+        assert line[0] == pytest.approx(line[-1])
+
+
+def test_two_way__the_turnaround_beyond_the_end_is_not_drivable(nets: dict[str, Read]) -> None:
+    west, _, east, _ = nets["two-way street"].area.bounds
+    assert (west, east) == pytest.approx((0.0, 150.0), abs=0.02)
+
+
+def test_crossing__left_and_right_edges_reach_into_the_arms(nets: dict[str, Read]) -> None:
+    table = nets["crossing"].table("sc", "cn")
+    middle = np.abs(table.y_m - nets["crossing"].net.getNode("c").getCoord()[1]).argmin()
+    approach = stations(table).searchsorted(30.0)
+    assert table.left_edge_m[middle] > 10.0  # in the middle the area extends into the side streets
+    assert table.right_edge_m[middle] < -10.0
+    assert table.left_edge_m[approach] - table.right_edge_m[approach] == pytest.approx(4 * 3.2, abs=0.05)
+
+
+def test_change_of_lanes__the_line_changes_lanes_on_the_edge(nets: dict[str, Read]) -> None:
+    table = nets["change of lanes"].table("in", "middle", "left")
+    middle = nets["change of lanes"].net.getEdge("middle")
+    entry, exit_ = (network.lane_line(middle.getLane(k)) for k in (0, 2))
+    line = shapely.LineString(np.stack((table.x_m, table.y_m), axis=1))
+    assert line.distance(shapely.Point(entry[0])) < 0.3
+    assert line.distance(shapely.Point(exit_[-1])) < 0.3
+
+
+def test_change_of_lanes__lanes_that_leave_the_route_end_at_their_edge(nets: dict[str, Read]) -> None:
+    table = nets["change of lanes"].table("in", "middle", "left")
+    row = np.flatnonzero(np.isfinite(table.lane_offset_m).sum(1) == 3)[20]
+    first, second, third = table.lane_end_m[row]
+    assert first == second
+    assert third == np.inf
+    end = shapely.Point(network.lane_line(nets["change of lanes"].net.getEdge("middle").getLane(2))[-1])
+    line = shapely.LineString(np.stack((table.x_m, table.y_m), axis=1))
+    assert first == pytest.approx(line.project(end) - MARGIN_M, abs=0.5)
+
+
+def test_junction__lanes_stay_side_by_side_inside(build_net: Build) -> None:
+    places = (("a", 0, 0), ("b", 80, 0), ("c", 160, 0), ("d", 80, 80))
+    nodes = "".join(f'<node id="{name}" x="{x}" y="{y}"/>' for name, x, y in places)
+    edges = "".join(
+        f'<edge id="{start}{end}" from="{start}" to="{end}" numLanes="{lanes}"/>'
+        for start, end, lanes in (("a", "b", 2), ("b", "c", 2), ("d", "b", 1))
+    )
+    table = Read(network.read_net(build_net(nodes, edges))).table("ab", "bc")
+    inside = (stations(table) >= 0.0) & (stations(table) <= table.length_m)
+    assert np.allclose(table.lane_offset_m[inside], [-3.2, 0.0], atol=0.05)
+
+
+@pytest.mark.parametrize("name", ["crossing", "crossing without lanes inside"])
+def test_goal__is_at_its_position_on_its_edge(nets: dict[str, Read], name: str) -> None:
+    table = nets[name].table("wc", "cn", goal_position_m=25.0)
+    row = stations(table).searchsorted(table.goal_m)
+    lane = nets[name].net.getLane("cn_0")  # SUMO's lane length may differ from its shape
+    goal = shapely.LineString(network.lane_line(lane)).interpolate(25.0 / lane.getLength(), normalized=True)
+    assert goal.distance(shapely.Point(table.x_m[row], table.y_m[row])) < 0.6
+
+
+def test_route__has_no_sidewalks(nets: dict[str, Read]) -> None:
+    read = nets["crossing with sidewalks"]
+    assert len(read.net.getEdge("nc").getLanes()) == 2  # a lane and a sidewalk
+    table = read.table("nc", "cs")
+    row = stations(table).searchsorted(20.0)
+    assert np.isfinite(table.lane_offset_m[row]).sum() == 1
+
+
+def test_route__a_gap_is_refused(nets: dict[str, Read]) -> None:
+    with pytest.raises(ValueError, match="no connection from edge 'cn' to 'wc'"):
+        nets["crossing"].table("cn", "wc")
+
+
+def test_route__a_missing_goal_is_refused(nets: dict[str, Read]) -> None:
+    net = nets["crossing"].net
+    edges = [net.getEdge("wc"), net.getEdge("cn")]
+    with pytest.raises(ValueError, match="does not pass the goal's edge 'ce'"):
+        route_table(net, nets["crossing"].area, edges, goal=net.getEdge("ce"), goal_position_m=1.0)
+
+
+def test_find__names_the_most_similar_edge_and_lane(nets: dict[str, Read]) -> None:
+    net, path = nets["change of lanes"].net, Path("a.net.xml")
+    assert network.find_edge(net, path, "key", "middle").getID() == "middle"
+    assert network.find_lane(net, path, "key", "middle_2").getID() == "middle_2"
+    with pytest.raises(UsageError, match=r"a\.net\.xml: key: the net has no edge 'midle' \(did you mean 'middle'\?\)"):
+        network.find_edge(net, path, "key", "midle")
+    with pytest.raises(UsageError, match=r"no lane 'middle_7' \(did you mean 'middle_"):
+        network.find_lane(net, path, "key", "middle_7")
+
+
+def test_read__a_net_without_roads_for_cars_is_refused(build_net: Build) -> None:
+    rails_only = '<edge id="e" from="a" to="b" allow="tram"/>'
+    path = build_net('<node id="a" x="0" y="0"/><node id="b" x="90" y="0"/>', rails_only)
+    with pytest.raises(UsageError, match="no lane that cars may use"):
+        network.read_net(path)

@@ -1,0 +1,129 @@
+"""Persons of a route file: how they are read, which walks SUMO can carry out, and how they depart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from harness.errors import UsageError
+from harness.road.demand.route_file import RouteFile
+from harness.road.demand.route_reading import read_route_file
+from harness.road.scene.load_check import check_loads
+from harness.road.scene.open_scene import open_scene
+from tests.support.scenes import CROSSING_EDGES, CROSSING_NODES, build_scene
+
+Places = Mapping[str, Sequence[str]]
+STREETS: Places = {"ego": ("wc ce", "wc_0"), "non_ego": ("wc ce", "wc_0", "[50.0, 60.0]"), "goal": "ce"}
+PAVED = CROSSING_EDGES.replace('spreadType="right"', 'spreadType="right" sidewalkWidth="2"')
+PAVED_PLACES: Places = {"ego": ("wc ce", "wc_1"), "non_ego": ("wc ce", "wc_1", "[50.0, 60.0]"), "goal": "ce"}
+
+
+def read(folder: Path, content: str) -> RouteFile:
+    path = folder / "a.rou.xml"
+    path.write_text(f"<routes>{content}</routes>", encoding="utf-8")
+    return read_route_file(path)
+
+
+def message(
+    folder: Path, others: str, edges: str = CROSSING_EDGES, places: dict[str, tuple[str, ...]] = STREETS
+) -> str:
+    with pytest.raises(UsageError) as raised:
+        build_scene(folder, CROSSING_NODES, edges, places, others=others, goal_m=50.0)
+    (problem,) = raised.value.problems
+    return f"{problem.key}: {problem.message} ({problem.remedy})"
+
+
+def person(walk: str, attributes: str = 'depart="2"') -> str:
+    return f'<person id="p" {attributes}>{walk}</person>'
+
+
+def test_person__has_the_type_the_size_and_the_places_of_sumo(tmp_path: Path) -> None:
+    routes = read(tmp_path, person('<walk edges="a b" arrivalPos="-5" speed="1.1"/>', 'depart="2" departPos="7"'))
+    found = routes.vehicles["p"]
+    kind = routes.types[found.vehicle_type]
+    assert (found.on_foot, found.edges, found.depart_s) == (True, ("a", "b"), 2.0)
+    assert (found.position, found.arrival[1], found.speed) == ("7", "-5", "1.1")
+    assert (kind.name, kind.length_m, kind.width_m) == ("DEFAULT_PEDTYPE", 0.215, 0.478)
+    assert kind.vehicle_class == "pedestrian"
+
+
+def test_flow__of_persons_has_the_rates_of_other_flows(tmp_path: Path) -> None:
+    flow = '<personFlow id="f" begin="0" end="100" personsPerHour="360"><walk edges="a"/></personFlow>'
+    drawn = read(tmp_path, flow).departures(set(), 25.0, np.random.default_rng(1))
+    assert [(each.name, each.depart_s) for each in drawn] == [("f.0", 0.0), ("f.1", 10.0), ("f.2", 20.0)]
+
+
+def test_place__at_random_is_drawn_for_each_game(tmp_path: Path) -> None:
+    routes = read(tmp_path, person('<walk edges="a" departPos="random"/>'))
+    places = [routes.departures(set(), 9.0, np.random.default_rng(k))[0].position for k in (1, 2, 1)]
+    assert places[0] == places[2] != places[1]
+    assert all(0.0 <= float(each.removesuffix(" of the edge")) <= 1.0 for each in places)
+
+
+def test_walk__without_edges_is_found_by_sumo(tmp_path: Path) -> None:
+    walk = person('<walk from="sc" to="ce"/>', 'depart="2" departPos="max"')
+    scene = build_scene(tmp_path, CROSSING_NODES, CROSSING_EDGES, STREETS, others=walk, goal_m=50.0)
+    (found,) = scene.departures(np.random.default_rng(1))
+    assert found.edges == ("sc", "ce")
+    edge_m = float(found.position)  # in metres: SUMO's edges end before the junction
+    assert 80.0 < edge_m < 100.0
+    check_loads(scene)
+
+
+def test_walk__against_the_direction_of_edges_is_possible(tmp_path: Path) -> None:
+    back = person('<walk edges="ce wc"/>')
+    scene = build_scene(tmp_path, CROSSING_NODES, CROSSING_EDGES, STREETS, others=back, goal_m=50.0)
+    assert scene.departures(np.random.default_rng(1))[0].edges == ("ce", "wc")
+
+
+def test_net__with_walking_areas_has_no_persons(tmp_path: Path) -> None:
+    net_options = ("--crossings.guess", "true")
+    walk = person('<walk edges="wc"/>')
+    with pytest.raises(UsageError) as raised:
+        build_scene(tmp_path, CROSSING_NODES, PAVED, PAVED_PLACES, others=walk, goal_m=50.0, net_options=net_options)
+    (problem,) = raised.value.problems
+    assert problem.key == "person"
+    assert "libsumo 1.28 may die of a segmentation fault" in problem.message
+    assert "rebuild the net without crossings" in problem.remedy
+
+
+def test_walk__over_a_gap_is_refused(tmp_path: Path) -> None:
+    # the pavements of two streets are not connected: they end 7.2 m before the crossing's middle, on each side
+    said = message(tmp_path, person('<walk edges="wc ce"/>'), PAVED, PAVED_PLACES)
+    assert said.startswith("person p: SUMO moves it ")
+    assert "at once, from edge 'wc' to 'ce'" in said
+
+
+@pytest.mark.parametrize(
+    ("walk", "expected"),
+    [
+        ('<walk edges="wc sc"/>', "person p: SUMO moves it "),
+        ('<walk edges="wc" arrivalPos="500"/>', "person p: its arrivalPos 500 lies beyond the edge's end"),
+        ('<walk edges="wc" arrivalPos="there"/>', "person p.arrivalPos: 'there' is not a place along an edge"),
+        ('<walk edges="wc nowhere"/>', "person p: the net has no edge 'nowhere'"),
+        ('<walk edges="wc" duration="9"/>', "walk.duration: is not supported (give a speed)"),
+        ('<walk edges="wc"/><stop lane="wc_0" duration="5"/>', "person.stop: is not supported"),
+        ('<walk edges="wc"/><walk edges="ce"/>', "person p: has 2 walks, one is possible"),
+        ('<personTrip from="wc" to="ce"/>', "person.personTrip: is not supported"),
+        ("", "person p: has no walk, one is possible"),
+    ],
+)
+def test_walk__that_sumo_does_not_carry_out_is_refused(tmp_path: Path, walk: str, expected: str) -> None:
+    assert message(tmp_path, person(walk)).startswith(expected)
+
+
+def test_walk__on_a_road_for_vehicles_alone_is_refused(tmp_path: Path) -> None:
+    edges = CROSSING_EDGES.replace('id="cn"', 'id="cn" allow="passenger"')
+    said = message(tmp_path, person('<walk edges="sc cn"/>'), edges)
+    assert said.startswith("person p: walks on edge 'cn', none of whose lanes allows pedestrians")
+
+
+def test_player__is_no_person_of_the_route_file(tmp_path: Path) -> None:
+    scene = build_scene(tmp_path, others='<person id="walker" depart="0"><walk edges="road"/></person>')
+    document = (scene.folder / "scene.toml").read_text().replace('vehicle = "non_ego"', 'vehicle = "walker"')
+    (scene.folder / "scene.toml").write_text(document)
+    with pytest.raises(UsageError, match=r'is a person.*kind = "pedestrian"'):
+        open_scene(scene.folder)

@@ -1,0 +1,85 @@
+"""SUMO's files as they are found: compressed, and with the schema addresses of older versions."""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import pytest
+from sumolib.net import readNet
+
+from harness.errors import UsageError
+from harness.replay.floating_car_data import Lanes
+from harness.road.net import tiles
+from harness.road.net.net_file import check_net
+from harness.road.net.network import read_net
+from harness.road.scene.open_scene import OpenScene
+from harness.road.xml import xml_file
+from harness.road.xml.xml_file import parse_xml
+
+XSI = 'xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance"'
+
+
+def packed(folder: Path, content: bytes) -> Path:
+    file = folder / "small.net.xml.gz"
+    file.write_bytes(content)
+    return file
+
+
+def test_gzip__is_unpacked_by_the_files_name(tmp_path: Path) -> None:
+    assert parse_xml(packed(tmp_path, gzip.compress(b"<net/>"))).tag == "net"
+
+
+def test_gzip__of_several_members_as_sumo_writes_them(tmp_path: Path) -> None:
+    assert parse_xml(packed(tmp_path, gzip.compress(b"<net>") + gzip.compress(b"</net>"))).tag == "net"
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(b"<net/>", "is not a gzip file"), (gzip.compress(b"<net/>" * 99)[:-9], "is cut off: its gzip data has no end")],
+    ids=["plain", "cut off"],
+)
+def test_gzip__that_is_damaged_is_refused(tmp_path: Path, content: bytes, message: str) -> None:
+    with pytest.raises(UsageError, match=message):
+        parse_xml(packed(tmp_path, content))
+
+
+def test_gzip__that_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(xml_file, "_MOST_BYTES", 1_000_000)
+    with pytest.raises(UsageError, match="holds more than 1 MB"):
+        parse_xml(packed(tmp_path, gzip.compress(b"<net>" + b" " * 1_000_000 + b"</net>")))
+
+
+def test_gzip__a_net_is_checked_read_tiled_and_replayed(
+    tmp_path: Path, merge: OpenScene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tiles.platformdirs, "user_cache_dir", lambda name: str(tmp_path / name))
+    net = packed(tmp_path, gzip.compress(merge.net_file.read_bytes()))
+    check_net(net)
+    assert [edge.getID() for edge in read_net(net).getEdges(withInternal=False)] == ["approach", "exit"]
+    assert Lanes.read(net).ids == Lanes.read(merge.net_file).ids
+    assert tiles.tile_offset_m(net, 2) == tiles.tile_offset_m(merge.net_file, 2)
+    assert readNet(str(tiles.tiled_net(net, 2))).hasEdge("g1_approach")
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "http://sumo.dlr.de/xsd/net_file.xsd",
+        "https://sumo-sim.org/xsd/net_file.xsd",
+        "https://sumo.sf.net/xsd/net_file.xsd",
+        "http://sumo.sourceforge.net/xsd/net_file.xsd",
+    ],
+)
+def test_schema__addresses_that_were_sumos_are_accepted(tmp_path: Path, address: str) -> None:
+    file = tmp_path / "small.net.xml"
+    file.write_text(f'<net {XSI} xsi:noNamespaceSchemaLocation="{address}"/>', encoding="utf-8")
+    assert parse_xml(file).tag == "net"
+
+
+@pytest.mark.parametrize("address", ["https://sumo.sf.net.example.org/xsd/net_file.xsd", "file:///etc/net_file.xsd"])
+def test_schema__other_addresses_are_refused(tmp_path: Path, address: str) -> None:
+    file = tmp_path / "small.net.xml"
+    file.write_text(f'<net {XSI} xsi:noNamespaceSchemaLocation="{address}"/>', encoding="utf-8")
+    with pytest.raises(UsageError, match="names the schema"):
+        parse_xml(file)
