@@ -21,9 +21,10 @@ from tests.support.slow import slow_tests
 from tests.support.sources import PACKAGE, SOURCES, label, tree_of
 
 # Which room may import which others, from the lowest floor to the highest. A room is a module or folder directly under
-# harness/, or a folder under harness/road/ or harness/campaign/. A new arrow is a decision: add it here first. "harness"
-# is the public face, harness/__init__.py: no room imports it.
+# harness/, or a folder in one that has a line of its own. A new arrow is a decision: add it here first.
+# "harness" is the public face, harness/__init__.py: no room imports it.
 GROUND = {"errors", "files", "version", "shipped_documents", "game", "config"}
+EVALUATION = {"evaluation", "evaluation.comparisons", "evaluation.game_theory"}
 ROAD = {"road.xml", "road.net", "road.demand", "road.scene"}
 CAMPAIGN = {"campaign", "campaign.plan", "campaign.storage", "campaign.execution", "campaign.results"}
 ROOMS: dict[str, set[str]] = {
@@ -34,8 +35,10 @@ ROOMS: dict[str, set[str]] = {
     "game": set(),
     "config": {"errors", "files", "game"},
     "evaluation": {"errors", "files", "game"},
+    "evaluation.comparisons": {"errors", "files", "game", "evaluation"},
+    "evaluation.game_theory": {"errors", "files", "game", "evaluation", "evaluation.comparisons"},
     "drivers": GROUND,
-    "reports": GROUND | {"evaluation"},
+    "reports": GROUND | EVALUATION,
     "road": set(),
     "road.xml": GROUND,
     "road.net": GROUND | {"road.xml"},
@@ -43,32 +46,32 @@ ROOMS: dict[str, set[str]] = {
     "road.scene": GROUND | {"road.xml", "road.net", "road.demand"},
     "maps": GROUND | {"road.xml", "road.net"},
     "sumo": GROUND | ROAD,
-    "replay": {"errors", "game", "evaluation", "sumo"} | ROAD,
-    "export": {"errors", "game", "evaluation", "replay"} | ROAD,
-    "environments": GROUND | ROAD | {"drivers", "evaluation", "sumo"},
-    "assessment": GROUND | ROAD | {"drivers", "evaluation", "sumo", "environments"},
+    "replay": {"errors", "game", "sumo"} | ROAD | EVALUATION,
+    "export": {"errors", "game", "replay"} | ROAD | EVALUATION,
+    "environments": GROUND | ROAD | EVALUATION | {"drivers", "sumo"},
+    "assessment": GROUND | ROAD | EVALUATION | {"drivers", "sumo", "environments"},
     "training": GROUND | ROAD | {"drivers", "environments"},
-    "campaign.plan": {"errors", "game", "config", "evaluation"},
-    "campaign.storage": {"errors", "files", "version", "config", "evaluation", "campaign.plan"}
+    "campaign.plan": {"errors", "game", "config"} | EVALUATION,
+    "campaign.storage": {"errors", "files", "version", "config", "campaign.plan"}
+    | EVALUATION
     | {"road.scene", "environments"},
     "campaign": GROUND | {"road.scene", "drivers", "campaign.plan"},  # preflight
     "campaign.results": GROUND
-    | {"road.net", "road.scene", "drivers", "evaluation", "environments", "replay", "export", "reports"}
-    | {"campaign.plan", "campaign.storage"},
+    | {"road.net", "road.scene", "drivers", "environments", "replay", "export", "reports"}
+    | {"campaign.plan", "campaign.storage"}
+    | EVALUATION,
     "campaign.execution": GROUND
-    | {"road.scene", "drivers", "evaluation", "assessment", "reports", "training"}
+    | {"road.scene", "drivers", "assessment", "reports", "training"}
+    | EVALUATION
     | CAMPAIGN,
     "cli": GROUND | {"road.net", "road.scene", "maps", "drivers", "assessment", "export", "reports"} | CAMPAIGN,
-    "library": GROUND | {"drivers", "evaluation"} | CAMPAIGN,
+    "library": GROUND | {"drivers"} | EVALUATION | CAMPAIGN,
     "__main__": {"cli"},
     "harness": GROUND | {"road.scene", "drivers", "environments", "library"},
 }
-PARTED = ("campaign", "road")
-"""Rooms whose folders are rooms."""
-
 SUMO = {"libsumo", "sumo", "sumolib", "traci"}
 LEARNERS = {"torch", "stable_baselines3"}
-PURE = ("evaluation", "reports")
+PURE = (*sorted(EVALUATION), "reports")
 """Rooms that judge: they neither import nor load SUMO or a learner."""
 GAME_MAY_IMPORT = {
     *("__future__", "abc", "bisect", "collections", "dataclasses", "enum", "functools", "harness", "hashlib"),
@@ -100,7 +103,7 @@ def module_of(path: Path) -> str:
 def room_of(module: str) -> str:
     """The room of a dotted module of the harness."""
     parts = module.split(".")[1:]
-    if parts[:1] and parts[0] in PARTED and parts[1:] and (PACKAGE / parts[0] / parts[1]).is_dir():
+    if ".".join(parts[:2]) in ROOMS:
         return ".".join(parts[:2])
     return parts[0] if parts else "harness"
 

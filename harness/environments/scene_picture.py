@@ -18,7 +18,8 @@ from harness.road.scene.open_scene import OpenScene
 SIZE_PX = (640, 320)
 WIDTH_M = 100.0  # of the road that is shown: a car of 4.6 m is 29 pixels long
 _FINER = 2  # drawn larger and scaled down: edges are smooth
-_GROUND, _ROAD, _MARK, _GOAL, _OUTLINE = "#e8ece4", "#9a9da3", "#ffffff", "#2ca02c", "#303030"
+_GROUND, _ROAD, _MARK = "#e8ece4", "#9a9da3", "#ffffff"
+_GOAL, _OUTLINE = "#2ca02c", "#303030"
 _BACKGROUND, _OBSTACLE = "#dcdcdc", "#6e6e78"
 _PLAYERS = ("#1f77ff", "#ff7f0e", "#d62728", "#9467bd", "#8c564b")  # as in films: the ego is blue
 

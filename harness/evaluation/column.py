@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import KW_ONLY, dataclass, replace
 
-TEXT, FLAG, COUNT, NUMBER, MAYBE = "object", "bool", "int64", "float64", "Int64"
+TEXT, FLAG = "object", "bool"
+COUNT, NUMBER, MAYBE = "int64", "float64", "Int64"
 """The pandas dtypes of columns; `MAYBE`: whole numbers or empty."""
 SHARE, POINTS, P_VALUE, OF_METRIC = "share", "difference of shares", "p", "that of the metric"
 """Units that pages show in their own way: in percent, in percentage points, as a p-value, and by the row's metric."""

@@ -30,7 +30,7 @@ from harness.game.human_factors import (
 )
 from harness.game.placed_obstacles import NO_OBSTACLES, Obstacles
 from harness.game.road import Routes
-from harness.game.seeding import between, generator_of, seed_of
+from harness.game.seeding import between, generator_of, parts_of, seed_of
 from harness.game.start_range import StartRange, draw_along_route
 
 _UNLIMITED = (Reaction(), Sight(), ActuatorShares())
@@ -197,6 +197,11 @@ def draw_member(shares: Sequence[float], player: int, *parts: str | int) -> int:
     """Draw the index of a player's driver by their shares, from a separate generator: other draws do not change."""
     upper = np.cumsum(shares)
     return int(np.searchsorted(upper, generator_of(*parts, "member", player).random() * upper[-1], side="right"))
+
+
+def member_in_episode(shares: Sequence[float], player: int, seed: int, episode: int) -> int:
+    """The index of a player's driver in an episode of an assessment, the same in every arm."""
+    return draw_member(shares, player, *parts_of(seed, episode))
 
 
 def _lapses(

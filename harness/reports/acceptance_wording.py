@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from harness.evaluation.acceptance_checks import Check
+from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, percent
 
 PASS, FAIL = "PASS", "FAIL"

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from harness.evaluation.run_comparison import Difference, Side
+from harness.evaluation.comparisons.run_comparison import Difference, Side
 from harness.reports.differences import CHANCE, NO_RELEVANT_DIFFERENCE, RELEVANT_SPEED_MPS
 from harness.reports.numbers import MISSING, NO_SPACE, interval, number, p_number, percent, signed
 from harness.reports.page_template import environment_of

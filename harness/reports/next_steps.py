@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from harness.evaluation.acceptance_checks import Check
+from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import EgoStrategy, NaiveEgo, against_persona
 from harness.reports.game_links import most_severe

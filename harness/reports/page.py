@@ -7,7 +7,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.acceptance_checks import worst_of_each
+from harness.evaluation.comparisons.acceptance_checks import worst_of_each
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NAIVE_ALONE
 from harness.evaluation.unplayed_games import reasons_of

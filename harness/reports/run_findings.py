@@ -9,7 +9,7 @@ from typing import Any
 import pandas as pd
 
 from harness.config.campaign import LEARNED, ego_called
-from harness.evaluation.preventability import Preventability, preventability_of
+from harness.evaluation.comparisons.preventability import Preventability, preventability_of
 from harness.evaluation.rule_book.cause_lines import cause_lines
 from harness.evaluation.strategies import Arm, ReconfiguredEgo
 from harness.reports.differences import Row

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from harness.evaluation.acceptance_checks import Check
+from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.evaluation.game_theory.records import GameFindings
 from harness.evaluation.strategies import Arm, Strategy
 from harness.evaluation.tables import table_of, typed

@@ -28,14 +28,14 @@ from harness.errors import SimulationError
 from harness.game.arrays import FloatArray
 from harness.game.initial_state import InitialState
 from harness.road.demand.route_file import Departure
-from harness.road.demand.warm_up import LANE_CHANGE_S, clear_of_players
+from harness.road.demand.warm_up import LANE_CHANGE_S
 from harness.road.net.tiles import tile_offset_m, tile_prefix, tiled_net
-from harness.road.scene.open_obstacles import clear_of_obstacles
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.angles import compass_deg_of, heading_rad_of
 from harness.sumo.background_traffic import BackgroundTraffic
 from harness.sumo.insertion import Insertion
 from harness.sumo.road_signals import Signals, SpeedLimits
+from harness.sumo.room_at_start import clear_of_obstacles, clear_of_players
 from harness.sumo.simulation import NO_SIGNALS, AtReset, Reading
 from harness.sumo.standing_vehicles import TYPE_XML, StandingVehicles
 

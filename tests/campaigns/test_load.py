@@ -31,7 +31,7 @@ from harness.config.persona import Persona
 from harness.config.toml_reading import read_document
 from harness.drivers.sumo import SumoDriver
 from harness.environments.arena import Arena, Seat
-from harness.evaluation.summary import summarise
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.tables import table_of, typed
 from harness.evaluation.trace_file import SCHEMA, TraceWriter
 from harness.game.arrays import FloatArray, IntArray

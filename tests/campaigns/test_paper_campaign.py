@@ -20,7 +20,7 @@ from scipy import stats
 
 from harness.drivers.policy_file import read_policy
 from harness.evaluation.columns import TABLES
-from harness.evaluation.comparison import compare
+from harness.evaluation.comparisons.comparison import compare
 from harness.evaluation.research_questions import Question
 from harness.evaluation.tables import read_csv
 from harness.evaluation.trace_file import read_trace

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
-from harness.evaluation.comparison import compare, games_by_arm
+from harness.evaluation.comparisons.comparison import compare, games_by_arm
 from harness.evaluation.competence import Goals, gate, goals_alone
 from harness.evaluation.research_questions import INCOMPETENT, AloneBound, Question, Verdict
 

@@ -9,12 +9,12 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.columns import TABLES
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.competence import goals_alone
 from harness.evaluation.people import COLLIDED_WITH, columns_for, judged, judged_outcomes, people_in
 from harness.evaluation.recorded_game import BodyKind
 from harness.evaluation.rule_book.course import Course
 from harness.evaluation.rule_book.named_manoeuvres import find_manoeuvres
-from harness.evaluation.summary import summarise
 from harness.evaluation.tables import read_csv, table_of, write_csv
 from tests.support.scenes import LEFT_Y, RIGHT_Y, THREE_PEOPLE, build_scene
 from tests.support.traces import drawn, game

@@ -11,9 +11,9 @@ from scipy import stats
 
 from harness.errors import UsageError
 from harness.evaluation.columns import TABLES
-from harness.evaluation.comparison import compare
+from harness.evaluation.comparisons.comparison import compare
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.research_questions import Question
-from harness.evaluation.summary import summarise
 from harness.evaluation.tables import read_csv, table_of, typed, write_csv
 
 WHOLE = st.integers(-(2**62), 2**62)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pandas as pd
 import pytest
 
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, RetrainedEgo, against_persona
-from harness.evaluation.summary import summarise
 from harness.reports.key_figures import (
     NEAR_MISSES,
     PARTLY,

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.research_questions import INCOMPETENT, Verdict
-from harness.evaluation.summary import summarise
 from harness.evaluation.tables import write_csv
 from harness.evaluation.worst_first import worst_first
 from harness.replay.selection import choose_games, replay_name

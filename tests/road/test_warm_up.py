@@ -17,9 +17,9 @@ from harness.game.observation_layout import LAYOUT, in_units
 from harness.game.seeding import generator_of
 from harness.road.demand import warm_up
 from harness.road.demand.route_file import Departure
-from harness.road.demand.warm_up import CLEAR_AROUND_M, clear_of_players
 from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import OpenScene, open_scene
+from harness.sumo.room_at_start import CLEAR_AROUND_M, clear_of_players
 from tests.support.rollouts import Steady, arm, play, trace
 from tests.support.scenes import build_scene, drawn, placed
 

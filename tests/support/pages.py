@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 from harness.campaign.plan.alone_bounds import alone_bounds
 from harness.config.campaign import Campaign
 from harness.evaluation.columns import TABLES
-from harness.evaluation.comparison import compare
+from harness.evaluation.comparisons.comparison import compare
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.research_questions import Question, ResearchQuestion
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
@@ -30,7 +31,6 @@ from harness.evaluation.strategies import (
     persona_alone,
     strategy_name,
 )
-from harness.evaluation.summary import summarise
 from harness.evaluation.tables import table_of, typed
 from harness.replay.selection import choose_games, replay_name
 from harness.reports.page import render_page

@@ -17,6 +17,7 @@ import threading
 from collections.abc import Iterator
 from typing import Any
 
+from harness.campaign.execution.ray_nodes import OPTION
 from harness.campaign.execution.worker_pool import cores
 from harness.errors import UsageError
 

@@ -18,6 +18,7 @@ from harness.campaign.storage.run_folder import RunFolder
 from harness.campaign.storage.versions import versions_of_numbers
 from harness.errors import Problem
 
+OPTION = "--ray"
 _ANSWER_S = 120.0  # the time that a node has to answer: a busy one imports the harness slowly
 _INSTALL = "install the versions of requirements.lock on every node"
 _SHARE = "use a folder that all nodes share under the same path; --out names the run folder"

@@ -35,9 +35,8 @@ from harness.drivers.mixture import mixture_of
 from harness.drivers.protocol import Driver
 from harness.errors import UsageError
 from harness.files import content_of
-from harness.game.initial_state import draw_member
+from harness.game.initial_state import member_in_episode
 from harness.game.roles import EGO
-from harness.game.seeding import parts_of
 from harness.road.scene.open_scene import OpenScene, open_scene
 from harness.shipped_documents import shipped
 
@@ -138,7 +137,7 @@ def _member(stage: AssessmentStage, player: int, episode: int) -> PlannedMember:
     """Who of a mixture drives as a player in an episode; the driver itself where there is one."""
     planned = driver_in(stage.ego, 0) if player == EGO else driver_in(stage.non_ego, player - 1)
     if isinstance(planned, FixedMixture):
-        return planned.members[draw_member(planned.shares, player, *parts_of(stage.seed, episode))]
+        return planned.members[member_in_episode(planned.shares, player, stage.seed, episode)]
     assert planned is not None
     assert not isinstance(planned, BestOf | EquilibriumMixture), "left out of `arms`"
     return planned

@@ -11,7 +11,7 @@ from harness.campaign.results.kept_results import RunResult
 from harness.campaign.storage.manifest import FINISHED, FORMAT
 from harness.campaign.storage.run_folder import RunFolder
 from harness.config.campaign import Campaign
-from harness.evaluation.acceptance_checks import Check, Evidence, judge, worst_of_each
+from harness.evaluation.comparisons.acceptance_checks import Check, Evidence, judge, worst_of_each
 from harness.files import write_atomically
 from harness.reports import junit
 from harness.reports.acceptance_wording import TITLES, Line, line

@@ -10,7 +10,7 @@ from typing import Any
 
 from harness.campaign.storage.run_folder import RunFolder
 from harness.errors import UsageError
-from harness.evaluation.run_comparison import differences_of
+from harness.evaluation.comparisons.run_comparison import differences_of
 from harness.evaluation.tables import read_csv
 from harness.files import write_atomically
 from harness.reports.comparison_page import ComparedRow, compared_rows, headline, render_comparison

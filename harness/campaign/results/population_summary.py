@@ -8,13 +8,12 @@ import pandas as pd
 
 from harness.config.campaign import Campaign, Population
 from harness.evaluation.columns import TABLES
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.people import people_in
 from harness.evaluation.strategies import Arm, NaiveEgo, PersonaNonEgo, ReconfiguredEgo, RetrainedEgo
-from harness.evaluation.summary import summarise
 from harness.evaluation.tables import joined
-from harness.game.initial_state import draw_member
+from harness.game.initial_state import member_in_episode
 from harness.game.roles import NON_EGO
-from harness.game.seeding import parts_of
 
 _SUMMARY_COLUMNS = [name for name in TABLES["populations"] if name not in ("arm", "population", "seed", "persona")]
 
@@ -44,7 +43,7 @@ def _rows(population: Population, games: pd.DataFrame) -> pd.DataFrame:
     names, shares = list(population.shares), list(population.shares.values())
     players = range(NON_EGO, NON_EGO + len(people_in(games.columns)))
     drivers = [
-        ", ".join(names[draw_member(shares, player, *parts_of(int(seed), int(episode)))] for player in players)
+        ", ".join(names[member_in_episode(shares, player, int(seed), int(episode))] for player in players)
         for seed, episode in zip(games["seed"], games["episode"], strict=True)
     ]
     rows = summarise(games.assign(persona=drivers)).sort_values(["seed", "persona"], kind="stable")

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from harness.evaluation.comparison import games_by_arm, mean_interval, measured_values, rate_interval
+from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, measured_values, rate_interval
 from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.tables import table_of
 

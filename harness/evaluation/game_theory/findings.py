@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import pandas as pd
 
-from harness.evaluation.comparison import games_by_arm
+from harness.evaluation.comparisons.comparison import games_by_arm
 from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.best_response_gap import gaps
 from harness.evaluation.game_theory.crossplay import crossplay

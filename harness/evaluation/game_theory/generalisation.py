@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from harness.evaluation.comparison import games_by_arm, holm, paired_t_test, pairs_of, rate_interval, verdict_of
+from harness.evaluation.comparisons.comparison import (
+    games_by_arm,
+    holm,
+    paired_t_test,
+    pairs_of,
+    rate_interval,
+    verdict_of,
+)
 from harness.evaluation.competence import gate
 from harness.evaluation.game_theory.records import Pairing
 from harness.evaluation.tables import table_of, typed
@@ -26,8 +33,7 @@ def generalisation(
     pairings, the table `generalisation`. The baseline is the naive ego against the same non-ego.
 
     `trained_against` names for each retrained ego the personas it was trained against; the naive ego is not in it.
-    `episodes` has the columns of episodes.csv. Pairs and tests are those of `harness.evaluation.comparison`; where a
-    player, or the naive ego, misses a bound of `Pairing.alone`, there is no test.
+    `episodes` has the columns of episodes.csv. Pairs and tests are those of `comparisons.comparison`; where a player, or the naive ego, misses a bound of `Pairing.alone`, there is no test.
 
     Raises ValueError when significance is not in (0, 1), or an arm has two games for one episode.
     """

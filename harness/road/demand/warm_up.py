@@ -22,14 +22,11 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
 import platformdirs
 
 from harness.config.scene import Scene
 from harness.errors import SimulationError, UsageError
 from harness.files import write_atomically
-from harness.game.arrays import FloatArray
-from harness.game.initial_state import InitialState
 from harness.game.seeding import between, generator_of, seed_of
 from harness.road.demand.route_file import Departure, Motion, RouteFile
 from harness.road.demand.route_writing import traveller_element
@@ -39,12 +36,8 @@ from harness.road.xml.sumo_program import run_program
 from harness.road.xml.xml_file import parse_xml
 
 SNAPSHOTS = 20
-CLEAR_M, CLEAR_S, CLEAR_AROUND_M = 10.0, 2.0, 2.0
-"""Room at a player's start: no vehicle on its lane nearer than the first or than the way that the one behind drives in
-the second, and none nearer than the third anywhere."""
 LANE_CHANGE_S = 2.0
 """Duration of a lane change of background traffic."""
-_LANE_M = 3.0
 _ENDING = ".warm"  # of a vehicle's name: a flow numbers its later vehicles anew
 _PATIENCE_S = 300.0
 _LOGGER = logging.getLogger("harness.preparation")
@@ -84,25 +77,6 @@ def snapshots(document: Scene, routes: RouteFile, net_file: Path) -> tuple[Snaps
     cache.parent.mkdir(parents=True, exist_ok=True)
     write_atomically(cache, json.dumps([asdict(each) for each in done]).encode())
     return tuple(done)
-
-
-def clear_of_players(departures: Sequence[Departure], start: InitialState, length_m: FloatArray) -> list[Departure]:
-    """The departures without vehicles of the warm-up that are too near to a player's start (`CLEAR_M` and the others).
-
-    `length_m` [P] are the players' lengths. Players that take no part count too: arms have the same traffic.
-    """
-    return [each for each in departures if each.motion is None or not _is_near(each.motion, start, length_m)]
-
-
-def _is_near(motion: Motion, start: InitialState, length_m: FloatArray) -> bool:
-    dx = motion.x_m - 0.5 * motion.length_m * np.cos(motion.heading_rad) - start.x_m
-    dy = motion.y_m - 0.5 * motion.length_m * np.sin(motion.heading_rad) - start.y_m
-    cos, sin = np.cos(start.heading_rad), np.sin(start.heading_rad)
-    ahead, beside = dx * cos + dy * sin, np.abs(dy * cos - dx * sin)
-    bodies = 0.5 * (motion.length_m + length_m)
-    behind_mps = np.where(ahead > 0.0, start.speed_mps, motion.speed_mps)
-    on_lane = (beside < _LANE_M) & (np.abs(ahead) - bodies < np.maximum(CLEAR_M, CLEAR_S * behind_mps))
-    return bool((on_lane | (np.hypot(dx, dy) - bodies < CLEAR_AROUND_M)).any())
 
 
 def _drawn(document: Scene, routes: RouteFile, players: set[str], k: int) -> tuple[float, list[Departure]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -19,14 +19,13 @@ from harness.config import obstacle as written
 from harness.config.scene import Scene
 from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
-from harness.game.geometry import Box, box_distance
+from harness.game.geometry import Box
 from harness.game.near_players import NOTICED_M
 from harness.game.placed_obstacles import AtPoint, Obstacles, OnLane, PlacedObstacle
 from harness.game.road import Route
 from harness.game.sight import TALL_WIDTH_M, Hiding
 from harness.road.demand.departures import background_departures
-from harness.road.demand.route_file import Departure, Motion, RouteFile, VehicleType
-from harness.road.demand.warm_up import CLEAR_M, CLEAR_S
+from harness.road.demand.route_file import RouteFile, VehicleType
 from harness.road.net import network
 from harness.road.scene.scene_files import SceneFiles
 
@@ -58,24 +57,6 @@ def open_obstacles(files: SceneFiles, area: BaseGeometry, ways: Sequence[Route])
     if problems:
         raise UsageError(problems)
     return Obstacles(each=tuple(found), outlines=tuple(outlines))
-
-
-def clear_of_obstacles(departures: Iterable[Departure], obstacles: Box) -> list[Departure]:
-    """The departures without vehicles of a warm-up that are on an obstacle, or would have to brake hard before it."""
-    boxes = boxes_of(obstacles)
-    return [
-        each
-        for each in departures
-        if each.motion is None or all(box_distance(_way(each.motion), box) > 0.0 for box in boxes)
-    ]
-
-
-def _way(motion: Motion) -> Box:
-    """The body of a vehicle and the room before it that it needs."""
-    room_m = max(CLEAR_M, CLEAR_S * motion.speed_mps)
-    ahead_m = 0.5 * (room_m - motion.length_m)  # a motion is that of the front bumper
-    x_m, y_m = motion.x_m + ahead_m * np.cos(motion.heading_rad), motion.y_m + ahead_m * np.sin(motion.heading_rad)
-    return Box(float(x_m), float(y_m), motion.heading_rad, motion.length_m + room_m, motion.width_m)
 
 
 def boxes_of(boxes: Box) -> list[Box]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from shapely.geometry.base import BaseGeometry
 from sumolib.net import Net
 from sumolib.net.edge import Edge
@@ -15,6 +16,7 @@ from harness.config.road_user import CYCLING
 from harness.config.scene import Player, Scene
 from harness.config.toml_reading import nearest
 from harness.errors import Problem, UsageError, collect
+from harness.game.bicycle import ActuatorLimits
 from harness.game.road import Route
 from harness.road.demand.departures import edges_of
 from harness.road.demand.route_file import Departure, RouteFile, VehicleType
@@ -146,3 +148,18 @@ def _vehicle(file: Path, role: str, player: Player, routes: RouteFile) -> Depart
         message = f"reaches {player.speed_mps[1]:g} m/s, more than the vehicle's maxSpeed"
         raise UsageError.of(file, f"{role}.speed_mps", message, f"keep it to {fastest_mps:g} m/s")
     return vehicle
+
+
+def actuator_limits(document: Scene, types: Sequence[VehicleType]) -> ActuatorLimits:
+    """What the players' bodies can do, [P]; `types` are those of their vehicles."""
+    limits = [player.actuators.with_defaults_of(player.kind) for player in document.players]
+    return ActuatorLimits(
+        max_acceleration_mps2=np.array([each.max_acceleration_mps2 for each in limits]),
+        max_braking_mps2=np.array([each.max_braking_mps2 for each in limits]),
+        max_speed_mps=np.array([each.max_speed_mps for each in types]),
+        max_steering_rad=np.array([each.max_steering_rad for each in limits]),
+        max_steering_rate_radps=np.array([each.max_steering_rate_radps for each in limits]),
+        wheelbase_m=np.array([each.wheelbase_m for each in limits]),
+        max_lateral_mps2=np.array([each.max_lateral_mps2 for each in limits]),
+        friction=document.friction,
+    )

@@ -8,7 +8,6 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from harness.config.scene import Scene
 from harness.game.arrays import FloatArray
@@ -164,7 +163,7 @@ def _recorded(files: SceneFiles, found: SceneWorld) -> OpenScene:
         *found.own,
         *(net.getEdge(name) for name in sorted(background)),
     ]  # background traffic needs its whole routes
-    crossings = [shapely.get_coordinates(way.line) for way in found.ways if way.marked]
+    crossings = [np.array(way.line.coords) for way in found.ways if way.marked]
     return OpenScene(
         folder=files.folder,
         document=files.document,

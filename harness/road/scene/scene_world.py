@@ -12,7 +12,6 @@ from sumolib.net.edge import Edge
 
 from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
-from harness.game.bicycle import ActuatorLimits
 from harness.game.junctions import RightOfWay
 from harness.game.placed_obstacles import Obstacles
 from harness.game.quantities import REACH_M
@@ -27,7 +26,7 @@ from harness.road.net.right_of_way_table import right_of_way
 from harness.road.net.walker_conflicts import WalkersWay, ways_of, with_walkers_conflicts
 from harness.road.scene.footway import Ground, open_walker, opened_ground
 from harness.road.scene.open_obstacles import hiding_in, open_obstacles
-from harness.road.scene.open_player import OpenPlayer, open_player
+from harness.road.scene.open_player import OpenPlayer, actuator_limits, open_player
 from harness.road.scene.scene_files import SceneFiles
 from harness.road.scene.start_ranges import start_range
 
@@ -132,20 +131,10 @@ def _world(
 ) -> World:
     document = files.document
     types = [player.vehicle_type for player in players]
-    limits = [player.actuators.with_defaults_of(player.kind) for player in document.players]
     walking = tuple(player.on_foot for player in document.players)
     return World(
         road=road,
-        actuators=ActuatorLimits(
-            max_acceleration_mps2=np.array([each.max_acceleration_mps2 for each in limits]),
-            max_braking_mps2=np.array([each.max_braking_mps2 for each in limits]),
-            max_speed_mps=np.array([each.max_speed_mps for each in types]),
-            max_steering_rad=np.array([each.max_steering_rad for each in limits]),
-            max_steering_rate_radps=np.array([each.max_steering_rate_radps for each in limits]),
-            wheelbase_m=np.array([each.wheelbase_m for each in limits]),
-            max_lateral_mps2=np.array([each.max_lateral_mps2 for each in limits]),
-            friction=document.friction,
-        ),
+        actuators=actuator_limits(document, types),
         length_m=np.array([each.length_m for each in types]),
         width_m=np.array([each.width_m for each in types]),
         step_s=document.step_length_s,

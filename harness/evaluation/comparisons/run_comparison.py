@@ -19,7 +19,14 @@ import numpy as np
 import pandas as pd
 from scipy import stats
 
-from harness.evaluation.comparison import Floats, games_by_arm, holm, mean_interval, measured_values, rate_interval
+from harness.evaluation.comparisons.comparison import (
+    Floats,
+    games_by_arm,
+    holm,
+    mean_interval,
+    measured_values,
+    rate_interval,
+)
 
 MEASURES = {"failures": "ego_failed", "near misses": "near_miss", "average speed": "ego_mean_speed_mps"}
 """What is compared, and its column in episodes.csv."""

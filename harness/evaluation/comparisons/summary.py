@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from harness.evaluation.columns import MEANS
-from harness.evaluation.comparison import mean_interval, rate_interval
+from harness.evaluation.comparisons.comparison import mean_interval, rate_interval
 from harness.evaluation.people import of_people
 from harness.evaluation.tables import table_of, typed
 

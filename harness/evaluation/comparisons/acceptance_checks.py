@@ -23,8 +23,8 @@ from typing import Any, Literal
 import numpy as np
 import pandas as pd
 
-from harness.evaluation.comparison import games_by_arm, mean_interval, pairs_of, rate_interval
-from harness.evaluation.preventability import ANY
+from harness.evaluation.comparisons.comparison import games_by_arm, mean_interval, pairs_of, rate_interval
+from harness.evaluation.comparisons.preventability import ANY
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,

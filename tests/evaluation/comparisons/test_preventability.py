@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.preventability import ANY, count_prevented, preventability_of
+from harness.evaluation.comparisons.preventability import ANY, count_prevented, preventability_of
 from harness.evaluation.tables import table_of, typed
 
 ARM = {"arm": "naive_vs_speedy", "persona": "speedy", "seed": 1}

@@ -9,7 +9,15 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from harness.evaluation.acceptance_checks import MEASURES, Evidence, judge, judged_ego, unanswered, worst_of_each
+from harness.evaluation.comparisons.acceptance_checks import (
+    MEASURES,
+    Evidence,
+    judge,
+    judged_ego,
+    unanswered,
+    worst_of_each,
+)
+from harness.evaluation.comparisons.summary import summarise
 from harness.evaluation.strategies import (
     NAIVE_ALONE,
     Arm,
@@ -19,7 +27,6 @@ from harness.evaluation.strategies import (
     RobustEgo,
     against_persona,
 )
-from harness.evaluation.summary import summarise
 from tests.support.game_tables import arm, table
 
 RETRAINED = RetrainedEgo(against="speedy")

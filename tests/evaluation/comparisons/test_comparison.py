@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from harness.evaluation.columns import TABLES
-from harness.evaluation.comparison import METRICS, compare, holm
+from harness.evaluation.comparisons.comparison import METRICS, compare, holm
 from harness.evaluation.research_questions import Question, Verdict
 
 RQ1 = Question(question="RQ1", persona="speedy", seed=1, baseline="naive_alone", treatment="naive_vs_speedy")

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from harness.evaluation.comparison import rate_interval
+from harness.evaluation.comparisons.comparison import rate_interval
 from harness.evaluation.tables import table_of
 
 ANY = "any"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from harness.evaluation.run_comparison import differences_of
+from harness.evaluation.comparisons.run_comparison import differences_of
 from harness.reports.comparison_page import BETTER, EQUAL, NOT_SHOWN, UNKNOWN, WORSE, compared_rows, headline
 from harness.reports.differences import NO_RELEVANT_DIFFERENCE
 from tests.support.game_tables import arm, table
