@@ -33,7 +33,8 @@ def generalisation(
     pairings, the table `generalisation`. The baseline is the naive ego against the same non-ego.
 
     `trained_against` names for each retrained ego the personas it was trained against; the naive ego is not in it.
-    `episodes` has the columns of episodes.csv. Pairs and tests are those of `comparisons.comparison`; where a player, or the naive ego, misses a bound of `Pairing.alone`, there is no test.
+    `episodes` has the columns of episodes.csv. Pairs and tests are those of `comparisons.comparison`; there is no test
+    where a player, or the naive ego, misses a bound of `Pairing.alone`.
 
     Raises ValueError when significance is not in (0, 1), or an arm has two games for one episode.
     """
