@@ -89,48 +89,6 @@ def test_scene_file__a_missing_one_is_an_error(tmp_path: Path) -> None:
     assert only(tmp_path) == ("scene.toml", "", "there is no such file (did you mean 'scene.tml'?)")
 
 
-def test_folder__a_missing_one_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="there is no folder"):
-        open_scene(tmp_path / "nowhere")
-
-
-def test_net__a_missing_one_is_an_error_with_the_most_similar_name(folder: Path) -> None:
-    change(folder, "scene.toml", 'net = "merge.net.xml"', 'net = "merg.net.xml"')
-    assert only(folder) == ("merg.net.xml", "", "there is no such file (did you mean 'merge.net.xml'?)")
-
-
-def test_net__other_content_than_xml_is_an_error(folder: Path) -> None:
-    (folder / "merge.net.xml").write_text("a road, honestly", encoding="utf-8")
-    name, _, message = only(folder)
-    assert name == "merge.net.xml"
-    assert message.startswith("is not readable XML")
-
-
-def test_net__another_kind_of_xml_is_an_error(folder: Path) -> None:
-    shutil.copy(folder / "merge.rou.xml", folder / "merge.net.xml")
-    message = "is not a SUMO net: its root is not net (build it with netconvert or netedit)"
-    assert only(folder) == ("merge.net.xml", "routes", message)
-
-
-def test_net__an_invalid_shape_is_an_error(folder: Path) -> None:
-    change(folder, "merge.net.xml", 'shape="0.00,-4.80 100.00,-4.80"', 'shape="0.00,-4.80 here"')
-    message = "'0.00,-4.80 here' is not a line of points x,y (build it with netconvert or netedit)"
-    assert only(folder) == ("merge.net.xml", "lane approach_0.shape", message)
-
-
-def test_net__an_entity_bomb_is_refused(folder: Path) -> None:
-    (folder / "merge.net.xml").write_text(
-        '<!DOCTYPE n [<!ENTITY a "ha"><!ENTITY b "&a;&a;">]><net>&b;</net>', encoding="utf-8"
-    )
-    assert only(folder)[2].startswith("carries XML entities")
-
-
-def test_files__two_missing_ones_are_both_named(folder: Path) -> None:
-    (folder / "merge.net.xml").unlink()
-    (folder / "merge.rou.xml").unlink()
-    assert [Path(each.file).name for each in problems(folder)] == ["merge.net.xml", "merge.rou.xml"]
-
-
 # --- inconsistent names ----------------------------------------------------------------------------------------------
 
 
@@ -201,15 +159,6 @@ def test_scene__an_inconsistency_with_the_net_is_named(
 ) -> None:
     change(folder, file, old, new)
     assert only(folder) == expected
-
-
-def test_start__off_the_lane_is_an_error(folder: Path) -> None:
-    change(folder, "scene.toml", "[30.0, 45.0]", "[30.0, 120.0]")
-    ego, non_ego = problems(folder)  # the non-ego starts beside the ego
-    assert (ego.key, non_ego.key) == ("ego.position_m", "non_ego.beside_ego_m")
-    assert ego.message == "reaches from 30 to 120 m, off lane 'approach_1' of 100 m"
-    assert non_ego.message == "reaches from 22 to 128 m, off lane 'approach_0' of 100 m"
-    assert ego.remedy == non_ego.remedy == "keep it between 0 and 100 m, or give route_m instead of lane"
 
 
 def own_route(folder: Path, edges: str) -> None:

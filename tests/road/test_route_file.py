@@ -167,32 +167,6 @@ def test_mistake__is_named_with_its_place_and_remedy(write: Write, content: str,
     assert problem(write(TYPE_AND_ROUTE + content)).startswith(expected)
 
 
-def test_file__a_missing_one_is_an_error(write: Write) -> None:
-    path = write("")
-    assert "there is no such file (did you mean 'a.rou.xml'?)" in problem(path.with_name("b.rou.xml"))
-
-
-def test_file__other_content_than_xml_is_an_error(tmp_path: Path) -> None:
-    path = tmp_path / "a.rou.xml"
-    path.write_text("<routes><vehicle", encoding="utf-8")
-    assert problem(path).startswith("is not readable XML")
-    path.write_bytes(b"\x89PNG\r\n\xff\xfe")
-    assert problem(path).startswith("is not readable XML")
-
-
-def test_file__an_entity_bomb_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.rou.xml"
-    laughs = "".join(f'<!ENTITY l{k} "{f"&l{k - 1};" * 10}">' for k in range(1, 10))
-    path.write_text(f'<!DOCTYPE r [<!ENTITY l0 "ha">{laughs}]><routes>&l9;</routes>', encoding="utf-8")
-    assert problem(path).startswith("carries XML entities")
-
-
-def test_file__an_external_entity_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / "a.rou.xml"
-    path.write_text('<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/hostname">]><routes>&x;</routes>', encoding="utf-8")
-    assert problem(path).startswith("carries XML entities")
-
-
 # --- trips, distributions, stops ----------------------------------------------------------------------------------
 
 
