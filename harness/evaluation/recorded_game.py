@@ -182,12 +182,14 @@ class RecordedGame:
         for name in _PLAYERS:
             setattr(state, name, self._filled(name)[:, :players].copy())
         state.present = self._present[:, :players].copy()
-        steps = self.trace.drop_duplicates("step").sort_values("step")
         state.step = np.arange(len(self._present))
-        state.friction, state.limit_share = steps["friction"].to_numpy(), steps["limit_share"].to_numpy()
+        start = self.trace.iloc[0]
+        state.friction[:], state.limit_share[:] = start["friction"], start["limit_share"]
         if links:
-            state.signals = np.array([_states_of(str(text), tuple(links)) for text in steps["signals"]], dtype=np.int8)
-            state.signal_s = _since_s(state.signals, str(steps["signal_s"].iloc[0]), self.world.step_s)
+            steps = self.trace.drop_duplicates("step")
+            states = [_states_of(str(text), tuple(links)) for text in steps["signals"]]
+            state.signals[steps["step"]] = states
+            state.signal_s = _since_s(state.signals, str(start["signal_s"]), self.world.step_s)
         return state
 
 

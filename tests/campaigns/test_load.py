@@ -274,11 +274,14 @@ def test_report__of_ten_thousand_episodes_fits_a_page_and_opens(
         assert page.seen == []
 
 
-def test_report__a_pair_of_manoeuvres_lists_no_more_games_than_can_be_read(large: dict[str, Any]) -> None:
-    html = rendered(**large, manoeuvres=table_of("manoeuvres"))
+def test_report__a_cause_lists_no_more_games_than_can_be_read(large: dict[str, Any]) -> None:
+    failed = large["episodes"][large["episodes"]["ego_failed"] == 1].to_dict("records")
+    event = {"other": "non_ego", "event": "cut_in", "deed": "cuts in", "time_s": 1.0, "time_left_s": 0.5}
+    causes = table_of("causes", [game | event for game in failed])
+    html = rendered(**large, manoeuvres=table_of("manoeuvres"), causes=causes)
     listed = html.split('id="pair-1"')[1].split("</details>")[0]
     assert listed.count("<li>") == MOST_LISTED
-    assert "more: <code>manoeuvres.csv</code>" in listed
+    assert "more: <code>causes.csv</code>" in listed
 
 
 if __name__ == "__main__":

@@ -36,8 +36,7 @@ def is_vouched_for(run: Path, file: Path) -> bool:
     """Whether numbers are read from a file when the stages are done."""
     where = file.relative_to(run).parts
     if where[0] == ".stages":
-        tables = ("episodes.csv", "manoeuvres.csv", "training.csv", "severity-2.csv", "causes-2.csv")
-        return file.name in ("done.json", *tables)
+        return file.name in ("done.json", "played.csv", "training.csv")
     return where[0] in ("policies", "traces", "scene") and file.name not in ANEW
 
 
@@ -102,7 +101,7 @@ def test_manifest__torn_is_one_message(way: str, copy: Path) -> None:
 
 def test_report__of_a_torn_run_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
     run = shutil.copytree(learned_run(), tmp_path / "run")
-    table = run / ".stages" / "naive_alone-seed1" / "episodes.csv"
+    table = run / ".stages" / "naive_alone-seed1" / "played.csv"
     lines = table.read_text().splitlines(keepends=True)
     table.write_text("".join(lines[:-1]))  # a table still, of a game less
     (run / "episodes.csv").unlink()

@@ -286,7 +286,7 @@ def test_run_folder__other_folders_are_refused(
 
 def test_run_folder__damaged_files_are_named(tmp_path: Path, run_command: Callable[..., Result]) -> None:
     run = shutil.copytree(learned_run(), tmp_path / "run")
-    table = run / ".stages" / "naive_alone-seed1" / "episodes.csv"
+    table = run / ".stages" / "naive_alone-seed1" / "played.csv"
     table.write_text(table.read_text().replace("naive_alone", "../../../x"))
     result = run_command("report", run)
     assert result.code == 2

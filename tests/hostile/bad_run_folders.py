@@ -21,7 +21,7 @@ from tests.hostile.inputs import Bad, Spoil, edit, inserted, link, put, several,
 
 REPORT, LIST, GAME = ("report", "run"), ("replay", "run", "--list"), ("replay", "run", "naive_alone", "1")
 MANIFEST, TABLE = "run/manifest.json", "run/episodes.csv"
-GAMES, TRACES = "run/.stages/naive_alone-seed1/episodes.csv", "run/traces/naive_alone-seed1.parquet"
+GAMES, TRACES = "run/.stages/naive_alone-seed1/played.csv", "run/traces/naive_alone-seed1.parquet"
 CURVE, CARD = "run/.stages/speedy-seed1/training.csv", "run/policies/speedy-seed1/policy.json"
 SCENE, NET, ROUTES = "run/scene/scene.toml", "run/scene/merge.net.xml", "run/scene/merge.rou.xml"
 
@@ -186,10 +186,10 @@ RUNS = [
     *to(REPORT, *(bad for bad in whole_file(CURVE) if "last bytes" not in bad.name)),
     *to(LIST, *whole_file(TABLE)),
     *(Bad(f"{command[0]}: manifest with {way}", spoil, ("manifest.json", *words), command) for command, odd in ((LIST, ODD), (REPORT, OF_REPORT)) for way, (spoil, words) in odd.items()),
-    *(Bad(f"report: episodes.csv with {way}", spoil(GAMES), ("episodes.csv", *words), REPORT) for way, (spoil, words) in TABLES.items()),
+    *(Bad(f"report: played.csv with {way}", spoil(GAMES), ("played.csv", *words), REPORT) for way, (spoil, words) in TABLES.items()),
     *(Bad(f"replay: episodes.csv with {way}", spoil(TABLE), ("episodes.csv", *words), LIST) for way, (spoil, words) in TABLES.items()),
-    Bad("report: games of another arm", edit(GAMES, "naive_alone", "../../../x"), ("episodes.csv", "naive_alone-seed1"), REPORT),
-    Bad("report: games of another seed", edit(GAMES, "naive_alone,,1", "naive_alone,,2"), ("episodes.csv", "naive_alone-seed1"), REPORT),
+    Bad("report: games of another arm", edit(GAMES, "naive_alone", "../../../x"), ("played.csv", "naive_alone-seed1"), REPORT),
+    Bad("report: games of another seed", edit(GAMES, "naive_alone,,1", "naive_alone,,2"), ("played.csv", "naive_alone-seed1"), REPORT),
     Bad("report: a game that was not recorded", edit(GAMES, "naive_alone,,1,1,", "naive_alone,,1,7,"), ("naive_alone-seed1.parquet", "episode 7"), REPORT),
     Bad("report: a run without a scene", lambda project: os.rename(project / "run/scene", project / "scene"), ("scene.toml",), REPORT),
     *(

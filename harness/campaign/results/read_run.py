@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
+from rich.console import Console
 
 from harness.campaign.plan.plan import plan
-from harness.campaign.plan.stages import Stage
+from harness.campaign.plan.stages import Stage, stage_id
 from harness.campaign.results.policy_cards import trained_policies
-from harness.campaign.storage.arm_tables import arm_tables
+from harness.campaign.results.shown_work import doing
+from harness.campaign.storage.arm_tables import PLAYED, arm_tables
 from harness.campaign.storage.manifest import is_tuned
 from harness.campaign.storage.run_folder import JUDGED, RunFolder
 from harness.config.campaign import Campaign
@@ -41,31 +44,32 @@ class ReadRun:
     """None where no arm's failures are judged."""
 
 
-def read_run(folder: RunFolder) -> ReadRun:
+def read_run(folder: RunFolder, console: Console) -> ReadRun:
     """Read a run. Tables of arms whose log or whose metrics have changed are made anew. Raises UsageError where files
     are missing or damaged."""
     manifest = folder.manifest()
     folder.check_whole(manifest)
     campaign = Campaign.model_validate(manifest["campaign"], strict=False)
     scene = open_scene(folder.scene)
-    arms = [arm_tables(folder, stage, scene) for stage in _done(manifest, "assessment")]
-    for stage, arm in zip(_done(manifest, "assessment"), arms, strict=True):
-        _check_rows(folder, stage, manifest, "arm", arm.episodes)
-        check_traces(folder.traces(stage), arm.episodes.loc[arm.episodes["error"] == "", "episode"])
+    for stage in _done(manifest, "assessment"):
+        _check_log(folder, stage, manifest["stages"][stage])
+    training = joined("training", _gathered(folder, manifest, "training", "training.csv"))
+    searches = joined("reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv"))
+    policies, reference_drivers = trained_policies(folder, manifest), _reference_drivers(folder, manifest)
+    with doing(console, "measuring the games"):
+        arms = [arm_tables(folder, stage, scene) for stage in _done(manifest, "assessment")]
     return ReadRun(
         manifest=manifest,
         campaign=campaign,
         stages=plan(campaign, manifest["personas"], is_tuned(manifest)),
         scene=scene,
-        policies=trained_policies(folder, manifest),
+        policies=policies,
         episodes=joined("episodes", [arm.episodes for arm in arms]),
         causes=joined("causes", [arm.causes for arm in arms]),
         manoeuvres=joined("manoeuvres", [arm.manoeuvres for arm in arms]),
-        training=joined("training", _gathered(folder, manifest, "training", "training.csv")),
-        reconfiguration=joined(
-            "reconfiguration", _gathered(folder, manifest, "reconfiguration", "reconfiguration.csv")
-        ),
-        reference_drivers=_reference_drivers(folder, manifest),
+        training=training,
+        reconfiguration=searches,
+        reference_drivers=reference_drivers,
     )
 
 
@@ -75,13 +79,22 @@ def _done(manifest: Mapping[str, Any], kind: str) -> list[str]:
     return [name for name, entry in entries if entry["kind"] == kind and entry["status"] == "done"]
 
 
+def _check_log(folder: RunFolder, stage: str, entry: Mapping[str, Any]) -> None:
+    """Raises UsageError unless the log of an arm is its own, and has a trace of each game that was played."""
+    file = folder.work(stage) / PLAYED
+    played = read_csv(file)
+    _check_rows(file, entry, played["arm"], played["seed"])
+    check_traces(folder.traces(stage), played.loc[played["error"] == "", "episode"])
+
+
 def _gathered(folder: RunFolder, manifest: Mapping[str, Any], kind: str, table: str) -> Iterator[pd.DataFrame]:
     """The tables of the stages of a kind."""
     for stage in _done(manifest, kind):
-        frame = read_csv(folder.work(stage) / table)
-        _check_rows(folder, stage, manifest, "stage", frame)
+        file = folder.work(stage) / table
+        frame = read_csv(file)
+        _check_rows(file, manifest["stages"][stage], frame["stage"], frame["seed"])
         if kind == "reconfiguration" and not is_of_a_search(frame):
-            raise _of_others(folder, stage)
+            raise UsageError.of(file, "", "has rows of no search", "run the campaign again")
         yield frame
 
 
@@ -89,16 +102,13 @@ def _reference_drivers(folder: RunFolder, manifest: Mapping[str, Any]) -> pd.Dat
     stages = _done(manifest, "preventability")
     frames = [read_csv(folder.work(stage) / JUDGED) for stage in stages]
     for stage, frame in zip(stages, frames, strict=True):
-        _check_rows(folder, stage, manifest, "arm", frame.assign(arm=frame["arm"] + "_preventability"))
+        names = frame["arm"] + "_preventability"
+        _check_rows(folder.work(stage) / JUDGED, manifest["stages"][stage], names, frame["seed"])
     return joined("reference_drivers", frames) if stages else None
 
 
-def _check_rows(folder: RunFolder, stage: str, manifest: Mapping[str, Any], column: str, rows: pd.DataFrame) -> None:
+def _check_rows(file: Path, entry: Mapping[str, Any], names: pd.Series, seeds: pd.Series) -> None:
     """Raises UsageError unless these rows are of this stage."""
-    entry = manifest["stages"][stage]
-    if not ((rows[column] == entry["name"]) & (rows["seed"] == entry["seed"])).all():
-        raise _of_others(folder, stage)
-
-
-def _of_others(folder: RunFolder, stage: str) -> UsageError:
-    return UsageError.of(folder.work(stage), "", f"has rows that are not of {stage}", "run the campaign again")
+    if not ((names == entry["name"]) & (seeds == entry["seed"])).all():
+        message = f"has rows that are not of {stage_id(entry['name'], entry['seed'])}"
+        raise UsageError.of(file, "", message, "run the campaign again")

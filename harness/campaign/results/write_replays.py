@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pandas as pd
@@ -12,6 +10,7 @@ from rich.console import Console
 from rich.progress import track
 
 from harness.campaign.plan.stages import stage_id
+from harness.campaign.results.shown_work import say
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import worst_first
@@ -27,7 +26,7 @@ def write_replays(folder: RunFolder, scene: OpenScene, episodes: pd.DataFrame, c
     names = [replay_name(game.arm, game.seed, game.episode) for game in chosen.itertuples()]
     games = list(zip(chosen.itertuples(), names, strict=True))
     reader = TraceReader()
-    _say(console, WRITING_REPLAYS)
+    say(console, WRITING_REPLAYS)
     for game, name in track(games, WRITING_REPLAYS, console=console, transient=True, disable=not console.is_terminal):
         write_replay(
             reader.read(folder.traces(stage_id(game.arm, game.seed)), game.episode),
@@ -49,17 +48,3 @@ def _drop_stale(replays: Path, names: set[str]) -> None:
     for old in replays.iterdir():
         if old.is_dir() and old.name not in names:
             shutil.rmtree(old)
-
-
-@contextmanager
-def doing(console: Console, what: str) -> Iterator[None]:
-    """Show what is being done: as long as it takes on a terminal, as a line elsewhere."""
-    _say(console, what)
-    with console.status(what):
-        yield
-
-
-def _say(console: Console, what: str) -> None:
-    """A line where the output is not a terminal, as `StageProgress` prints it for stages."""
-    if not console.is_terminal:
-        console.print(f"results  {what}", highlight=False, markup=False)

@@ -14,7 +14,8 @@ from harness.campaign.results.model_cards import write_model_cards
 from harness.campaign.results.read_run import ReadRun
 from harness.campaign.results.recorded_games import recorded_games, scene_drawing
 from harness.campaign.results.shown_result import shown_result
-from harness.campaign.results.write_replays import doing, write_replays
+from harness.campaign.results.shown_work import doing
+from harness.campaign.results.write_replays import write_replays
 from harness.campaign.storage.run_folder import RunFolder
 from harness.evaluation.tables import write_csv
 from harness.files import write_atomically

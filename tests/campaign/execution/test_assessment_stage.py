@@ -15,6 +15,7 @@ import harness.campaign.execution.assessment_stage
 from harness.assessment.rollout import SeatedArm
 from harness.campaign.execution.assessment_stage import Segment, join_segments, play_segments, segments_of
 from harness.campaign.execution.stage_run import Attempt, StageRun
+from harness.campaign.storage.arm_tables import PLAYED
 from harness.drivers.sumo import SumoDriver
 from harness.errors import StageFailed
 from harness.evaluation.tables import read_csv
@@ -48,7 +49,7 @@ def play(
     segments = segments_of(folder / "segments", EPISODES)
     run = StageRun(context=empty_context(folder), attempt=attempt, on_start=note)
     errors = play_segments(assessed, segments, LABELS, run)
-    join_segments(segments, [folder / name for name in ("episodes.csv", "manoeuvres.csv", "traces.parquet")])
+    join_segments(segments, folder / PLAYED, folder / "traces.parquet")
     return errors, played
 
 
@@ -87,7 +88,7 @@ def test_arm__killed_in_any_game_is_uninterrupted(dies_in: int, steady: SeatedAr
 
 
 def test_arm__has_every_game_once_in_order(whole: Path) -> None:
-    assert read_csv(whole / "episodes.csv")["episode"].tolist() == list(range(EPISODES))
+    assert read_csv(whole / PLAYED)["episode"].tolist() == list(range(EPISODES))
     assert [episode for episode, _ in read_traces(whole / "traces.parquet")] == list(range(EPISODES))
 
 
@@ -96,7 +97,7 @@ def test_arm__a_game_that_is_given_up_is_an_error_and_the_others_are_played(
 ) -> None:
     errors, played = play(steady, tmp_path, Attempt(first=False, abandoned={4: "the worker died of SIGSEGV"}))
     assert (errors, played) == (1, [0, 1, 2, 3, 5, 6])
-    expected, table = (read_csv(folder / "episodes.csv") for folder in (whole, tmp_path))
+    expected, table = (read_csv(folder / PLAYED) for folder in (whole, tmp_path))
     assert table.loc[4, ["ego_outcome", "non_ego_outcome", "error"]].tolist() == [
         *("error", "error", "the worker died of SIGSEGV")
     ]
@@ -158,7 +159,7 @@ def test_arm__ends_if_its_first_ten_games_fail_for_one_reason(merge: OpenScene, 
     assert play_ten(NeverDecides(but=9), merge, tmp_path / "one") == 11
 
 
-@pytest.mark.parametrize("name", ["json", "episodes.csv", "manoeuvres.csv", "traces.parquet"])
+@pytest.mark.parametrize("name", ["json", PLAYED, "traces.parquet"])
 @pytest.mark.parametrize("gone", [True, False])
 def test_arm__a_torn_segment_is_played_again(
     name: str, gone: bool, steady: SeatedArm, whole: Path, tmp_path: Path
@@ -188,20 +189,18 @@ from harness.campaign.execution.stage_run import StageRun
 from tests.support.plans import empty_context
 from harness.evaluation.trace_file import SCHEMA
 folder, episodes = Path(sys.argv[1]), int(sys.argv[2])
-texts = {"player": "ego", "vehicle_type": "car", "outcome": "", "signals": ""}
+texts = {"player": "ego", "vehicle_type": "car", "outcome": "", "signals": "", "signal_s": "", "steers": True}
 def game(episode):
     columns = {name: [texts.get(name, 0.5)] * 2000 for name in SCHEMA.names}
     columns |= {"episode": [episode] * 2000, "step": list(range(2000)), "lapsed": [False] * 2000}
-    record = {"episode": episode, "ego_outcome": "goal", "ego_failed": 0, "error": ""}
-    return Game(record=record, trace=columns)
+    return Game(played={"episode": episode, "ego_outcome": "goal", "error": ""}, trace=columns, scene=None)
 segments.assess = lambda arm, episodes, begin, abandoned: (game(each) for each in episodes)
-segments.name_manoeuvres = lambda table, traces, scene: segments.table_of("manoeuvres")
 class Anyone:
     scene, drivers = None, (None, None)
 parts = segments.segments_of(folder / "segments", episodes)
 run = StageRun(context=empty_context(folder))
 segments.play_segments(Anyone, parts, {"arm": "a", "persona": "", "seed": 1}, run)
-segments.join_segments(parts, [folder / "e.csv", folder / "m.csv", folder / "t.parquet"])
+segments.join_segments(parts, folder / "played.csv", folder / "t.parquet")
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
