@@ -140,7 +140,7 @@ def in_session(leader: int) -> list[int]:
 def workers_of(parent: int) -> list[int]:
     """The workers that a command has started."""
     children = [pid for pid, fields in _processes() if int(fields[1]) == parent and fields[0] != "Z"]
-    return [pid for pid in children if b"worker_process" in _read(f"/proc/{pid}/cmdline")]
+    return [pid for pid in children if b"worker_pool" in _read(f"/proc/{pid}/cmdline")]
 
 
 def _processes() -> Iterable[tuple[int, list[str]]]:

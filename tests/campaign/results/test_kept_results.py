@@ -84,7 +84,7 @@ def test_kept_result__is_none_for_other_files_of_a_stage(folder: RunFolder) -> N
 
 
 def test_kept_result__is_none_for_another_program(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(kept_results, "_digest_of_sources", lambda: "another")
+    monkeypatch.setattr(kept_results, "digest_of_sources", lambda: "another")
     assert kept_result(folder, folder.manifest()) is None
 
 
