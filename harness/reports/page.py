@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Iterable
 from typing import Any
 
 import pandas as pd
@@ -23,10 +23,9 @@ from harness.reports.game_links import GameLinks, replay_list, worst_game
 from harness.reports.learning import learning, searches, stopped
 from harness.reports.manoeuvres import MOST_LISTED, failures_by_cause, marks_of
 from harness.reports.next_steps import first_answers, next_steps
-from harness.reports.numbers import percent
 from harness.reports.page_template import CONTENT_POLICY, ELSEWHERE, environment_of, libraries, script
 from harness.reports.player_data import GameTracks, SceneDrawing, key
-from harness.reports.provenance import command_of, facts, made_by, mixed_versions
+from harness.reports.provenance import asked_alone, command_of, facts, made_by, mixed_versions
 from harness.reports.run_findings import RunFindings, results, unplayed
 from harness.reports.run_tables import RunTables
 
@@ -197,20 +196,8 @@ def _replays(tables: RunTables, embedded: Container[str]) -> dict[str, Any]:
 def _method(tables: RunTables, found: RunFindings) -> dict[str, Any]:
     return {
         "significance": found.significance,
-        "asked_alone": _asked_alone(tables.manifest),
+        "asked_alone": asked_alone(tables.manifest),
         "rules": sorted({stage["rule"] for stage in tables.stages.values() if stage.get("rule")}),
         "glossary": glossary(list(dict.fromkeys(tables.summary["arm"])), tables.arms, found),
         "versions": tables.manifest.get("versions", {}),
     }
-
-
-def _asked_alone(manifest: Mapping[str, Any]) -> str:
-    """What the campaign asks of players alone; empty if nothing."""
-    asked = manifest.get("campaign", {}).get("competence", {})
-    names = {"ego_goal_share": "an ego", "non_ego_goal_share": "a non-ego"}
-    bounds = [f"{percent(asked[key])} of {player}" for key, player in names.items() if asked.get(key)]
-    if not bounds:
-        return ""
-    return (
-        f"A question is answered only if its players reach their goals alone in a share of games: {', '.join(bounds)}."
-    )

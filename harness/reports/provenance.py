@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from harness.reports.numbers import steps_text
+from harness.reports.numbers import percent, steps_text
 
 
 def facts(manifest: Mapping[str, Any], seeds: Sequence[int], personas: int) -> list[tuple[str, str]]:
@@ -53,6 +53,18 @@ if TYPE_CHECKING:
 
 MIXED_VERSIONS = "This run mixes versions: its results may differ from those of a single version."
 THEN = ", then "
+
+
+def asked_alone(manifest: Mapping[str, Any]) -> str:
+    """What the campaign asks of players alone; empty if nothing."""
+    asked = manifest.get("campaign", {}).get("competence", {})
+    names = {"ego_goal_share": "an ego", "non_ego_goal_share": "a non-ego"}
+    bounds = [f"{percent(asked[key])} of {player}" for key, player in names.items() if asked.get(key)]
+    if not bounds:
+        return ""
+    return (
+        f"A question is answered only if its players reach their goals alone in a share of games: {', '.join(bounds)}."
+    )
 
 
 def mixed_versions(stages: Mapping[str, Mapping[str, Any]]) -> list[str]:
