@@ -31,7 +31,6 @@ SECTIONS = {
     "Concepts": (
         "glossary",
         "verdicts",
-        "causes",
         "preventability",
         "manoeuvres",
         "game",

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.repository import REPOSITORY
+from tests.support.scripts import script
 
 PAGES = [REPOSITORY / folder / "README.md" for folder in ("", "reports", "policies")]
 PAGES += [REPOSITORY / name for name in ("CONTRIBUTING.md", "CHANGELOG.md")]
@@ -57,6 +58,13 @@ def test_page__every_named_test_exists(page: Path) -> None:
 def test_page__every_link_leads_to_a_file_and_a_heading(page: Path) -> None:
     links = LINK.findall(CODE.sub("", page.read_text(encoding="utf-8")))
     assert [link for link in links if leads_nowhere(page, *link)] == []
+
+
+def test_site__its_navigation_has_every_page_of_docs() -> None:
+    pages = {page for section in script("site/navigation.py").SECTIONS.values() for page in section}
+    made = {page for page in pages if page.startswith("reference/")} | {"changelog", "contributing"}
+    docs = REPOSITORY / "docs"
+    assert pages - made == {page.relative_to(docs).with_suffix("").as_posix() for page in docs.rglob("*.md")}
 
 
 def test_link__to_nothing_is_seen() -> None:
