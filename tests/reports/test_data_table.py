@@ -65,12 +65,12 @@ def test_table__downloads_the_rows_that_the_filter_shows(page, arguments):
     page.locator("[data-filter=text]").fill("")
 
 
-def test_table__of_pairs_downloads_too(page):
+def test_table__of_causes_downloads_too(page):
     with page.expect_download() as download:
         page.locator(".filters:has(+ .holds-table #pairs) button").click()
     first, *rows = download.value.path().read_text().splitlines()
-    assert first.startswith("non-ego,ego,failures,naive_vs_sumo,naive_vs_speedy")
-    assert any(row.startswith("cut-in,swerve,") for row in rows)
+    assert first.startswith("cause,response,failures,naive_vs_sumo,naive_vs_speedy")
+    assert any(row.startswith("cut-in,swerves,") for row in rows)
 
 
 def column(page, place):

@@ -9,10 +9,11 @@ import re
 import pandas as pd
 import pytest
 
+from harness.evaluation.column import POINTS, SHARE
 from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps
 from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.game_theory.records import Response
-from harness.evaluation.tables import write_csv
+from harness.evaluation.tables import columns_of, write_csv
 from harness.reports.game import game_section
 from harness.reports.game_links import GameLinks
 from harness.reports.game_wording import (
@@ -65,15 +66,15 @@ def test_section__the_numbers_are_those_of_the_csv_file(name, found, page, tmp_p
         assert page.cells(name) == list(csv.reader(file))
 
 
-def test_section__every_number_that_is_read_is_the_exact_one_rounded(page):
+def test_section__every_number_that_is_read_is_the_exact_one_rounded(found, page):
     checked = 0
     for name in CAPTIONS:
-        headings = [cell["exact"] for cell in page.tables[name][0]]
+        headings, columns = [cell["exact"] for cell in page.tables[name][0]], columns_of(getattr(found, name).columns)
         for row in page.tables[name][1:]:
             for column, cell in zip(headings, row, strict=True):
                 if cell["exact"] in (None, "") or column in ("p_value", "p_holm"):
                     continue
-                scaled = any(word in column for word in ("rate", "share", "fewer", "failure_difference"))
+                scaled = columns[column].unit in (SHARE, POINTS)
                 read = float(cell["text"].replace("\N{MINUS SIGN}", "-").replace(",", ""))
                 exact = float(cell["exact"]) * (100 if scaled else 1)
                 assert read == pytest.approx(exact, abs=0.0501 if scaled else 0.00501), column

@@ -433,18 +433,19 @@ def test_page__ignores_the_users_matplotlib_settings(small, html):
 # --- manoeuvres ---
 
 
-def test_manoeuvres__failures_are_counted_by_pair_and_arm(small):
+def test_causes__failures_are_counted_by_cause_response_and_arm(small):
     page = Page(without_curves(small | recordings(small)))
     heading, *rows = [[cell["text"] for cell in row] for row in page.tables["pairs"]]
     episodes = small["episodes"]
     failed = episodes[episodes["ego_failed"].fillna(0) == 1]
-    assert heading[:3] == ["non-ego", "ego", "failures"]
+    assert heading[:3] == ["cause", "response", "failures"]
     assert sum(int(row[2]) for row in rows) == len(failed)
     assert sum(int(row[heading.index("naive_vs_speedy")]) for row in rows) == (failed["arm"] == "naive_vs_speedy").sum()
-    assert [row[:2] for row in rows] == [["cut-in", "swerve"], ["drift", "hard brake"], ["tailgate", "overtake"]]
+    assert [row[:2] for row in rows] == [["cut-in", "swerves"], ["drift", "brakes"]]
     assert all(sum(map(int, row[3:])) == int(row[2]) for row in rows)
 
 
-def test_manoeuvres__each_pair_opens_its_games_shortly_before_the_manoeuvre(small):
+def test_causes__each_opens_its_games_shortly_before_it(small):
     html = without_curves(small | recordings(small))
-    assert '<a href="#game=naive_vs_speedy,1,6&amp;t=2.5">naive_vs_speedy, game 6</a>: collision (gap 3.1 m' in html
+    link = '<a href="#game=naive_vs_speedy,1,6&amp;t=2.5">naive_vs_speedy, game 6</a>'
+    assert f"{link}: collision (cuts in from the left, 1.2 s before the end)" in html

@@ -36,7 +36,7 @@ from harness.replay.selection import choose_games, replay_name
 from harness.reports.page import render_page
 from harness.reports.player_data import GameTracks, SceneDrawing
 from harness.reports.run_tables import RunTables
-from tests.support.recorded import SCENE, manoeuvres, recorded
+from tests.support.recorded import SCENE, causes, manoeuvres, recorded
 from tests.support.tiny import UNGATED
 
 GAMES = 60
@@ -193,9 +193,10 @@ def rendered(games: Sequence[GameTracks] = (), scene: SceneDrawing | None = None
 
 
 def recordings(arguments: Mapping[str, Any], background: int = 2) -> dict[str, Any]:
-    """What `rendered` takes beside a campaign: recorded games that fit it, and their manoeuvres."""
-    games = recorded(arguments["episodes"], background)
-    return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(arguments["episodes"])}
+    """What `rendered` takes beside a campaign: recorded games that fit it, their manoeuvres and causes of failures."""
+    episodes = arguments["episodes"]
+    games = recorded(episodes, background)
+    return {"games": games, "scene": SCENE, "manoeuvres": manoeuvres(episodes), "causes": causes(episodes)}
 
 
 def _done(seed: int) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from harness.evaluation.tables import table_of
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games
@@ -139,3 +140,19 @@ def manoeuvres(episodes: pd.DataFrame) -> pd.DataFrame:
             | {"gap_m": np.nan, "ttc_s": np.nan, "text": ""}
         )
     return pd.DataFrame(rows)
+
+
+def causes(episodes: pd.DataFrame) -> pd.DataFrame:
+    """A frame of causes that fits: the non-ego's manoeuvre in each failure against a persona."""
+    deeds = {0: ("cut_in", "cuts in from the left", "swerves"), 1: ("drift", "drifts in", "brakes")}
+    rows = []
+    for row in episodes[episodes["ego_failed"].fillna(0) == 1].itertuples():
+        event, deed, reaction = deeds[row.episode % 2]
+        other = "non_ego" if "_vs_" in row.arm else ""
+        rows.append(
+            {"arm": row.arm, "persona": row.persona, "seed": row.seed, "episode": row.episode}
+            | {"ego_outcome": row.ego_outcome, "other": other, "event": event, "deed": deed}
+            | {"time_s": 4.0, "time_left_s": 1.2, "ego_saw": "yes", "hidden_until_s": np.nan}
+            | {"reaction": reaction, "braking_mps2": 2.5, "ego_broke": ""}
+        )
+    return table_of("causes", rows)
