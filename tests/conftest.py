@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sumo
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 from harness.game.arrays import FloatArray
 from harness.game.quantities import Quantities
@@ -23,8 +23,8 @@ from tests.support.shared import shared_folder
 from tests.support.slow import slow_tests
 from tests.support.stations import nearest_station_m
 
-# A busy machine exceeds any deadline now and then. The examples are the same in every run.
-settings.register_profile("harness", deadline=None, derandomize=True)
+# A busy machine exceeds any deadline now and then, and makes examples slowly. They are the same in every run.
+settings.register_profile("harness", deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("harness")
 
 

@@ -11,7 +11,7 @@ import pytest
 from tests.support.tiny import BY_SUMO, files_in, harness, sumo_run, tables, write_campaign
 
 PUBLISHED = ("report.html", "manifest.json")
-PUBLISHED += ("comparisons.csv", "episodes.csv", "manoeuvres.csv", "summary.csv", "training.csv")
+PUBLISHED += tuple(f"{name}.csv" for name in ("causes", "comparisons", "episodes", "manoeuvres", "summary", "training"))
 
 
 @pytest.fixture

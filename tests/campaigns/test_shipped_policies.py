@@ -41,9 +41,7 @@ def demo(repository: Path) -> Path:
     for key in ("scene", "policies"):
         document[key] = os.path.normpath(campaigns / document[key])
     document["personas"] = [os.path.normpath(campaigns / each) for each in document["personas"]]
-    document["ego"]["persona"] = os.path.normpath(campaigns / document["ego"]["persona"])
-    document["assessment"]["episodes"] = EPISODES
-    document["assessment"]["reference_drivers"] = False
+    document["assessment"] = {"episodes": EPISODES, "reference_drivers": False}
     del document["acceptance"]
     return finished(**{"training": None, **document})
 

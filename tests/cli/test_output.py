@@ -66,7 +66,7 @@ def test_replay__json_lists_the_games_that_the_table_lists(run: Path) -> None:
     assert listed["number"] == len(read_csv(run / "episodes.csv")) > 3
     assert listed["pages"] == -(-listed["number"] // 3)
     assert len(listed["games"]) == 3
-    names = {"arm", "seed", "episode", "ego_outcome", "non_ego_outcome", "ego_min_ttc_s", "severity", "manoeuvres"}
+    names = {"arm", "seed", "episode", "ego_outcome", "non_ego_outcome", "ego_min_ttc_s", "severity", "cause"}
     assert set(listed["games"][0]) == names
 
 

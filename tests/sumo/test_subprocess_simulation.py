@@ -156,7 +156,7 @@ from harness.sumo import libsumo_simulation
 from harness.sumo import subprocess_simulation
 import os
 class Printing:
-    def __init__(self, *arguments): os.write(1, b"SUMO says"); print("this", flush=True)
+    def __init__(self, *arguments, **options): os.write(1, b"SUMO says"); print("this", flush=True)
     def reload(self, seed): os.write(1, b"and that"); return seed
     def close(self): print("bye", flush=True)
 libsumo_simulation.LibsumoSimulation = Printing
@@ -171,7 +171,7 @@ subprocess_simulation.serve()
     )
     assert child.stdin is not None
     assert child.stdout is not None
-    for message, answer in (((None,), None), (("reload", 5), 5)):
+    for message, answer in (((None, 1, (True, True), 1, False), None), (("reload", 5), 5)):
         subprocess_simulation._send(child.stdin, message)
         assert subprocess_simulation._receive(child.stdout) == (answer, None)
     rest, errors = child.communicate(timeout=300)
@@ -184,7 +184,7 @@ sys.path.insert(0, {repository!r})
 from harness import open_scene
 from harness.sumo.subprocess_simulation import open_simulation
 scene = open_scene(pathlib.Path("straight"))
-both = [open_simulation(scene, 1, (True, True), 1) for _ in range(2)]
+both = [open_simulation(scene, 1, (True, True), seed=1) for _ in range(2)]
 os.chdir("/")
 both[1].reload(2)
 print(both[1]._child.pid, flush=True)
