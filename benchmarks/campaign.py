@@ -96,6 +96,9 @@ class _EventRecorder:
         elif event.kind != "started":
             raise RuntimeError(f"{event.stage} {event.kind}: {event.message}")
 
+    def tell(self, stage: Stage, status: str, message: str) -> None:
+        """A remark on a stage costs nothing."""
+
 
 def campaign_side(timer: LapTimer, steps: int, episodes: int) -> None:
     """One shortened campaign in one lap; the lap's values are the seconds of its parts."""

@@ -6,13 +6,13 @@ All sides call `harness.training.ppo.train` with a campaign's own settings; only
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
-import gymnasium
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import SubprocVecEnv, VecEnv
@@ -114,9 +114,9 @@ def update_side(timer: LapTimer, learner: str) -> None:
                     updates += 1
                 timer.finish_lap(updates * gradient_steps)
 
-    replaced: Any = {"Arena": _NoArena, "ArenaVecEnv": _FreeVecEnv, "CurveRecorder": lambda *_, **__: Repeated()}
     with (
-        patch.multiple("harness.training.ppo", **replaced),
+        _games_of(_FreeVecEnv),
+        patch("harness.training.ppo.CurveRecorder", lambda *_, **__: Repeated()),
         tempfile.TemporaryDirectory(prefix="benchmark-") as scratch,
     ):
         spec = training_spec(endless_training(learner=learner))
@@ -125,7 +125,7 @@ def update_side(timer: LapTimer, learner: str) -> None:
 
 def free_side(timer: LapTimer) -> None:
     """Training on an environment that costs nothing."""
-    with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=_FreeVecEnv):
+    with _games_of(_FreeVecEnv):
         train_in_laps(timer, endless_training())
 
 
@@ -136,18 +136,16 @@ def subprocess_side(timer: LapTimer, environments: int, policy: Path) -> None:
     )
     default = Training()
     settings = endless_training(games=environments, buffer=default.buffer // environments * environments)
-    with patch.multiple("harness.training.ppo", Arena=_NoArena, ArenaVecEnv=partial(_SubprocessVecEnv, make_env)):
+    with _games_of(lambda games: _SubprocessVecEnv([make_env] * games)):
         train_in_laps(timer, settings)
 
 
-class _NoArena:
-    """Replaces the arena in `train`."""
-
-    def __init__(self, scene: Any, games: int, *arguments: Any, **keywords: Any) -> None:
-        self.games = games
-
-    def reload(self, seed: int) -> None:
-        """No SUMO is running."""
+@contextmanager
+def _games_of(environment_of: Callable[[int], VecEnv]) -> Iterator[None]:
+    """Let `train` play in another environment, made from the number of games, whose games draw their own starts."""
+    games: dict[str, Any] = {"open_games": lambda spec: environment_of(spec.settings.games), "sample": lambda *_: None}
+    with patch.multiple("harness.training.ppo", **games):
+        yield
 
 
 class _FreeVecEnv(VecEnv):
@@ -155,21 +153,18 @@ class _FreeVecEnv(VecEnv):
 
     render_mode = None
 
-    def __init__(
-        self, arena: _NoArena, learner: int, start_distribution: Any, *parts: str | int, **keywords: Any
-    ) -> None:
-        super().__init__(arena.games, OBSERVATION_SPACE, ACTION_SPACE)
-        self.arena = arena
+    def __init__(self, games: int) -> None:
+        super().__init__(games, OBSERVATION_SPACE, ACTION_SPACE)
         generator = np.random.default_rng(1)
-        shape = (16, arena.games, *OBSERVATION_SPACE.shape)
+        shape = (16, games, *OBSERVATION_SPACE.shape)
         self._observations = generator.uniform(-1.0, 1.0, shape).astype(np.float32)
-        self._payoff = generator.standard_normal((16, arena.games)).astype(np.float32)
-        self._done = np.zeros(arena.games, dtype=bool)
-        self._infos: list[dict[str, Any]] = [{} for _ in range(arena.games)]
+        self._payoff = generator.standard_normal((16, games)).astype(np.float32)
+        self._done = np.zeros(games, dtype=bool)
+        self._infos: list[dict[str, Any]] = [{} for _ in range(games)]
         self._steps = 0
 
-    def sample_from(self, start_distribution: Any, *parts: str | int) -> None:
-        """No start is drawn."""
+    def reload(self, seed: int) -> None:
+        """No SUMO is running."""
 
     def take_finished(self) -> list[Any]:
         """No game ends."""
@@ -204,20 +199,8 @@ class _FreeVecEnv(VecEnv):
 class _SubprocessVecEnv(SubprocVecEnv):
     """SB3's own, with the methods that `train` calls on its environment."""
 
-    def __init__(
-        self,
-        make_env: Callable[[], gymnasium.Env[Any, Any]],
-        arena: _NoArena,
-        learner: int,
-        start_distribution: Any,
-        *parts: str | int,
-        **keywords: Any,
-    ) -> None:
-        super().__init__([make_env] * arena.games)
-        self.arena = arena
-
-    def sample_from(self, start_distribution: Any, *parts: str | int) -> None:
-        """Each environment draws its own games."""
+    def reload(self, seed: int) -> None:
+        """Each environment reloads its own SUMO."""
 
     def take_finished(self) -> list[Any]:
         """Finished games are not counted."""
