@@ -21,7 +21,8 @@ from benchmarks.bare_sumo import Placement, place_and_step, record_placements
 from benchmarks.games import GAMES, CoastingGames
 from benchmarks.traffic import write_scene
 from harness.game.arrays import FloatArray
-from harness.game.near_players import NOTICED_M, NearSearch
+from harness.game.near_players import NearSearch
+from harness.game.state import NOTICED_M
 from harness.road.scene.open_scene import open_scene
 from harness.sumo.vehicle_reads import DIRECT, read_near, string_record
 

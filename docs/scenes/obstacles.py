@@ -15,7 +15,7 @@ from pathlib import Path
 import libsumo
 import sumo
 
-from harness.sumo.standing_vehicles import OBSTACLE_TYPE, TYPE_XML, stand
+from harness.sumo.insertion import OBSTACLE_TYPE, TYPE_XML, stand
 
 _NODES = '<nodes><node id="a" x="0" y="0"/><node id="b" x="300" y="0"/><node id="c" x="600" y="0"/></nodes>'
 _EDGE = '<edge id="{}" from="{}" to="{}" numLanes="{}" speed="13.89" spreadType="right"/>'

@@ -6,7 +6,6 @@ import numpy as np
 
 from harness.game.arrays import FloatArray, IntArray
 from harness.game.initial_state import InitialState
-from harness.game.near_players import NEAREST, NOTICED_M
 from harness.game.placed_obstacles import Obstacles
 from harness.game.state import Bodies, State
 from harness.game.world import World
@@ -54,7 +53,7 @@ class NearbyBodies:
                 width_m=reading.width_m[games],
                 present=reading.present[games],
             )
-            bodies = bodies.with_nearest(background, NEAREST, NOTICED_M)
+            bodies = bodies.with_nearest(background)
         if not self._obstacles.each:
             return bodies
         standing = (*np.moveaxis(self.poses[games], -1, 0), *(each[games] for each in self._at_rest))

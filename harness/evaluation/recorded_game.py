@@ -18,10 +18,9 @@ from harness.evaluation.encounters import Encounter, encounters_of
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.geometry import Box, box_distance
 from harness.game.junctions import SIGNALS, Signal
-from harness.game.near_players import NEAREST, NOTICED_M
 from harness.game.outcome import Outcome
 from harness.game.quantities import Quantities
-from harness.game.state import Bodies, State
+from harness.game.state import NEAREST, NOTICED_M, Bodies, State
 from harness.game.traffic_rules import since_change_s
 from harness.game.world import World
 

@@ -8,9 +8,7 @@ import numpy as np
 
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.jit import compiled
-
-NEAREST = 16  # background vehicles in the bodies of a game
-NOTICED_M = 120.0  # a vehicle farther than this from every player does not affect the game
+from harness.game.state import NOTICED_M
 
 
 class NearSearch(NamedTuple):
@@ -76,30 +74,3 @@ def near_players(search: NearSearch, due: IntArray, fronts_m: FloatArray) -> Int
             near[count] = k
             count += 1
     return near[:count]
-
-
-@compiled
-def rows_by_game(
-    places: IntArray, motion: tuple[FloatArray, ...], sizes_m: tuple[FloatArray, ...]
-) -> tuple[FloatArray, BoolArray, IntArray]:
-    """[C, G, M] the columns of n vehicles, one row for each of G games; [G, M] whether there is a vehicle; [G, M] its
-    index, n without one.
-
-    `places` [n] are the vehicles' flat places in a table [G, N], in ascending order. The columns are those of `motion`,
-    [n] each, followed by those of `sizes_m`, [G, N] each. M is the largest number of vehicles in a game.
-    """
-    count, room = sizes_m[0].shape
-    first, most = np.searchsorted(places, np.arange(0, (count + 1) * room, room)), 0
-    for g in range(count):
-        most = max(most, first[g + 1] - first[g])
-    rows = np.zeros((len(motion) + len(sizes_m), count, most))
-    present, index = np.zeros((count, most), dtype=np.bool_), np.full((count, most), len(places))
-    for g in range(count):
-        for slot in range(first[g + 1] - first[g]):
-            k = first[g] + slot
-            present[g, slot], index[g, slot] = True, k
-            for column in range(len(motion)):
-                rows[column, g, slot] = motion[column][k]
-            for column in range(len(sizes_m)):
-                rows[len(motion) + column, g, slot] = sizes_m[column][g, places[k] - g * room]
-    return rows, present, index

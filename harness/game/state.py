@@ -15,6 +15,11 @@ from harness.game.outcome import Outcome
 ALL_AROUND = -2.0
 """`State.sight_cosine` of a player that sees all around: below every cosine, whatever its rounding."""
 
+NEAREST = 16
+"""Background vehicles in the bodies of a game."""
+NOTICED_M = 120.0
+"""A background vehicle farther than this from every player does not affect the game."""
+
 _RUNNING = int(Outcome.RUNNING)  # comparing arrays with an enumeration member is slow in NumPy
 
 
@@ -103,28 +108,23 @@ class Bodies(NamedTuple):
         """Their boxes, [G, B]."""
         return Box(self.x_m, self.y_m, self.heading_rad, self.length_m, self.width_m)
 
-    def with_nearest(self, background: Bodies, most: int, within_m: float) -> Bodies:
-        """These bodies (the players), followed by the nearest background vehicles.
-
-        At most `most` vehicles are added, sorted by distance to the nearest player. A vehicle farther than `within_m`
-        from every player is not present.
-        """
-        columns, present = _with_nearest(tuple(self), tuple(background), most, within_m)
+    def with_nearest(self, background: Bodies) -> Bodies:
+        """These bodies (the players), followed by the `NEAREST` background vehicles, sorted by distance to the nearest
+        player. A vehicle farther than `NOTICED_M` from every player is not present."""
+        columns, present = _with_nearest(tuple(self), tuple(background))
         return Bodies._make((*columns, present))
 
 
 @compiled
-def _with_nearest(
-    players: tuple[Any, ...], vehicles: tuple[Any, ...], most: int, within_m: float
-) -> tuple[FloatArray, BoolArray]:
+def _with_nearest(players: tuple[Any, ...], vehicles: tuple[Any, ...]) -> tuple[FloatArray, BoolArray]:
     """[C, G, B] the columns of players and added vehicles but the last, and [G, B] which are present."""
     among, background = Bodies(*players), Bodies(*vehicles)
     of_players, of_vehicles = players[:-1], vehicles[:-1]
     games, player_count = among.present.shape
-    added = min(most, background.present.shape[1])
+    added = min(NEAREST, background.present.shape[1])
     columns = np.empty((len(players) - 1, games, player_count + added))
     present = np.empty((games, player_count + added), dtype=np.bool_)
-    nearest, nearest_m = np.empty(most + 1, dtype=np.int64), np.empty(most + 1)
+    nearest, nearest_m = np.empty(NEAREST + 1, dtype=np.int64), np.empty(NEAREST + 1)
     for g in range(games):
         count = 0
         for vehicle in range(background.present.shape[1]):
@@ -140,10 +140,10 @@ def _with_nearest(
                 nearest[place], nearest_m[place] = nearest[place - 1], nearest_m[place - 1]
                 place -= 1
             nearest[place], nearest_m[place] = vehicle, distance_m
-            count = min(count + 1, most)
+            count = min(count + 1, NEAREST)
         present[g, :player_count] = among.present[g]
         for k in range(added):
-            present[g, player_count + k] = nearest_m[k] <= within_m
+            present[g, player_count + k] = nearest_m[k] <= NOTICED_M
         for column in range(len(of_players)):
             columns[column, g, :player_count] = of_players[column][g]
             for k in range(added):

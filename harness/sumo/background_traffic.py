@@ -15,17 +15,15 @@ from typing import Any
 import libsumo
 import numpy as np
 from libsumo import _libsumo  # the same functions without Python wrappers
-from numpy.typing import NDArray
 
 from harness.errors import SimulationError
-from harness.game.arrays import BoolArray, FloatArray, IntArray
-from harness.game.near_players import NearSearch, rows_by_game
+from harness.game.arrays import FloatArray, IntArray
+from harness.game.near_players import NearSearch
 from harness.road.demand.route_file import Departure
-from harness.road.net.levels import on_players_level
 from harness.road.xml.angles import heading_rad_of
 from harness.sumo.background_people import BackgroundPeople
 from harness.sumo.insertion import Insertion, put_beside
-from harness.sumo.simulation import Reading, side_by_side
+from harness.sumo.simulation import Players, Reading, Tiles, reading_of, side_by_side
 from harness.sumo.vehicle_reads import DIRECT, read_near, string_record
 
 _LONGEST_WAIT = 50  # steps
@@ -77,29 +75,20 @@ class BackgroundTraffic:
     """The background traffic of all games."""
 
     def __init__(
-        self,
-        *,
-        prefixes: Sequence[str],
-        offsets_m: FloatArray,
-        step_s: float,
-        fastest_player_mps: float,
-        recorded: bool,
-        insertion: Insertion,
-        roads_m: FloatArray | None = None,
+        self, tiles: Tiles, insertion: Insertion, *, step_s: float, fastest_player_mps: float, recorded: bool
     ) -> None:
-        """`roads_m` are the points [n, 3] of the players' roads: vehicles on other levels are left out of readings."""
-        self._prefixes, self._offsets_m, self._step_s = prefixes, offsets_m, step_s
-        self._fastest_player_mps, self._recorded, self._insertion = fastest_player_mps, recorded, insertion
-        self._roads_m = roads_m
+        self._tiles, self._insertion, self._recorded = tiles, insertion, recorded
+        self._step_s, self._fastest_player_mps = step_s, fastest_player_mps
         self.standing = 0
         """Vehicles in SUMO that stand for obstacles."""
         self._step = 0
-        self._first_step = [0] * len(prefixes)
+        games = len(tiles.prefixes)
+        self._first_step = [0] * games
         self._waiting: dict[int, list[Departure]] = {}  # by game, the next departure last
         self._places: dict[str, tuple[int, int]] = {}  # row and place of each vehicle in SUMO, by its name there
         self._beside: dict[str, Departure] = {}  # vehicles that are to depart beside the middle of their lane
-        self._table = _Table(len(prefixes))
-        self._people = BackgroundPeople(prefixes=prefixes, offsets_m=offsets_m, recorded=recorded, roads_m=roads_m)
+        self._table = _Table(games)
+        self._people = BackgroundPeople(tiles, recorded=recorded)
         self._empty_reading = self._reading(np.zeros(0, dtype=np.int64), np.zeros((4, 0)))
 
     def reset(self, game: int, departures: Sequence[Departure]) -> Reading | None:
@@ -121,7 +110,7 @@ class BackgroundTraffic:
             return None
         self._waiting[game] = list(reversed(departures))
         self._depart(game)
-        return _warmed_up(self._on_level(game, departures))
+        return self._warmed_up(game, departures)
 
     def advance(self) -> None:
         """Process a step of SUMO: arrivals, vehicles that entered the traffic, and departures that are due."""
@@ -143,52 +132,61 @@ class BackgroundTraffic:
         for game in list(self._waiting):
             self._depart(game)
 
-    def read(self, players_x_m: FloatArray, players_y_m: FloatArray, players_present: BoolArray) -> Reading:
-        """The vehicles and persons near the players [G, P] that are present, or all if games are recorded."""
-        vehicles = self._read_vehicles(players_x_m, players_y_m, players_present)
-        if not self._people.inserted:
-            return vehicles
-        return side_by_side(vehicles, self._people.read(players_x_m, players_y_m, players_present))
+    def read(self, players: Players) -> Reading:
+        """The vehicles and persons near a player, or all if games are recorded."""
+        vehicles = self._read_vehicles(players)
+        return side_by_side(vehicles, self._people.read(players)) if self._people.inserted else vehicles
 
-    def _read_vehicles(self, players_x_m: FloatArray, players_y_m: FloatArray, players_present: BoolArray) -> Reading:
-        if not self._places:
-            return self._empty_reading
+    def _read_vehicles(self, players: Players) -> Reading:
         table = self._table
-        due = np.flatnonzero(table.due == self._step)  # by game, then by departure
-        if not len(due):
+        if not self._places or not len(due := np.flatnonzero(table.due == self._step)):  # by game, then by departure
             return self._empty_reading
         search = NearSearch(
-            *(table.due, table.length_m, table.max_speed_mps, self._offsets_m),
-            *(players_x_m, players_y_m, players_present, self._fastest_player_mps),
-            *(self._step, self._step_s, 1 if self._recorded else _LONGEST_WAIT, self._recorded),
+            *(table.due, table.length_m, table.max_speed_mps, self._tiles.offsets_m, *players),
+            *(self._fastest_player_mps, self._step, self._step_s),
+            *(1 if self._recorded else _LONGEST_WAIT, self._recorded),
         )
-        direct = DIRECT and self._sumo_has_all(players_present)
+        direct = DIRECT and self._sumo_has_all(players)
         places, motion = read_near(search, table.sumo_name, records=table.sumo_record, due=due, direct=direct)
-        if self._roads_m is not None and len(places):
-            names, games = table.sumo_name.ravel()[places], places // table.due.shape[1]
-            near = on_players_level(self._roads_m, self._points(names, games))
-            places, motion = places[near], np.ascontiguousarray(motion[:, near])
-        return self._reading(places, motion)
+        names = table.sumo_name.ravel()[places].tolist() if self._tiles.roads_m is not None else []
+        points = map(_libsumo.vehicle_getPosition3D, names)
+        near = self._tiles.on_level(points, places // table.due.shape[1])
+        return self._reading(places[near], motion[:, near])
 
-    def _points(self, sumo_names: NDArray[np.object_], games: IntArray) -> FloatArray:
-        """[m, 3] where vehicles are, with their heights, in the coordinates of the net."""
-        points = np.array([_libsumo.vehicle_getPosition3D(name) for name in sumo_names.tolist()]).reshape(-1, 3)
-        points[:, 1] -= self._offsets_m[games]
-        return points
-
-    def _on_level(self, game: int, departures: Sequence[Departure]) -> list[Departure]:
-        """The vehicles of the warm-up among the departures that are on the level of the players' roads."""
-        vehicles = [each for each in departures if each.motion is not None and not each.on_foot]
-        if self._roads_m is None or not vehicles:
-            return vehicles
-        names = np.array([self._prefixes[game] + each.name for each in vehicles], dtype=object)
-        near = on_players_level(self._roads_m, self._points(names, np.full(len(names), game)))
-        return [each for each, kept in zip(vehicles, near.tolist(), strict=True) if kept]
-
-    def _sumo_has_all(self, players_present: BoolArray) -> bool:
+    def _sumo_has_all(self, players: Players) -> bool:
         """Whether SUMO has as many vehicles and persons as were inserted and have neither arrived nor been removed."""
-        others = np.count_nonzero(players_present) + self.standing + len(self._people.inserted)
+        others = np.count_nonzero(players[2]) + self.standing + len(self._people.inserted)
         return _libsumo.simulation_getMinExpectedNumber() == len(self._places) + others
+
+    def _reading(self, places: IntArray, motion: FloatArray) -> Reading:
+        """The reading of vehicles at flat places [n] of the table; motion [4, n] is front x, y, SUMO's angle, speed."""
+        table, (front_x_m, front_y_m, angle_deg, speed_mps) = self._table, motion
+        return reading_of(
+            len(self._first_step),
+            places // table.due.shape[1],
+            names=table.name.ravel()[places],
+            types=table.kind.ravel()[places],
+            motion=(front_x_m, front_y_m, heading_rad_of(angle_deg), speed_mps),
+            sizes_m=(table.length_m.ravel()[places], table.width_m.ravel()[places]),
+        )
+
+    def _warmed_up(self, game: int, departures: Sequence[Departure]) -> Reading | None:
+        """The vehicles of a warm-up among the departures that are on the level of the players' roads, [1, M]."""
+        moving = [(each, each.motion) for each in departures if each.motion is not None and not each.on_foot]
+        places = (_libsumo.vehicle_getPosition3D(self._tiles.prefixes[game] + each.name) for each, _ in moving)
+        on_level = self._tiles.on_level(places, np.full(len(moving), game))
+        vehicles = [vehicle for vehicle, kept in zip(moving, on_level.tolist(), strict=True) if kept]
+        if not vehicles:
+            return None
+        *motion, length_m, width_m = np.array([astuple(each) for _, each in vehicles]).T
+        return reading_of(
+            1,
+            np.zeros(len(vehicles), dtype=np.int64),
+            names=[each.name for each, _ in vehicles],
+            types=[each.vehicle_type for each, _ in vehicles],
+            motion=motion,
+            sizes_m=(length_m, width_m),
+        )
 
     def _depart(self, game: int) -> None:
         now = (self._step - self._first_step[game]) * self._step_s + 1e-9
@@ -198,9 +196,9 @@ class BackgroundTraffic:
             if departure.on_foot:
                 self._people.add(game, departure)
                 continue
-            sumo_name, vehicle = self._prefixes[game] + departure.name, libsumo.vehicle
+            sumo_name, vehicle = self._tiles.prefixes[game] + departure.name, libsumo.vehicle
             sumo_text = sumo_name.encode()
-            self._insertion.depart(self._prefixes[game], sumo_name, departure)
+            self._insertion.depart(self._tiles.prefixes[game], sumo_name, departure)
             place = self._table.add(
                 game,
                 sumo_name=sumo_name,
@@ -219,33 +217,3 @@ class BackgroundTraffic:
                 self._beside[sumo_name] = departure
         if not waiting:
             del self._waiting[game]
-
-    def _reading(self, places: IntArray, motion: FloatArray) -> Reading:
-        """The reading of vehicles at flat places [n] of the table; motion [4, n] is front x, y, SUMO's angle, speed."""
-        table, (front_x, front_y, angle, speed) = self._table, motion
-        length, heading = table.length_m.ravel()[places], heading_rad_of(angle)
-        x = front_x - 0.5 * length * np.cos(heading)
-        y = front_y - 0.5 * length * np.sin(heading)
-        columns, present, index = rows_by_game(places, (x, y, heading, speed), (table.length_m, table.width_m))
-        names, types = (_in_rows(words, places, index) for words in (table.name, table.kind))
-        x_m, y_m, heading_rad, speed_mps, length_m, width_m = columns
-        return Reading(names, types, x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
-
-
-def _warmed_up(departures: Sequence[Departure]) -> Reading | None:
-    """The vehicles of a warm-up among the departures of a game, [1, M]; None without any."""
-    vehicles = [(each, each.motion) for each in departures if each.motion is not None]
-    if not vehicles:
-        return None
-    names, types = np.array([(each.name, each.vehicle_type) for each, _ in vehicles], dtype=object).T[:, None]
-    front_x, front_y, heading, speed, length, width = np.array([astuple(motion) for _, motion in vehicles]).T[:, None]
-    x, y = front_x - 0.5 * length * np.cos(heading), front_y - 0.5 * length * np.sin(heading)
-    return Reading(names, types, x, y, heading, speed, length, width, np.ones((1, len(vehicles)), dtype=bool))
-
-
-def _in_rows(words: NDArray[np.object_], places: IntArray, index: IntArray) -> NDArray[np.object_]:
-    """[G, M] the words [G, N] of vehicles at flat places [n] in rows of their indices [G, M]; None where it is n."""
-    of_vehicles = np.empty(len(places) + 1, dtype=object)  # filled with None
-    of_vehicles[:-1] = words.ravel()[places]
-    rows: NDArray[np.object_] = of_vehicles[index]
-    return rows

@@ -1,16 +1,36 @@
-"""Insertion of vehicles into SUMO's traffic, with all that a departure of the route file says."""
+"""Insertion of vehicles into SUMO's traffic: departures of the route file, and vehicles that stand for obstacles.
+
+A vehicle of a warm-up is left out if it leaves a player or an obstacle of the game too little room. Where an obstacle
+blocks lanes, one vehicle stands on each, so that the traffic stops behind it or drives round it. Contact is tested
+against the obstacle itself.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import libsumo
+import numpy as np
 
-from harness.road.demand.route_file import SHARE, Departure
+from harness.game.arrays import FloatArray
+from harness.game.geometry import Box, box_distance
+from harness.game.initial_state import InitialState
+from harness.road.demand.route_file import SHARE, Departure, Motion
 from harness.road.demand.stops import Stop
+from harness.road.scene.blocked_lanes import blockages
+from harness.road.scene.open_obstacles import boxes_of
+from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.xml_file import number_of
 
+CLEAR_M, CLEAR_S, CLEAR_AROUND_M = 10.0, 2.0, 2.0
+"""Room at a player's start: no vehicle on its lane nearer than the first or than the way that the one behind drives in
+the second, and none nearer than the third anywhere."""
+OBSTACLE_TYPE = "harness_obstacle"
+TYPE_XML = f'<vType id="{OBSTACLE_TYPE}" vClass="ignoring" minGap="0"/>'
+"""The type of vehicles that stand for obstacles: no lane's permissions exclude it."""
+
 _PARKING = 1  # a flag of setStop: the vehicle leaves the lane while it stands
+_LANE_M = 3.0
 _WITHOUT_END = -1073741824.0  # SUMO's double for a value that is not given
 
 
@@ -100,3 +120,83 @@ def _add_stop(prefix: str, name: str, stop: Stop, depart_s: float) -> None:
         startPos=stop.start_m or 0.0,
         until=_WITHOUT_END if stop.until_s is None else max(now + stop.until_s - depart_s, 0.0),
     )
+
+
+# --- obstacles -------------------------------------------------------------------------------------------------------
+
+
+class StandingVehicles:
+    """The vehicles of all games that stand for obstacles."""
+
+    def __init__(self, scene: OpenScene, prefixes: Sequence[str], insertion: Insertion) -> None:
+        self._scene, self._prefixes, self._insertion = scene, prefixes, insertion
+        self._names: list[list[str]] = [[] for _ in prefixes]
+
+    @property
+    def count(self) -> int:
+        """Vehicles of all games."""
+        return sum(map(len, self._names))
+
+    def reset(self, game: int, *parts: str | int) -> None:
+        """Replace the vehicles of a game by those of the game whose seeds have these parts."""
+        for name in self._names[game]:
+            libsumo.vehicle.remove(name)
+        obstacles, prefix = self._scene.obstacles, self._prefixes[game]
+        self._names[game] = []
+        for k, each in enumerate(blockages(self._scene.lane_strips, obstacles.poses(*parts), obstacles)):
+            name, edges = f"{prefix}{obstacles.each[each.obstacle].name}.{k}", each.strip.edges
+            self._insertion.add(
+                prefix, name, edges=edges, vehicle_type=OBSTACLE_TYPE, lane="first", position="base", speed="0"
+            )
+            stand(name, in_tile(prefix, each.strip.name), each.front_m, each.length_m)
+            self._names[game].append(name)
+
+
+def stand(name: str, lane: str, front_m: float, length_m: float) -> None:
+    """Let a vehicle of this length that was just added stand on a lane for good."""
+    vehicle = libsumo.vehicle
+    vehicle.setLength(name, length_m)
+    vehicle.moveTo(name, lane, front_m)  # at once: SUMO would wait for room
+    vehicle.setSpeedMode(name, 0)
+    vehicle.setLaneChangeMode(name, 0)
+    vehicle.setSpeed(name, 0.0)
+
+
+# --- room for the vehicles of a warm-up ------------------------------------------------------------------------------
+
+
+def clear_of_players(departures: Sequence[Departure], start: InitialState, length_m: FloatArray) -> list[Departure]:
+    """The departures without vehicles of the warm-up that are too near to a player's start (`CLEAR_M` and the others).
+
+    `length_m` [P] are the players' lengths. Players that take no part count too: arms have the same traffic.
+    """
+    return [each for each in departures if each.motion is None or not _is_near(each.motion, start, length_m)]
+
+
+def _is_near(motion: Motion, start: InitialState, length_m: FloatArray) -> bool:
+    dx = motion.x_m - 0.5 * motion.length_m * np.cos(motion.heading_rad) - start.x_m
+    dy = motion.y_m - 0.5 * motion.length_m * np.sin(motion.heading_rad) - start.y_m
+    cos, sin = np.cos(start.heading_rad), np.sin(start.heading_rad)
+    ahead, beside = dx * cos + dy * sin, np.abs(dy * cos - dx * sin)
+    bodies = 0.5 * (motion.length_m + length_m)
+    behind_mps = np.where(ahead > 0.0, start.speed_mps, motion.speed_mps)
+    on_lane = (beside < _LANE_M) & (np.abs(ahead) - bodies < np.maximum(CLEAR_M, CLEAR_S * behind_mps))
+    return bool((on_lane | (np.hypot(dx, dy) - bodies < CLEAR_AROUND_M)).any())
+
+
+def clear_of_obstacles(departures: Sequence[Departure], obstacles: Box) -> list[Departure]:
+    """The departures without vehicles of a warm-up that are on an obstacle, or would have to brake hard before it."""
+    boxes = boxes_of(obstacles)
+    return [
+        each
+        for each in departures
+        if each.motion is None or all(box_distance(_way(each.motion), box) > 0.0 for box in boxes)
+    ]
+
+
+def _way(motion: Motion) -> Box:
+    """The body of a vehicle and the room before it that it needs."""
+    room_m = max(CLEAR_M, CLEAR_S * motion.speed_mps)
+    ahead_m = 0.5 * (room_m - motion.length_m)  # a motion is that of the front bumper
+    x_m, y_m = motion.x_m + ahead_m * np.cos(motion.heading_rad), motion.y_m + ahead_m * np.sin(motion.heading_rad)
+    return Box(float(x_m), float(y_m), motion.heading_rad, motion.length_m + room_m, motion.width_m)

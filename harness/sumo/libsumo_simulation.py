@@ -12,11 +12,12 @@ models are disabled for them. SUMO then has the poses of the players, but not al
 
 from __future__ import annotations
 
+import contextlib
 import tempfile
 import weakref
 from collections import deque
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from itertools import repeat
 from pathlib import Path
 
@@ -33,11 +34,9 @@ from harness.road.net.tiles import tile_offset_m, tile_prefix, tiled_net
 from harness.road.scene.open_scene import OpenScene
 from harness.road.xml.angles import compass_deg_of, heading_rad_of
 from harness.sumo.background_traffic import BackgroundTraffic
-from harness.sumo.insertion import Insertion
+from harness.sumo.insertion import TYPE_XML, Insertion, StandingVehicles, clear_of_obstacles, clear_of_players
 from harness.sumo.road_signals import Signals, SpeedLimits
-from harness.sumo.room_at_start import clear_of_obstacles, clear_of_players
-from harness.sumo.simulation import NO_SIGNALS, AtReset, Reading
-from harness.sumo.standing_vehicles import TYPE_XML, StandingVehicles
+from harness.sumo.simulation import NO_SIGNALS, AtReset, Reading, Simulation, Tiles
 
 # Options of moveToXY: keepRoute, and the distance within which SUMO looks for a lane. keepRoute's bit 2 places the car
 # exactly, on the road or off it. Its bit 1 limits the search to lanes of the car's route.
@@ -50,31 +49,7 @@ _ANY_SPEED = 100.0  # a speed factor: other vehicles see at most the speed limit
 _FAILURES = (libsumo.TraCIException, libsumo.FatalTraCIError)
 
 
-class _SumoCall:
-    """A block of calls: libsumo's errors in it become a SimulationError that names the action."""
-
-    def __init__(self, release: weakref.finalize[..., LibsumoSimulation], action: str) -> None:
-        self._release, self._action = release, action
-
-    def __enter__(self) -> None:
-        if not self._release.alive:
-            raise SimulationError(f"SUMO can't {self._action}: this simulation was closed")
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        if isinstance(error, _FAILURES):
-            raise SimulationError(f"SUMO could not {self._action}: {error}") from error
-
-
-@dataclass(kw_only=True)
-class _Tile:
-    """The part of the simulation that belongs to one game."""
-
-    prefix: str
-    offset_m: float
-    inside: set[int] = field(default_factory=set)  # players in SUMO's traffic
-
-
-class LibsumoSimulation:
+class LibsumoSimulation(Simulation):
     """The SUMO simulation of this process. `close`, or the end of this object, releases libsumo."""
 
     @staticmethod
@@ -96,8 +71,11 @@ class LibsumoSimulation:
         self._players_only = all(self._taken_over) and not scene.has_background_traffic  # SUMO drives no vehicle
         self._move_options = _ON_ITS_ROUTE if self._players_only else _ON_ANY_LANE
         self._half_length = 0.5 * scene.world.length_m
-        offset = tile_offset_m(scene.net_file, games)
-        self._offsets = offset * np.arange(games)
+        self._tiles = Tiles(
+            prefixes=[tile_prefix(game, games) for game in range(games)],
+            offsets_m=tile_offset_m(scene.net_file, games) * np.arange(games),
+            roads_m=scene.roads_m,
+        )
         folder = tempfile.TemporaryDirectory(prefix="harness-sumo-")
         types = Path(folder.name) / "types.rou.xml"
         types.write_text(scene.routes.types_xml.replace("</routes>", f"{TYPE_XML}</routes>"), encoding="utf-8")
@@ -124,52 +102,46 @@ class LibsumoSimulation:
     def _needs_sublanes(self) -> bool:
         """Whether a player that SUMO drives has the lane-change model SL2015, which requires sublanes."""
         types = self._scene.routes.types
-        kinds = [
-            types[self._scene.vehicle(player).vehicle_type] for player in np.flatnonzero(~np.array(self._taken_over))
-        ]
-        return any(kind.lane_changes == "SL2015" for kind in kinds)
+        driven = [player for player, taken_over in enumerate(self._taken_over) if not taken_over]
+        return any(types[self._scene.vehicle(player).vehicle_type].lane_changes == "SL2015" for player in driven)
+
+    @contextlib.contextmanager
+    def _calls(self, action: str) -> Iterator[None]:
+        """A block of calls: libsumo's errors in it become a SimulationError that names the action."""
+        if not self._release.alive:
+            raise SimulationError(f"SUMO can't {action}: this simulation was closed")
+        try:
+            yield
+        except (libsumo.TraCIException, libsumo.FatalTraCIError) as error:
+            raise SimulationError(f"SUMO could not {action}: {error}") from error
 
     def _load(self, options: list[str], load: Callable[[list[str]], object]) -> None:
-        with _SumoCall(self._release, f"load scene {self._scene.document.name!r}"):
+        with self._calls(f"load scene {self._scene.document.name!r}"):
             load(options)
-        self._tiles = [
-            _Tile(prefix=tile_prefix(game, self._games), offset_m=float(self._offsets[game]))
-            for game in range(self._games)
-        ]
         self._traffic = Insertion()
         self._placed: dict[str, int] = {}  # players placed by the arena, by name in SUMO: index in a flat [G, P]
         self._sumo_driven: dict[str, tuple[int, int]] = {}  # players that SUMO drives: game and player
         self._present = np.zeros((self._games, len(self._taken_over)), dtype=bool)
         self._insertions = [self._insertion(player) for player in range(len(self._taken_over))]
-        world = self._scene.world
-        prefixes = [tile.prefix for tile in self._tiles]
+        world, prefixes = self._scene.world, self._tiles.prefixes
         self._signals = Signals(prefixes, world.right_of_way.signal_links)
         self._speed_limits = SpeedLimits(prefixes) if self._scene.document.varies.speed_limit_share else None
         blocks = bool(self._scene.obstacles.each) and not self._players_only
         self._standing = StandingVehicles(self._scene, prefixes, self._traffic) if blocks else None
+        fastest_mps = float(world.actuators.max_speed_mps.max())
         self._background = BackgroundTraffic(
-            prefixes=prefixes,
-            offsets_m=self._offsets,
-            step_s=world.step_s,
-            fastest_player_mps=float(world.actuators.max_speed_mps.max()),
-            recorded=self._recorded,
-            insertion=self._traffic,
-            roads_m=self._scene.roads_m,
+            self._tiles, self._traffic, step_s=world.step_s, fastest_player_mps=fastest_mps, recorded=self._recorded
         )
 
     def reload(self, seed: int) -> None:
-        """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._load([*self._options, "--seed", str(seed)], libsumo.load)
 
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
-        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
-        tile = self._tiles[game]
-        with _SumoCall(self._release, f"reset game {game}"):
-            taking_part = {player for player, present in enumerate(start.present.tolist()) if present}
-            staying = tile.inside & taking_part if self._players_only else set()
-            for player in tile.inside - staying:
+        with self._calls(f"reset game {game}"):
+            staying = self._present[game] & start.present & self._players_only
+            for player in np.flatnonzero(self._present[game] & ~staying).tolist():
                 self._remove_vehicle(game, player)
-            for player in sorted(taking_part - staying):
+            for player in np.flatnonzero(start.present & ~staying).tolist():
                 self._add_player(game, player, start)
             departures = clear_of_players(departures, start, self._scene.world.length_m)
             if self._standing is not None:
@@ -183,7 +155,6 @@ class LibsumoSimulation:
             return at_reset if background is None else at_reset._replace(background=background)
 
     def halt(self, game: int, player: int) -> None:
-        """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
         if self._taken_over[player]:
             return
         name = self._name(game, player)
@@ -193,24 +164,23 @@ class LibsumoSimulation:
     def remove(self, game: int, player: int) -> None:
         """Remove a player from the traffic. If SUMO drives no vehicle, it stays in place until the next reset."""
         if not self._players_only:
-            with _SumoCall(self._release, f"remove a player from game {game}"):
+            with self._calls(f"remove a player from game {game}"):
                 self._remove_vehicle(game, player)
 
     def _remove_vehicle(self, game: int, player: int) -> None:
         name = self._name(game, player)
         libsumo.vehicle.remove(name)
-        self._tiles[game].inside.discard(player)
         self._present[game, player] = False
         self._sumo_driven.pop(name, None)
         self._placed.pop(name, None)
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
-        """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
         seats = list(self._placed.values())
+        in_tiles_y_m = y_m + self._half_length * np.sin(heading_rad) + self._tiles.offsets_m[:, None]
         front_x = (x_m + self._half_length * np.cos(heading_rad)).ravel()[seats].tolist()
-        front_y = (y_m + self._half_length * np.sin(heading_rad) + self._offsets[:, None]).ravel()[seats].tolist()
+        front_y = in_tiles_y_m.ravel()[seats].tolist()
         angle = compass_deg_of(heading_rad).ravel()[seats].tolist()
-        with _SumoCall(self._release, "step"):
+        with self._calls("step"):
             targets = (_ANY_EDGE, _ANY_LANE, front_x, front_y, angle, *map(repeat, self._move_options))
             deque(map(_libsumo.vehicle_moveToXY, self._placed, *targets), maxlen=0)  # faster than a loop
             _libsumo.simulation_step()
@@ -219,27 +189,24 @@ class LibsumoSimulation:
             if players is not None:
                 x_m = np.where(np.isnan(players[..., 0]), x_m, players[..., 0])
                 y_m = np.where(np.isnan(players[..., 1]), y_m, players[..., 1])
-            reading = self._background.read(x_m, y_m, self._present)
-            if players is None and not self._signals:
-                return reading
+            reading = self._background.read((x_m, y_m, self._present))
             if not self._signals:
-                return replace(reading, players=players)
+                return reading if players is None else replace(reading, players=players)
             texts = self._signals.texts() if self._recorded else None
             return replace(reading, players=players, signals=self._signals.read(), signal_texts=texts)
 
     def close(self) -> None:
-        """Release libsumo. A second call has no effect."""
         self._release()
 
     def _name(self, game: int, player: int) -> str:
-        return self._tiles[game].prefix + self._scene.world.roles[player]
+        return self._tiles.prefixes[game] + self._scene.world.roles[player]
 
     def _add_player(self, game: int, player: int, start: InitialState) -> None:
-        tile, name, speed = self._tiles[game], self._name(game, player), float(start.speed_mps[player])
+        name, speed = self._name(game, player), float(start.speed_mps[player])
         vehicle_type, lane, fastest = self._insertions[player]
         on_lane = lane is not None and not np.isnan(start.position_m[player])
         self._traffic.add(
-            tile.prefix,
+            self._tiles.prefixes[game],
             name,
             edges=self._scene.edges[player],
             vehicle_type=vehicle_type,
@@ -247,7 +214,6 @@ class LibsumoSimulation:
             position=str(start.position_m[player]) if on_lane else "base",
             speed=str(min(speed, fastest)),
         )
-        tile.inside.add(player)
         self._present[game, player] = True
         ahead = self._half_length[player]
         if self._taken_over[player]:
@@ -261,7 +227,7 @@ class LibsumoSimulation:
             ahead += speed * self._scene.world.step_s  # SUMO does not move a vehicle in the step of its insertion
         heading = float(start.heading_rad[player])
         x = float(start.x_m[player] + ahead * np.cos(heading))
-        y = float(start.y_m[player] + ahead * np.sin(heading) + tile.offset_m)
+        y = float(start.y_m[player] + ahead * np.sin(heading) + self._tiles.offsets_m[game])
         options = self._move_options if self._taken_over[player] else _ON_ITS_ROUTE
         # moveToXY puts the vehicle in the traffic at once; without it, the vehicle would wait for free space
         libsumo.vehicle.moveToXY(name, "", -1, x, y, float(compass_deg_of(heading)), *options)
@@ -289,7 +255,7 @@ class LibsumoSimulation:
             players[seat] = (x, y, libsumo.vehicle.getAngle(name), libsumo.vehicle.getSpeed(name))
         players[..., 2] = heading_rad_of(players[..., 2])
         players[..., 0] -= self._half_length * np.cos(players[..., 2])
-        players[..., 1] -= self._half_length * np.sin(players[..., 2]) + self._offsets[:, None]
+        players[..., 1] -= self._half_length * np.sin(players[..., 2]) + self._tiles.offsets_m[:, None]
         return players
 
 

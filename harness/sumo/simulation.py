@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from itertools import chain
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,13 +13,17 @@ from numpy.typing import NDArray
 from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.game.initial_state import InitialState
 from harness.road.demand.route_file import Departure
+from harness.road.net.levels import on_players_level
+
+Players: TypeAlias = tuple[FloatArray, FloatArray, BoolArray]
+"""x_m and y_m of the players' centres, and which are present, [G, P] each."""
 
 
 @dataclass
 class Reading:
     """The background vehicles [G, M] after a step, padded where not present, and the players that SUMO drives.
 
-    A reading has at least the background vehicles within `neighbours.NOTICED_M` of a player, and all of them if games
+    A reading has at least the background vehicles within `game.state.NOTICED_M` of a player, and all of them if games
     are recorded. Poses are those of the body's centre.
     """
 
@@ -37,11 +43,6 @@ class Reading:
     signal_texts: tuple[str, ...] | None = None
     """[G] the whole states of the traffic lights on the players' routes, as `id=state` separated by spaces, if games
     are recorded."""
-
-    @property
-    def bodies(self) -> list[NDArray[Any]]:
-        """The columns [G, M] of the background vehicles, in the order of the fields."""
-        return [getattr(self, name) for name in _OF_VEHICLES]
 
 
 class AtReset(NamedTuple):
@@ -75,7 +76,64 @@ def with_game(reading: Reading | None, games: int, game: int, background: Readin
 
 def side_by_side(first: Reading, second: Reading) -> Reading:
     """A reading [G, M + N] with the bodies of two readings [G, M] and [G, N]."""
-    return Reading(*(np.concatenate(pair, axis=1) for pair in zip(first.bodies, second.bodies, strict=True)))
+    pairs = ((getattr(first, name), getattr(second, name)) for name in _OF_VEHICLES)
+    return Reading(*(np.concatenate(pair, axis=1) for pair in pairs))
+
+
+def reading_of(
+    games: int,
+    of_game: IntArray,
+    *,
+    names: Sequence[str] | NDArray[np.object_],
+    types: Sequence[str] | NDArray[np.object_],
+    motion: Sequence[FloatArray],
+    sizes_m: Sequence[FloatArray | Sequence[float]],
+) -> Reading:
+    """The reading of bodies [n], sorted by their game: names, types, motion [4, n] (x_m and y_m of the front bumper,
+    heading_rad, speed_mps) and sizes [2, n] (length and width)."""
+    column = np.arange(len(of_game)) - np.searchsorted(of_game, of_game)
+    shape = (games, int(column.max(initial=-1)) + 1)
+    words, numbers = np.full((2, *shape), None, dtype=object), np.zeros((6, *shape))
+    present = np.zeros(shape, dtype=bool)
+    words[0, of_game, column], words[1, of_game, column] = names, types
+    (front_x_m, front_y_m, heading_rad, speed_mps), (length_m, width_m) = motion, np.array(sizes_m)
+    back_x_m, back_y_m = 0.5 * length_m * np.cos(heading_rad), 0.5 * length_m * np.sin(heading_rad)
+    values = (front_x_m - back_x_m, front_y_m - back_y_m, heading_rad, speed_mps, length_m, width_m)
+    numbers[:, of_game, column] = values
+    present[of_game, column] = True
+    x_m, y_m, heading_rad, speed_mps, length_m, width_m = numbers
+    return Reading(words[0], words[1], x_m, y_m, heading_rad, speed_mps, length_m, width_m, present)
+
+
+def distance_to_player_m(fronts_m: FloatArray, of_game: IntArray, players: Players) -> FloatArray:
+    """[n] distances of front bumpers [n, 2] in games [n] to the nearest player that is present; inf without one."""
+    x_m, y_m, present = (column[of_game] for column in players)
+    distances_m = np.hypot(fronts_m[:, :1] - x_m, fronts_m[:, 1:] - y_m)
+    return np.where(present, distances_m, np.inf).min(1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tiles:
+    """The tiles of the games: copies of the net, side by side."""
+
+    prefixes: Sequence[str]
+    """Of all names in the tile of each game."""
+    offsets_m: FloatArray
+    """[G] in y"""
+    roads_m: FloatArray | None = None
+    """[n, 3] points of the players' roads; None if all roads are on one level."""
+
+    def points_m(self, points: Iterable[tuple[float, ...]], of_game: IntArray, size: int = 2) -> FloatArray:
+        """[n, size] the points of SUMO in games [n], in the coordinates of the net."""
+        found = np.fromiter(chain.from_iterable(points), float, size * len(of_game)).reshape(-1, size)
+        found[:, 1] -= self.offsets_m[of_game]
+        return found
+
+    def on_level(self, points: Iterable[tuple[float, ...]], of_game: IntArray) -> BoolArray:
+        """[n] whether points of SUMO in games [n], with their heights, are on the level of the players' roads."""
+        if self.roads_m is None or not len(of_game):
+            return np.ones(len(of_game), dtype=bool)
+        return on_players_level(self.roads_m, self.points_m(points, of_game, 3))
 
 
 class Simulation(Protocol):

@@ -41,18 +41,15 @@ def open_simulation(
     """
     from harness.sumo.libsumo_simulation import LibsumoSimulation
 
-    if not LibsumoSimulation.in_use():
-        return LibsumoSimulation(scene, games, taken_over, seed, recorded=recorded)
-    from harness.sumo.subprocess_simulation import SubprocessSimulation
-
-    return SubprocessSimulation(scene, games, taken_over, seed, recorded=recorded)
+    kind = SubprocessSimulation if LibsumoSimulation.in_use() else LibsumoSimulation
+    return kind(scene, games, taken_over, seed, recorded=recorded)
 
 
 _LENGTH = struct.Struct("<Q")
 _PATIENCE_S = 10.0  # time limit for a child to end
 
 
-class SubprocessSimulation:
+class SubprocessSimulation(Simulation):
     """A `LibsumoSimulation` in a child process. The child ends with `close`, or with this object."""
 
     def __init__(
@@ -71,29 +68,23 @@ class SubprocessSimulation:
             raise
 
     def reload(self, seed: int) -> None:
-        """Load SUMO again, with its random numbers from `seed`. Every game needs a `reset` afterwards."""
         self._call("reload", seed)
 
     def reset(self, game: int, start: InitialState, departures: list[Departure]) -> AtReset:
-        """Clear a game's tile and place its players at their start. Background vehicles depart at their times."""
         at_reset: AtReset = self._call("reset", game, start, departures)
         return at_reset
 
     def halt(self, game: int, player: int) -> None:
-        """Stop a player. From now on it stands at the pose given to `step`, even if SUMO drove it before."""
         self._call("halt", game, player)
 
     def remove(self, game: int, player: int) -> None:
-        """Remove a player from the traffic."""
         self._call("remove", game, player)
 
     def step(self, x_m: FloatArray, y_m: FloatArray, heading_rad: FloatArray) -> Reading:
-        """Place the players that the harness drives at poses [G, P] of their centres, step SUMO, read its vehicles."""
         reading: Reading = self._call("step", x_m, y_m, heading_rad)
         return reading
 
     def close(self) -> None:
-        """End the child. A second call has no effect."""
         self._finalizer()
 
     def _call(self, *message: Any) -> Any:
@@ -185,21 +176,16 @@ def serve() -> None:
     outgoing = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     simulation: LibsumoSimulation | None = None
-
-    def answer(first: Any, *arguments: Any) -> Any:
-        nonlocal simulation
-        if simulation is None:
-            *of_game, recorded = arguments
-            simulation = LibsumoSimulation(first, *of_game, recorded=recorded)
-            return None
-        return getattr(simulation, first)(*arguments)
-
     with contextlib.suppress(EOFError, BrokenPipeError):  # the parent has closed this simulation, or has ended
         while True:
-            message = _receive(incoming)
+            first, *arguments = _receive(incoming)
             result, refusal = None, None
             try:
-                result = answer(*message)
+                if simulation is None:
+                    *of_game, recorded = arguments
+                    simulation = LibsumoSimulation(first, *of_game, recorded=recorded)
+                else:
+                    result = getattr(simulation, first)(*arguments)
             except SimulationError as error:
                 refusal = str(error)
             except Exception as error:

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 
 from harness.evaluation.recorded_game import BodyKind
-from harness.game.near_players import NEAREST, NOTICED_M
 from harness.game.outcome import Outcome
 from harness.game.sight import Hiding
+from harness.game.state import NEAREST, NOTICED_M
 from harness.road.scene.open_scene import OpenScene
 from tests.support.traces import along, drawn, game, rows
 

@@ -1,12 +1,13 @@
-"""Vehicles near a player, the step in which to read the others again, and rows of vehicles by game."""
+"""Vehicles near a player, and the step in which to read the others again."""
 
 from __future__ import annotations
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from harness.game.near_players import NOTICED_M, NearSearch, near_players, rows_by_game
+from harness.game.near_players import NearSearch, near_players
+from harness.game.state import NOTICED_M
 
 STEP_S, FASTEST_MPS = 0.1, 40.0
 
@@ -62,29 +63,3 @@ def test_near__no_vehicle_is_missed_at_any_closing_speed(distances: list[float],
     for k, each in enumerate(distances):
         if k not in near:
             assert each - (due[k] - 101) * STEP_S * (speed + FASTEST_MPS) > NOTICED_M
-
-
-def test_rows__one_of_the_second_game_and_two_of_the_third() -> None:
-    values, length_m = np.array([7.0, 8.0, 9.0]), np.array([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]])
-    rows, present, index = rows_by_game(np.array([3, 4, 5]), (values, -values), (length_m,))
-    assert rows[0].tolist() == [[0, 0], [7, 0], [8, 9]]
-    assert rows[2].tolist() == [[0, 0], [4, 0], [5, 6]]
-    assert present.tolist() == [[False, False], [True, False], [True, True]]
-    assert index.tolist() == [[3, 3], [0, 3], [1, 2]]
-
-
-@settings(deadline=None)  # the first call compiles
-@given(counts=st.lists(st.integers(0, 5), min_size=1, max_size=6))
-def test_rows__have_all_vehicles_of_a_game_from_the_first_place_on(counts: list[int]) -> None:
-    places = np.concatenate([10 * game + np.arange(count) for game, count in enumerate(counts)])
-    motion, length_m = np.arange(1.0, len(places) + 1.0), np.arange(10.0 * len(counts)).reshape(-1, 10) + 1.0
-    rows, present, index = rows_by_game(places, (motion, -motion), (length_m,))
-    assert present.sum(1).tolist() == counts
-    assert present.shape[1] == max(counts)
-    assert index[present].tolist() == list(range(len(places)))
-    assert (index[~present] == len(places)).all()
-    for column, values in zip(rows, (motion, -motion, length_m.ravel()[places]), strict=True):
-        assert column[present].tolist() == values.tolist()
-        assert not column[~present].any()
-    for game, count in enumerate(counts):
-        assert present[game, :count].all()

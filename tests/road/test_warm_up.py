@@ -19,7 +19,7 @@ from harness.road.demand import warm_up
 from harness.road.demand.route_file import Departure
 from harness.road.scene.load_check import check_loads
 from harness.road.scene.open_scene import OpenScene, open_scene
-from harness.sumo.room_at_start import CLEAR_AROUND_M, clear_of_players
+from harness.sumo.insertion import CLEAR_AROUND_M, clear_of_players
 from tests.support.rollouts import Steady, arm, play, trace
 from tests.support.scenes import build_scene, drawn, placed
 

@@ -20,10 +20,10 @@ from harness.config.scene import Scene
 from harness.errors import Problem, UsageError, collect
 from harness.game.arrays import FloatArray
 from harness.game.geometry import Box
-from harness.game.near_players import NOTICED_M
 from harness.game.placed_obstacles import AtPoint, Obstacles, OnLane, PlacedObstacle
 from harness.game.road import Route
 from harness.game.sight import TALL_WIDTH_M, Hiding
+from harness.game.state import NOTICED_M
 from harness.road.demand.departures import background_departures
 from harness.road.demand.route_file import RouteFile, VehicleType
 from harness.road.net import network
