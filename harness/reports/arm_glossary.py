@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-
 from harness.evaluation.strategies import (
     Arm,
     EgoStrategy,
@@ -13,15 +11,17 @@ from harness.evaluation.strategies import (
     SumoNonEgo,
     strategy_name,
 )
-from harness.reports.run_findings import RunFindings
+from harness.reports.run_tables import RunTables
 
 
-def glossary(arms: Sequence[str], records: Mapping[str, Arm], found: RunFindings) -> list[tuple[str, str]]:
-    """Each arm that is planned, and what it pairs."""
-    return [(name, _in_words(records[name], found)) for name in arms if name in records]
+def glossary(tables: RunTables) -> list[tuple[str, str]]:
+    """Each arm of the summary that is planned, and what it pairs."""
+    return [
+        (name, _in_words(tables.arms[name], tables)) for name in tables.summary["arm"].unique() if name in tables.arms
+    ]
 
 
-def _in_words(arm: Arm, found: RunFindings) -> str:
+def _in_words(arm: Arm, tables: RunTables) -> str:
     """What an arm pairs."""
     if arm.best_response_of is not None:
         player = ("the ego", "the non-ego")[arm.best_response_of]
@@ -30,19 +30,19 @@ def _in_words(arm: Arm, found: RunFindings) -> str:
         case Arm(ego=None, non_ego=non_ego) if non_ego is not None:
             return f"the non-ego {strategy_name(non_ego)} without the ego"
         case Arm(ego=NaiveEgo(), non_ego=None):
-            return f"the {found.naive} on the road without the non-ego"
+            return f"the {tables.naive} on the road without the non-ego"
         case Arm(ego=ego, non_ego=None) if ego is not None:
-            return f"{_ego_in_words(ego, found.naive)}, without the non-ego"
+            return f"{_ego_in_words(ego, tables.naive)}, without the non-ego"
         case Arm(ego=NaiveEgo(), non_ego=SumoNonEgo()):
-            return f"the {found.naive} with an ordinary law-abiding SUMO driver in the non-ego's place"
+            return f"the {tables.naive} with an ordinary law-abiding SUMO driver in the non-ego's place"
         case Arm(ego=RetrainedEgo(against=against) | ReconfiguredEgo(against=against) as ego, non_ego=non_ego) if (
             non_ego is not None and against == strategy_name(non_ego)
         ):
-            same = found.who(against).removeprefix("the ") or against
-            return f"{_ego_in_words(ego, found.naive)}, against the same {same}"
+            same = tables.who(against).removeprefix("the ") or against
+            return f"{_ego_in_words(ego, tables.naive)}, against the same {same}"
         case Arm(ego=ego, non_ego=non_ego) if ego is not None and non_ego is not None:
             name = strategy_name(non_ego)
-            return f"{_ego_in_words(ego, found.naive)} against {found.who(name) or f'the non-ego {name}'}"
+            return f"{_ego_in_words(ego, tables.naive)} against {tables.who(name) or f'the non-ego {name}'}"
     raise ValueError("an arm has at least one player")
 
 

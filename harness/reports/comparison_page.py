@@ -89,9 +89,7 @@ def _row(found: Difference, significance: float) -> ComparedRow:
         tone=TONES.get(verdict, "open"),
         sentence=f"{sentence}: {CHANCE if verdict == NOT_SHOWN else verdict}",
         difference=_with_unit(found, found.mean) if found.pairs else "",
-        interval=" to ".join(_with_unit(found, end) for end in (found.low, found.high))
-        if math.isfinite(found.low)
-        else MISSING,
+        interval=" to ".join(_with_unit(found, end) for end in _ends(found)) if len(_ends(found)) > 1 else MISSING,
         p_value=p_number(found.p_value),
         p_holm=p_number(found.p_holm),
         pairs=found.pairs,

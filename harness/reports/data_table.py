@@ -7,8 +7,7 @@ import json
 import math
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 from markupsafe import Markup
@@ -24,73 +23,47 @@ _SYMBOLS = {SHARE: "%", POINTS: "points", P_VALUE: "", OF_METRIC: ""}
 _KINDS = {TEXT: "text", FLAG: "flag", COUNT: "count", MAYBE: "count"}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Heading:
-    """A column: its name in the CSV file, its label on the page, and its unit."""
-
-    column: str
-    label: str
-    unit: str
-    text: bool
-    """Whether its cells are words."""
-    kind: str = "text"
-    """How a cell of the column is shown: text, flag, count, plain, percent or number."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cell:
-    """`exact` is the text of the CSV file's cell, None where `text` is the same (text columns)."""
+class Cell(NamedTuple):
+    """A cell of the page."""
 
     text: str
     exact: str | None
+    """The text of the CSV file's cell, None where it is the same (text columns)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """One CSV file as the page shows it."""
-
-    name: str
-    caption: str
-    headings: Sequence[Heading]
-    rows: Sequence[Sequence[Cell]]
-    """None of them where they are packed."""
-    length: int
-    """Its number of rows."""
-    packed: Markup | None = None
-
-
-def table(name: str, caption: str, frame: pd.DataFrame) -> Table:
-    """The frame, one of `harness.evaluation.columns.TABLES`, as cells; `name` is the CSV file's without its suffix."""
+def table(name: str, caption: str, frame: pd.DataFrame) -> dict[str, Any]:
+    """What the template shows of the frame, one of `harness.evaluation.columns.TABLES`; `name` is the CSV file's
+    without its suffix. `length` is the number of rows; there are no `rows` where they are `packed`."""
     frame, about = typed(frame), columns_of(frame.columns)
-    headings = [heading(column) for column in about.values()]
+    shown = {"name": name, "caption": caption, "headings": list(map(_heading, about.values())), "length": len(frame)}
     if name in PACKED:
-        packed = pack([[exact(value) for value in frame[column].tolist()] for column in about])
-        return Table(name=name, caption=caption, headings=headings, rows=(), length=len(frame), packed=packed)
+        packed = _pack([[exact(value) for value in frame[column].tolist()] for column in about])
+        return {**shown, "rows": (), "packed": packed}
     metrics = frame["metric"].tolist() if "metric" in frame.columns else [""] * len(frame)
     columns = [
         [_cell(column, value, metric) for value, metric in zip(frame[name].tolist(), metrics, strict=True)]
         for name, column in about.items()
     ]
-    rows = list(zip(*columns, strict=True))
-    return Table(name=name, caption=caption, headings=headings, rows=rows, length=len(rows))
+    return {**shown, "rows": list(zip(*columns, strict=True)), "packed": None}
 
 
-def pack(columns: Sequence[Sequence[str]]) -> Markup:
+def _pack(columns: Sequence[Sequence[str]]) -> Markup:
     """Columns of texts as one text of a script element."""
     text = json.dumps(columns, separators=(",", ":"))
     return Markup(base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii"))
 
 
-def heading(column: Column) -> Heading:
-    """The heading of a column."""
+def _heading(column: Column) -> dict[str, Any]:
+    """A column: its name in the CSV file, its label on the page, its unit, and whether its cells are words. `kind` says
+    how a cell is shown: text, flag, count, plain, percent or number."""
     kind = "percent" if column.unit in (SHARE, POINTS) else _KINDS.get(column.dtype, "number")
-    return Heading(
-        column=column.name,
-        label=column.words,
-        unit=_SYMBOLS.get(column.unit, column.unit),
-        text=column.dtype == TEXT,
-        kind="plain" if column.name == "seed" else kind,
-    )
+    return {
+        "column": column.name,
+        "label": column.words,
+        "unit": _SYMBOLS.get(column.unit, column.unit),
+        "text": column.dtype == TEXT,
+        "kind": "plain" if column.name == "seed" else kind,
+    }
 
 
 def _cell(column: Column, value: Any, metric: str) -> Cell:

@@ -9,13 +9,10 @@ significance of 2.5 % each.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
 
 from harness.evaluation.research_questions import Verdict
 from harness.reports.numbers import MISSING, NO_SPACE, SURE, number, p_text, signed, trimmed
-
-Row = Mapping[Any, Any]
+from harness.reports.run_tables import Row
 
 RELEVANT_SPEED_MPS = 0.25
 """The smallest difference of average speed that counts: just under 1 km/h, the step of a car's speedometer."""

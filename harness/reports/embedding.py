@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 
 from harness.game.roles import NON_EGO, roles_of
 from harness.reports.page_template import json_text
-from harness.reports.player_data import FloatArray, GameTracks, SceneDrawing, Track, key
+from harness.reports.player_data import GameTracks, Track, key
 
 IntArray = NDArray[np.int64]
 
@@ -52,112 +51,67 @@ LONGEST = 1e5
 """Metres or seconds; a longer gap or time counts as missing."""
 
 
-class Embedded:
-    """The games that fit into the page, in the order of the input."""
-
-    def __init__(
-        self,
-        scene: SceneDrawing | None,
-        games: Iterable[GameTracks],
-        marks: Mapping[str, Sequence[Mapping[str, Any]]],
-        budget_bytes: int,
-        *,
-        crowds: Mapping[str, Sequence[str]] = MappingProxyType({}),
-    ) -> None:
-        """`games`, those to watch first at the front, are embedded until the budget is used up; `marks` are the
-        manoeuvres to mark in each, by `key`; `crowds` are the personas of each crowd, in the order of its people."""
-        self.games: list[GameTracks] = []
-        self._texts: list[str] = []
-        size = 0
-        for game in games if scene is not None else ():
-            text = game_text(game, marks, crowds)
-            size += len(text)
-            if size > budget_bytes:
-                break
-            self.games.append(game)
-            self._texts.append(text)
-        self._scene = scene
-
-    def __contains__(self, name: str) -> bool:
-        return name in self.keys
-
-    @property
-    def keys(self) -> set[str]:
-        """The keys of all embedded games."""
-        return {key(game.arm, game.seed, game.episode) for game in self.games}
-
-    def document(self) -> Markup:
-        """The games and the road as JSON that is safe inside a script element."""
-        columns = json_text(list(COLUMNS.values()))
-        head = f'"columns":{columns},"backgroundColumns":{BACKGROUND_COLUMNS},"scene":{json_text(_scene(self._scene))}'
-        return Markup("{" + head + ',"games":[' + ",\n".join(self._texts) + "]}")
+Marks = Mapping[str, Sequence[Mapping[str, Any]]]
+"""The manoeuvres to mark in each game, by `key`."""
+Crowds = Mapping[str, Sequence[str]]
+"""The personas of each crowd, in the order of its people."""
 
 
-def game_text(
-    game: GameTracks,
-    marks: Mapping[str, Sequence[Mapping[str, Any]]],
-    crowds: Mapping[str, Sequence[str]] = MappingProxyType({}),
-) -> str:
-    """One game as JSON, with its manoeuvres out of `marks` and the personas of its crowd, if it has one."""
-    return json_text(_game(game, marks.get(key(game.arm, game.seed, game.episode), ()), crowds.get(game.persona, ())))
+def embedded_games(games: Iterable[GameTracks], marks: Marks, crowds: Crowds, budget_bytes: int) -> dict[str, str]:
+    """The games that fit into the page as JSON, by `key`, those to watch first at the front.
+
+    Games are read until the budget is used up.
+    """
+    texts: dict[str, str] = {}
+    size = 0
+    for game in games:
+        text = game_text(game, marks, crowds)
+        size += len(text)
+        if size > budget_bytes:
+            break
+        texts[key(game.arm, game.seed, game.episode)] = text
+    return texts
 
 
-def _scene(scene: SceneDrawing | None) -> dict[str, Any] | None:
-    if scene is None:
-        return None
-    return {
-        "surfaces": [[_points(ring) for ring in rings] for rings in scene.surfaces],
-        "laneMarks": [_points(line) for line in scene.lane_marks],
-        "edgeLines": [_points(line) for line in scene.edge_lines],
-        "rails": [_points(line) for line in scene.rails],
-        "goal": [_points(line) for line in scene.goal],
-        **{
-            name: [_points(outline) for outline in outlines]
-            for name, outlines in (("buildings", scene.buildings), ("stripes", scene.stripes))
-            if outlines
-        },
-        "hidingObstacles": list(scene.hiding_obstacles),
-        "tallWidth": scene.tall_width_m,
-    }
+def recorded_document(scene: Mapping[str, Any] | None, games: Iterable[str]) -> Markup:
+    """Texts of games, and the road, as JSON that is safe inside a script element. `road.js` reads the scene."""
+    columns = json_text(list(COLUMNS.values()))
+    head = f'"columns":{columns},"backgroundColumns":{BACKGROUND_COLUMNS},"scene":{json_text(scene)}'
+    return Markup("{" + head + ',"games":[' + ",\n".join(games) + "]}")
 
 
-def _points(line: FloatArray) -> list[list[float]]:
-    points: list[list[float]] = np.round(np.asarray(line, dtype=float), 2).tolist()
-    return points
-
-
-def _game(game: GameTracks, marks: Sequence[Mapping[str, Any]], crowd: Sequence[str] = ()) -> dict[str, Any]:
+def game_text(game: GameTracks, marks: Marks, crowds: Crowds) -> str:
+    """One game as JSON, with its manoeuvres and the personas of its crowd, if it has one."""
+    crowd = crowds.get(game.persona, ())
+    people = dict(zip(roles_of(1 + len(crowd))[NON_EGO:], crowd, strict=True)) if crowd else {}
     times = [player.time_to_collision_s for player in game.players if player.name == "ego"]
     measured = [float(values[np.isfinite(values)].min()) for values in times if np.isfinite(values).any()]
-    return {
-        "arm": game.arm,
-        "persona": game.persona,
-        "seed": game.seed,
-        "episode": game.episode,
-        "step": game.step_s,
-        "steps": game.steps,
-        "outcome": game.outcome,
-        "leastTime": round(measured[0], 2) if measured else None,
-        "players": [
-            _track(player) | {"outcome": player.outcome, "ended": player.ended_step} | _persona(player, crowd)
-            for player in game.players
-        ],
-        "background": [_track(vehicle) for vehicle in game.background],
-        "touches": [[round(each.time_s, 3), round(each.x_m, 2), round(each.y_m, 2)] for each in game.touches],
-        "marks": list(marks),
-        "packed": pack(columns_of(game)),
-    }
+    players = []
+    for player in game.players:
+        persona = {"persona": people[player.name]} if player.name in people else {}
+        players.append(_track(player) | {"outcome": player.outcome, "ended": player.ended_step} | persona)
+    return json_text(
+        {
+            "arm": game.arm,
+            "persona": game.persona,
+            "seed": game.seed,
+            "episode": game.episode,
+            "step": game.step_s,
+            "steps": game.steps,
+            "outcome": game.outcome,
+            "leastTime": round(measured[0], 2) if measured else None,
+            "players": players,
+            "background": [_track(vehicle) for vehicle in game.background],
+            "touches": [[round(time_s, 3), round(x_m, 2), round(y_m, 2)] for time_s, x_m, y_m in game.touches],
+            "marks": list(marks.get(key(game.arm, game.seed, game.episode), ())),
+            "packed": pack(columns_of(game)),
+        }
+    )
 
 
 def _track(track: Track) -> dict[str, Any]:
     size = [round(track.length_m, 3), round(track.width_m, 3)]
     return {"name": track.name, "size": size, "first": track.first_step, "count": len(track.x_m)}
-
-
-def _persona(player: Track, crowd: Sequence[str]) -> dict[str, str]:
-    """The persona of one of the people of a crowd; empty for the ego and without a crowd."""
-    people = roles_of(1 + len(crowd))[NON_EGO:] if crowd else ()
-    return {"persona": crowd[people.index(player.name)]} if player.name in people else {}
 
 
 def columns_of(game: GameTracks) -> Iterator[tuple[IntArray, int]]:

@@ -8,13 +8,15 @@ from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from harness.evaluation.people import COLLIDED_WITH, judged
 from harness.evaluation.worst_first import worst_first
 from harness.reports.numbers import NO_SPACE, number
 from harness.reports.player_data import key
+
+OUTCOMES = {"rail": "contact with the rail", "timeout": "out of time", "goal": "goal reached"}
+"""Outcomes in words, where the name is not clear."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,67 +29,53 @@ class GameLinks:
 
     def of(self, rows: pd.DataFrame) -> list[str]:
         """An address for each row's game, empty for a game that the page does not contain."""
-        games = zip(rows["arm"].tolist(), rows["seed"].tolist(), rows["episode"].tolist(), strict=True)
-        return [self._address(*game) for game in games]
+        keys = map(key, rows["arm"].tolist(), rows["seed"].tolist(), rows["episode"].tolist())
+        return [f"#game={name}" if name in self.embedded else "" for name in keys]
 
     def worst(self, arm: str) -> str:
         """The address of the worst game of an arm that the page contains; empty without one."""
         found = self.of(worst_first(self.episodes[self.episodes["arm"] == arm]))
         return next(filter(None, found), "")
 
-    def _address(self, arm: str, seed: int, episode: int) -> str:
-        name = key(arm, seed, episode)
-        return f"#game={name}" if name in self.embedded else ""
+    def worst_of(self, arms: Mapping[str, str]) -> tuple[str, str] | None:
+        """Key and description of the worst game of `arms`, which are labelled, of those that the page contains; None
+        where it contains none."""
+        games = worst_first(self.episodes[self.episodes["arm"].isin(list(arms))]).to_dict("records")
+        game = next((game for game in games if _key(game) in self.embedded), None)
+        if game is None:
+            return None
+        (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
+        seed = f", seed {game['seed']}" if self.episodes["seed"].nunique() > 1 else ""
+        name = f"{arms[game['arm']]}{seed}, game {game['episode']}"
+        nearest = f", least time to collision {number(ttc, 1)} s" if 0 < ttc < math.inf else ""
+        return _key(game), f"{name}: {OUTCOMES.get(outcome, outcome)}{_with(game)}{_impact(game)}{nearest}"
+
+    def replays(self, names: Sequence[str], most: int) -> list[dict[str, str]]:
+        """The worst of the replays with these names: each game, its outcome, and how to watch it. `watch` is the key of
+        a game that the page contains, else empty."""
+        wanted, several_seeds = set(names), self.episodes["seed"].nunique() > 1
+        games = [game for game in worst_first(self.episodes).to_dict("records") if _name(game) in wanted][:most]
+        found = []
+        for game in games:
+            who, outcome = judged(game)
+            seed = f", seed {game['seed']}" if several_seeds else ""
+            found.append(
+                {
+                    "game": f"{game['arm']}{seed}, game {game['episode']}",
+                    "outcome": f"{_in_words(who)}: {outcome}{_with(game)}{_impact(game)}",
+                    "min_ttc": number(game["ego_min_ttc_s"], 2),
+                    "command": replay_command(game, several_seeds),
+                    "scene": f"sumo-gui -c {shlex.quote(f'replays/{_name(game)}/scene.sumocfg')}",
+                    "watch": _key(game) if _key(game) in self.embedded else "",
+                }
+            )
+        return found
 
 
-NO_LINKS = GameLinks(embedded=(), episodes=pd.DataFrame({"arm": [], "seed": np.zeros(0, int), "episode": []}))
-"""Of a page without recorded games."""
-
-
-OUTCOMES = {"rail": "contact with the rail", "timeout": "out of time", "goal": "goal reached"}
-"""Outcomes in words, where the name is not clear."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class ListedReplay:
-    """A recorded game and how to watch it."""
-
-    game: str
-    outcome: str
-    min_ttc: str
-    command: str
-    scene: str
-    watch: str
-    """Key of the game if the page can play it, else empty."""
-
-
-def replay_list(names: Sequence[str], episodes: pd.DataFrame, embedded: Container[str]) -> list[ListedReplay]:
-    """The replays, worst first.
-
-    `embedded` are the keys of the games that the page can play.
-    """
-    several_seeds, wanted = episodes["seed"].nunique() > 1, set(names)
-    games = [game for game in worst_first(episodes).to_dict("records") if _name(game) in wanted]
-    return [_replay(_name(game), game, several_seeds, embedded) for game in games]
-
-
-def worst_game(arms: Mapping[str, str], episodes: pd.DataFrame, embedded: Container[str]) -> tuple[str, str] | None:
-    """Key and description of the worst game of `arms`, which are labelled, of those games that the page can play; None
-    where it can play none."""
-    games = worst_first(episodes[episodes["arm"].isin(list(arms))]).to_dict("records")
-    game = next((game for game in games if _key(game) in embedded), None)
-    if game is None:
-        return None
-    (_, outcome), ttc = judged(game), game["ego_min_ttc_s"]
-    seed = f", seed {game['seed']}" if episodes["seed"].nunique() > 1 else ""
-    name = f"{arms[game['arm']]}{seed}, game {game['episode']}"
-    nearest = f", least time to collision {number(ttc, 1)} s" if 0 < ttc < math.inf else ""
-    return _key(game), f"{name}: {OUTCOMES.get(outcome, outcome)}{_with(game)}{_impact(game)}{nearest}"
-
-
-def most_severe(episodes: pd.DataFrame) -> Mapping[Any, Any]:
-    """The worst of these games, of which there is at least one."""
-    return worst_first(episodes).head(1).to_dict("records")[0]
+def replay_command(game: Mapping[Any, Any], several_seeds: bool) -> str:
+    """The command that shows a game, typed in the run folder."""
+    seed = f" --seed {game['seed']}" if several_seeds else ""
+    return f"harness replay . {shlex.quote(game['arm'])} {game['episode']}{seed}"
 
 
 def _name(game: Mapping[Any, Any]) -> str:
@@ -96,19 +84,6 @@ def _name(game: Mapping[Any, Any]) -> str:
 
 def _key(game: Mapping[Any, Any]) -> str:
     return key(game["arm"], game["seed"], game["episode"])
-
-
-def _replay(name: str, game: Mapping[Any, Any], several_seeds: bool, embedded: Container[str]) -> ListedReplay:
-    arm, seed, episode = game["arm"], game["seed"], game["episode"]
-    who, outcome = judged(game)
-    return ListedReplay(
-        game=f"{arm}, seed {seed}, game {episode}" if several_seeds else f"{arm}, game {episode}",
-        outcome=f"{_in_words(who)}: {outcome}{_with(game)}{_impact(game)}",
-        min_ttc=number(game["ego_min_ttc_s"], 2),
-        command=f"harness replay . {shlex.quote(arm)} {episode}" + (f" --seed {seed}" if several_seeds else ""),
-        scene=f"sumo-gui -c {shlex.quote(f'replays/{name}/scene.sumocfg')}",
-        watch=_key(game) if _key(game) in embedded else "",
-    )
 
 
 def _in_words(name: str) -> str:

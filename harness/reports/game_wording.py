@@ -6,16 +6,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import pandas as pd
 
 from harness.evaluation.game_theory.best_response_gap import NOTHING_TO_GAIN, GapVerdict
 from harness.evaluation.game_theory.empirical_game import ALL, SolutionKind
-from harness.reports.differences import Row
-from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, signed, trimmed
-from harness.reports.verdict_wording import NOT_ANSWERED, Answer, Conclusion, Tone, as_sentence, left_out
+from harness.reports.numbers import MISSING, NO_SPACE, SURE, interval, number, p_text, percent, signed, sure, trimmed
+from harness.reports.run_tables import Row
+from harness.reports.verdict_wording import NOT_ANSWERED, Answer, as_sentence, left_out
 
 QUESTION = "Equilibrium"
 NO, NEAR, OPEN = "no", "not refuted", "not decided"
@@ -25,70 +24,38 @@ MEANINGS = {
     OPEN: "it is not decided whether this is an equilibrium",
 }
 """The end of a pair's sentence, by its label."""
-CAPTIONS = {
-    "gaps": "A row per best response.",
-    "crossplay": "A row per pairing of an ego and a non-ego.",
-    "equilibria": "A row per strategy of each solution of each game.",
-    "generalisation": "A row per retrained ego and non-ego of a persona it was not trained against.",
-}
-HEAT_TITLES = {
-    "failure_rate": "Failure rate of the ego (%)",
-    "ego_payoff": "Payoff of the ego",
-    "non_ego_payoff": "Payoff of the non-ego",
-}
-_HEAT_CAPTIONS = {
-    "failure_rate": "Darker: fails more.",
-    "ego_payoff": "Darker: earns more.",
-    "non_ego_payoff": (
-        "Darker: earns more than other strategies of the same persona; payoffs of two personas are not comparable."
-    ),
-}
 NOT_VERIFIED = "No equilibrium could be verified with the accuracy of the numbers."
 NO_GAME = "No ego was measured against all of these: there is no game to solve."
 
 
-def gap_verdicts(gaps: pd.DataFrame) -> list[tuple[str, Conclusion]]:
+def gap_verdicts(gaps: pd.DataFrame) -> list[tuple[str, Answer]]:
     """For each persona, whether its last pair is an equilibrium (equation 2), for the page and the terminal."""
     verdicts = []
     for persona in dict.fromkeys(gaps["persona"]):
-        last = last_pairs(gaps[gaps["persona"] == persona])
-        answers = [pair_answer(rows) for rows in last]
-        shown = [row for rows in last for row in rows if not row["reason"]]
-        responders = [row for row in shown if row["role"] == "non_ego" and row["pairs"]]
-        verdicts.append((str(persona), _headline(str(persona), answers, responders)))
+        rows = gaps[gaps["persona"] == persona]
+        last = rows[rows["round"] == rows.groupby("seed")["round"].transform("max")]
+        pairs = [pair.to_dict("records") for _, pair in last.groupby(["seed", "ego", "non_ego"], sort=False)]
+        verdicts.append((str(persona), _of_pairs(str(persona), pairs)))
     return verdicts
 
 
-def pairs(gaps: pd.DataFrame) -> list[list[Row]]:
-    """The rows of each pair of players: one for each side for which a best response was trained."""
-    keys = ["seed", "persona", "round", "ego", "non_ego"]
-    return [rows.to_dict("records") for _, rows in gaps.groupby(keys, sort=False)]
-
-
-def last_pairs(gaps: pd.DataFrame) -> list[list[Row]]:
-    """The pairs of each seed's last round."""
-    last = gaps.groupby("seed")["round"].transform("max")
-    return pairs(gaps[gaps["round"] == last])
-
-
-def pair_answer(rows: Sequence[Row]) -> Answer:
-    """Whether a pair is an equilibrium as far as was found, and how a best-responding persona affects the ego."""
+def _of_pair(rows: Sequence[Row]) -> Answer:
+    """Whether a pair is an equilibrium as far as was found, and how a best-responding persona affects the ego. `rows`
+    are one for each side for which a best response was trained."""
     by_role = {row["role"]: row for row in rows}
-    ego, non_ego = by_role.get("ego"), by_role.get("non_ego")
+    ego, non_ego, seed = by_role.get("ego"), by_role.get("non_ego"), rows[0]["seed"]
     if reason := rows[0]["reason"]:  # the same of both sides
-        return Answer(
-            seed=rows[0]["seed"], yes=False, label=NOT_ANSWERED, tone="open", sentence=as_sentence(reason), speed=""
-        )
+        return Answer(question=QUESTION, seed=seed, label=NOT_ANSWERED, sentence=as_sentence(reason))
     label = _label([GapVerdict(row["verdict"]) for row in rows], both=ego is not None and non_ego is not None)
     sentence = f"{_both_sides(str(rows[0]['persona']), ego, non_ego)}: {MEANINGS[label]}."
     harmful = non_ego is not None and non_ego["failure_difference_low"] > 0
     return Answer(
-        seed=rows[0]["seed"],
-        yes=label == NEAR,
+        question=QUESTION,
+        seed=seed,
         label=label,
         tone="harm" if harmful else "open",  # "not refuted" is no yes
         sentence=sentence[0].upper() + sentence[1:] + "".join(map(left_out, rows)),
-        speed="" if non_ego is None else induced_failures(non_ego),
+        speed="" if non_ego is None else _induced_failures(non_ego),
     )
 
 
@@ -100,24 +67,22 @@ def _label(verdicts: Sequence[GapVerdict], both: bool) -> str:
 
 def _both_sides(persona: str, ego: Row | None, non_ego: Row | None) -> str:
     driver = f"the {persona} driver"
-    if ego is not None and non_ego is not None and _both_gain(ego, non_ego):
+    if ego is not None and non_ego is not None and all(map(_gains_a_share, (ego, non_ego))):
         return f"{_side('the ego', ego)}; {driver} {_share(non_ego)}"
     return f"{_side('the ego', ego)}; {_side(driver, non_ego)}"
 
 
-def _both_gain(*rows: Row) -> bool:
-    return all(
-        GapVerdict(row["verdict"]) is GapVerdict.DISTINGUISHABLE and math.isfinite(row["gap_share"]) for row in rows
-    )
+def _gains_a_share(row: Row) -> bool:
+    return GapVerdict(row["verdict"]) is GapVerdict.DISTINGUISHABLE and math.isfinite(row["gap_share"])
 
 
-def induced_failures(row: Row) -> str:
+def _induced_failures(row: Row) -> str:
     """How often the ego fails against a persona that was newly trained against it."""
     games, rate = row["pairs"], row["ego_failure_rate_best_response"]
     if not games:
         return f"The effect of a {row['persona']} driver newly trained against this ego was not measured."
-    low, high = row["ego_failure_rate_best_response_low"], row["ego_failure_rate_best_response_high"]
-    counts = f"{round(rate * games)} of {games} games ({percent(rate)}; {SURE}: {interval(low, high)})"
+    span = sure(row["ego_failure_rate_best_response_low"], row["ego_failure_rate_best_response_high"])
+    counts = f"{round(rate * games)} of {games} games ({percent(rate)}; {span})"
     text = f"{_newly_trained(str(row['persona']))} {counts} instead of {round(row['ego_failure_rate'] * games)}"
     if GapVerdict(row["verdict"]) is GapVerdict.NONE_FOUND:
         return f"{text}, but this driver does not earn more by it."
@@ -128,33 +93,27 @@ def _newly_trained(persona: str) -> str:
     return f"A {persona} driver newly trained against this ego makes it fail in"
 
 
-def _induced_in_several(persona: str, responders: Sequence[Row], unit: str) -> str:
-    if not responders:
-        return ""
-    rates = [row["ego_failure_rate_best_response"] for row in responders]
-    before = sum(row["ego_failure_rate"] for row in responders) / len(rates)
-    text = f"{_newly_trained(persona)} {percent(sum(rates) / len(rates))} of games "
-    return f"{text}(mean of {len(rates)} {unit}: {interval(min(rates), max(rates))}) instead of {percent(before)}."
-
-
 def _side(player: str, row: Row | None) -> str:
     """The gap of one side of a pair, as a clause."""
     if row is None:
         return f"no best response of {player} was trained"
-    return {
-        GapVerdict.DISTINGUISHABLE: f"{player} could still gain {_share(row)} of its payoff",
-        GapVerdict.BEFORE_HOLM_ONLY: (
-            f"{player} might gain {_share(row)} of its payoff, "
-            f"but not after Holm's correction ({p_text(row['p_holm'])})"
-        ),
-        GapVerdict.NOT_DISTINGUISHABLE: (
-            f"for {player} a gain of {_share(row)} was measured, which is not distinguishable from 0{_span(row)}"
-        ),
-        GapVerdict.NONE_FOUND: f"for {player} nothing better was found",
-        GapVerdict.NO_DIFFERENCE: f"the best response of {player} earns the same in every game",
-        GapVerdict.ALL_EQUAL: f"{player} gains {_share(row)} of its payoff, the same in every game: there is no test",
-        GapVerdict.NOT_ENOUGH_PAIRS: f"for {player} too few games could be compared",
-    }[GapVerdict(row["verdict"])]
+    match GapVerdict(row["verdict"]):
+        case GapVerdict.DISTINGUISHABLE:
+            return f"{player} could still gain {_share(row)} of its payoff"
+        case GapVerdict.BEFORE_HOLM_ONLY:
+            holm = f"but not after Holm's correction ({p_text(row['p_holm'])})"
+            return f"{player} might gain {_share(row)} of its payoff, {holm}"
+        case GapVerdict.NOT_DISTINGUISHABLE:
+            measured = f"for {player} a gain of {_share(row)} was measured"
+            return f"{measured}, which is not distinguishable from 0{_span(row)}"
+        case GapVerdict.NONE_FOUND:
+            return f"for {player} nothing better was found"
+        case GapVerdict.NO_DIFFERENCE:
+            return f"the best response of {player} earns the same in every game"
+        case GapVerdict.ALL_EQUAL:
+            return f"{player} gains {_share(row)} of its payoff, the same in every game: there is no test"
+        case _:
+            return f"for {player} too few games could be compared"
 
 
 def _share(row: Row) -> str:
@@ -172,10 +131,12 @@ def _span(row: Row) -> str:
     return f" ({SURE}: {low} to {high}{NO_SPACE}%)"
 
 
-def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]) -> Conclusion:
-    if len(answers) == 1:
-        return Conclusion.of_one(QUESTION, answers[0])
+def _of_pairs(persona: str, pairs: Sequence[Sequence[Row]]) -> Answer:
+    """The answer of the pair, or of several: of all seeds, or of all pairs of the last round."""
+    answers = [_of_pair(rows) for rows in pairs]
     several = len(answers)
+    if several == 1:
+        return answers[0]
     unit = "seeds" if len({answer.seed for answer in answers}) == several else "pairs"
     findings = {
         NO: f"the ego or the {persona} driver could still gain by a change of strategy alone (after Holm's correction)",
@@ -188,15 +149,29 @@ def _headline(persona: str, answers: Sequence[Answer], responders: Sequence[Row]
         f"in {count} of {several} {unit} {findings[label]}" for label, count in counts.items() if count
     )
     headline = next((label for label in (NO, NEAR, OPEN) if counts[label]), NOT_ANSWERED)
-    tone: Tone = "harm" if "harm" in [answer.tone for answer in answers] else "open"
-    return Conclusion(
+    responders = [row for rows in pairs for row in rows if _is_measured_response(row)]
+    return Answer(
         question=QUESTION,
         label=headline if headline in (OPEN, NOT_ANSWERED) else f"{headline} in {counts[headline]} of {several} {unit}",
-        tone=tone,
+        tone="harm" if "harm" in [answer.tone for answer in answers] else "open",
         sentence=f"{sentence[0].upper()}{sentence[1:]}.",
         speed=_induced_in_several(persona, responders, unit),
         per_seed=answers,
     )
+
+
+def _is_measured_response(row: Row) -> bool:
+    """Whether a row has the games of a persona's best response."""
+    return not row["reason"] and row["role"] == "non_ego" and bool(row["pairs"])
+
+
+def _induced_in_several(persona: str, responders: Sequence[Row], unit: str) -> str:
+    if not responders:
+        return ""
+    rates = [row["ego_failure_rate_best_response"] for row in responders]
+    before = sum(row["ego_failure_rate"] for row in responders) / len(rates)
+    text = f"{_newly_trained(persona)} {percent(sum(rates) / len(rates))} of games "
+    return f"{text}(mean of {len(rates)} {unit}: {interval(min(rates), max(rates))}) instead of {percent(before)}."
 
 
 def equilibrium_sentences(equilibria: pd.DataFrame) -> list[tuple[int, str, list[str]]]:
@@ -224,7 +199,7 @@ def _solution(game: str, rows: pd.DataFrame) -> str:
     return text + (f" {more} more {'is' if more == 1 else 'are'} in the table." if more else "")
 
 
-def _safest(rows: Sequence[Mapping[str, Any]]) -> str:
+def _safest(rows: Sequence[Row]) -> str:
     egos = [row for row in rows if row["role"] == "ego"]
     most = egos[0]["solution_failure_rate"]
     worst = [row["player"] for row in rows if row["role"] == "non_ego" and row["failure_rate"] >= most - 1e-6]
@@ -236,7 +211,7 @@ def _safest(rows: Sequence[Mapping[str, Any]]) -> str:
     return text
 
 
-def _mixture(rows: Sequence[Mapping[str, Any]]) -> str:
+def _mixture(rows: Sequence[Row]) -> str:
     played = [row for row in rows if row["share"] >= 0.0005]
     if len(played) == 1:
         return f"{played[0]['player']} alone"
@@ -271,12 +246,3 @@ def fewer_failures(difference: float, low: float, high: float) -> str:
         low, high = (low * 100, high * 100) if difference > 0 else (-high * 100, -low * 100)
         text += f" ({signed(low, 1)} to {signed(high, 1)})"
     return text
-
-
-def heat_caption(quantity: str, *, is_rate: bool, is_mean: bool, unpaid: bool) -> str:
-    """The caption of a heat map; `is_mean`: over seeds, `unpaid`: a column has no payoff."""
-    spread = "least to most of the seeds that played it"
-    if not is_mean:
-        spread = f"95 % interval ({'Clopper-Pearson' if is_rate else 't'})"
-    note = " SUMO’s own driver has no payoff." if unpaid else ""
-    return f"{_HEAT_CAPTIONS[quantity]}{note} Below each mean: {spread}."

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import pandas as pd
-from markupsafe import Markup
 
-from harness.evaluation.game_theory.crossplay import Matrices, matrices
 from harness.evaluation.worst_first import worst_first
 from harness.reports.figures import GAME, INK, SERIES, figure_of, svg
-from harness.reports.game_links import NO_LINKS, GameLinks
-from harness.reports.game_wording import HEAT_TITLES, heat_caption
+from harness.reports.game_links import GameLinks
 from harness.reports.numbers import MISSING, number, trimmed
+from harness.reports.run_tables import Row
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Floats = npt.NDArray[np.float64]
+WorstGames = Mapping[tuple[str, int | None], str]
+"""The address of the worst game of each arm and seed, and under the seed None of each arm."""
 
 OPENS_A_GAME = "A cell opens the worst of its games."
 PALEST, DARKEST = 0.04, 0.5
@@ -31,62 +31,66 @@ COLUMN_IN, ROW_IN, LETTER_IN = 0.8, 0.46, 0.085
 
 
 @dataclass(frozen=True, kw_only=True)
-class HeatMap:
-    """One figure of a view."""
-
-    title: str
-    caption: str
-    figure: Markup
-    width_in: float
-
-    @property
-    def wide(self) -> bool:
-        """Whether it takes the whole width of the page."""
-        return self.width_in > 5.5
-
-
-@dataclass(frozen=True, kw_only=True)
-class MatrixView:
-    """The heat maps of one training seed, or of the mean over all."""
-
-    label: str
-    maps: Sequence[HeatMap]
-
-
-@dataclass(frozen=True, kw_only=True)
 class _Quantity:
-    """A column of `crossplay`, with its colour."""
+    """A column of `crossplay`, with its colour and words."""
 
     name: str
     series: str
-    per_cent: bool
+    title: str
+    caption: str
+    per_cent: bool = False
+
+    def text(self, value: float) -> str:
+        """A value as it stands in its cell."""
+        if not np.isfinite(value):
+            return MISSING
+        return f"{trimmed(value * 100, 1)} %" if self.per_cent else number(value, 1)
+
+    def span(self, cell: Row) -> str:
+        """The interval of a cell; empty where it has none."""
+        low, high = cell[f"{self.name}_low"], cell[f"{self.name}_high"]
+        if not (np.isfinite(low) and np.isfinite(high)):
+            return ""
+        if self.per_cent:
+            return f"{trimmed(low * 100, 0)}–{trimmed(high * 100, 0)}"
+        return f"{number(low, 1)} to {number(high, 1)}"
 
 
 QUANTITIES = (
-    _Quantity(name="failure_rate", series="persona", per_cent=True),
-    _Quantity(name="ego_payoff", series="alone", per_cent=False),
-    _Quantity(name="non_ego_payoff", series="retrained", per_cent=False),
+    _Quantity(
+        name="failure_rate",
+        series="persona",
+        title="Failure rate of the ego (%)",
+        caption="Darker: fails more.",
+        per_cent=True,
+    ),
+    _Quantity(name="ego_payoff", series="alone", title="Payoff of the ego", caption="Darker: earns more."),
+    _Quantity(
+        name="non_ego_payoff",
+        series="retrained",
+        title="Payoff of the non-ego",
+        caption=(
+            "Darker: earns more than other strategies of the same persona; payoffs of two personas are not comparable."
+        ),
+    ),
 )
 
 
-def views(crossplay: pd.DataFrame, links: GameLinks = NO_LINKS) -> list[MatrixView]:
+def views(crossplay: pd.DataFrame, links: GameLinks) -> list[dict[str, Any]]:
     """The heat maps of `crossplay`: of its seed, or of the mean over its seeds first and then of each. A cell leads to
-    the worst of its games."""
+    the worst of its games. Each view has its `label` and its `maps`, a dictionary for each quantity."""
     worst = _worst_games(links)
     seeds = list(dict.fromkeys(crossplay["seed"]))
     shown = [(f"seed {seed}", crossplay[crossplay["seed"] == seed]) for seed in seeds]
     if len(seeds) > 1:
         shown.insert(0, (f"mean over {len(seeds)} seeds", _mean(crossplay)))
     return [
-        MatrixView(
-            label=label, maps=[_map(quantity, rows, label=label, place=place, worst=worst) for quantity in QUANTITIES]
-        )
+        {"label": label, "maps": [_map(quantity, rows, label, place, worst) for quantity in QUANTITIES]}
         for place, (label, rows) in enumerate(shown)
     ]
 
 
-def _worst_games(links: GameLinks) -> dict[tuple[str, int | None], str]:
-    """The address of the worst game of each arm and seed, and under the seed None of each arm."""
+def _worst_games(links: GameLinks) -> WorstGames:
     worst: dict[tuple[str, int | None], str] = {}
     games = worst_first(links.episodes) if links.embedded else links.episodes[:0]
     for game, address in zip(games.itertuples(), links.of(games), strict=True):
@@ -104,122 +108,88 @@ def _mean(crossplay: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(means).reset_index()
 
 
-def _map(
-    quantity: _Quantity,
-    crossplay: pd.DataFrame,
-    *,
-    label: str,
-    place: int,
-    worst: Mapping[tuple[str, int | None], str],
-) -> HeatMap:
-    """One heat map; `place` makes its ids unique. `worst` has the game that a cell of an arm and seed links to."""
-    table = _by_persona(matrices(crossplay))
-    cells = {(row["ego"], row["non_ego"]): row for row in crossplay.to_dict("records")}
-    values = {
-        "failure_rate": table.failure_rates,
-        "ego_payoff": table.ego_payoffs,
-        "non_ego_payoff": table.non_ego_payoffs,
-    }[quantity.name]
-    title = f"{HEAT_TITLES[quantity.name]}, {label}"
+def _map(quantity: _Quantity, crossplay: pd.DataFrame, label: str, place: int, worst: WorstGames) -> dict[str, Any]:
+    """One heat map: its title, caption, figure and width; `place` makes its ids unique. Each persona's strategies are
+    side by side."""
+    personas = dict(zip(crossplay["non_ego"], crossplay["persona"], strict=True))
+    order = list(dict.fromkeys(personas.values()))
+    egos, non_egos = (
+        list(dict.fromkeys(crossplay["ego"])),
+        sorted(personas, key=lambda each: order.index(personas[each])),
+    )
+    table = crossplay.pivot(index="ego", columns="non_ego", values=quantity.name)
+    table = table.reindex(index=egos, columns=non_egos)
+    title = f"{quantity.title}, {label}"
     numbers = [
-        f"{ego} against {non_ego} {_text(quantity, values[row, column])}"
-        for row, ego in enumerate(table.egos)
-        for column, non_ego in enumerate(table.non_egos)
+        f"{ego} against {non_ego} {quantity.text(table.loc[ego, non_ego])}" for ego in egos for non_ego in non_egos
     ]
-    longest = max(map(len, table.egos)), max(map(len, table.non_egos))
-    width_in = LETTER_IN * longest[0] + COLUMN_IN * len(table.non_egos) + 0.1 * min(longest[1], 12) * 0.5
-    height_in = ROW_IN * len(table.egos) + 0.35 + LETTER_IN * longest[1] * 0.55
+    longest = max(map(len, egos)), max(map(len, non_egos))
+    width_in = LETTER_IN * longest[0] + COLUMN_IN * len(non_egos) + 0.1 * min(longest[1], 12) * 0.5
+    height_in = ROW_IN * len(egos) + 0.35 + LETTER_IN * longest[1] * 0.55
+    shades = _shades(quantity, table.to_numpy(float), [personas[each] for each in non_egos])
     with figure_of(width_in, height_in) as figure:
-        axes = _axes(figure, table)
-        _draw_cells(axes, quantity, table, values, cells=cells, worst=worst)
+        axes = _axes(figure, egos, non_egos)
+        _draw_cells(axes, quantity, crossplay, pd.DataFrame(shades, egos, non_egos), worst)
         for drawing in (*axes.texts, *axes.patches):
             drawing.set_in_layout(False)  # they are within the axes; to measure them again is slow
         name = f"heat-{quantity.name.replace('_', '-')}-{place}"
         element = svg(figure, name, f"{title}: {'; '.join(numbers)}")
-    caption = heat_caption(
-        quantity.name,
-        is_rate=quantity.per_cent,
-        is_mean=label.startswith("mean"),
-        unpaid=quantity.name == "non_ego_payoff" and "" in table.personas,
-    )
+    spread = f"95 % interval ({'Clopper-Pearson' if quantity.per_cent else 't'})"
+    if label.startswith("mean"):
+        spread = "least to most of the seeds that played it"
+    unpaid = " SUMO’s own driver has no payoff." if quantity.name == "non_ego_payoff" and "" in order else ""
+    caption = f"{quantity.caption}{unpaid} Below each mean: {spread}."
     caption = f"{caption} {OPENS_A_GAME}" if GAME in element else caption
-    return HeatMap(title=title, caption=caption, figure=element, width_in=round(width_in, 2))
+    return {"title": title, "caption": caption, "figure": element, "width_in": round(width_in, 2)}
 
 
-def _axes(figure: Figure, table: Matrices) -> Axes:
+def _axes(figure: Figure, egos: list[str], non_egos: list[str]) -> Axes:
     """Axes with a row for each ego and a column for each non-ego."""
     axes = figure.subplots()
     axes.grid(False)
     for spine in axes.spines.values():
         spine.set_visible(False)
-    axes.set(xlim=(0, len(table.non_egos)), ylim=(len(table.egos), 0))
+    axes.set(xlim=(0, len(non_egos)), ylim=(len(egos), 0))
     axes.xaxis.tick_top()
     axes.set_xticks(
-        [column + 0.5 for column in range(len(table.non_egos))], table.non_egos,
-        rotation=30, ha="left", rotation_mode="anchor",
-    )  # fmt: skip
-    axes.set_yticks([row + 0.5 for row in range(len(table.egos))], table.egos)
+        [column + 0.5 for column in range(len(non_egos))], non_egos, rotation=30, ha="left", rotation_mode="anchor"
+    )
+    axes.set_yticks([row + 0.5 for row in range(len(egos))], egos)
     axes.tick_params(length=0)
     return axes
 
 
 def _draw_cells(
-    axes: Axes,
-    quantity: _Quantity,
-    table: Matrices,
-    values: Floats,
-    *,
-    cells: Mapping[tuple[str, str], Mapping[str, Any]],
-    worst: Mapping[tuple[str, int | None], str],
+    axes: Axes, quantity: _Quantity, crossplay: pd.DataFrame, shades: pd.DataFrame, worst: WorstGames
 ) -> None:
     """Shade each cell by its value, and write the value and its interval in it."""
-    shades = _shades(quantity, table, values)
-    for row, ego in enumerate(table.egos):
-        for column, non_ego in enumerate(table.non_egos):
-            if not np.isfinite(values[row, column]):
+    cells = {(cell["ego"], cell["non_ego"]): cell for cell in crossplay.to_dict("records")}
+    for row, ego in enumerate(shades.index):
+        for column, non_ego in enumerate(shades.columns):
+            cell = cells.get((ego, non_ego))
+            if cell is None or not np.isfinite(cell[quantity.name]):
                 axes.text(column + 0.5, row + 0.5, MISSING, ha="center", va="center")
                 continue
             (bar,) = axes.bar(
                 column + 0.5, 0.92, 0.95, bottom=row + 0.04, linewidth=0,
-                color=SERIES[quantity.series], alpha=PALEST + (DARKEST - PALEST) * shades[row, column],
+                color=SERIES[quantity.series], alpha=PALEST + (DARKEST - PALEST) * shades.iloc[row, column],
             )  # fmt: skip
-            cell = cells[ego, non_ego]
             bar.set_url(worst.get((cell["arm"], cell.get("seed"))) or None)
-            axes.text(column + 0.5, row + 0.46, _text(quantity, values[row, column]), ha="center", color=INK)
-            axes.text(column + 0.5, row + 0.82, _span(quantity, cell), ha="center", fontsize=8, color=INK)
+            axes.text(column + 0.5, row + 0.46, quantity.text(cell[quantity.name]), ha="center", color=INK)
+            axes.text(column + 0.5, row + 0.82, quantity.span(cell), ha="center", fontsize=8, color=INK)
 
 
-def _by_persona(table: Matrices) -> Matrices:
-    """Each persona's strategies side by side."""
-    places = sorted(range(len(table.non_egos)), key=lambda place: table.personas.index(table.personas[place]))
-    return table.among(range(len(table.egos)), places)
-
-
-def _shades(quantity: _Quantity, table: Matrices, values: Floats) -> Floats:
-    """How dark each cell is, from 0 to 1; NaN stays."""
+def _shades(quantity: _Quantity, values: Floats, personas: list[str]) -> Floats:
+    """How dark each cell is, from 0 to 1; NaN stays. Payoffs of non-egos are compared within a persona."""
     if quantity.per_cent:
         most = np.nanmax(values, initial=0.0)
         return values / most if most > 0 else values
     shades = np.full(values.shape, np.nan)
-    groups = table.personas if quantity.name == "non_ego_payoff" else [""] * len(table.non_egos)
-    for group in set(groups):
-        columns = [place for place, each in enumerate(groups) if each == group]
-        part = values[:, columns]
+    groups = np.array(personas if quantity.name == "non_ego_payoff" else [""] * len(personas))
+    for group in set(groups.tolist()):
+        part = values[:, groups == group]
         low, high = (np.nan, np.nan) if np.isnan(part).all() else (np.nanmin(part), np.nanmax(part))
-        shades[:, columns] = (part - low) / (high - low) if high > low else np.where(np.isnan(part), np.nan, 0.5)
+        shades[:, groups == group] = (
+            (part - low) / (high - low) if high > low else np.where(np.isnan(part), np.nan, 0.5)
+        )
     return shades
-
-
-def _text(quantity: _Quantity, value: float) -> str:
-    if not np.isfinite(value):
-        return MISSING
-    return f"{trimmed(value * 100, 1)} %" if quantity.per_cent else number(value, 1)
-
-
-def _span(quantity: _Quantity, cell: Mapping[str, Any]) -> str:
-    low, high = cell[f"{quantity.name}_low"], cell[f"{quantity.name}_high"]
-    if not (np.isfinite(low) and np.isfinite(high)):
-        return ""
-    if quantity.per_cent:
-        return f"{trimmed(low * 100, 0)}–{trimmed(high * 100, 0)}"
-    return f"{number(low, 1)} to {number(high, 1)}"

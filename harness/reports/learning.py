@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -12,53 +11,77 @@ from markupsafe import Markup
 from harness.evaluation.competence import DID_NOT_LEARN
 from harness.evaluation.strategies import NaiveEgo, Strategy, player_of
 from harness.game.roles import EGO
-from harness.reports.differences import Row
-from harness.reports.figures import INK, SERIES, Curve, figure_of, learning_figure, svg
-from harness.reports.numbers import MISSING, number, percent, short, trimmed
-from harness.reports.run_tables import RunTables
+from harness.reports.figures import INK, SERIES, figure_of, svg
+from harness.reports.numbers import MISSING, number, percent, short, steps_text, trimmed
+from harness.reports.run_tables import Row, RunTables
+
+_LINES = ("-", "--", ":", "-.")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Learning:
-    """One training stage's curves."""
-
-    stage: str
-    figure: Markup
-    stops: Sequence[str]
-
-
-def learning(tables: RunTables) -> list[Learning]:
-    """A figure per training stage, in order of first appearance, with a curve per seed."""
-    training = tables.training
-    return [
-        _stage(str(stage), place, tables, training[training["stage"] == stage])
-        for place, stage in enumerate(training["stage"].unique(), 1)
-    ]
-
-
-def _stage(stage: str, place: int, tables: RunTables, rows: pd.DataFrame) -> Learning:
-    curves, stops = [], []
-    several = rows["seed"].nunique() > 1
-    for seed, windows in rows.groupby("seed", sort=True):
-        entry = tables.stages.get(f"{stage}-seed{seed}", {})
-        windows = windows.sort_values("steps")
-        curves.append(
-            Curve(
-                seed=int(seed),
-                steps=windows["steps"].tolist(),
-                payoffs=windows["mean_payoff"].tolist(),
-                failure_rates=windows["failure_rate"].tolist(),
-                stopped_at=entry.get("steps"),
-                stopped=str(entry.get("stopped") or ""),
-            )
+def learning(tables: RunTables) -> list[dict[str, Any]]:
+    """Each training in order of first appearance: `stage`, `figure` with a curve per seed, and why each `stops`."""
+    training, found = tables.training, []
+    for place, stage in enumerate(training["stage"].unique(), 1):
+        rows = training[training["stage"] == stage]
+        entries = {seed: tables.stages.get(f"{stage}-seed{seed}", {}) for seed in sorted(rows["seed"].unique())}
+        stops = {
+            seed: f"{entry['steps']:,} steps ({stopped(entry)})"
+            for seed, entry in entries.items()
+            if entry.get("steps") is not None
+        }
+        found.append(
+            {
+                "stage": str(stage),
+                "figure": _learning_figure(rows, entries, _series(tables.strategies.get(str(stage))), place),
+                "stops": [f"seed {seed}: {text}" if len(entries) > 1 else text for seed, text in stops.items()],
+            }
         )
-        if entry.get("steps") is not None:
-            text = f"{entry['steps']:,} steps ({stopped(entry)})"
-            stops.append(f"seed {seed}: {text}" if several else text)
-    ends = "; ".join(f"seed {curve.seed} ends at mean payoff {curve.payoffs[-1]:.3g}" for curve in curves)
-    alternative = f"Learning curve of {stage}: mean payoff and failure rate over training steps; {ends}"
-    figure = learning_figure(curves, _series(tables.strategies.get(stage)), f"curve{place}", alternative)
-    return Learning(stage=stage, figure=figure, stops=stops)
+    return found
+
+
+def _learning_figure(
+    training: pd.DataFrame, entries: Mapping[int, Mapping[str, Any]], series: str, place: int
+) -> Markup:
+    """Mean payoff and failure rate of the learner over its steps, a line per seed, and where each stopped."""
+    with figure_of(3.7, 3.9) as figure:
+        payoff, failure = figure.subplots(2, 1, sharex=True)
+        ends = []
+        for (seed, entry), linestyle in zip(entries.items(), _LINES * len(entries), strict=False):
+            curve = training[training["seed"] == seed].sort_values("steps")
+            line: dict[str, Any] = {"color": SERIES[series], "linestyle": linestyle, "markersize": 3}
+            line["marker"] = "o" if len(curve) <= 30 else ""
+            payoff.plot(curve["steps"], curve["mean_payoff"], label=f"seed {seed}", **line)
+            failure.plot(curve["steps"], curve["failure_rate"], **line)
+            ends.append(f"seed {seed} ends at mean payoff {curve['mean_payoff'].iloc[-1]:.3g}")
+            if entry.get("steps") is not None:
+                for axes in (payoff, failure):
+                    axes.axvline(entry["steps"], color=INK, linewidth=1, linestyle=linestyle)
+        first = next(iter(entries.values()))
+        if len(entries) > 1:
+            payoff.legend(frameon=False, fontsize=8)
+        elif first.get("steps") is not None:
+            payoff.annotate(
+                _end(first), (first["steps"], 1), (0, 3),
+                xycoords=("data", "axes fraction"), textcoords="offset points", ha="right", fontsize=9,
+            )  # fmt: skip
+        payoff.set_ylabel("mean payoff")
+        payoff.yaxis.set_major_formatter(lambda value, _: short(value))
+        failure.set_ylabel("failure rate (%)")
+        failure.yaxis.set_major_formatter(lambda share, _: f"{share * 100:.3g}")
+        failure.set_ylim(0, max([0.05, *training["failure_rate"].dropna()]) * 1.08)
+        failure.set_xlim(left=0)
+        failure.xaxis.set_major_formatter(lambda steps, _: steps_text(steps))
+        failure.locator_params(axis="x", nbins=5)
+        failure.set_xlabel("training steps")
+        stage = training["stage"].iloc[0]
+        alternative = f"Learning curve of {stage}: mean payoff and failure rate over training steps; {'; '.join(ends)}"
+        return svg(figure, f"curve{place}", alternative)
+
+
+def _end(entry: Mapping[str, Any]) -> str:
+    """Where a curve ends. No text that a run folder brings is drawn."""
+    reasons = {"converged": "stopped early", "budget": "budget used", DID_NOT_LEARN: DID_NOT_LEARN}
+    return f"{reasons.get(str(entry.get('stopped')), 'stopped')}: {steps_text(entry['steps'])}"
 
 
 def stopped(stage: Mapping[str, Any]) -> str:
@@ -82,43 +105,31 @@ def _series(strategy: Strategy | None) -> str:
             return "retrained" if player_of(strategy) == EGO else "persona"
 
 
-@dataclass(frozen=True, kw_only=True)
-class SearchSection:
-    """One search, in words and numbers."""
+def searches(reconfiguration: pd.DataFrame) -> list[dict[str, Any]]:
+    """Each search of `reconfiguration`, the table, in order of first appearance.
 
-    stage: str
-    """With its seed when there are several."""
-    figure: Markup
-    summary: str
-    parameters: Sequence[Mapping[Hashable, Any]]
-    """Name (`parameter`), given `value`, `value_found`, and the bounds `low` and `high` of the search."""
-    document: str
-    """The path of the driver that it found, from the run folder."""
-
-
-def searches(reconfiguration: pd.DataFrame) -> list[SearchSection]:
-    """Each search of `reconfiguration`, the table, in order of first appearance."""
-    several = reconfiguration["seed"].nunique() > 1
-    return [
-        _search(f"{stage}-seed{seed}", f"{stage}, seed {seed}" if several else str(stage), rows, place)
-        for place, ((stage, seed), rows) in enumerate(reconfiguration.groupby(["stage", "seed"], sort=False), 1)
-    ]
-
-
-def _search(stage_id: str, title: str, rows: pd.DataFrame, place: int) -> SearchSection:
-    trials = rows.drop_duplicates("trial").sort_values("trial")
-    given, chosen = rows[rows["trial"] == 0], rows[rows["chosen"]]
-    summary = _summary(trials, given.iloc[0], chosen.iloc[0])
-    both = given.merge(chosen[["parameter", "value"]], on="parameter", suffixes=("", "_found"))
-    return SearchSection(
-        stage=title,
-        figure=_figure(
-            trials, f"search{place}", f"Mean payoff of each trial of {title}, and the best so far. {summary}"
-        ),
-        summary=summary,
-        parameters=both.to_dict("records"),
-        document=f"policies/{stage_id}/driver.toml",
-    )
+    `stage` has its seed when there are several. `parameters` are rows with the name (`parameter`), the given `value`,
+    `value_found`, and the bounds `low` and `high` of the search. `document` is the path of the driver that it found,
+    from the run folder.
+    """
+    several, found = reconfiguration["seed"].nunique() > 1, []
+    for place, ((stage, seed), rows) in enumerate(reconfiguration.groupby(["stage", "seed"], sort=False), 1):
+        title = f"{stage}, seed {seed}" if several else str(stage)
+        trials = rows.drop_duplicates("trial").sort_values("trial")
+        given, chosen = rows[rows["trial"] == 0], rows[rows["chosen"]]
+        summary = _summary(trials, given.iloc[0], chosen.iloc[0])
+        alternative = f"Mean payoff of each trial of {title}, and the best so far. {summary}"
+        both = given.merge(chosen[["parameter", "value"]], on="parameter", suffixes=("", "_found"))
+        found.append(
+            {
+                "stage": title,
+                "figure": _figure(trials, f"search{place}", alternative),
+                "summary": summary,
+                "parameters": both.to_dict("records"),
+                "document": f"policies/{stage}-seed{seed}/driver.toml",
+            }
+        )
+    return found
 
 
 def _summary(trials: pd.DataFrame, first: Row, best: Row) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import pandas as pd
@@ -17,61 +16,35 @@ MOST_LISTED = 50
 """The most games that a cause and response list."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class FailedGame:
-    """A failure of the ego, and the time to watch it from."""
-
-    arm: str
-    seed: int
-    episode: int
-    outcome: str
-    time_s: float
-    text: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Failures:
-    """What led to failures, the ego's response to it, and the failures."""
-
-    cause: str
-    response: str
-    counts: Sequence[int]
-    """Failures in each arm, in the order of the table's arms."""
-    games: Sequence[FailedGame]
-
-    def listed(self, embedded: Container[str], most: int) -> Sequence[FailedGame]:
-        """The games to list, at most `most`: those that the page can play are preferred."""
-        if len(self.games) <= most:
-            return self.games
-        return sorted(self.games, key=lambda game: key(game.arm, game.seed, game.episode) not in embedded)[:most]
-
-
-def failures_by_cause(causes: pd.DataFrame) -> tuple[list[str], list[Failures]]:
+def failures_by_cause(causes: pd.DataFrame, embedded: Container[str]) -> tuple[list[str], list[dict[str, Any]]]:
     """The arms in which the ego failed, and its failures in rows of `causes.csv`, grouped by event and response, the
-    most frequent first."""
+    most frequent first.
+
+    Of each group: `cause`, `response`, `total`, `counts` in the order of the arms, and the `games` to list, at most
+    `MOST_LISTED`, of which those that the page contains (`embedded`) are preferred.
+    """
     arms = list(dict.fromkeys(causes["arm"]))
-    grouped: dict[tuple[str, str], list[FailedGame]] = {}
-    for game in causes.itertuples():
-        failure = FailedGame(
-            arm=game.arm,
-            seed=game.seed,
-            episode=game.episode,
-            outcome=game.ego_outcome,
-            time_s=max(game.time_s - RUN_UP_S, 0.0),
-            text=f"{game.deed}, {game.time_left_s:.1f} s before the end" if game.other else game.deed,
-        )
-        grouped.setdefault((event_words(game.event), game.reaction), []).append(failure)
-    rows = [
-        Failures(
-            cause=cause,
-            response=response,
-            counts=[sum(game.arm == arm for game in games) for arm in arms],
-            games=games,
-        )
-        for (cause, response), games in grouped.items()
-    ]
-    rows.sort(key=lambda row: (-len(row.games), row.cause, row.response))
-    return arms, rows
+    found = []
+    for (cause, response), rows in causes.groupby([causes["event"].map(event_words), "reaction"], sort=False):
+        games = [_game(row) for row in rows.itertuples()]
+        if len(games) > MOST_LISTED:
+            games = sorted(games, key=lambda game: game["key"] not in embedded)[:MOST_LISTED]
+        counts = [int((rows["arm"] == arm).sum()) for arm in arms]
+        found.append({"cause": cause, "response": response, "total": len(rows), "counts": counts, "games": games})
+    return arms, sorted(found, key=lambda group: (-group["total"], group["cause"], group["response"]))
+
+
+def _game(row: Any) -> dict[str, Any]:
+    """A failure of the ego, the words on it, and the time to watch it from."""
+    return {
+        "key": key(row.arm, row.seed, row.episode),
+        "arm": row.arm,
+        "seed": row.seed,
+        "episode": row.episode,
+        "outcome": row.ego_outcome,
+        "time_s": max(row.time_s - RUN_UP_S, 0.0),
+        "text": f"{row.deed}, {row.time_left_s:.1f} s before the end" if row.other else row.deed,
+    }
 
 
 def marks_of(manoeuvres: pd.DataFrame | None) -> Mapping[str, Sequence[Mapping[str, Any]]]:

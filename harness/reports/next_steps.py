@@ -3,33 +3,18 @@ commands to type in the run folder."""
 
 from __future__ import annotations
 
-import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from harness.evaluation.comparisons.acceptance_checks import Check
 from harness.evaluation.competence import DID_NOT_LEARN
-from harness.evaluation.strategies import EgoStrategy, NaiveEgo, against_persona
-from harness.reports.game_links import most_severe
+from harness.evaluation.worst_first import worst_first
+from harness.reports.game_links import replay_command
+from harness.reports.key_figures import egos_of
 from harness.reports.player_data import key
 from harness.reports.provenance import command_of
-from harness.reports.run_findings import RunFindings
-from harness.reports.run_tables import RunTables
-from harness.reports.verdict_wording import failures
+from harness.reports.run_tables import RunTables, failures
 
-FINISH = "Some stages are not done. The same command continues; finished stages are skipped."
-LEARN_BY_EXAMPLE = (
-    "{persona} did not learn to drive here. Let people imitate a rule-based driver before their training: add this to "
-    "the campaign, and run it again."
-)
-IMITATION = "[non_ego_training]\nimitation = true"
-WATCH_REMAINING = "See how the {made} ego still fails against {persona}: its worst game."
-WATCH_NAIVE = "See how {persona} makes the {naive} fail: its worst game."
-RETRAIN_AGAINST_SEVERAL = "Retrain one ego against several personas: add this to the campaign, and run it again."
-MINIMISE = "Find the mildest start at which this game still fails, and keep it as a test."
-SET_BOUNDS = "State what this ego must achieve: add bounds to the campaign, and the command passes or fails."
-TIGHTEN = "Every bound is kept. Add a persona or a scene that this ego has not met."
 MOST_STEPS = 4
 
 
@@ -43,151 +28,131 @@ class NextStep:
     """The key of the game to watch (`player_data.key`); empty: the step is about no game."""
 
 
-def next_steps(tables: RunTables, found: RunFindings) -> list[NextStep]:
+def next_steps(tables: RunTables) -> list[NextStep]:
     """The first few steps that this run suggests, the most urgent first."""
-    manifest, personas, checks = tables.manifest, tables.personas, tables.acceptance
-    finish = NextStep(sentence=FINISH, command=command_of(manifest))
-    steps = [
-        *([finish] if tables.unfinished else []),
-        *_learn(manifest, personas, found),
-        *_watch(personas, found),
-        *_widen(personas, found, checks),
-    ]
+    steps = [*_finish(tables), *_learn(tables), *_watch(tables), *_widen(tables)]
     return steps[:MOST_STEPS]
 
 
-def _learn(manifest: Mapping[str, Any], personas: Sequence[str], found: RunFindings) -> Iterator[NextStep]:
+def _finish(tables: RunTables) -> Iterator[NextStep]:
+    if tables.unfinished:
+        sentence = "Some stages are not done. The same command continues; finished stages are skipped."
+        yield NextStep(sentence=sentence, command=command_of(tables.manifest))
+
+
+def _learn(tables: RunTables) -> Iterator[NextStep]:
     """What helps people who did not learn to reach their goal. People on foot have no rule-based driver to imitate."""
-    training = manifest.get("campaign", {}).get("non_ego_training", {})
-    unable = [persona for persona in personas if _did_not_learn(manifest, persona)]
-    if unable and found.non_ego_drives and not training.get("imitation"):
-        yield NextStep(sentence=LEARN_BY_EXAMPLE.format(persona=" and ".join(unable)), command=IMITATION)
+    unable = [
+        persona
+        for persona in tables.personas
+        if any(
+            name.startswith(f"{persona}-seed") and each.get("stopped") == DID_NOT_LEARN
+            for name, each in tables.stages.items()
+        )
+    ]
+    if unable and tables.non_ego_drives and not tables.campaign.get("non_ego_training", {}).get("imitation"):
+        yield NextStep(
+            sentence=f"{' and '.join(unable)} did not learn to drive here. Let people imitate a rule-based driver "
+            "before their training: add this to the campaign, and run it again.",
+            command="[non_ego_training]\nimitation = true",
+        )
 
 
-def _did_not_learn(manifest: Mapping[str, Any], persona: str) -> bool:
-    """Whether the persona did not learn to reach its goal, in any training seed."""
-    return any(
-        name.startswith(f"{persona}-seed") and each.get("stopped") == DID_NOT_LEARN
-        for name, each in manifest.get("stages", {}).items()
-    )
-
-
-def _watch(personas: Sequence[str], found: RunFindings) -> Iterator[NextStep]:
+def _watch(tables: RunTables) -> Iterator[NextStep]:
     """The worst game of the persona against which the last ego fails most; else, of the naive ego's."""
-    for made, sentence in ((found.change.made, WATCH_REMAINING), ("naive", WATCH_NAIVE)):
-        arms = []
-        for persona in personas:
-            ego = NaiveEgo() if made == "naive" else found.change.ego(against=persona)
-            arm = against_persona(ego, persona).name
-            rows = found.of(arm)
-            arms += [(sum(map(failures, rows.values())), persona, arm)] if rows else []
-        if arms and max(arms)[0]:
-            _, persona, arm = max(arms)
-            game = most_severe(found.games[found.games["arm"] == arm])
-            command = f"harness replay . {shlex.quote(arm)} {game['episode']}"
-            command += f" --seed {game['seed']}" if len(found.seeds) > 1 else ""
-            watched = key(arm, int(game["seed"]), int(game["episode"]))
-            words = sentence.format(made=made, persona=persona, naive=found.naive)
-            yield NextStep(sentence=words, command=command, game=watched)
-            yield NextStep(sentence=MINIMISE, command=command.replace("harness replay", "harness minimise", 1))
+    for place, sentence in (
+        (1, f"See how the {tables.change.made} ego still fails against {{}}: its worst game."),
+        (0, f"See how {{}} makes the {tables.naive} fail: its worst game."),
+    ):
+        arms = [(tables.arms_of("RQ2", persona)[place], persona) for persona in tables.personas]
+        counts = [(sum(map(failures, tables.rates_of(arm).values())), persona, arm) for arm, persona in arms]
+        if counts and max(counts)[0]:
+            _, persona, arm = max(counts)
+            game = worst_first(tables.games_of(arm)).iloc[0].to_dict()
+            command, watched = replay_command(game, tables.several_seeds), key(arm, game["seed"], game["episode"])
+            yield NextStep(sentence=sentence.format(persona), command=command, game=watched)
+            yield NextStep(
+                sentence="Find the mildest start at which this game still fails, and keep it as a test.",
+                command=command.replace("harness replay", "harness minimise", 1),
+            )
             return
 
 
-def _widen(personas: Sequence[str], found: RunFindings, checks: Sequence[Check] | None) -> Iterator[NextStep]:
-    if checks is None:
-        yield NextStep(sentence=SET_BOUNDS, command="[acceptance]\nfailure_rate = 0.1")
-    elif all(check.passed for check in checks):
-        yield NextStep(sentence=TIGHTEN, command="harness persona new NAME")
-    if len(personas) > 1 and any(found.asked("RQ2", persona) for persona in personas) and not found.is_reconfigured:
+def _widen(tables: RunTables) -> Iterator[NextStep]:
+    if tables.acceptance is None:
+        yield NextStep(
+            sentence="State what this ego must achieve: add bounds to the campaign, and the command passes or fails.",
+            command="[acceptance]\nfailure_rate = 0.1",
+        )
+    elif all(check.passed for check in tables.acceptance):
+        yield NextStep(
+            sentence="Every bound is kept. Add a persona or a scene that this ego has not met.",
+            command="harness persona new NAME",
+        )
+    personas = tables.personas
+    is_retrained = tables.change.made == "retrained" and any(tables.asked("RQ2", persona) for persona in personas)
+    if len(personas) > 1 and is_retrained:
         against = ", ".join(f'"{persona}"' for persona in personas)
-        yield NextStep(sentence=RETRAIN_AGAINST_SEVERAL, command=f"[retraining]\nagainst = [{against}]")
+        yield NextStep(
+            sentence="Retrain one ego against several personas: add this to the campaign, and run it again.",
+            command=f"[retraining]\nagainst = [{against}]",
+        )
 
 
-WHY = "Why does it fail?"
-PREVENTABLE = "Could it have been prevented?"
-NOW = "What now?"
-NO_FAILURE = "Against {persona} no ego fails."
-FAILS = "Against {persona} the {ego} fails in {failures} of {games} games."
-FAILS_NO_MORE = "The {ego} does not fail."
-MOSTLY = "{share} failures: {cause}."
-ALL, SOME, NONE = "Yes.", "Partly.", "No."
-PREVENTED = (
-    "Against {persona} a reference driver (a model of a careful human driver) in the seat of the {naive} avoids "
-    "{avoided} of its {failures} failures."
-)
-ALSO = "Against {persona}: {avoided} of {failures}."
-NOT_JUDGED = "Not known: reference drivers have judged no failure of this run."
-NOTHING_TO_PREVENT = "There is nothing to prevent: the {naive} does not fail."
-
-
-@dataclass(frozen=True, kw_only=True)
-class FirstAnswer:
-    """One question of the first screen and its answer, a sentence each line."""
-
-    question: str
-    lines: Sequence[str]
-    command: str = ""
-    """What to type, if the answer is something to do."""
-    game: str = ""
-    """The key of the game that it is about, empty for none."""
-
-
-def first_answers(personas: Sequence[str], found: RunFindings, steps: Sequence[NextStep]) -> list[FirstAnswer]:
-    """The questions after "did it pass?", in order; empty before a game against a persona was played."""
-    lines = [line for persona in personas for line in _why(persona, found)]
+def first_answers(tables: RunTables, steps: Sequence[NextStep]) -> list[dict[str, Any]]:
+    """The questions after "did it pass?", in order, each with `lines` of an answer, a `command` to type and the key of
+    a `game` to watch; empty before a game against a persona was played."""
+    lines = [line for persona in tables.personas for line in _why(persona, tables)]
     if not lines:
         return []
-    answers = [
-        FirstAnswer(question=WHY, lines=lines),
-        FirstAnswer(question=PREVENTABLE, lines=_prevented(personas, found)),
+    answers: list[dict[str, Any]] = [
+        {"question": "Why does it fail?", "lines": lines},
+        {"question": "Could it have been prevented?", "lines": _prevented(tables)},
     ]
-    answers += [
-        FirstAnswer(question=NOW, lines=[step.sentence], command=step.command, game=step.game) for step in steps[:1]
-    ]
-    return answers
+    for step in steps[:1]:
+        what = {"lines": [step.sentence], "command": step.command, "game": step.game}
+        answers.append({"question": "What now?", **what})
+    return [{"command": "", "game": "", **each} for each in answers]
 
 
-def _egos(persona: str, found: RunFindings) -> Iterator[tuple[str, str, EgoStrategy]]:
-    """The egos that a persona's card shows: the question about each, its word, and the strategy."""
-    yield "RQ1", found.naive, NaiveEgo()
-    if found.asked("RQ2", persona):
-        yield "RQ2", f"{found.change.made} ego", found.change.ego(against=persona)
-
-
-def _why(persona: str, found: RunFindings) -> Iterator[str]:
+def _why(persona: str, tables: RunTables) -> Iterator[str]:
     """One line for each ego that fails against a persona: how often, and its most frequent cause."""
-    failing, egos = 0, 0
-    for question, word, ego in _egos(persona, found):
-        games = found.games[found.games["arm"] == against_persona(ego, persona).name]
+    is_played, is_failing = False, False
+    for question, ego, arm in egos_of(persona, tables):
+        games = tables.games_of(arm)
         if games.empty:
             continue
-        failures, egos = int(games["ego_failed"].sum()), egos + 1
-        if failures:
-            failing += 1
-            cause = next(iter(found.causes(question, persona)), "")
+        failed, is_played = int(games["ego_failed"].sum()), True
+        if failed:
+            is_failing = True
+            cause = next(iter(tables.causes_of(question, persona)), "")
             share, _, words = cause.partition(": ")
-            mostly = f" {MOSTLY.format(share=share, cause=words)}" if words else ""
-            yield FAILS.format(persona=persona, ego=word, failures=failures, games=len(games)) + mostly
-        elif failing:
-            yield FAILS_NO_MORE.format(ego=word)
-    if egos and not failing:
-        yield NO_FAILURE.format(persona=persona)
+            mostly = f" {share} failures: {words}." if words else ""
+            yield f"Against {persona} the {ego} fails in {failed} of {len(games)} games.{mostly}"
+        elif is_failing:
+            yield f"The {ego} does not fail."
+    if is_played and not is_failing:
+        yield f"Against {persona} no ego fails."
 
 
-def _prevented(personas: Sequence[str], found: RunFindings) -> list[str]:
+def _prevented(tables: RunTables) -> list[str]:
+    arms = {persona: tables.arms_of("RQ1", persona)[1] for persona in tables.personas}
     lines: list[str] = []
     all_avoided, all_failures = 0, 0
-    for persona in personas:
-        judged = found.preventability.get(against_persona(NaiveEgo(), persona).name, ())
-        avoided = sum(each.from_start.by_any for each in judged)
-        failures = sum(each.from_start.judged for each in judged)
-        if failures:
-            sentence = ALSO if lines else PREVENTED
-            lines.append(sentence.format(persona=persona, naive=found.naive, avoided=avoided, failures=failures))
-        all_avoided, all_failures = all_avoided + avoided, all_failures + failures
-    if not lines:
-        arms = [against_persona(NaiveEgo(), persona).name for persona in personas]
-        failed = found.games[found.games["arm"].isin(arms)]["ego_failed"].sum()
-        return [NOT_JUDGED if failed else NOTHING_TO_PREVENT.format(naive=found.naive)]
-    label = ALL if all_avoided == all_failures else SOME if all_avoided else NONE
-    return [f"{label} {lines[0]}", *lines[1:]]
+    for persona, arm in arms.items():
+        judged = [each.from_start for each in tables.prevented_in(arm)]
+        avoided, failed = sum(each.by_any for each in judged), sum(each.judged for each in judged)
+        if failed and lines:
+            lines.append(f"Against {persona}: {avoided} of {failed}.")
+        elif failed:
+            lines.append(
+                f"Against {persona} a reference driver (a model of a careful human driver) in the seat of the "
+                f"{tables.naive} avoids {avoided} of its {failed} failures."
+            )
+        all_avoided, all_failures = all_avoided + avoided, all_failures + failed
+    if lines:
+        label = "Yes." if all_avoided == all_failures else "Partly." if all_avoided else "No."
+        return [f"{label} {lines[0]}", *lines[1:]]
+    if tables.played.loc[tables.played["arm"].isin(list(arms.values())), "ego_failed"].sum():
+        return ["Not known: reference drivers have judged no failure of this run."]
+    return [f"There is nothing to prevent: the {tables.naive} does not fail."]

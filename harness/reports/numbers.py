@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-
-Number = Callable[[float], str]
 
 NO_SPACE = "\N{NO-BREAK SPACE}"
 MINUS = "\N{MINUS SIGN}"
@@ -51,6 +48,11 @@ def interval(low: float, high: float) -> str:
     if not (math.isfinite(low) and math.isfinite(high)):
         return MISSING
     return f"{trimmed(low * 100, 1)}–{trimmed(high * 100, 1)}{NO_SPACE}%"
+
+
+def sure(low: float, high: float) -> str:
+    """The 95 % interval of a share, e.g. "95 %: 16.9–34.7 %"."""
+    return f"{SURE}: {interval(low, high)}"
 
 
 def p_text(p: float) -> str:

@@ -46,19 +46,11 @@ def environment_of(*folders: str) -> Environment:
     return environment
 
 
-def script(environment: Environment) -> Markup:
-    """The page's scripts as one text. A script is no template."""
-    return Markup("\n").join(Markup(_source(environment, name)) for name in SCRIPTS)
-
-
-def libraries(environment: Environment) -> Markup:
-    """The scripts of others that the page's own scripts use, as one text."""
-    return Markup("\n").join(Markup(_source(environment, name)) for name in LIBRARIES)
-
-
-def _source(environment: Environment, name: str) -> str:
+def sources(environment: Environment, names: Sequence[str]) -> Markup:
+    """Scripts as one text, unchanged: a script is no template."""
     assert environment.loader is not None
-    return environment.loader.get_source(environment, name)[0].rstrip()
+    texts = [environment.loader.get_source(environment, name)[0].rstrip() for name in names]
+    return Markup("\n".join(texts))
 
 
 def served_page(page: str, games: Sequence[Sequence[Any]], run: str) -> str:

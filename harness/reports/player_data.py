@@ -1,4 +1,4 @@
-"""A recorded game and the road as plain data, for the player of the page."""
+"""A recorded game as plain data, for the player of the page."""
 
 from __future__ import annotations
 
@@ -44,16 +44,6 @@ class PlayerTrack(Track):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Touch:
-    """The place and time of a contact."""
-
-    time_s: float
-    x_m: float
-    y_m: float
-    label: str
-
-
-@dataclass(frozen=True, kw_only=True)
 class GameTracks:
     """One game, step 0 to step `steps`."""
 
@@ -67,28 +57,8 @@ class GameTracks:
     """Of the judged player: the ego, or the non-ego where it drives alone."""
     players: Sequence[PlayerTrack]
     background: Sequence[Track]
-    touches: Sequence[Touch]
-
-
-@dataclass(frozen=True, kw_only=True)
-class SceneDrawing:
-    """The road as lines in the scene's coordinates (m), each [n, 2]."""
-
-    surfaces: Sequence[Sequence[FloatArray]]
-    """Polygons of the drivable area, each with its outline and its holes."""
-    lane_marks: Sequence[FloatArray]
-    rails: Sequence[FloatArray]
-    goal: Sequence[FloatArray]
-    edge_lines: Sequence[FloatArray] = ()
-    """Solid lines between lanes and hard shoulders."""
-    buildings: Sequence[FloatArray] = ()
-    """Outlines of buildings."""
-    stripes: Sequence[FloatArray] = ()
-    """Corners of the stripes of marked crossings."""
-    hiding_obstacles: Sequence[str] = ()
-    """Names of the obstacles that are higher than eyes."""
-    tall_width_m: float | None = None
-    """Width from which a vehicle hides what is behind it; None: no vehicle of the scene is that wide."""
+    touches: Sequence[tuple[float, float, float]]
+    """Time (s) and place (x, y in m) of each contact."""
 
 
 def key(arm: str, seed: int, episode: int) -> str:

@@ -1,20 +1,53 @@
-"""The contents of a run's report: its manifest, its tables and its replays."""
+"""The contents of a run's report: its manifest and its tables, and what the page looks up in them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import pandas as pd
 
+from harness.config.campaign import LEARNED, ego_called
 from harness.evaluation.comparisons.acceptance_checks import Check
+from harness.evaluation.comparisons.preventability import Preventability, preventability_of
 from harness.evaluation.game_theory.records import GameFindings
-from harness.evaluation.strategies import Arm, Strategy
-from harness.evaluation.tables import table_of, typed
+from harness.evaluation.rule_book.cause_lines import cause_lines
+from harness.evaluation.strategies import (
+    NAIVE_ALONE,
+    Arm,
+    NaiveEgo,
+    ReconfiguredEgo,
+    RetrainedEgo,
+    Strategy,
+    against_persona,
+)
+from harness.evaluation.tables import table_of
 
+Row = Mapping[Any, Any]
+"""A row of a table, by column."""
 FINISHED = ("done", "settled")
 """Statuses of a stage that is complete."""
+QUESTIONS = {
+    "RQ1": "Does this {person} cause failures?",
+    "RQ2": "Did {doing} fix it?",
+}
+
+
+class Change(NamedTuple):
+    """What round 2 makes of the ego."""
+
+    made: str
+    """The ego of round 2 in sentences."""
+    doing: str
+    """What round 2 does, in sentences."""
+    ego: type[RetrainedEgo] | type[ReconfiguredEgo]
+    """The ego of round 2 as a strategy."""
+
+
+RETRAINED = Change("retrained", "retraining", RetrainedEgo)
+RECONFIGURED = Change("reconfigured", "reconfiguration", ReconfiguredEgo)
 
 
 def _empty(name: str) -> Callable[[], pd.DataFrame]:
@@ -23,7 +56,7 @@ def _empty(name: str) -> Callable[[], pd.DataFrame]:
 
 @dataclass(frozen=True, kw_only=True)
 class RunTables:
-    """What a report is made of. The frames have the columns of `harness.evaluation.columns.TABLES`."""
+    """What a report is made of. The frames are tables of `harness.evaluation.columns.TABLES`."""
 
     manifest: Mapping[str, Any]
     """The content of manifest.json."""
@@ -53,12 +86,11 @@ class RunTables:
     replays: Sequence[str] = ()
     """Names of the folders under `replays/`, in any order."""
 
-    def with_types(self) -> RunTables:
-        """The same with the dtypes of `TABLES`. Raises ValueError when a frame does not have a table's columns."""
-        frames = {
-            each.name: value for each in fields(self) if isinstance(value := getattr(self, each.name), pd.DataFrame)
-        }
-        return replace(self, **{name: typed(frame) for name, frame in frames.items()})
+    @property
+    def campaign(self) -> Mapping[str, Any]:
+        """The campaign's document in the manifest."""
+        campaign: Mapping[str, Any] = self.manifest.get("campaign", {})
+        return campaign
 
     @property
     def stages(self) -> Mapping[str, Mapping[str, Any]]:
@@ -76,3 +108,117 @@ class RunTables:
         """Every persona that the manifest or a table names, in order of first appearance."""
         names = (*self.manifest.get("personas", ()), *self.comparisons["persona"], *self.summary["persona"])
         return [name for name in dict.fromkeys(names) if name]
+
+    @cached_property
+    def seeds(self) -> list[int]:
+        """Every training seed that the manifest or a table names."""
+        return sorted({*self.manifest.get("seeds", ()), *self.summary["seed"], *self.comparisons["seed"]})
+
+    @property
+    def several_seeds(self) -> bool:
+        """Whether texts name the seed."""
+        return len(self.seeds) > 1
+
+    @property
+    def significance(self) -> float | None:
+        """The significance of the campaign's tests."""
+        significance: float | None = self.campaign.get("assessment", {}).get("significance")
+        return significance
+
+    @property
+    def crowds(self) -> Mapping[str, Sequence[str]]:
+        """The personas of each crowd, in the order of the scene's people."""
+        return crowds_of(self.manifest)
+
+    @property
+    def person(self) -> str:
+        """What a persona is in sentences, after "this"."""
+        return "driver" if self.non_ego_drives else "person"
+
+    @property
+    def naive(self) -> str:
+        """The ego before round 2 in sentences, after "the"."""
+        return ego_called(self.campaign.get("ego", {}).get("driver", LEARNED))
+
+    @property
+    def change(self) -> Change:
+        """What round 2 makes of the ego, if it is played."""
+        reconfigured = any(isinstance(arm.ego, ReconfiguredEgo) for arm in self.arms.values())
+        return RECONFIGURED if reconfigured else RETRAINED
+
+    @cached_property
+    def played(self) -> pd.DataFrame:
+        """The rows of `episodes` that could be played."""
+        return self.episodes[~unplayed(self.episodes)]
+
+    @cached_property
+    def rates(self) -> Mapping[tuple[str, int], Row]:
+        """The rows of `summary` by arm and seed."""
+        return {(row["arm"], row["seed"]): row for row in self.summary.to_dict("records")}
+
+    def rates_of(self, arm: str) -> dict[int, Row]:
+        """The arm's rows of `summary` by seed, where there are games that could be played."""
+        rows = {seed: self.rates.get((arm, seed)) for seed in self.seeds}
+        return {seed: row for seed, row in rows.items() if row is not None and played(row)}
+
+    def games_of(self, arm: str) -> pd.DataFrame:
+        """The arm's games that could be played."""
+        return self.played[self.played["arm"] == arm]
+
+    def arms_of(self, question: str, persona: str) -> tuple[str, str]:
+        """Baseline and treatment of a question about a persona."""
+        naive = against_persona(NaiveEgo(), persona).name
+        if question == "RQ1":
+            return NAIVE_ALONE.name, naive
+        return naive, against_persona(self.change.ego(against=persona), persona).name
+
+    def tests_of(self, question: str, persona: str) -> list[Row]:
+        """The rows of `comparisons` on a question about a persona."""
+        rows = self.comparisons
+        return rows[(rows["question"] == question) & (rows["persona"] == persona)].to_dict("records")
+
+    def asked(self, question: str, persona: str) -> list[int]:
+        """The training seeds of which a question is asked: its treatment is planned, or it is compared."""
+        _, treatment = self.arms_of(question, persona)
+        compared = {row["seed"] for row in self.tests_of(question, persona)}
+        return [seed for seed in self.seeds if f"{treatment}-seed{seed}" in self.stages or seed in compared]
+
+    def causes_of(self, question: str, persona: str) -> tuple[str, ...]:
+        """Why the ego failed against a persona in the arm that a question is about, a line for each kind of cause."""
+        _, treatment = self.arms_of(question, persona)
+        return tuple(cause_lines(self.causes[self.causes["arm"] == treatment]))
+
+    def prevented_in(self, arm: str) -> list[Preventability]:
+        """What reference drivers prevent in an arm, for each training seed."""
+        return preventability_of(self.preventability, self.reference_drivers, arm)
+
+    def who(self, persona: str) -> str:
+        """What the ego meets, if it is not one driver with a persona; else empty."""
+        if persona in self.crowds:
+            return f"the crowd {persona}"
+        return "" if self.non_ego_drives else f"the {persona}"
+
+
+def crowds_of(manifest: Mapping[str, Any]) -> Mapping[str, Sequence[str]]:
+    """The personas of each crowd of a manifest, in the order of the scene's people."""
+    return {each["name"]: each["personas"] for each in manifest.get("campaign", {}).get("crowd", ())}
+
+
+def unplayed(episodes: pd.DataFrame) -> pd.Series:
+    """Which games could not be played."""
+    return (episodes["ego_outcome"] == "error") | (episodes["error"] != "")
+
+
+def played(row: Row | None) -> int:
+    """Games of an arm that could be played; none when the arm has no row."""
+    return 0 if row is None else row["episodes"] - row["errors"]
+
+
+def failures(row: Row) -> int:
+    """How many games of the arm the ego failed."""
+    return int(row["collisions"] + row["rails"] + row["timeouts"])
+
+
+def failures_of(row: Row) -> str:
+    """E.g. "25 of 100"."""
+    return f"{failures(row)} of {played(row)}"

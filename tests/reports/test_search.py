@@ -15,7 +15,7 @@ from harness.evaluation.tables import table_of
 from harness.reports.cards import STILL_DRIVES
 from harness.reports.learning import searches
 from harness.reports.provenance import mixed_versions, rounds
-from harness.reports.verdict_wording import QUESTIONS, RECONFIGURED
+from harness.reports.run_tables import QUESTIONS, RECONFIGURED
 from tests.support.pages import campaign, rendered
 
 PAYOFFS = (2.0, 1.5, math.nan, 4.25, 4.25)
@@ -88,13 +88,13 @@ def test_page__says_what_was_found_and_escapes_names() -> None:
 
 def test_searches__in_words() -> None:
     (found,) = searches(trials())
-    assert found.summary == (
+    assert found["summary"] == (
         "5 trials; the best is trial 3: mean payoff 4.25, failures in 12.5 %. "
         "As given: mean payoff 2.00, failures in 12.5 %. 1 could not be played: ValueError: no"
     )
-    assert found.document == "policies/reconfigured_speedy-seed1/driver.toml"
+    assert found["document"] == "policies/reconfigured_speedy-seed1/driver.toml"
     (found,) = searches(trials(payoffs=(3.0, 1.0, 3.0)))
-    assert found.summary == "3 trials, none better than the ego as given: mean payoff 3.00, failures in 12.5 %."
+    assert found["summary"] == "3 trials, none better than the ego as given: mean payoff 3.00, failures in 12.5 %."
 
 
 def test_mixed_versions__programs_of_searches_are_compared_among_searches() -> None:

@@ -34,7 +34,7 @@ from harness.evaluation.strategies import (
 from harness.evaluation.tables import table_of, typed
 from harness.replay.selection import choose_games, replay_name
 from harness.reports.page import render_page
-from harness.reports.player_data import GameTracks, SceneDrawing
+from harness.reports.player_data import GameTracks
 from harness.reports.run_tables import RunTables
 from tests.support.recorded import SCENE, causes, manoeuvres, recorded
 from tests.support.tiny import UNGATED
@@ -187,7 +187,7 @@ def blank_figures() -> Iterator[None]:
         yield
 
 
-def rendered(games: Sequence[GameTracks] = (), scene: SceneDrawing | None = None, **tables: Any) -> str:
+def rendered(games: Sequence[GameTracks] = (), scene: Mapping[str, Any] | None = None, **tables: Any) -> str:
     """The report of these tables, as `campaign` makes them."""
     return render_page(RunTables(**tables), games, scene)
 

@@ -12,16 +12,17 @@ from harness.evaluation.tables import table_of
 from harness.evaluation.worst_first import worst_first
 from harness.game.arrays import FloatArray
 from harness.replay.selection import choose_games
-from harness.reports.player_data import GameTracks, PlayerTrack, SceneDrawing, Touch, Track
+from harness.reports.player_data import GameTracks, PlayerTrack, Track
 
 STEP_S, STEPS = 0.1, 80
-OUTLINE = np.array([[0, 0], [220, 0], [220, -3.2], [130, -3.2], [100, -6.4], [0, -6.4], [0, 0.0]])
-SCENE = SceneDrawing(
-    surfaces=[[OUTLINE]],
-    lane_marks=[np.array([[0, -3.2], [100, -3.2]])],
-    rails=[np.array([[0.3, 0], [219.7, 0]]), np.array([[219.7, -3.2], [130, -3.2], [100, -6.4], [0.3, -6.4]])],
-    goal=[np.array([[175, -3.2], [175, 0]])],
-)
+OUTLINE = [[0, 0], [220, 0], [220, -3.2], [130, -3.2], [100, -6.4], [0, -6.4], [0, 0]]
+SCENE: dict[str, Any] = {
+    "surfaces": [[OUTLINE]],
+    "laneMarks": [[[0, -3.2], [100, -3.2]]],
+    "edgeLines": [],
+    "rails": [[[0.3, 0], [219.7, 0]], [[219.7, -3.2], [130, -3.2], [100, -6.4], [0.3, -6.4]]],
+    "goal": [[[175, -3.2], [175, 0]]],
+}
 
 
 def recorded(episodes: pd.DataFrame, background: int = 2) -> Iterator[GameTracks]:
@@ -51,9 +52,8 @@ def recorded_game(row: Any, background: int = 2) -> GameTracks:
         players[1].x_m[:] += (players[0].x_m[-1] - players[1].x_m[-1] + 1.2) * (time / time[-1])
     touches = []
     if outcome in ("collision", "rail"):
-        place = (players[0].x_m[-1], players[0].y_m[-1] - 0.9 if outcome == "collision" else 0.0)
-        x_m, y_m = map(float, place)
-        touches.append(Touch(time_s=float(time[-1]), x_m=x_m, y_m=y_m, label=f"{outcome} at {time[-1]:.1f} s"))
+        y_m = players[0].y_m[-1] - 0.9 if outcome == "collision" else 0.0
+        touches.append((float(time[-1]), float(players[0].x_m[-1]), float(y_m)))
     along = [
         Track(
             name=f"car {n}",

@@ -15,11 +15,12 @@ from harness.evaluation.people import judged, judged_outcomes
 from harness.evaluation.strategies import Arm, counterparts
 from harness.evaluation.trace_file import TraceReader
 from harness.evaluation.worst_first import worst_first
+from harness.game.arrays import FloatArray
 from harness.game.sight import TALL_WIDTH_M
 from harness.replay import choose_games
 from harness.replay.contacts import contacts
 from harness.replay.vehicles import types_of_vehicles
-from harness.reports.player_data import GameTracks, PlayerTrack, SceneDrawing, Touch, Track
+from harness.reports.player_data import GameTracks, PlayerTrack, Track
 from harness.road.net.network import read_net
 from harness.road.scene import drawing
 from harness.road.scene.open_scene import OpenScene
@@ -100,10 +101,7 @@ def tracks_of(trace: pd.DataFrame, scene: OpenScene, game: Any) -> GameTracks:
         outcome=judged(game._asdict())[1],
         players=players,
         background=[Track(**_track(name, piece, sizes_m)) for name, rows in by_name.items() for piece in _pieces(rows)],
-        touches=[
-            Touch(time_s=contact.time_s, x_m=contact.x_m, y_m=contact.y_m, label=contact.label)
-            for contact in contacts(trace, types, scene.rail_lines)
-        ],
+        touches=[(contact.time_s, contact.x_m, contact.y_m) for contact in contacts(trace, types, scene.rail_lines)],
     )
 
 
@@ -122,17 +120,26 @@ def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
         yield rows.iloc[first:end]
 
 
-def scene_drawing(scene: OpenScene) -> SceneDrawing:
-    """The parts of a scene that the page's player draws."""
+def scene_drawing(scene: OpenScene) -> dict[str, Any]:
+    """The parts of a scene that the page's player draws, in the scene's coordinates (m), for `road.js`."""
     net = read_net(scene.net_file)
-    return SceneDrawing(
-        surfaces=drawing.surfaces(net),
-        lane_marks=drawing.lane_marks(net),
-        edge_lines=drawing.edge_lines(net),
-        rails=scene.rail_lines,
-        goal=drawing.goal_lines(scene, net),
-        buildings=scene.obstacles.outlines,
-        stripes=scene.stripes,
-        hiding_obstacles=[each.name for each in scene.obstacles.each if each.hides],
-        tall_width_m=TALL_WIDTH_M if scene.world.hiding.vehicles else None,
-    )
+    lines = {
+        "laneMarks": drawing.lane_marks(net),
+        "edgeLines": drawing.edge_lines(net),
+        "rails": scene.rail_lines,
+        "goal": drawing.goal_lines(scene, net),
+        "buildings": scene.obstacles.outlines,
+        "stripes": scene.stripes,
+    }
+    return {
+        "surfaces": [list(map(_points, rings)) for rings in drawing.surfaces(net)],
+        **{name: list(map(_points, each)) for name, each in lines.items()},
+        "hidingObstacles": [each.name for each in scene.obstacles.each if each.hides],
+        "tallWidth": TALL_WIDTH_M if scene.world.hiding.vehicles else None,
+    }
+
+
+def _points(line: FloatArray) -> list[list[float]]:
+    """A line [n, 2] rounded to centimetres."""
+    points: list[list[float]] = np.round(line, 2).tolist()
+    return points

@@ -23,6 +23,7 @@ from harness.evaluation.worst_first import worst_first
 from harness.reports.embedding import game_text
 from harness.reports.manoeuvres import marks_of
 from harness.reports.page_template import served_page
+from harness.reports.run_tables import crowds_of
 from harness.road.scene.open_scene import open_scene
 
 HOST = "127.0.0.1"
@@ -64,9 +65,8 @@ class ServedReport:
     def _recorded(self, game: Any) -> bytes:
         with self._lock:  # the reader keeps one file open
             trace = self._reader.read(self._folder.traces(stage_id(game.arm, game.seed)), game.episode)
-        crowds = self._folder.manifest().get("campaign", {}).get("crowd", ())
-        people = {each["name"]: each["personas"] for each in crowds}
-        return game_text(tracks_of(trace, self._scene, game), self._marks, people).encode()
+        crowds = crowds_of(self._folder.manifest())
+        return game_text(tracks_of(trace, self._scene, game), self._marks, crowds).encode()
 
 
 def _entry(game: Any) -> list[Any]:

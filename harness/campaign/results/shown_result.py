@@ -10,21 +10,23 @@ from harness.config.campaign import Campaign
 from harness.errors import plain
 from harness.evaluation.unplayed_games import reasons_of
 from harness.reports.game_wording import gap_verdicts
-from harness.reports.run_findings import results
-from harness.reports.run_tables import RunTables
-from harness.reports.verdict_wording import ARMS, Conclusion
+from harness.reports.run_tables import QUESTIONS, RunTables
+from harness.reports.verdict_wording import Answer, answer
 
 
 def shown_result(campaign: Campaign, report: RunTables) -> RunResult:
     """Verdicts, acceptance checks, and what went wrong."""
-    entries, found = report.manifest["stages"], results(report)
+    entries = report.manifest["stages"]
     personas = [*report.manifest["personas"], *campaign.mixed_people]
-    verdicts = [(persona, found.verdicts(question, persona)) for persona in personas for question in ARMS]
-    verdicts += gap_verdicts(report.game.gaps) if report.game is not None else []
+    verdicts = [
+        _shown(persona, answer(report, question, persona), report.causes_of(question, persona))
+        for persona in personas
+        for question in QUESTIONS
+    ]
+    if report.game is not None:
+        verdicts += [_shown(persona, verdict) for persona, verdict in gap_verdicts(report.game.gaps)]
     return RunResult(
-        verdicts=tuple(
-            _shown(persona, verdict, found.causes(verdict.question, persona)) for persona, verdict in verdicts
-        ),
+        verdicts=tuple(verdicts),
         failed_stages=tuple(name for name, entry in entries.items() if entry["status"] not in FINISHED),
         error_games=int((report.episodes["error"] != "").sum()),
         error_reasons=tuple(map(plain, reasons_of(report.episodes["error"]))),
@@ -36,6 +38,6 @@ def shown_result(campaign: Campaign, report: RunTables) -> RunResult:
     )
 
 
-def _shown(persona: str, verdict: Conclusion, causes: tuple[str, ...] = ()) -> ShownVerdict:
+def _shown(persona: str, verdict: Answer, causes: tuple[str, ...] = ()) -> ShownVerdict:
     told = {name: getattr(verdict, name) for name in ("question", "label", "tone", "sentence", "speed")}
     return ShownVerdict(persona=persona, causes=causes, **told)
