@@ -17,8 +17,8 @@ from harness.reports.key_figures import (
     portrait,
 )
 from harness.reports.numbers import NO_SPACE
-from harness.reports.run_findings import results
 from harness.reports.run_tables import RunTables
+from harness.reports.verdict_wording import answer
 from tests.support.game_tables import arm, table
 from tests.support.pages import campaign
 
@@ -30,7 +30,7 @@ def found(arguments, near_misses=None):
         rows = episodes["arm"] == name
         marks = [int(place < share * rows.sum()) for place in range(int(rows.sum()))]
         episodes.loc[rows, "near_miss"] = pd.Series(marks, index=episodes.index[rows], dtype="Int64")
-    return results(RunTables(**arguments))
+    return RunTables(**arguments)
 
 
 def figures_of(run):
@@ -61,14 +61,14 @@ def test_near_misses__of_an_ego_without_failures_are_on_its_card():
 @pytest.mark.parametrize(("share", "label", "tone"), [(0.95, PARTLY, "open"), (0.0, "Yes", "mended")])
 def test_verdict__an_ego_that_comes_too_close_is_mended_only_in_part(share, label, tone):
     run = found(campaign(personas=["speedy"]), {"retrained_vs_speedy": share})
-    shown = card_verdict("Did retraining fix it?", run.verdicts("RQ2", "speedy"), key_figures("speedy", run))
-    assert (shown.label, shown.tone, bool(shown.caution)) == (label, tone, label == PARTLY)
+    shown = card_verdict("Did retraining fix it?", answer(run, "RQ2", "speedy"), key_figures("speedy", run))
+    assert (shown["label"], shown["tone"], bool(shown["caution"])) == (label, tone, label == PARTLY)
 
 
 @pytest.mark.parametrize(("drives", "who"), [(True, "The speedy driver"), (False, "The speedy")])
 def test_verdict__people_on_foot_are_not_called_drivers(drives, who):
     run = found(campaign(personas=["speedy"]) | {"non_ego_drives": drives})
-    assert run.verdicts("RQ1", "speedy").sentence.startswith(f"{who} makes the naive ego fail")
+    assert answer(run, "RQ1", "speedy").sentence.startswith(f"{who} makes the naive ego fail")
 
 
 def test_worst_known_opponent__is_the_one_of_a_later_round():

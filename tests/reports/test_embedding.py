@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from harness.reports.embedding import COLUMNS, NOTHING, Embedded, columns_of, pack
+from harness.reports.embedding import COLUMNS, NOTHING, columns_of, embedded_games, pack, recorded_document
 from harness.reports.player_data import key
 from tests.support.pages import campaign
 from tests.support.recorded import SCENE, recorded
@@ -17,10 +17,6 @@ from tests.support.recorded import SCENE, recorded
 @pytest.fixture(scope="module")
 def games():
     return list(recorded(campaign(personas=["speedy"])["episodes"]))
-
-
-def read(embedded):
-    return json.loads(embedded.document())
 
 
 def test_packing__of_differences_in_variable_length():
@@ -42,26 +38,15 @@ def test_columns__are_the_trace_to_half_a_unit(games):
     assert len(columns) == len(COLUMNS) * len(game.players) + 4 * len(game.background)
 
 
-def test_embedded__as_many_as_fit_and_the_first_ones(games):
-    whole = Embedded(SCENE, games, {}, 10_000_000)
-    assert whole.keys == {key(game.arm, game.seed, game.episode) for game in games}
-    part = Embedded(SCENE, games, {}, 20_000)
-    assert 0 < len(part.games) < len(games)
-    assert part.games == games[: len(part.games)]
-    road = len(Embedded(SCENE, [], {}, 0).document())
-    assert len(part.document()) - road < 20_000 + 2 * len(part.games)
-
-
-def test_embedded__games_are_read_only_until_the_page_is_full(games):
-    asked = []
-
-    def one_by_one():
-        for game in games:
-            asked.append(game)
-            yield game
-
-    part = Embedded(SCENE, one_by_one(), {}, 20_000)
-    assert len(asked) == len(part.games) + 1
+def test_embedded__as_many_as_fit_and_no_further_game_is_read(games):
+    keys = [key(game.arm, game.seed, game.episode) for game in games]
+    assert list(embedded_games(games, {}, {}, 10_000_000)) == keys
+    one_by_one = iter(games)
+    part = embedded_games(one_by_one, {}, {}, 20_000)
+    assert 0 < len(part) < len(games)
+    assert list(part) == keys[: len(part)]
+    assert sum(map(len, part.values())) <= 20_000
+    assert len(list(one_by_one)) == len(games) - len(part) - 1
 
 
 def test_document__names_the_persona_of_each_of_a_crowd(games):
@@ -69,13 +54,13 @@ def test_document__names_the_persona_of_each_of_a_crowd(games):
     people = [replace(person, name=name) for name in ("non_ego", "non_ego_2")]
     game = replace(games[0], persona="rush", players=[ego, *people])
     for crowds, expected in ({"rush": ["speedy", "anna"]}, [None, "speedy", "anna"]), ({}, [None, None, None]):
-        embedded = Embedded(SCENE, [game], {}, 10_000_000, crowds=crowds)
-        assert [player.get("persona") for player in read(embedded)["games"][0]["players"]] == expected
+        (text,) = embedded_games([game], {}, crowds, 10_000_000).values()
+        assert [player.get("persona") for player in json.loads(text)["players"]] == expected
 
 
 def test_document__cannot_end_the_script(games):
     hostile = "</script><!--<script>&\u2028"
     marks = {key(games[0].arm, games[0].seed, games[0].episode): [{"text": hostile}]}
-    embedded = Embedded(SCENE, games[:1], marks, 10_000_000)
-    assert not set(embedded.document()) & set("<>&\u2028")
-    assert read(embedded)["games"][0]["marks"] == [{"text": hostile}]
+    document = recorded_document(SCENE, embedded_games(games[:1], marks, {}, 10_000_000).values())
+    assert not set(document) & set("<>&\u2028")
+    assert json.loads(document)["games"][0]["marks"] == [{"text": hostile}]

@@ -13,22 +13,16 @@ from harness.evaluation.column import POINTS, SHARE
 from harness.evaluation.game_theory.best_response_gap import GapVerdict, gaps
 from harness.evaluation.game_theory.empirical_game import equilibria
 from harness.evaluation.game_theory.records import Response
-from harness.evaluation.tables import columns_of, write_csv
-from harness.reports.game import game_section
+from harness.evaluation.tables import columns_of, table_of, write_csv
+from harness.reports.game import CAPTIONS, game_section
 from harness.reports.game_links import GameLinks
-from harness.reports.game_wording import (
-    CAPTIONS,
-    MEANINGS,
-    NEAR,
-    NO,
-    OPEN,
-    equilibrium_sentences,
-    gap_verdicts,
-)
+from harness.reports.game_wording import MEANINGS, NEAR, NO, OPEN, equilibrium_sentences, gap_verdicts
 from harness.reports.heatmaps import OPENS_A_GAME, views
 from tests.support.chromium import launched, opener
 from tests.support.game_tables import arm, findings, table
 from tests.support.pages import CONTRAST, Page, campaign, rendered
+
+NO_LINKS = GameLinks(embedded=(), episodes=table_of("episodes"))
 
 
 @pytest.fixture(scope="module")
@@ -84,9 +78,9 @@ def test_section__every_number_that_is_read_is_the_exact_one_rounded(found, page
 
 def test_heat_map__has_the_tables_number_in_every_cell(found):
     first = found.crossplay[found.crossplay["seed"] == 2]
-    (mean, _, second) = game_section(found).views
-    assert (mean.label, second.label) == ("mean over 2 seeds", "seed 2")
-    failures, ego, non_ego = (each.figure for each in second.maps)
+    (mean, _, second) = game_section(found, NO_LINKS)["views"]
+    assert (mean["label"], second["label"]) == ("mean over 2 seeds", "seed 2")
+    failures, ego, non_ego = (each["figure"] for each in second["maps"])
     for row in first.to_dict("records"):
         between = f"{row['ego']} against {row['non_ego']} "
         assert f"{between}{row['failure_rate'] * 100:g} %" in failures
@@ -95,7 +89,7 @@ def test_heat_map__has_the_tables_number_in_every_cell(found):
         assert f"{between}{payoff}" in non_ego
         assert f">{row['failure_rate'] * 100:g} %<" in failures  # and not only for those who can't see it
     naive = found.crossplay[(found.crossplay["ego"] == "naive") & (found.crossplay["non_ego"] == "speedy")]
-    assert f"naive against speedy {naive['ego_payoff'].mean():.1f}" in mean.maps[1].figure
+    assert f"naive against speedy {naive['ego_payoff'].mean():.1f}" in mean["maps"][1]["figure"]
 
 
 def test_heat_map__a_cell_links_to_the_worst_of_its_games(found):
@@ -105,16 +99,16 @@ def test_heat_map__a_cell_links_to_the_worst_of_its_games(found):
     worst = "naive_vs_speedy,1,7"
     mean, first, second = views(found.crossplay, GameLinks(embedded={worst}, episodes=episodes))
     for view in (mean, first):
-        assert f'href="#game={worst}"' in view.maps[0].figure
-        assert OPENS_A_GAME in view.maps[0].caption
-    assert "#game=" not in second.maps[0].figure  # the page does not contain the game
-    assert OPENS_A_GAME not in second.maps[0].caption
+        assert f'href="#game={worst}"' in view["maps"][0]["figure"]
+        assert OPENS_A_GAME in view["maps"][0]["caption"]
+    assert "#game=" not in second["maps"][0]["figure"]  # the page does not contain the game
+    assert OPENS_A_GAME not in second["maps"][0]["caption"]
 
 
 def test_heat_map__has_a_personas_strategies_side_by_side(found):
     rows = found.crossplay[found.crossplay["seed"] == 1]
     rows = pd.concat([rows[rows["non_ego"] != "speedy_round2"], rows[rows["non_ego"] == "speedy_round2"]])
-    figure = views(rows)[0].maps[0].figure
+    figure = views(rows, NO_LINKS)[0]["maps"][0]["figure"]
     names = re.findall(r">(speedy|speedy_round2|distracted|sumo)</text>", figure)
     assert names == ["speedy", "speedy_round2", "distracted", "sumo"]
 

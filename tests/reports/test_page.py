@@ -4,6 +4,7 @@ import csv
 import math
 import re
 
+import pandas as pd
 import pytest
 
 from harness.evaluation.comparisons.summary import summarise
@@ -15,7 +16,8 @@ from harness.reports import page as page_module
 from harness.reports.differences import CHANCE, NO_T_STATISTIC, effect, speed_sentence
 from harness.reports.numbers import duration, number, p_number, p_text, percent, signed
 from harness.reports.page import REPLAYS_SHOWN
-from harness.reports.verdict_wording import NO_ROUND_2, Asked, conclusion
+from harness.reports.run_tables import RunTables
+from harness.reports.verdict_wording import NO_ROUND_2, answer
 from tests.support.incompetent import cannot_drive
 from tests.support.pages import (
     Page,
@@ -74,10 +76,9 @@ def test_page__a_table_too_long_for_a_page_is_left_to_its_file(small, monkeypatc
 NOT_PLAYED = "Not played: retrained_vs_speedy."
 
 
-def asked(question, rows, arms):
-    """A question about the speedy driver."""
-    who = "the speedy driver"
-    return Asked(question=question, persona="speedy", who=who, comparisons=rows, arms=arms, significance=0.01)
+def answered(question, rows, arguments):
+    """The answer about the speedy driver where these are the comparisons of a campaign."""
+    return answer(RunTables(**arguments | {"comparisons": pd.DataFrame(rows)}), question, "speedy")
 
 
 def text_of(arguments):
@@ -178,26 +179,32 @@ def test_words__several_seeds_are_counted_and_shown_each():
 @pytest.mark.parametrize("question", ["RQ1", "RQ2"])
 @pytest.mark.parametrize("verdict", list(Verdict))
 def test_words__only_significant_is_a_yes(verdict, question, small):
-    row = {"question": question, "seed": 1, "verdict": verdict.value, "pairs": 60, "pairs_left_out": 0}
+    row = {
+        "question": question,
+        "persona": "speedy",
+        "seed": 1,
+        "verdict": verdict.value,
+        "pairs": 60,
+        "pairs_left_out": 0,
+    }
     row |= {"p_value": 0.004, "p_holm": 0.02, "mcnemar_p": 0.004, "reason": "the speedy driver can't drive this scene"}
     row |= {"mean_difference": 0.3, "ci_low": 0.1, "ci_high": 0.5}
     rows = [row | {"metric": metric} for metric in ("failure", "mean_speed")]
-    arms = {(arm["arm"], arm["seed"]): arm for arm in small["summary"].to_dict("records")}
-    answer = conclusion(asked(question, rows, arms), [1])
+    found = answered(question, rows, small)
     yes = verdict is Verdict.SIGNIFICANT
-    assert (answer.label == "yes") == yes
-    assert (answer.tone != "open") == yes
-    assert answer.sentence.endswith(".")
+    assert (found.label == "yes") == yes
+    assert (found.tone != "open") == yes
+    assert found.sentence.endswith(".")
     if verdict in INCOMPETENT:  # no number of the games is an answer
-        assert (answer.label, answer.tone, answer.speed) == (verdict.value, "open", "")
-        assert answer.sentence == "The speedy driver can't drive this scene."
+        assert (found.label, found.tone, found.speed) == (verdict.value, "open", "")
+        assert found.sentence == "The speedy driver can't drive this scene."
         return
-    assert answer.speed.endswith(".")
-    for text in (answer.sentence, answer.speed):
+    assert found.speed.endswith(".")
+    for text in (found.sentence, found.speed):
         if verdict in (Verdict.NO_DIFFERENCE, Verdict.ALL_EQUAL, Verdict.NOT_ENOUGH_PAIRS):
             assert "significantly" not in text
     if verdict is Verdict.NOT_SIGNIFICANT:
-        assert CHANCE in answer.sentence
+        assert CHANCE in found.sentence
 
 
 SPEEDS = {"mean_speed_mps": 13.5}
@@ -222,13 +229,10 @@ def test_speed__is_judged_in_both_directions_and_by_its_size(question, mean, hal
 
 def test_words__one_seed_of_several_is_enough_for_harm_but_not_for_mended():
     arguments = campaign(personas=["speedy"], seeds=(1, 2))
-    arms = {(arm["arm"], arm["seed"]): arm for arm in arguments["summary"].to_dict("records")}
+    arguments["comparisons"].loc[arguments["comparisons"]["seed"] == 2, "verdict"] = Verdict.NOT_SIGNIFICANT.value
     for question, tone in (("RQ1", "harm"), ("RQ2", "open")):
-        rows = [row for row in arguments["comparisons"].to_dict("records") if row["question"] == question]
-        rows = [row | {"verdict": Verdict.NOT_SIGNIFICANT.value} if row["seed"] == 2 else row for row in rows]
-        answer = conclusion(asked(question, rows, arms), [1, 2])
-        assert answer.label == "yes in 1 of 2 seeds"
-        assert answer.tone == tone
+        found = answered(question, arguments["comparisons"], arguments)
+        assert (found.label, found.tone) == ("yes in 1 of 2 seeds", tone)
 
 
 def test_words__a_person_that_cannot_drive_leaves_both_questions_unanswered():

@@ -123,7 +123,7 @@ def test_player__keys_step_one_frame_jump_a_second_and_go_to_the_ends(opened, ga
         ("ArrowLeft", 2.1),
         ("End", games[GAME].steps * STEP_S),
         ("Home", 0),
-        ("c", games[GAME].touches[0].time_s),
+        ("c", games[GAME].touches[0][0]),
     ):
         press(page, pressed)
         assert time_of(page) == pytest.approx(expected, abs=1e-6), pressed
