@@ -13,47 +13,30 @@ from typing import TYPE_CHECKING, Any
 from harness.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from harness.config.persona import Persona
-    from harness.config.toml_reading import read_document
-    from harness.drivers.policy import LearnedDriver
-    from harness.drivers.policy_file import Policy, read_policy
-    from harness.drivers.protocol import Driver
-    from harness.drivers.sumo import SumoDriver
-    from harness.environments.arena import Arena, Seat, Step
-    from harness.environments.gymnasium_env import DrivingEnv, ParallelDrivingEnv
-    from harness.environments.gymnasium_vector import VectorDrivingEnv, make_vec
-    from harness.environments.vector_env import ArenaVecEnv
-    from harness.errors import HarnessError, SimulationError, UsageError
-    from harness.game.outcome import Outcome
-    from harness.library import Results, load, run
-    from harness.road.scene.open_scene import OpenScene, open_scene
-
-__all__ = [
-    "Arena",
-    "ArenaVecEnv",
-    "Driver",
-    "DrivingEnv",
-    "HarnessError",
-    "LearnedDriver",
-    "OpenScene",
-    "Outcome",
-    "ParallelDrivingEnv",
-    "Persona",
-    "Policy",
-    "Results",
-    "Seat",
-    "SimulationError",
-    "Step",
-    "SumoDriver",
-    "UsageError",
-    "VectorDrivingEnv",
-    "load",
-    "make_vec",
-    "open_scene",
-    "read_document",
-    "read_policy",
-    "run",
-]
+    from harness.config.persona import Persona as Persona
+    from harness.config.toml_reading import read_document as read_document
+    from harness.drivers.policy import LearnedDriver as LearnedDriver
+    from harness.drivers.policy_file import Policy as Policy
+    from harness.drivers.policy_file import read_policy as read_policy
+    from harness.drivers.protocol import Driver as Driver
+    from harness.drivers.sumo import SumoDriver as SumoDriver
+    from harness.environments.arena import Arena as Arena
+    from harness.environments.arena import Seat as Seat
+    from harness.environments.arena import Step as Step
+    from harness.environments.gymnasium_env import DrivingEnv as DrivingEnv
+    from harness.environments.gymnasium_env import ParallelDrivingEnv as ParallelDrivingEnv
+    from harness.environments.gymnasium_vector import VectorDrivingEnv as VectorDrivingEnv
+    from harness.environments.gymnasium_vector import make_vec as make_vec
+    from harness.environments.vector_env import ArenaVecEnv as ArenaVecEnv
+    from harness.errors import HarnessError as HarnessError
+    from harness.errors import SimulationError as SimulationError
+    from harness.errors import UsageError as UsageError
+    from harness.game.outcome import Outcome as Outcome
+    from harness.library import Results as Results
+    from harness.library import load as load
+    from harness.library import run as run
+    from harness.road.scene.open_scene import OpenScene as OpenScene
+    from harness.road.scene.open_scene import open_scene as open_scene
 
 _MODULES = {
     "config.persona": ("Persona",),
@@ -71,6 +54,7 @@ _MODULES = {
     "library": ("Results", "load", "run"),
     "road.scene.open_scene": ("OpenScene", "open_scene"),
 }
+__all__ = sorted(name for names in _MODULES.values() for name in names)
 
 
 def __getattr__(name: str) -> Any:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -95,33 +95,13 @@ class Results:
 
     @property
     def policies(self) -> Mapping[str, Policy]:
-        """The policies that the run trained, by stage. Each is read when it is asked for."""
-        return _Policies(self.path / "policies")
+        """The policies that the run trained, by stage. Raises UsageError if one is damaged."""
+        cards = sorted(self.path.glob("policies/*/policy.json"))
+        return {card.parent.name: read_policy(card.parent) for card in cards}
 
     def policy(self, stage: str) -> Policy:
         """The policy of a training, such as "naive-seed1". Raises UsageError if the run has none."""
         return read_policy(self.path / "policies" / stage)
-
-
-class _Policies(Mapping[str, Policy]):
-    """The policies in a folder, by the names of their folders."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-
-    def __getitem__(self, stage: str) -> Policy:
-        if stage not in set(self):
-            raise KeyError(stage)
-        return read_policy(self._folder / stage)
-
-    def __iter__(self) -> Iterator[str]:
-        return (card.parent.name for card in sorted(self._folder.glob("*/policy.json")))
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
-    def __repr__(self) -> str:
-        return f"<policies {', '.join(self) or '(none)'}>"
 
 
 def run(

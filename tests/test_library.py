@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 
 import harness
-from harness.library import _Policies
 from tests.support.repository import REPOSITORY
 from tests.support.tiny import BY_SUMO, tables, write_campaign
 from tests.support.tiny import harness as command
@@ -41,9 +40,10 @@ def test_table__a_name_that_the_run_has_not_is_refused(tmp_path: Path) -> None:
         harness.Results(tmp_path).table("none")
 
 
-def test_policies__are_shown_by_their_names_and_shapes() -> None:
-    folder = REPOSITORY / "policies" / "merge"
-    assert repr(_Policies(folder)).startswith("<policies distracted-seed1, naive-seed1,")
-    shown = repr(harness.read_policy(folder / "naive-seed1"))
+def test_policies__are_shown_by_their_names_and_shapes(tmp_path: Path) -> None:
+    (tmp_path / "policies").symlink_to(REPOSITORY / "policies" / "merge")
+    policies = harness.Results(tmp_path).policies
+    assert [*policies][:2] == ["distracted-seed1", "naive-seed1"]
+    shown = repr(policies["naive-seed1"])
     assert shown.startswith("Policy(naive-seed1: actor.0.bias [64], actor.0.weight [64, 98],")
     assert len(shown) < 500

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 NOT_CONFORMANT = 1
 
 PersonaFile = Annotated[
-    Path,
-    typer.Argument(
-        metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.", show_default=False
-    ),
+    Path, typer.Argument(metavar="FILE", help="The TOML file of the persona, or the name of a shipped one.")
 ]
 policy_app = typer.Typer(no_args_is_help=True, help="Export policies.")
 persona_app = typer.Typer(
@@ -31,13 +28,8 @@ persona_app = typer.Typer(
 
 @persona_app.command("new")
 def new_persona(
-    name: Annotated[
-        str, typer.Argument(metavar="NAME", help="The name of the persona, such as late_merger.", show_default=False)
-    ],
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="The file.  [default: personas/NAME.toml]", show_default=False),
-    ] = None,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The name of the persona, such as late_merger.")],
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="The file.  [default: personas/NAME.toml]")] = None,
 ) -> None:
     """Write a commented template of a persona: a valid document with every key. No file is overwritten."""
     from harness.cli.persona_template import create_persona
@@ -64,8 +56,7 @@ def check_persona(
 def show_persona(
     file: PersonaFile,
     html: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Also write an HTML page that opens offline.", show_default=False),
+        Path | None, typer.Option(metavar="FILE", help="Also write an HTML page that opens offline.")
     ] = None,
 ) -> None:
     """Show the profile of a persona: the value of each term, membership functions, and a sample of its lapses."""
@@ -87,7 +78,7 @@ def show_persona(
 
 
 def new(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.", show_default=False)],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="The new folder.")],
 ) -> None:
     """Make a project: a campaign, a scene and a persona of your own, which run as they are, and a README."""
     from rich.console import Console
@@ -104,7 +95,6 @@ def check(
         typer.Argument(
             metavar="PATH",
             help="The TOML file of a campaign or the name of a shipped one, or a scene.toml, or a scene's folder.",
-            show_default=False,
         ),
     ],
     allow_code: AllowCode = False,
@@ -135,7 +125,7 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
     ego = [] if opened.document.ego.driver == LEARNED else [messages.ego(opened), *notes]
     ego = [plain(each) for each in (*ego, *(f"{driver}: {told}" for driver, told in varying.items()))]
     remarks = [*opened.scene.warnings, *opened.persona_remarks, *ego]
-    print_plain([messages.in_order(file), *remarks], console)
+    print_plain([f"{file} is in order.", *remarks], console)
     print_plain([messages.work(opened, stages), *messages.stage_lines(stages)], console)
     if as_json:
         checked = {"campaign": opened.document.name, "file": str(file), "in_order": True}
@@ -145,15 +135,10 @@ def _check_campaign(file: Path, allow_code: bool, as_json: bool, console: Consol
 def schema(
     document: Annotated[
         str | None,
-        typer.Argument(
-            metavar="DOCUMENT",
-            help="campaign, persona, scene or driver.  [default: all, with --out]",
-            show_default=False,
-        ),
+        typer.Argument(metavar="DOCUMENT", help="campaign, persona, scene or driver.  [default: all, with --out]"),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option(metavar="DIR", help="Write DOCUMENT.schema.json into this folder.", show_default=False),
+        Path | None, typer.Option(metavar="DIR", help="Write DOCUMENT.schema.json into this folder.")
     ] = None,
 ) -> None:
     """Print the JSON Schema of a kind of document, or write one or all schemas. Editors use them to complete and check
@@ -172,9 +157,7 @@ def schema(
 
 
 def columns(
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Write the page to this file.", show_default=False)
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="Write the page to this file.")] = None,
 ) -> None:
     """Print what the columns of episodes.csv are, as Markdown: unit, formula and source of each."""
     from harness.files import write_atomically
@@ -189,18 +172,11 @@ def columns(
 def check_driver(
     driver: Annotated[
         str,
-        typer.Argument(
-            metavar="DRIVER",
-            help="A driver document, a policy's folder, an installed driver, or sumo.",
-            show_default=False,
-        ),
+        typer.Argument(metavar="DRIVER", help="A driver document, a policy's folder, an installed driver, or sumo."),
     ],
-    scene: Annotated[
-        Path,
-        typer.Option(
-            metavar="DIR", help="The scene of the games, a folder or a name.  [default: merge]", show_default=False
-        ),
-    ] = Path("merge"),
+    scene: Annotated[Path, typer.Option(metavar="DIR", help="The scene of the games, a folder or a name.")] = Path(
+        "merge"
+    ),
     games: Annotated[int, typer.Option(min=2, max=1000, metavar="N", help="Games to play.")] = 3,
     allow_code: AllowCode = False,
 ) -> None:
@@ -221,16 +197,9 @@ def check_driver(
 @policy_app.command("export")
 def export_policy(
     driver: Annotated[
-        str,
-        typer.Argument(
-            metavar="DRIVER",
-            help="A policy's folder, or a driver document of kind stable_baselines3.",
-            show_default=False,
-        ),
+        str, typer.Argument(metavar="DRIVER", help="A policy's folder, or a driver document of kind stable_baselines3.")
     ],
-    out: Annotated[
-        Path, typer.Argument(metavar="FILE", help="The new file: .onnx, or .pt for TorchScript.", show_default=False)
-    ],
+    out: Annotated[Path, typer.Argument(metavar="FILE", help="The new file: .onnx, or .pt for TorchScript.")],
     allow_code: AllowCode = False,
 ) -> None:
     """Write a policy as one network, which drives without the library that trained it.

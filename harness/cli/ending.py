@@ -15,19 +15,22 @@ if TYPE_CHECKING:
 
     from harness.campaign.results.kept_results import RunResult
 
-_STYLES = {"harm": "red", "mended": "green", "open": "yellow"}
+_STYLES = {"harm": "bold red", "mended": "bold green", "open": "bold yellow"}
 
 
-def show_result(outcome: RunResult, run: Path, console: Console, as_json: bool = False) -> None:
-    """Say what has come out. As JSON: the content of `result.json`, the run folder and the report."""
-    for training in outcome.did_not_learn:
-        console.print(_did_not_learn(training), style="bold yellow", highlight=False, markup=False)
+def end_with(outcome: RunResult, run: Path, console: Console, as_json: bool = False) -> None:
+    """Say what has come out, and end the command with the exit code of the run.
+
+    What failed is said also where the console is quiet. As JSON: the content of `result.json`, the run folder and the
+    report.
+    """
+    did_not_learn = [f"Did not learn: {training}" for training in outcome.did_not_learn]
+    print_plain(did_not_learn, console, "bold yellow")
     for verdict in outcome.verdicts:
         label = f"{verdict.persona}, {verdict.question}: {verdict.label}"
-        console.print(label, style=f"bold {_STYLES[verdict.tone]}", highlight=False, markup=False)
-        for sentence in (verdict.sentence, *verdict.causes, verdict.speed):
-            if sentence:
-                console.print(f"  {sentence}", highlight=False, markup=False)
+        console.print(label, style=_STYLES[verdict.tone], highlight=False, markup=False)
+        for sentence in filter(None, (verdict.sentence, *verdict.causes, verdict.speed)):
+            console.print(f"  {sentence}", highlight=False, markup=False)
     for bound in outcome.acceptance:
         print_plain([bound.text], console, "green" if bound.passed else "bold red")
     print_plain([f"Report: {run / 'report.html'}"], console)
@@ -36,13 +39,9 @@ def show_result(outcome: RunResult, run: Path, console: Console, as_json: bool =
 
         result = json.loads((run / RESULT).read_text(encoding="utf-8"))
         print_json({"run": str(run), "report": str(run / "report.html"), **result})
-
-
-def exit_as(outcome: RunResult, console: Console) -> None:
-    """Say what failed, also where the console is quiet, and end the command with the exit code of the run."""
     if console.quiet:
         console.quiet = False
-        print_plain(map(_did_not_learn, outcome.did_not_learn), console)
+        print_plain(did_not_learn, console)
         print_plain((bound.text for bound in outcome.acceptance if not bound.passed), console)
     if outcome.failed_stages:
         print_plain([f"Not finished: {', '.join(outcome.failed_stages)}"], console, "red")
@@ -51,7 +50,3 @@ def exit_as(outcome: RunResult, console: Console) -> None:
         print_plain([count, *(f"  {each}" for each in outcome.error_reasons)], console, "red")
     if outcome.exit_code:
         raise typer.Exit(outcome.exit_code)
-
-
-def _did_not_learn(training: str) -> str:
-    return f"Did not learn: {training}"

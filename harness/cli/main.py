@@ -5,21 +5,26 @@ from __future__ import annotations
 import errno
 import signal
 import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from harness.cli import messages
 from harness.cli.documents import check, check_driver, columns, new, persona_app, policy_app, schema
-from harness.cli.ending import exit_as, show_result
+from harness.cli.ending import end_with
 from harness.cli.output import AllowCode, AsJson, Quiet, RunPath, Verbose, output, print_plain, print_version
 from harness.cli.pinning import minimise, regression
 from harness.cli.runs import compare, export, replay, serve
 from harness.cli.scenes import scene_app
-from harness.cli.workers import Ray, started_on
 from harness.errors import FAILED, NOT_ACCEPTED, USAGE_ERROR
 from harness.shipped_documents import document_at
+
+if TYPE_CHECKING:
+    from harness.campaign.execution.run_stages import StartWorkers
 
 MACHINE_ERRORS = (
     errno.ENOSPC,
@@ -54,10 +59,7 @@ and reports the differences with paired statistics.
 )
 
 CampaignFile = Annotated[
-    Path,
-    typer.Argument(
-        metavar="FILE", help="The TOML file of the campaign, or the name of a shipped campaign.", show_default=False
-    ),
+    Path, typer.Argument(metavar="FILE", help="The TOML file of the campaign, or the name of a shipped campaign.")
 ]
 QuickRun = Annotated[
     bool,
@@ -67,22 +69,24 @@ QuickRun = Annotated[
     ),
 ]
 RunOut = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]", show_default=False
-    ),
+    Path | None, typer.Option(metavar="DIR", help="The run folder.  [default: reports/NAME, or reports/NAME-quick]")
 ]
 KeepGoing = Annotated[
     bool,
     typer.Option(
-        "--keep-going",
-        help="Play all games of an arm, even if its first ten can't be played for one reason.",
+        "--keep-going", help="Play all games of an arm, even if its first ten can't be played for one reason."
     ),
 ]
 Jobs = Annotated[
-    int | None,
+    int | None, typer.Option(min=1, metavar="N", help="Number of stages run in parallel.  [default: one per core]")
+]
+
+Ray = Annotated[
+    str | None,
     typer.Option(
-        min=1, metavar="N", help="Number of stages run in parallel.  [default: one per core]", show_default=False
+        metavar="ADDRESS",
+        help="Run the stages on a Ray cluster: **local** (started on this machine for the run), **auto** (the one that "
+        "runs on this machine) or HOST:PORT. docs/scaling.md describes it.  [default: processes of this machine]",
     ),
 ]
 
@@ -129,13 +133,12 @@ def campaign(
             console.print(messages.NOTHING_TO_SHORTEN)
         _handle_termination_signals()
         try:
-            with started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
+            with _started_on(ray, jobs, lambda line: print_plain([line], console)) as start_workers:
                 outcome = run_campaign(opened, folder, start_workers, console, keep_going=keep_going)
         except KeyboardInterrupt as interrupt:
             console.print(messages.INTERRUPTED)
-            raise typer.Exit(interrupt.code if isinstance(interrupt, _Terminated) else INTERRUPTED) from None
-        show_result(outcome, folder.path, console, as_json)
-        exit_as(outcome, console)
+            raise typer.Exit(*(interrupt.args or [INTERRUPTED])) from None
+        end_with(outcome, folder.path, console, as_json)
 
 
 @app.command()
@@ -164,37 +167,38 @@ def report(run: RunPath, as_json: AsJson = False, quiet: Quiet = False, verbose:
         folder.manifest()
         with folder.held():
             outcome = write_results(folder, console)
-        show_result(outcome, run, console, as_json)
-        exit_as(outcome, console)
+        end_with(outcome, run, console, as_json)
 
 
-app.command()(replay)
-app.command()(export)
-app.command()(serve)
-app.command()(compare)
-app.command()(new)
-app.command()(check)
-app.command("check-driver")(check_driver)
-app.command()(minimise)
-app.command()(regression)
-app.add_typer(persona_app, name="persona")
-app.add_typer(policy_app, name="policy")
-app.add_typer(scene_app, name="scene")
-app.command()(schema)
-app.command()(columns)
+for command in (replay, export, serve, compare, new, check, check_driver, minimise, regression, schema, columns):
+    app.command()(command)
+for name, group in (("persona", persona_app), ("policy", policy_app), ("scene", scene_app)):
+    app.add_typer(group, name=name)
 
 
-class _Terminated(KeyboardInterrupt):
-    """SIGTERM or SIGHUP: the command ends as after Ctrl-C, with another exit code."""
+@contextmanager
+def _started_on(ray: str | None, jobs: int | None, warn: Callable[[str], None]) -> Iterator[StartWorkers]:
+    """What carries stages out: processes of this machine, or a Ray cluster, which is connected during the block.
 
-    def __init__(self, number: int) -> None:
-        super().__init__()
-        self.code = 128 + number
+    Raises UsageError where there is no such cluster.
+    """
+    from harness.campaign.execution.worker_pool import WorkerPool, cores
+
+    if ray is None:
+        yield partial(WorkerPool, jobs=jobs or cores())
+        return
+    from harness.campaign.execution.ray_cluster import ray_cluster
+    from harness.campaign.execution.ray_workers import RayWorkers
+
+    with ray_cluster(ray, jobs) as cluster:
+        yield partial(RayWorkers, ray=cluster, jobs=jobs, warn=warn)
 
 
 def _handle_termination_signals() -> None:
+    """Let SIGTERM and SIGHUP end the command as Ctrl-C does, with an exit code of its own as the exception's value."""
+
     def terminate(number: int, frame: object) -> NoReturn:
-        raise _Terminated(number)
+        raise KeyboardInterrupt(128 + number)
 
     for name in ("SIGTERM", "SIGHUP"):  # a signal that nohup ignores stays ignored
         if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_DFL:
@@ -218,10 +222,10 @@ def main() -> None:
         _fail(f"{type(error).__name__}: {error}", FAILED)
     except Exception as error:
         if is_of_memory(error):
-            _fail(messages.out_of_memory(error), FAILED)
+            _fail(f"the machine is short of memory: {error or 'none is left'}; finished work is kept", FAILED)
         if not isinstance(error, OSError) or error.errno not in MACHINE_ERRORS:
             raise
-        _fail(messages.machine_error(error), FAILED)
+        _fail(f"{error.filename or 'the run folder'}: {error.strerror}; finished work is kept", FAILED)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 NOTHING_TO_SHORTEN = "Nothing to shorten: the players are already trained. All games are played."
 INTERRUPTED = "Interrupted. Finished work is kept: run the same command again to continue."
 NOTHING_TO_TUNE = "It has nothing to train or to tune: the campaign has rounds 0 and 1 only."
-_KEPT = "finished work is kept"
 
 
 def reading(file: Path) -> str:
@@ -31,20 +30,8 @@ def no_folder(folder: Path) -> tuple[str, str]:
     return f"there is no folder {folder}", "create it, or name another file"
 
 
-def out_of_memory(error: BaseException) -> str:
-    return f"the machine is short of memory: {error or 'none is left'}; {_KEPT}"
-
-
-def machine_error(error: OSError) -> str:
-    return f"{error.filename or 'the run folder'}: {error.strerror}; {_KEPT}"
-
-
 def rows_left_out(number: int, what: str) -> str:
     return f"{number} more {what} are not listed: choose some with --near EDGE and --within M, or give a larger --rows"
-
-
-def in_order(file: Path) -> str:
-    return f"{file} is in order."
 
 
 def scene_lines(scene: OpenScene) -> Iterator[str]:
@@ -61,14 +48,14 @@ def scene_lines(scene: OpenScene) -> Iterator[str]:
 
 def ego(campaign: OpenCampaign) -> str:
     """The external driver of the ego, and its round 2."""
-    if campaign.ego_driver is None:
-        return f"The ego: SUMO's own models. {NOTHING_TO_TUNE}"
-    if not campaign.tunable:
-        return f"The ego: {campaign.ego_driver.in_words}. {NOTHING_TO_TUNE}"
+    driver = campaign.ego_driver
+    if driver is None or not campaign.tunable:
+        words = "SUMO's own models" if driver is None else driver.in_words
+        return f"The ego: {words}. {NOTHING_TO_TUNE}"
     search = campaign.document.reconfiguration
-    ranges = ", ".join(f"{key} from {low:g} to {high:g}" for key, low, high in campaign.ego_driver.searched)
+    ranges = ", ".join(f"{key} from {low:g} to {high:g}" for key, low, high in driver.searched)
     round_2 = f"Round 2 searches its parameters in {search.trials} trials of {search.games} games: {ranges}."
-    return f"The ego: {campaign.ego_driver.in_words}. {round_2}"
+    return f"The ego: {driver.in_words}. {round_2}"
 
 
 def work(campaign: OpenCampaign, stages: Sequence[Stage]) -> str:

@@ -52,15 +52,15 @@ def plan_priority(plan: GamePlan) -> str:
     candidate = plan.candidate
     if candidate.kind is CandidateKind.ZEBRA:
         return "the person"
-    rule = {Priority.FIRST: "the ego"}.get(candidate.priority, _RULES[candidate.priority])
-    return f"signals, then {rule}" if candidate.with_signals else rule
+    first_is = {Priority.FIRST: "the ego"}
+    return _with_signals(first_is.get(candidate.priority, _RULES[candidate.priority]), candidate.with_signals)
 
 
 def conflict_words(conflict: ListedConflict) -> str:
-    """A conflict in one sentence."""
+    """The ways and the priority of a conflict."""
     verb = "merges with" if conflict.merging else "crosses"
     ways = f"{_way(conflict.first)} {verb} {_way(conflict.second)}"
-    return f"conflict {conflict.number}: {ways}; priority: {_priority(conflict)}"
+    return f"{ways}; priority: {_priority(conflict)}"
 
 
 def _way(lanes: tuple[str, str]) -> str:
@@ -68,8 +68,11 @@ def _way(lanes: tuple[str, str]) -> str:
 
 
 def _priority(conflict: ListedConflict) -> str:
-    rule = _RULES[conflict.priority]
-    return f"signals, then {rule}" if conflict.with_signals else rule
+    return _with_signals(_RULES[conflict.priority], conflict.with_signals)
+
+
+def _with_signals(rule: str, signals: bool) -> str:
+    return f"signals, then {rule}" if signals else rule
 
 
 def _table(*columns: str) -> Table:

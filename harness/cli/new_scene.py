@@ -24,16 +24,13 @@ _ROWS = 40
 
 
 def new_scene(
-    name: Annotated[
-        str, typer.Argument(metavar="NAME", help="The name of the scene and of its campaign.", show_default=False)
-    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="The name of the scene and of its campaign.")],
     source: Annotated[
         Path,
         typer.Option(
             "--from",
             metavar="FILE",
             help="A map: .net.xml of SUMO, .osm of OpenStreetMap or .xodr of OpenDRIVE; each may be compressed (.gz).",
-            show_default=False,
         ),
     ],
     conflict: Annotated[
@@ -41,19 +38,15 @@ def new_scene(
         typer.Option(
             metavar="K",
             help="Make the scene of this conflict.  [default: the first one without traffic lights, if there is one]",
-            show_default=False,
         ),
     ] = None,
     every: Annotated[
         bool, typer.Option("--all", help="Make a scene of each conflict that is listed: NAME_1, NAME_2 and so on.")
     ] = False,
     only_list: Annotated[bool, typer.Option("--list", help="List the conflicts, and make no scene.")] = False,
-    kind: Annotated[
-        str | None, typer.Option(metavar="KIND", help="Only conflicts of this kind.", show_default=False)
-    ] = None,
+    kind: Annotated[str | None, typer.Option(metavar="KIND", help="Only conflicts of this kind.")] = None,
     near: Annotated[
-        str | None,
-        typer.Option(metavar="EDGE", help="Only conflicts at junctions near this edge.", show_default=False),
+        str | None, typer.Option(metavar="EDGE", help="Only conflicts at junctions near this edge.")
     ] = None,
     within: Annotated[float, typer.Option(min=0.0, metavar="M", help="Distance in metres that is near.")] = 100.0,
     rows: Annotated[int, typer.Option(min=1, metavar="N", help="Most conflicts to list.")] = _ROWS,
@@ -61,10 +54,7 @@ def new_scene(
         bool, typer.Option("--left-hand", help="Traffic in the OpenStreetMap file keeps to the left.")
     ] = False,
     html: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="Also write a page that draws the map with the conflicts.", show_default=False
-        ),
+        Path | None, typer.Option(metavar="FILE", help="Also write a page that draws the map with the conflicts.")
     ] = None,
     out: Annotated[
         Path, typer.Option(metavar="DIR", help="Folder that gets networks/NAME and campaigns/NAME.toml.")
@@ -87,7 +77,7 @@ def new_scene(
         with console.status(messages.reading(source)):
             opened = open_map(source, Path(folder), left_hand=left_hand)
         plans = _wanted(opened, kind, near, within)
-        chosen = {name: _numbered(opened, conflict) if conflict is not None else _first(plans)}
+        chosen = {name: _numbered(opened, conflict, plans)}
         if every:
             chosen = {f"{name}_{plan.number}": plan for plan in plans}
             check_new(name, [] if only_list else list(chosen), out)
@@ -113,16 +103,14 @@ def _wanted(opened: OpenMap, kind: str | None, near: str | None, within_m: float
     return [plan for plan in plans if plan.candidate.kind.value == kind]
 
 
-def _numbered(opened: OpenMap, number: int) -> GamePlan:
+def _numbered(opened: OpenMap, number: int | None, plans: Sequence[GamePlan]) -> GamePlan:
+    """The plan of a number; without one, the first of `plans` without signals, which take long to learn, if any."""
+    if number is None:
+        return next((plan for plan in plans if not plan.candidate.with_signals), plans[0])
     if not 1 <= number <= len(opened.plans):
         remedy = f"choose one from 1 to {len(opened.plans)}: --list lists them"
         raise UsageError.of("--conflict", str(number), "there is no conflict of this number", remedy)
     return opened.plans[number - 1]
-
-
-def _first(plans: Sequence[GamePlan]) -> GamePlan:
-    """The first one without signals, which take long to learn, if there is one."""
-    return next((plan for plan in plans if not plan.candidate.with_signals), plans[0])
 
 
 def _show(opened: OpenMap, plans: Sequence[GamePlan], console: Console) -> None:
@@ -136,16 +124,15 @@ def _show(opened: OpenMap, plans: Sequence[GamePlan], console: Console) -> None:
 
 
 def _write_page(opened: OpenMap, plans: Sequence[GamePlan], file: Path) -> None:
-    from harness.cli.net_drawing import map_drawing
+    from harness.cli.net_drawing import drawing_of
     from harness.cli.net_tables import plan_priority
     from harness.reports.net_page import write_net_page
 
     places = []
     for plan in plans:
-        kind, priority = plan.candidate.kind.value, plan_priority(plan)
-        text = f"conflict {plan.number}: {kind}, {opened.place_of(plan)}; priority: {priority}"
+        text = f"{plan.candidate.kind.value}, {opened.place_of(plan)}; priority: {plan_priority(plan)}"
         places.append((plan.number, plan.candidate.place, text))
-    write_net_page(map_drawing(opened.source.name, *opened.listed(), places), file)
+    write_net_page(drawing_of(opened.source.name, *opened.listed(), places), file)
 
 
 def _write(opened: OpenMap, chosen: dict[str, GamePlan], out: Path, console: Console) -> None:

@@ -7,7 +7,8 @@ import json
 import logging
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -19,9 +20,7 @@ from harness.version import __version__
 if TYPE_CHECKING:
     from rich.console import Console
 
-RunPath = Annotated[
-    Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.", show_default=False)
-]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="A run folder, such as reports/merge.")]
 AllowCode = Annotated[
     bool,
     typer.Option(
@@ -31,8 +30,7 @@ AllowCode = Annotated[
     ),
 ]
 AsJson = Annotated[
-    bool,
-    typer.Option("--json", help="Print the result as one JSON object; what else there is to say goes to stderr."),
+    bool, typer.Option("--json", help="Print the result as one JSON object; what else there is to say goes to stderr.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only what failed.")]
 Verbose = Annotated[
@@ -50,10 +48,15 @@ def output(as_json: bool, quiet: bool = False, verbose: bool = False) -> Iterato
 
     console = Console(stderr=as_json, quiet=quiet)
     console.soft_wrap = not console.is_terminal  # a file is searched and compared by lines
-    with _problems_as_json(as_json), _log_shown(verbose, console):
+    try:
         if quiet and verbose:
             raise UsageError.of("--quiet", "--verbose", "are opposites", "leave one of them out")
-        yield console
+        with _log_shown(console) if verbose else nullcontext():
+            yield console
+    except UsageError as error:
+        if as_json:
+            print_json({"exit_code": USAGE_ERROR, "problems": [asdict(problem) for problem in error.problems]})
+        raise
 
 
 def console_of_any_encoding() -> Console:
@@ -84,29 +87,13 @@ def print_json(content: Any) -> None:
 
 
 @contextmanager
-def _problems_as_json(as_json: bool) -> Iterator[None]:
-    """Where JSON is asked for, print the problems of a usage error as JSON as well."""
-    try:
-        yield
-    except UsageError as error:
-        if as_json:
-            names = ("file", "key", "message", "remedy")
-            problems = [{name: getattr(problem, name) for name in names} for problem in error.problems]
-            print_json({"exit_code": USAGE_ERROR, "problems": problems})
-        raise
-
-
-@contextmanager
-def _log_shown(verbose: bool, console: Console) -> Iterator[None]:
+def _log_shown(console: Console) -> Iterator[None]:
     """Print what is logged of a run, with details, above the bars of a console."""
-    if not verbose:
-        yield
-        return
     from harness.campaign.storage.run_log import LOGGER, RunLogFormatter
 
     class Shown(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            console.print(self.format(record), style="dim", highlight=False, markup=False, soft_wrap=True)
+            print_plain([self.format(record)], console, "dim")
 
     handler, level = Shown(), LOGGER.level
     handler.setFormatter(RunLogFormatter())

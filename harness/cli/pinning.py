@@ -26,31 +26,20 @@ _LEAST_SHOWN = 0.005
 
 def minimise(
     run: RunPath,
-    arm: Annotated[
-        str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.", show_default=False)
-    ] = None,
+    arm: Annotated[str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.")] = None,
     episode: Annotated[
-        int | None, typer.Argument(metavar="EPISODE", help="The number of a game the ego failed.", show_default=False)
+        int | None, typer.Argument(metavar="EPISODE", help="The number of a game the ego failed.")
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="The training seed.  [default: the first of the campaign]", show_default=False)
-    ] = None,
+    seed: Annotated[int | None, typer.Option(help="The training seed.  [default: the first of the campaign]")] = None,
     all_failures: Annotated[
         bool, typer.Option("--all", help="One game for each kind of failure of each arm, or of ARM.")
     ] = False,
-    out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="The folder.  [default: RUN/pinned]", show_default=False)
-    ] = None,
-    ego: Annotated[
-        str | None,
-        typer.Option(metavar="DRIVER", help="The campaign's ego, if no policy of it.", show_default=False),
-    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="The folder.  [default: RUN/pinned]")] = None,
+    ego: Annotated[str | None, typer.Option(metavar="DRIVER", help="The campaign's ego, if no policy of it.")] = None,
     policies: Annotated[
         Path | None,
         typer.Option(
-            metavar="DIR",
-            help="The folder of policies that the campaign read.  [default: found by their checksums]",
-            show_default=False,
+            metavar="DIR", help="The folder of policies that the campaign read.  [default: found by their checksums]"
         ),
     ] = None,
     allow_code: AllowCode = False,
@@ -91,18 +80,14 @@ def minimise(
 
 
 def regression(
-    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A folder of pinned games.", show_default=False)],
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A folder of pinned games.")],
     ego: Annotated[
         str,
         typer.Option(
-            metavar="DRIVER",
-            help="The ego: the folder of a policy, a driver document, an installed driver, or sumo.",
-            show_default=False,
+            metavar="DRIVER", help="The ego: the folder of a policy, a driver document, an installed driver, or sumo."
         ),
     ],
-    junit: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Also write the results as JUnit XML.", show_default=False)
-    ] = None,
+    junit: Annotated[Path | None, typer.Option(metavar="FILE", help="Also write the results as JUnit XML.")] = None,
     allow_code: AllowCode = False,
 ) -> None:
     """Play pinned games against an ego, like a test suite: a game passes if the ego reaches its goal.

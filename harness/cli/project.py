@@ -5,12 +5,9 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from pydantic import TypeAdapter, ValidationError
-
 from harness.cli import messages
+from harness.cli.new_documents import check_name, rendered
 from harness.cli.persona_template import create_persona
-from harness.config.campaign import CampaignName
 from harness.errors import UsageError
 from harness.files import write_atomically
 from harness.shipped_documents import shipped
@@ -27,11 +24,7 @@ def create_project(folder: Path) -> list[Path]:
     campaign, or it can't be written.
     """
     name = folder.absolute().name
-    try:
-        TypeAdapter(CampaignName).validate_python(name)
-    except ValidationError:
-        message = "the folder's name is that of the campaign, too: letters, digits, _ and -, a letter first, at most 40"
-        raise UsageError.of(folder, "", message, "name another folder") from None
+    check_name(name, "campaign")
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise UsageError.of(folder, "", "is there already, and not empty", "name a new folder")
     if not folder.absolute().parent.is_dir():
@@ -40,11 +33,8 @@ def create_project(folder: Path) -> list[Path]:
         (folder / "personas").mkdir(parents=True)
         shutil.copytree(shipped("networks") / SCENE, folder / "networks" / SCENE)
         persona = create_persona(PERSONA, folder / "personas" / f"{PERSONA}.toml")
-        environment = Environment(
-            loader=PackageLoader("harness", "cli"), undefined=StrictUndefined, keep_trailing_newline=True
-        )
         for file, template in _TEMPLATES.items():
-            text = environment.get_template(template).render(folder=name, persona=PERSONA, scene=SCENE)
+            text = rendered(template, folder=name, persona=PERSONA, scene=SCENE)
             write_atomically(folder / file, text.encode())
     except OSError as error:
         raise UsageError.of(folder, "", *messages.cannot_write(error)) from None

@@ -16,15 +16,9 @@ _STYLES = {"harm": "red", "mended": "green", "open": "default"}
 
 def replay(
     run: RunPath,
-    arm: Annotated[
-        str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.", show_default=False)
-    ] = None,
-    episode: Annotated[
-        int | None, typer.Argument(metavar="EPISODE", help="The number of the episode.", show_default=False)
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="The training seed.  [default: the first of the campaign]", show_default=False)
-    ] = None,
+    arm: Annotated[str | None, typer.Argument(metavar="ARM", help="The arm, such as naive_vs_speedy.")] = None,
+    episode: Annotated[int | None, typer.Argument(metavar="EPISODE", help="The number of the episode.")] = None,
+    seed: Annotated[int | None, typer.Option(help="The training seed.  [default: the first of the campaign]")] = None,
     list_games: Annotated[bool, typer.Option("--list", help="List the recorded games, worst first.")] = False,
     outcome: Annotated[
         str | None,
@@ -32,7 +26,6 @@ def replay(
             metavar="OUTCOME",
             help="List only games of this outcome of the ego: collision, rail, timeout, goal, or failure for the "
             "first three.",
-            show_default=False,
         ),
     ] = None,
     rows: Annotated[int, typer.Option(min=1, metavar="N", help="The most games to list.")] = 40,
@@ -40,10 +33,7 @@ def replay(
     film_file: Annotated[
         Path | None,
         typer.Option(
-            "--film",
-            metavar="FILE",
-            help="Write the game as a .gif or .mp4 film instead; this needs no screen.",
-            show_default=False,
+            "--film", metavar="FILE", help="Write the game as a .gif or .mp4 film instead; this needs no screen."
         ),
     ] = None,
     as_json: AsJson = False,
@@ -81,7 +71,6 @@ def export(
             metavar="ARM EPISODE DIR",
             help="The arm, the number of the episode, and a new folder for the files. With --failures, ARM may be left "
             "out, and there is no EPISODE.",
-            show_default=False,
         ),
     ],
     failures: Annotated[bool, typer.Option("--failures", help="Export every game that is a failure.")] = False,
@@ -95,10 +84,7 @@ def export(
         bool, typer.Option("--csv", help="Write tables in the layout of highD: NN_tracks.csv and two more.")
     ] = False,
     seed: Annotated[
-        int | None,
-        typer.Option(
-            help="The training seed.  [default: the first of the campaign; with --failures, all]", show_default=False
-        ),
+        int | None, typer.Option(help="The training seed.  [default: the first of the campaign; with --failures, all]")
     ] = None,
 ) -> None:
     """Export recorded games for other programs. Without a format, OpenSCENARIO and OpenDRIVE are written.
@@ -169,17 +155,10 @@ def serve(
 
 
 def compare(
-    before: Annotated[
-        Path, typer.Argument(metavar="BEFORE", help="The run folder before the change.", show_default=False)
-    ],
-    after: Annotated[
-        Path, typer.Argument(metavar="AFTER", help="The run folder after the change.", show_default=False)
-    ],
+    before: Annotated[Path, typer.Argument(metavar="BEFORE", help="The run folder before the change.")],
+    after: Annotated[Path, typer.Argument(metavar="AFTER", help="The run folder after the change.")],
     out: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE", help="The page.  [default: compare.html in the second folder]", show_default=False
-        ),
+        Path | None, typer.Option(metavar="FILE", help="The page.  [default: compare.html in the second folder]")
     ] = None,
 ) -> None:
     """Compare two runs, game by game: failures, near misses and average speed of every arm that both have."""

@@ -3,18 +3,14 @@ complete before it gets its name."""
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
-from pydantic import TypeAdapter, ValidationError
-
 from harness.cli import messages
-from harness.config.scene import Name
+from harness.cli.new_documents import check_name, rendered
 from harness.errors import Problem, UsageError, plain
 from harness.files import make_folder, write_atomically
 from harness.maps.candidates import CandidateKind
@@ -47,20 +43,12 @@ _MEANINGS = {
 
 def check_new(name: str, names: Sequence[str], out: Path) -> None:
     """Raise UsageError if scenes and campaigns of these names can't be written to a folder."""
-    try:
-        TypeAdapter(Name).validate_python(name)
-    except ValidationError:
-        raise UsageError.of(
-            "NAME", name, "can't be the name of a scene", "use letters, digits and _, a letter first, at most 40"
-        ) from None
+    check_name(name, "scene")
     if not out.is_dir():
         raise UsageError.of("--out", str(out), *messages.no_folder(out))
     taken = [path for each in names for path in files_of(each, out) if os.path.lexists(path)]
     if taken:
-        message, remedy = (
-            "is there already, and nothing is overwritten",
-            "choose another NAME, or another folder with --out",
-        )
+        message, remedy = "is there already, and nothing is overwritten", "choose another NAME, or --out another folder"
         raise UsageError(Problem(str(path), "", message, remedy) for path in taken)
 
 
@@ -132,55 +120,27 @@ def _put(opened: OpenMap, ready: dict[str, tuple[Path, GamePlan]], out: Path) ->
 def _scene_files(name: str, plan: GamePlan, opened: OpenMap, *, is_part: bool) -> dict[str, str]:
     """The texts of scene.toml and of the route file of a plan of a map, by the files' names. `is_part`: the scene's net
     is a part of the map."""
-    values = {
-        "name": name,
-        "plan": plan,
-        "part_m": KEPT_M if is_part else None,
-        "time_limit_s": plan.time_limit_s(opened.reds_s),
-        "source": plain(opened.source.name),
-        "place": plain(opened.place_of(plan)),
-        "meaning": _MEANINGS[plan.candidate.kind],
-    }
-    return {
-        "scene.toml": _rendered("new_scene.toml.jinja", values),
-        f"{name}.rou.xml": _rendered("new_scene.rou.xml.jinja", values, in_xml=True),
-    }
+    scene = rendered(
+        "new_scene.toml.jinja",
+        name=name,
+        plan=plan,
+        part_m=KEPT_M if is_part else None,
+        time_limit_s=plan.time_limit_s(opened.reds_s),
+        source=plain(opened.source.name),
+        place=plain(opened.place_of(plan)),
+        meaning=_MEANINGS[plan.candidate.kind],
+    )
+    return {"scene.toml": scene, f"{name}.rou.xml": rendered("new_scene.rou.xml.jinja", in_xml=True, plan=plan)}
 
 
 def _campaign_text(name: str, plan: GamePlan) -> str:
     """A campaign on a scene with the shipped personas that suit its kind."""
     kind = plan.candidate.kind
-    values = {
-        "name": name,
-        "personas": _personas_for(plan),
-        "meaning": _MEANINGS[kind],
-        "ego_waits": kind in _EGO_WAITS,
-    }
-    return _rendered("new_scene_campaign.toml.jinja", values)
-
-
-def _personas_for(plan: GamePlan) -> Sequence[str]:
-    """The shipped personas that suit a game."""
-    signals = plan.candidate.kind is CandidateKind.CROSSING and plan.candidate.with_signals
-    return ("red_light_runner",) if signals else _PERSONAS.get(plan.candidate.kind, ("impatient",))
-
-
-def _rendered(template: str, values: Mapping[str, object], *, in_xml: bool = False) -> str:
-    environment = Environment(
-        loader=PackageLoader("harness", "cli"),
-        undefined=StrictUndefined,
-        keep_trailing_newline=True,
-        autoescape=in_xml,
-        trim_blocks=True,
+    signals = kind is CandidateKind.CROSSING and plan.candidate.with_signals
+    return rendered(
+        "new_scene_campaign.toml.jinja",
+        name=name,
+        personas=("red_light_runner",) if signals else _PERSONAS.get(kind, ("impatient",)),
+        meaning=_MEANINGS[kind],
+        ego_waits=kind in _EGO_WAITS,
     )
-    environment.filters["toml"] = _toml
-    return environment.get_template(template).render(values)
-
-
-def _toml(value: object) -> str:
-    """A value in TOML: a string, a number, or a list of them."""
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(float(str(value)))

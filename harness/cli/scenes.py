@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -12,11 +12,7 @@ from harness.cli.new_scene import new_scene
 from harness.cli.output import console_of_any_encoding, print_plain
 from harness.shipped_documents import document_at
 
-if TYPE_CHECKING:
-    from harness.road.scene.open_scene import OpenScene
-
 _ROWS = 100
-_STARTS = 60  # drawn for each player
 
 scene_app = typer.Typer(no_args_is_help=True, help="Make scenes from maps, and show nets and scenes.")
 scene_app.command("new")(new_scene)
@@ -29,20 +25,16 @@ def show_scene(
         typer.Argument(
             metavar="NET_OR_SCENE",
             help="A .net.xml or .net.xml.gz, a scene.toml or its folder, or the name of a shipped scene.",
-            show_default=False,
         ),
     ],
     near: Annotated[
-        str | None,
-        typer.Option(metavar="EDGE", help="Only lanes near this edge, the nearest first.", show_default=False),
+        str | None, typer.Option(metavar="EDGE", help="Only lanes near this edge, the nearest first.")
     ] = None,
     within: Annotated[float, typer.Option(min=0.0, metavar="M", help="Distance in metres that is near.")] = 100.0,
     rows: Annotated[int, typer.Option(min=1, metavar="N", help="Most lanes to list.")] = _ROWS,
     html: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Also write a page that draws the net to scale and opens offline.", show_default=False
-        ),
+        typer.Option(metavar="FILE", help="Also write a page that draws the net to scale and opens offline."),
     ] = None,
 ) -> None:
     """List the lanes of a net: id, length, speed limit, permissions, the junctions at both ends, and the edges to which
@@ -52,14 +44,16 @@ def show_scene(
     The page shows junctions, signals and the numbers of conflicts, too, and for a scene the players' routes, starts and
     goals.
     """
-    from harness.cli.net_tables import conflict_table, lane_table
+    from harness.cli.net_tables import conflict_table, conflict_words, lane_table
     from harness.maps.net_conflicts import listed_conflicts
     from harness.road.net.net_file import check_net
     from harness.road.net.net_listing import edges_near, listed_junctions, listed_lanes
     from harness.road.net.network import read_net
+    from harness.road.scene.open_scene import open_scene
 
     path = document_at(path, "networks")
-    scene = _scene_of(path)
+    folder = folder_of_scene(path)
+    scene = open_scene(folder) if folder is not None else None
     net_file = scene.net_file if scene is not None else path
     if scene is None:
         check_net(net_file)
@@ -80,7 +74,8 @@ def show_scene(
         from harness.reports.net_page import write_net_page
 
         title = scene.document.name if scene is not None else path.name
-        write_net_page(drawing_of(title, lanes, junctions, conflicts, scene, starts=_STARTS), html)
+        places = ((each.number, each.place, conflict_words(each)) for each in conflicts)
+        write_net_page(drawing_of(title, lanes, junctions, places, scene), html)
         print_plain([f"Page: {html}"], console)
 
 
@@ -91,7 +86,7 @@ def check_scene(folder: Path) -> list[str]:
 
     scene = open_scene(folder)
     check_loads(scene)
-    return [messages.in_order(folder), *messages.scene_lines(scene), *scene.warnings]
+    return [f"{folder} is in order.", *messages.scene_lines(scene), *scene.warnings]
 
 
 def folder_of_scene(path: Path) -> Path | None:
@@ -101,10 +96,3 @@ def folder_of_scene(path: Path) -> Path | None:
     if path.name == SCENE_FILE:
         return path.parent
     return path if path.is_dir() else None
-
-
-def _scene_of(path: Path) -> OpenScene | None:
-    from harness.road.scene.open_scene import open_scene
-
-    folder = folder_of_scene(path)
-    return open_scene(folder) if folder is not None else None

@@ -58,15 +58,6 @@ class Body:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SignalChange:
-    """From a time on, a traffic light has a state: a character of SUMO's for each of its links."""
-
-    light: str
-    time_s: float
-    state: str
-
-
-@dataclass(frozen=True, kw_only=True)
 class ExportedGame:
     """A recorded game: the players first, then other road users by the time of their appearance, then buildings."""
 
@@ -80,8 +71,9 @@ class ExportedGame:
     step_s: float
     end_s: float
     bodies: tuple[Body, ...]
-    signals: tuple[SignalChange, ...]
-    """By time; the first of each light is at 0 s."""
+    signals: Mapping[str, Sequence[tuple[float, str]]]
+    """Of each traffic light: the times (s) at which its state changes, the first at 0 s, and the new states, with a
+    character of SUMO's for each of its links."""
 
 
 def exported_game(
@@ -96,12 +88,6 @@ def exported_game(
     world = scene.world
     types = types_of_vehicles(trace, scene.route_files, scene.obstacles)
     wheelbases_m = dict(zip(world.roles, world.actuators.wheelbase_m.tolist(), strict=True))
-    changes = changes_of_signals(trace, world.step_s)
-    states = [
-        SignalChange(light=light, time_s=step * world.step_s, state=state)
-        for light, phases in changes.items()
-        for step, state in phases
-    ]
     end_s = float(trace["time_s"].max())
     bodies = [*_bodies(trace, types, wheelbases_m, world.roles), *_buildings(scene.obstacles.outlines, end_s)]
     return ExportedGame(
@@ -114,7 +100,7 @@ def exported_game(
         step_s=world.step_s,
         end_s=end_s,
         bodies=tuple(_with_unique_names(bodies)),
-        signals=tuple(sorted(states, key=lambda each: (each.time_s, each.light))),
+        signals=changes_of_signals(trace, world.step_s),
     )
 
 
@@ -156,23 +142,20 @@ def _pieces(rows: pd.DataFrame) -> Iterator[pd.DataFrame]:
 def _buildings(outlines: Sequence[FloatArray], end_s: float) -> Iterator[Body]:
     """The smallest rectangle around each building's outline [n, 2]."""
     for number, outline in enumerate(outlines):
-        corners = shapely.get_coordinates(shapely.oriented_envelope(shapely.MultiPoint(outline)))
-        if len(corners) < 4:  # a wall without thickness
-            corners = np.concatenate((outline[[0, -1]], outline[[-1, 0]]))
-        along, across = corners[1] - corners[0], corners[2] - corners[1]
-        x_m, y_m = corners[:4].mean(0) if len(corners) > 4 else corners[:2].mean(0)
+        rectangle = shapely.oriented_envelope(shapely.MultiPoint(outline))
+        along, *across = np.diff(shapely.get_coordinates(rectangle), axis=0)  # a wall without thickness is a line
         yield Body(
             name=f"building_{number}",
             original=f"building_{number}",
             kind=BUILDING,
             length_m=float(np.hypot(*along)),
-            width_m=max(float(np.hypot(*across)), 0.1),
+            width_m=max(float(np.hypot(*across[0])), 0.1) if across else 0.1,
             wheelbase_m=0.0,
             is_player=False,
             first_step=0,
             time_s=np.array([0.0, end_s]),
-            x_m=np.full(2, x_m),
-            y_m=np.full(2, y_m),
+            x_m=np.full(2, rectangle.centroid.x),
+            y_m=np.full(2, rectangle.centroid.y),
             heading_rad=np.full(2, np.arctan2(along[1], along[0])),
             speed_mps=np.zeros(2),
             acceleration_mps2=np.zeros(2),

@@ -8,24 +8,23 @@ NN_tracks.csv and so on   the layout of highD, with a number per game
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
+import pandas as pd
+
 from harness.errors import UsageError
 from harness.export.exported_game import ExportedGame
 from harness.export.highd import highd_tables
 from harness.export.lane_courses import LaneCourses
-from harness.export.opendrive import ROAD_FILE, RoadFile, road_file
+from harness.export.opendrive import ROAD_FILE, road_file
 from harness.road.scene.open_scene import OpenScene
 
-GAMES_FILE = "games.csv"
 _NEW = "name a new folder"
 
 
@@ -80,29 +79,18 @@ def write_games(
             (partial / ROAD_FILE).write_bytes(road.xml)
         rows = []
         for number, game in enumerate(games, start=1):
-            for name, content in _files(game, number, road=road, courses=courses, formats=formats).items():
+            files = highd_tables(game, number, courses) if courses is not None else {}
+            if formats.openscenario:
+                from harness.export.openscenario import scenario_file
+
+                files[f"{game.name}.xosc"] = scenario_file(game, road)
+            for name, content in files.items():
                 (partial / name).write_bytes(content)
             rows.append((number, game.name, game.arm, game.seed, game.episode, game.outcome))
             on_game(number)
-        table = io.StringIO()
-        writer = csv.writer(table, lineterminator="\n")
-        writer.writerows([("number", "name", "arm", "seed", "episode", "outcome"), *rows])
-        (partial / GAMES_FILE).write_text(table.getvalue(), encoding="utf-8")
+        table = pd.DataFrame(rows, columns=["number", "name", "arm", "seed", "episode", "outcome"])
+        table.to_csv(partial / "games.csv", index=False, lineterminator="\n")
     return len(rows)
-
-
-def _files(
-    game: ExportedGame, number: int, *, road: RoadFile | None, courses: LaneCourses | None, formats: Formats
-) -> Mapping[str, bytes]:
-    """Contents of a game's files, by name."""
-    files: dict[str, bytes] = {}
-    if formats.openscenario:
-        from harness.export.openscenario import scenario_file
-
-        files[f"{game.name}.xosc"] = scenario_file(game, road)
-    if courses is not None:
-        files |= highd_tables(game, number, courses)
-    return files
 
 
 @contextmanager
@@ -117,8 +105,7 @@ def _complete(folder: Path) -> Iterator[Path]:
             folder.rmdir()
         partial.rename(folder)
     except OSError as error:
-        raise UsageError.of(
-            folder, "", f"can't be written: {error.strerror}", "name a folder that you may write"
-        ) from None
+        remedy = "name a folder that you may write"
+        raise UsageError.of(folder, "", f"can't be written: {error.strerror}", remedy) from None
     finally:
         shutil.rmtree(partial, ignore_errors=True)

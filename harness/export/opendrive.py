@@ -11,7 +11,6 @@ those of the net for every program.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,21 +18,9 @@ from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
 from harness.errors import HarnessError
+from harness.replay.floating_car_data import xml_text
 from harness.road.xml.sumo_program import run_program
 from harness.road.xml.xml_file import parse_xml
-
-_NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-
-def xml_text(root: ElementTree.Element) -> bytes:
-    """A document, indented; the same content gives the same bytes. Characters that XML can't contain become `?`."""
-    for element in root.iter():
-        for name, value in element.attrib.items():
-            element.set(name, _NOT_XML.sub("?", value))
-    ElementTree.indent(root)
-    text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
-    return text + b"\n"
-
 
 ROAD_FILE = "scene.xodr"
 NO_DATE = "1970-01-01T00:00:00"

@@ -9,7 +9,7 @@ players have a controller, which is not active: it is the place of another progr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -18,11 +18,10 @@ from scenariogeneration import xosc
 
 from harness.export.exported_game import Body, ExportedGame
 from harness.export.kinds import PERSON, THING
-from harness.export.opendrive import NO_DATE, ROAD_FILE, RoadFile, xml_text
-from harness.game.arrays import FloatArray
+from harness.export.opendrive import NO_DATE, ROAD_FILE, RoadFile
+from harness.replay.floating_car_data import xml_text
+from harness.replay.scenery import phases_of
 
-AFTER_THE_GAME_S = 3600.0
-"""Duration of the last phase: phases start again when they have ended."""
 _LAMPS = {
     "r": "on;off;off",
     "u": "on;on;off",
@@ -32,31 +31,9 @@ _LAMPS = {
     "G": "off;off;on",
     "s": "on;off;off",
     "o": "off;flashing;off",
-    "O": "off;off;off",
 }
-
-
-def lamps(state: str) -> str:
-    """The modes of a signal's red, yellow and green lamps, by a link's state in SUMO."""
-    return _LAMPS.get(state, "off;off;off")
-
-
-def signal_phases(game: ExportedGame) -> dict[str, list[tuple[float, str]]]:
-    """Durations (s) and states of the phases of each light; the last phase lasts beyond the game."""
-    changes: dict[str, list[tuple[float, str]]] = {}
-    for change in game.signals:
-        changes.setdefault(change.light, []).append((change.time_s, change.state))
-    return {
-        light: [
-            (of_light[place + 1][0] - time_s if place + 1 < len(of_light) else AFTER_THE_GAME_S, state)
-            for place, (time_s, state) in enumerate(of_light)
-        ]
-        for light, of_light in changes.items()
-    }
-
-
-MINOR_VERSION = 2
-AUTHOR = "harness"
+"""The modes of a signal's red, yellow and green lamps, by a link's state in SUMO."""
+_OFF = "off;off;off"
 _LIMITS = {"max_speed": 100.0, "max_acceleration": 50.0, "max_deceleration": 50.0}
 """Of every vehicle: wide enough for any recorded motion."""
 _FOR_ESMINI = {"plineInterpolation": "segment"}
@@ -91,23 +68,16 @@ def scenario_file(game: ExportedGame, road: RoadFile | None) -> bytes:
     board.add_story(story)
     scenario = xosc.Scenario(
         game.title,
-        AUTHOR,
+        "harness",
         xosc.ParameterDeclarations(),
         entities,
         board,
         network,
         xosc.Catalog(),
-        osc_minor_version=MINOR_VERSION,
+        osc_minor_version=2,
         creation_date=datetime.fromisoformat(NO_DATE),
     )
     return xml_text(scenario.get_element())
-
-
-def reference_points(body: Body) -> FloatArray:
-    """[n, 2] the standard's reference point of a body in each sample."""
-    back_m = 0.5 * body.wheelbase_m
-    heading = body.heading_rad
-    return np.stack((body.x_m - back_m * np.cos(heading), body.y_m - back_m * np.sin(heading)), axis=-1)
 
 
 def _entity(body: Body) -> xosc.Vehicle | xosc.Pedestrian | xosc.MiscObject:
@@ -174,35 +144,40 @@ def _course(body: Body) -> xosc.FollowTrajectoryAction:
 
 def _positions(body: Body) -> list[xosc.WorldPosition]:
     """The place of the body's reference point in each sample."""
-    poses = np.column_stack((reference_points(body), body.heading_rad)).round(6).tolist()
-    return [xosc.WorldPosition(x_m, y_m, h=heading_rad) for x_m, y_m, heading_rad in poses]
+    back_m, heading_rad = 0.5 * body.wheelbase_m, body.heading_rad
+    places_m = body.x_m - back_m * np.cos(heading_rad), body.y_m - back_m * np.sin(heading_rad)
+    poses = np.column_stack((*places_m, heading_rad)).round(6).tolist()
+    return [xosc.WorldPosition(x_m, y_m, h=turned_rad) for x_m, y_m, turned_rad in poses]
 
 
 def _signal_events(game: ExportedGame, road: RoadFile) -> Iterator[xosc.Event]:
     """An event for each time in which a light's state changes, with an action for each signal of the light."""
-    for change in game.signals:
-        numbers = road.signals.get(change.light, {})
-        shown = [(numbers[link], each) for link, each in enumerate(change.state) if link in numbers]
-        if shown:
-            event = _event(f"{change.light} at {change.time_s:.2f} s", change.time_s)
-            for number, each in shown:
-                event.add_action(f"signal {number}", xosc.TrafficSignalStateAction(str(number), lamps(each)))
+    changes = [(time_s, light, state) for light, each in game.signals.items() for time_s, state in each]
+    for time_s, light, state in sorted(changes):
+        if shown := _shown(road.signals.get(light, {}), state):
+            event = _event(f"{light} at {time_s:.2f} s", time_s)
+            for number, lamps in shown:
+                event.add_action(f"signal {number}", xosc.TrafficSignalStateAction(str(number), lamps))
             yield event
 
 
 def _signal_controllers(game: ExportedGame, road: RoadFile) -> Iterator[xosc.TrafficSignalController]:
     """A controller for each light, with the same states as phases."""
-    for light, phases in signal_phases(game).items():
+    for light, changes in game.signals.items():
         numbers = road.signals.get(light, {})
         controller = xosc.TrafficSignalController(light)
-        for place, (duration_s, state) in enumerate(phases):
+        for place, (duration_s, state) in enumerate(phases_of(changes)):
             phase = xosc.Phase(f"{light}_{place}", round(duration_s, 6))
-            for link, number in sorted(numbers.items()):
-                if link < len(state):
-                    phase.add_signal_state(str(number), lamps(state[link]))
+            for number, lamps in _shown(numbers, state):
+                phase.add_signal_state(str(number), lamps)
             controller.add_phase(phase)
         if numbers:
             yield controller
+
+
+def _shown(numbers: Mapping[int, int], state: str) -> list[tuple[int, str]]:
+    """The numbers of a light's signals and the modes of their lamps, by the state of each link."""
+    return [(numbers[link], _LAMPS.get(each, _OFF)) for link, each in enumerate(state) if link in numbers]
 
 
 def _group(name: str, events: Sequence[xosc.Event], actors: Sequence[str] | None = None) -> xosc.ManeuverGroup:

@@ -3,14 +3,13 @@
 from harness.replay.bundle import write_replay
 from harness.replay.film import write_film
 from harness.replay.selection import choose_games, replay_name
-from harness.replay.sumo_gui import follow_in_sumo_gui, open_in_sumo_gui
+from harness.replay.sumo_gui import follow_in_sumo_gui
 from harness.replay.vehicles import names_in_pictures
 
 __all__ = [
     "choose_games",
     "follow_in_sumo_gui",
     "names_in_pictures",
-    "open_in_sumo_gui",
     "replay_name",
     "write_film",
     "write_replay",

@@ -12,7 +12,7 @@ import shapely
 from shapely.affinity import rotate, translate
 
 from harness.game.arrays import FloatArray
-from harness.replay.vehicles import DrawnVehicle
+from harness.replay.vehicles import DrawnVehicle, shown_name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,28 +41,17 @@ def contacts(trace: pd.DataFrame, types: Mapping[str, DrawnVehicle], rails: Sequ
             against = [shapely.LineString(rail) for rail in rails]
         place = _touching_point(bodies[first], against)
         time_s = float(rows["time_s"].iloc[0])
-        label = f"{outcome}{_players_in_it(rows['player'], several)} at {time_s:.1f} s"
+        whose = " of " + " and ".join(shown_name(player, {}) for player in sorted(rows["player"])) if several else ""
+        label = f"{outcome}{whose} at {time_s:.1f} s"
         touches.append(Contact(time_s=time_s, x_m=place.x, y_m=place.y, label=label))
     return touches
-
-
-def _players_in_it(players: pd.Series, several: bool) -> str:
-    """Which players touch something, in a game with several people."""
-    if not several:
-        return ""
-    return " of " + " and ".join(name.replace("non_ego", "non-ego").replace("_", " ") for name in sorted(players))
 
 
 def box_of(row: Any, drawn: DrawnVehicle) -> shapely.Polygon:
     """The body of a vehicle or obstacle at a row of the trace."""
     half_length, half_width = 0.5 * drawn.length_m, 0.5 * drawn.width_m
-    box = rotate(
-        shapely.box(-half_length, -half_width, half_length, half_width),
-        row.heading_rad,
-        (0, 0),
-        use_radians=True,
-    )
-    return translate(box, row.x_m, row.y_m)
+    box = shapely.box(-half_length, -half_width, half_length, half_width)
+    return translate(rotate(box, row.heading_rad, (0, 0), use_radians=True), row.x_m, row.y_m)
 
 
 def _touching_point(body: shapely.Polygon, against: Sequence[shapely.Geometry]) -> shapely.Point:

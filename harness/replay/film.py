@@ -77,54 +77,36 @@ def write_film(
     if problems := film_problems(file):
         raise UsageError(problems)
     shown = shown_steps(int(trace["step"].max()), step_length_s)
+    interval_s = step_length_s * shown.step
+    centres, width_m = _centres(trace), _width_m(folder)
+    whose = legend(trace, names)
+
+    def pictures(plain: Iterator[Image.Image]) -> Iterator[Image.Image]:
+        """The pictures with their captions and labels, the last of them several times."""
+        for done, (step, picture) in enumerate(zip(shown, plain, strict=True), 1):
+            labels = labels_at(trace[trace["step"] == step], names, centres[step], SIZE_PX[0] / width_m)
+            yield captioned(picture, f"{title}   {step * step_length_s:.1f} s\n{whose}", labels)
+            on_progress(done, len(shown))
+        yield from [picture] * round(HOLD_S / interval_s)
+
     scratch = file.with_name(f".{file.stem}.{os.getpid()}{file.suffix}")
     try:
         with contextlib.ExitStack() as stack:
             work = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="harness-film-")))
             xvfb = find_xvfb()
             display = stack.enter_context(virtual_screen(xvfb, _SCREEN_PX)) if xvfb else None
-            pictures = _pictures(
-                folder=folder,
-                trace=trace,
-                shown=shown,
-                step_length_s=step_length_s,
-                title=title,
-                names=names,
-                work=work,
-                display=display,
-            )
-            interval_s = step_length_s * shown.step
-            filmed = _filmed(pictures, len(shown), on_progress, round(HOLD_S / interval_s))
-            encode(filmed, scratch, SIZE_PX, interval_s)
+            plain = _photographed(folder, centres, width_m, shown, work=work, display=display)
+            encode(pictures(plain), scratch, SIZE_PX, interval_s)
         os.replace(scratch, file)
     finally:
         scratch.unlink(missing_ok=True)
     return len(shown)
 
 
-def _filmed(
-    pictures: Iterator[Image.Image], total: int, on_progress: Callable[[int, int], None], held: int
+def _photographed(
+    folder: Path, centres: FloatArray, width_m: float, shown: range, *, work: Path, display: str | None
 ) -> Iterator[Image.Image]:
-    """The pictures, the last of them `held` more times."""
-    for done, picture in enumerate(pictures, 1):
-        yield picture
-        on_progress(done, total)
-        if done == total:
-            yield from [picture] * held
-
-
-def _pictures(
-    *,
-    folder: Path,
-    trace: pd.DataFrame,
-    shown: range,
-    step_length_s: float,
-    title: str,
-    names: Mapping[str, str],
-    work: Path,
-    display: str | None,
-) -> Iterator[Image.Image]:
-    """The pictures of the shown steps, in order."""
+    """SUMO-GUI's pictures of the shown steps, in order, each around its centre [T + 1, 2] (m)."""
     program = find_sumo_gui()
     assert program is not None, "film_problems has checked for it"
     options = ["-c", str(folder / "scene.sumocfg"), "--quit-on-end"]  # also after a failure
@@ -135,10 +117,7 @@ def _pictures(
         content = (folder / name).read_text(encoding="utf-8")
         (work / name).write_text(re.sub(left_out, "", content), encoding="utf-8")
         options += [option, str(work / name)]
-    whose = legend(trace, names)
-    centres, picture = _centres(trace), work / "picture.png"
-    width_m = _width_m(folder)
-    height_m = width_m * SIZE_PX[1] / SIZE_PX[0]
+    picture, height_m = work / "picture.png", width_m * SIZE_PX[1] / SIZE_PX[0]
     environment = gui_environment(home_of(program), display)
     with steered_gui(program, options, environment, patient=False) as window:
         try:
@@ -151,8 +130,7 @@ def _pictures(
                     window.photograph_next(picture, SIZE_PX)
                 window.step()
                 if step in shown:
-                    labels = labels_at(trace[trace["step"] == step], names, centres[step], SIZE_PX[0] / width_m)
-                    yield captioned(_taken(picture), f"{title}   {step * step_length_s:.1f} s\n{whose}", labels)
+                    yield _taken(picture)
         except WindowClosed as error:
             raise HarnessError(f"the film could not be finished: {error}") from error
 

@@ -15,7 +15,8 @@ Requirements of the device for an exact replay (measured on SUMO 1.28):
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
@@ -30,6 +31,7 @@ from harness.game.arrays import BoolArray, FloatArray, IntArray
 from harness.replay.vehicles import DrawnVehicle
 from harness.road.xml.xml_file import parse_xml
 
+_NOT_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _NOT_FOR_VEHICLES = {"crossing", "walkingarea"}
 
 
@@ -112,12 +114,15 @@ def write_recording(
     after = [last.assign(step=last_step + more) for more in (1, 2)]
     written = pd.concat([first, records, *after]).sort_values(["step", "id"], kind="stable")
 
+    names = [name for name in written.columns if name != "step"]
+    columns = [written[name].tolist() for name in names]
+    texts = [column if isinstance(column[0], str) else [f"{x + 0.0:.6f}" for x in column] for column in columns]
     root = ElementTree.Element("fcd-export")
-    for step, rows in groupby(_rows(written), itemgetter(0)):
+    for step, rows in groupby(zip(written["step"].tolist(), *texts, strict=True), itemgetter(0)):
         # step 0 of the game is shown by SUMO's second step
         timestep = ElementTree.SubElement(root, "timestep", time=f"{(step + 1) * step_length_s:.3f}")
-        for _, attributes in rows:
-            ElementTree.SubElement(timestep, "vehicle", attributes)
+        for _, *values in rows:
+            ElementTree.SubElement(timestep, "vehicle", dict(zip(names, values, strict=True)))
     write_xml(root, file)
 
 
@@ -128,13 +133,8 @@ def _records(
     trace = trace.sort_values(["step", "player"], kind="stable")
     length = trace["player"].map(lambda player: types[player].length_m).to_numpy(float)
     heading = trace["heading_rad"].to_numpy(float)
-    front = np.stack(
-        (
-            trace["x_m"].to_numpy(float) + 0.5 * length * np.cos(heading),
-            trace["y_m"].to_numpy(float) + 0.5 * length * np.sin(heading),
-        ),
-        axis=-1,
-    )
+    ahead_m = 0.5 * length[:, None] * np.stack((np.cos(heading), np.sin(heading)), axis=-1)
+    front = trace[["x_m", "y_m"]].to_numpy(float) + ahead_m
     player, step = trace["player"], np.rint(trace["time_s"].to_numpy(float) / step_length_s).astype(int)
     lane = lanes.locate(front, ~player.duplicated().to_numpy())
     leaves = ~player.duplicated(keep="last").to_numpy() & (step < step.max())
@@ -154,16 +154,15 @@ def _records(
     )
 
 
-def _rows(frame: pd.DataFrame) -> Iterator[tuple[int, dict[str, str]]]:
-    """The step and the attributes of each row."""
-    names = [name for name in frame.columns if name != "step"]
-    columns = [frame[name].tolist() for name in names]
-    texts = [column if isinstance(column[0], str) else [f"{x + 0.0:.6f}" for x in column] for column in columns]
-    for step, *values in zip(frame["step"].tolist(), *texts, strict=True):
-        yield step, dict(zip(names, values, strict=True))
-
-
 def write_xml(root: ElementTree.Element, file: Path) -> None:
-    """Write an XML document, indented, with the same bytes for the same content."""
+    """Write an XML document."""
+    file.write_bytes(xml_text(root))
+
+
+def xml_text(root: ElementTree.Element) -> bytes:
+    """A document, indented; the same content gives the same bytes. Characters that XML can't contain become `?`."""
+    for element in root.iter():
+        element.attrib.update({name: _NOT_XML.sub("?", value) for name, value in element.attrib.items()})
     ElementTree.indent(root)
-    file.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n")
+    text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text + b"\n"

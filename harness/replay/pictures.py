@@ -103,18 +103,9 @@ def find_ffmpeg() -> str | None:
 def encode(pictures: Iterator[Image.Image], file: Path, size_px: tuple[int, int], interval_s: float) -> None:
     """Write pictures of one size as a film, `interval_s` apart. Raises HarnessError with ffmpeg's message."""
     if file.suffix.lower() == ".gif":
-        _gif(pictures, file, interval_s)
-    else:
-        _mp4(pictures, file, size_px, interval_s)
-
-
-def _gif(pictures: Iterator[Image.Image], file: Path, interval_s: float) -> None:
-    few = (picture.quantize(_COLOURS, dither=Image.Dither.NONE) for picture in pictures)
-    first = next(few)
-    first.save(file, save_all=True, append_images=few, duration=round(1000 * interval_s), loop=0)
-
-
-def _mp4(pictures: Iterator[Image.Image], file: Path, size_px: tuple[int, int], interval_s: float) -> None:
+        few = (picture.quantize(_COLOURS, dither=Image.Dither.NONE) for picture in pictures)
+        next(few).save(file, save_all=True, append_images=few, duration=round(1000 * interval_s), loop=0)
+        return
     program = find_ffmpeg()
     assert program is not None, "encoding_problem has checked for it"
     raw = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size_px[0]}x{size_px[1]}", "-r", f"{1.0 / interval_s:g}"]

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import groupby
 from typing import Any
 from xml.etree import ElementTree
 
@@ -24,7 +23,7 @@ from harness.replay.vehicles import OBSTACLE_COLOUR, DrawnVehicle
 
 PROGRAMME = "recorded"
 _AFTER_THE_GAME_S = 3600.0
-"""Added to the last phase: the programme must not start again before the replay ends."""
+"""Duration of the last phase: the programme must not start again before the replay ends."""
 _COLOURS = {"cone": "255,110,0", "closed_lane": "200,60,40,120", "debris": "120,90,60", "wall": "90,90,100"}
 _BUILDING_COLOUR, _RAIL_COLOUR, _CONTACT_COLOUR = "150,140,130", "24,26,32", "220,20,20"
 _RING_RADIUS_M = 4.0
@@ -97,45 +96,39 @@ def _text(name: str, text: str, x_m: float, y_m: float) -> ElementTree.Element:
 def programmes(trace: pd.DataFrame, step_length_s: float) -> list[ElementTree.Element]:
     """A `<tlLogic>` for each light of a game's trace, in the order of their ids; none for a trace without lights.
 
-    The column `signals` has the state of each light in each step, as `id=state` separated by spaces. A change in a
-    step is shown in SUMO's step of the same sample, which is a step later than in the game.
+    A change in a step is shown in SUMO's step of the same sample, which is a step later than in the game.
     """
-    changes = changes_of_signals(trace, step_length_s)
-    return [_programme(light, states, step_length_s) for light, states in changes.items()]
+    found = []
+    for light, changes in changes_of_signals(trace, step_length_s).items():
+        root = ElementTree.Element("tlLogic", id=light, type="static", programID=PROGRAMME, offset="0")
+        for place, (duration_s, state) in enumerate(phases_of(changes)):
+            before_s = step_length_s if place == 0 else 0.0  # the first phase also covers the step before the game
+            ElementTree.SubElement(root, "phase", duration=f"{before_s + duration_s:.3f}", state=state)
+        found.append(root)
+    return found
 
 
-def changes_of_signals(trace: pd.DataFrame, step_length_s: float) -> dict[str, list[tuple[int, str]]]:
-    """The steps in which each light's recorded state changed, with the new states; the first is its first state.
+def changes_of_signals(trace: pd.DataFrame, step_length_s: float) -> dict[str, list[tuple[float, str]]]:
+    """The times (s) at which each light's recorded state changed, with the new states; the first is its first state.
 
-    In the order of the lights' ids; empty for a trace without lights.
+    In the order of the lights' ids; empty for a trace without lights. The column `signals` has the state of each light
+    in each step, as `id=state` separated by spaces.
     """
     if "signals" not in trace:
         return {}
-    steps = trace.assign(step=np.rint(trace["time_s"].to_numpy(float) / step_length_s).astype(int))
-    steps = steps.drop_duplicates("step").sort_values("step")
-    states: dict[str, list[tuple[int, str]]] = {}
-    for step, text in zip(steps["step"].tolist(), steps["signals"].tolist(), strict=True):
-        for light, state in _states(str(text)):
-            states.setdefault(light, []).append((step, state))
-    return {
-        light: [next(phase) for _, phase in groupby(of_light, key=lambda each: each[1])]
-        for light, of_light in sorted(states.items())
-    }
+    changes: dict[str, list[tuple[float, str]]] = {}
+    steps = trace.drop_duplicates("time_s").sort_values("time_s")
+    for time_s, text in zip(np.rint(steps["time_s"] / step_length_s) * step_length_s, steps["signals"], strict=True):
+        for each in str(text).split():
+            light, separator, state = each.rpartition("=")  # an id may contain '='
+            if separator:
+                of_light = changes.setdefault(light, [])
+                if not of_light or of_light[-1][1] != state:
+                    of_light.append((float(time_s), state))
+    return dict(sorted(changes.items()))
 
 
-def _states(text: str) -> Iterator[tuple[str, str]]:
-    """Id and state of each light in a cell of the trace."""
-    for each in text.split():
-        light, separator, state = each.rpartition("=")  # an id may contain '='
-        if separator:
-            yield light, state
-
-
-def _programme(light: str, starts: list[tuple[int, str]], step_length_s: float) -> ElementTree.Element:
-    root = ElementTree.Element("tlLogic", id=light, type="static", programID=PROGRAMME, offset="0")
-    begin = 0.0  # of SUMO's clock: the first phase also covers the step before the game
-    for place, (_, state) in enumerate(starts):
-        end = (starts[place + 1][0] + 1) * step_length_s if place + 1 < len(starts) else begin + _AFTER_THE_GAME_S
-        ElementTree.SubElement(root, "phase", duration=f"{end - begin:.3f}", state=state)
-        begin = end
-    return root
+def phases_of(changes: Sequence[tuple[float, str]]) -> list[tuple[float, str]]:
+    """Durations (s) and states from the times of changes; the last phase lasts beyond the game."""
+    ends_s = [time_s for time_s, _ in changes[1:]] + [changes[-1][0] + _AFTER_THE_GAME_S]
+    return [(end_s - time_s, state) for (time_s, state), end_s in zip(changes, ends_s, strict=True)]

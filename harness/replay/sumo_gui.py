@@ -23,27 +23,26 @@ NO_SUMO_GUI = Problem("sumo-gui", "", "is not installed", "pip install eclipse-s
 _END = re.compile(r'<(end|step-length) value="([0-9.]+)"')
 
 
-def open_in_sumo_gui(folder: Path) -> subprocess.Popen[bytes]:
-    """Start SUMO-GUI on a replay folder and return without waiting for it.
-
-    Raises UsageError, with the remedy, when the folder is not a replay, when there is no SUMO-GUI or no screen.
-    """
-    program = _gui_for(folder)
-    return subprocess.Popen(
-        [str(program), "-c", str(folder / "scene.sumocfg")], env=os.environ | {"SUMO_HOME": str(home_of(program))}
-    )
-
-
 def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) -> None:
     """Play a replay folder in SUMO-GUI with the view following the ego; return when the user closes SUMO-GUI.
 
     `opened` is called when the window is open. SUMO-GUI has no setting for the followed vehicle in a file, only a
-    command over TraCI. Raises UsageError as `open_in_sumo_gui` does, SimulationError if SUMO-GUI can't start.
+    command over TraCI. Raises UsageError, with the remedy, when the folder is not a replay, when there is no SUMO-GUI
+    or no screen; SimulationError if SUMO-GUI can't start.
     """
     from harness.sumo.gui import WindowClosed, gui_environment, steered_gui
 
-    program = _gui_for(folder)
-    configuration = folder / "scene.sumocfg"
+    configuration, program, problems = folder / "scene.sumocfg", find_sumo_gui(), list[Problem]()
+    if not configuration.is_file():
+        remedy = "`harness replay RUN --list` lists the games"
+        problems.append(Problem(str(folder), "", "is not a replay: it has no scene.sumocfg", remedy))
+    if program is None:
+        problems.append(NO_SUMO_GUI)
+    remedy = f"film it: --film game.gif; or on a computer with a desktop and SUMO: sumo-gui -c {configuration}"
+    if no_screen := screen_problem(remedy):
+        problems.append(no_screen)
+    if problems or program is None:
+        raise UsageError(problems)
     options = dict(_END.findall(configuration.read_text(encoding="utf-8")))
     steps = round(float(options["end"]) / float(options["step-length"]))
     with steered_gui(program, ["-c", str(configuration)], gui_environment(home_of(program))) as window:
@@ -60,24 +59,6 @@ def follow_in_sumo_gui(folder: Path, opened: Callable[[], None] = lambda: None) 
             return
         window.release()
         window.process.wait()
-
-
-def _gui_for(folder: Path) -> Path:
-    """The SUMO-GUI program for a replay folder. Raises UsageError for everything that is missing."""
-    configuration = folder / "scene.sumocfg"
-    program = find_sumo_gui()
-    problems = []
-    if not configuration.is_file():
-        remedy = "`harness replay RUN --list` lists the games"
-        problems.append(Problem(str(folder), "", "is not a replay: it has no scene.sumocfg", remedy))
-    if program is None:
-        problems.append(NO_SUMO_GUI)
-    remedy = f"film it: --film game.gif; or on a computer with a desktop and SUMO: sumo-gui -c {configuration}"
-    if no_screen := screen_problem(remedy):
-        problems.append(no_screen)
-    if problems or program is None:
-        raise UsageError(problems)
-    return program
 
 
 def screen_problem(remedy: str) -> Problem | None:

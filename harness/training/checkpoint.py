@@ -11,15 +11,12 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from stable_baselines3 import PPO
 
-from harness.drivers.policy_file import Policy
 from harness.files import write_atomically
 
 
@@ -93,39 +90,3 @@ def _digest(tensors: Mapping[str, torch.Tensor], metadata: Mapping[str, str]) ->
         digest.update(f"\n{name} {tensor.dtype} {tuple(tensor.shape)}\n".encode())
         digest.update(tensor.detach().contiguous().numpy().tobytes())
     return digest.hexdigest()
-
-
-_LAYERS = {"actor": ("mlp_extractor.policy_net", "action_net"), "critic": ("mlp_extractor.value_net", "value_net")}
-
-
-def policy_of(model: PPO, card: dict[str, Any]) -> Policy:
-    """The learner's policy as arrays, with the metadata `card`."""
-    state = model.policy.state_dict()
-    tensors = {"log_deviation": state["log_std"].numpy().copy()}
-    for part, (hidden, output) in _LAYERS.items():
-        for k, layer in enumerate([*_hidden_layers(state, hidden), output]):
-            tensors[f"{part}.{k}.weight"] = state[f"{layer}.weight"].numpy().copy()
-            tensors[f"{part}.{k}.bias"] = state[f"{layer}.bias"].numpy().copy()
-    return Policy(tensors, card)
-
-
-def put_policy(model: PPO, policy: Policy, deviation: float) -> None:
-    """Copy a policy's networks into a learner, and set the standard deviation of its actions to `deviation`. Raises
-    ValueError if the networks do not fit."""
-    state = model.policy.state_dict()
-    for part, (hidden, output) in _LAYERS.items():
-        layers = [*_hidden_layers(state, hidden), output]
-        initial = policy.layers(part)
-        if len(initial) != len(layers):
-            raise ValueError(f"the initial {part} has {len(initial)} layers, this training's has {len(layers)}")
-        for layer, (weight, bias) in zip(layers, initial, strict=True):
-            if state[f"{layer}.weight"].shape != weight.shape:
-                raise ValueError(f"the initial {part} has other layer sizes than this training's network")
-            state[f"{layer}.weight"] = torch.from_numpy(weight.copy())
-            state[f"{layer}.bias"] = torch.from_numpy(bias.copy())
-    state["log_std"] = torch.full_like(state["log_std"], float(np.log(deviation)))
-    model.policy.load_state_dict(state)
-
-
-def _hidden_layers(state: dict[str, Any], prefix: str) -> list[str]:
-    return [name.removesuffix(".weight") for name in state if name.startswith(prefix) and name.endswith(".weight")]

@@ -6,7 +6,8 @@ but for rounding.
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any, cast
 
@@ -39,10 +40,23 @@ from harness.training.ppo_kernel import (
 )
 
 
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """One thread for BLAS: for matrices of this size more threads wait for each other."""
+    with _thread_pools().limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _thread_pools() -> ThreadpoolController:
+    return ThreadpoolController()
+
+
 class CompiledPPO(PPO):
     """PPO for the policy that the harness trains: a diagonal Gaussian whose actor and critic have hidden layers of tanh
     units of the same sizes and share none, in float32 on the CPU, by Adam and without clipping of values."""
 
+    @_one_thread()
     def collect_rollouts(
         self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
     ) -> bool:
@@ -50,12 +64,6 @@ class CompiledPPO(PPO):
 
         Returns whether to go on: false if a callback ended the rollout.
         """
-        with _one_thread():
-            return self._collect(env, callback, rollout_buffer, n_rollout_steps)
-
-    def _collect(
-        self, env: VecEnv, callback: BaseCallback, rollout_buffer: RolloutBuffer, n_rollout_steps: int
-    ) -> bool:
         bounds = cast(Box, self.action_space)
         self.policy.set_training_mode(False)
         rollout_buffer.reset()
@@ -90,6 +98,7 @@ class CompiledPPO(PPO):
         callback.on_rollout_end()
         return True
 
+    @_one_thread()
     def train(self) -> None:
         """Update the policy from the rollout buffer.
 
@@ -97,12 +106,6 @@ class CompiledPPO(PPO):
         """
         self.policy.set_training_mode(True)
         self._update_learning_rate(self.policy.optimizer)
-        with _one_thread():
-            losses = self._update()
-        self._log(losses)
-
-    def _update(self) -> list[FloatArray]:
-        """Take the gradient steps. Returns their losses [gradient steps, LOSSES], per epoch."""
         order = parameter_order(self.policy)
         optimizer = self.policy.optimizer
         networks = networks_of(self.policy)
@@ -110,7 +113,14 @@ class CompiledPPO(PPO):
         adam, taken = _adam(self, state, len(networks.parameters)), int(state[0]["step"]) if state[0] else 0
         samples = _samples(self)
         minibatch = min(self.batch_size, len(samples.returns))
-        update = Update(networks, adam, samples, self._objective(), workspace_of(networks, minibatch))
+        objective = Objective(
+            clip=float(cast(Any, self.clip_range)(self._current_progress_remaining)),
+            value_coefficient=float(self.vf_coef),
+            entropy_coefficient=float(self.ent_coef),
+            normalize_advantages=bool(self.normalize_advantage),
+            target_kl=float("inf") if self.target_kl is None else float(self.target_kl),
+        )
+        update = Update(networks, adam, samples, objective, workspace_of(networks, minibatch))
         losses: list[FloatArray] = []
         for _ in range(self.n_epochs):
             shuffled = np.random.permutation(len(samples.returns))  # noqa: NPY002 - as SB3 draws it
@@ -129,20 +139,11 @@ class CompiledPPO(PPO):
             put_vector(moment, [optimizer.state[each][name] for each in order])
         for each in order:
             optimizer.state[each]["step"] = torch.tensor(float(taken))
-        return losses
+        self._log(losses, objective)
 
-    def _objective(self) -> Objective:
-        return Objective(
-            clip=float(cast(Any, self.clip_range)(self._current_progress_remaining)),
-            value_coefficient=float(self.vf_coef),
-            entropy_coefficient=float(self.ent_coef),
-            normalize_advantages=bool(self.normalize_advantage),
-            target_kl=float("inf") if self.target_kl is None else float(self.target_kl),
-        )
-
-    def _log(self, losses: list[FloatArray]) -> None:
-        """Record what Stable-Baselines3 records, from the losses of each epoch."""
-        mean, objective = np.concatenate(losses).mean(axis=0), self._objective()
+    def _log(self, losses: list[FloatArray], objective: Objective) -> None:
+        """Record what Stable-Baselines3 records, from the losses [gradient steps, LOSSES] of each epoch."""
+        mean = np.concatenate(losses).mean(axis=0)
         policy, value, entropy = losses[-1][-1, [POLICY_LOSS, VALUE_LOSS, ENTROPY_LOSS]]
         record = self.logger.record
         record("train/entropy_loss", mean[ENTROPY_LOSS])
@@ -156,16 +157,6 @@ class CompiledPPO(PPO):
         record("train/std", torch.exp(cast(Any, self.policy.log_std)).mean().item())
         record("train/n_updates", self._n_updates, exclude="tensorboard")
         record("train/clip_range", objective.clip)
-
-
-def _one_thread() -> AbstractContextManager[object]:
-    """One thread for BLAS: for matrices of this size more threads wait for each other."""
-    return cast(AbstractContextManager[object], _thread_pools().limit(limits=1, user_api="blas"))
-
-
-@cache
-def _thread_pools() -> ThreadpoolController:
-    return ThreadpoolController()
 
 
 class _ActorCritic:

@@ -9,8 +9,6 @@ that is learned from the payoff alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import torch
 from stable_baselines3 import PPO
@@ -22,15 +20,6 @@ from harness.environments.vector_env import ArenaVecEnv, JoinedVecEnv
 from harness.game.arrays import BoolArray, FloatArray
 
 _EPOCHS, _MINIBATCH, _LEARNING_RATE = 30, 512, 1e-3
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Demonstrations:
-    """What the demonstrator saw and did in T steps of G games."""
-
-    observations: FloatArray  # [T, G, SIZE]
-    actions: FloatArray  # [T, G, 2], without the noise
-    returns: FloatArray  # [T, G], NaN in games that had not ended
 
 
 def imitate(model: PPO, environment: JoinedVecEnv, *, steps: int, deviation: float, seed: int) -> None:
@@ -45,11 +34,9 @@ def imitate(model: PPO, environment: JoinedVecEnv, *, steps: int, deviation: flo
     if not driven or not rounds:
         return
     noise = np.random.default_rng(seed)
-    shown = [
-        _demonstrate(place, _DEMONSTRATOR, rounds, discount=model.gamma, deviation=deviation, noise=noise)
-        for place in driven
-    ]
-    _fit(model, shown, torch.Generator().manual_seed(seed))
+    shown = [_demonstrate(place, rounds, discount=model.gamma, deviation=deviation, noise=noise) for place in driven]
+    observations, actions, returns = (np.concatenate(each) for each in zip(*shown, strict=True))
+    _fit(model, observations, actions, returns, order=torch.Generator().manual_seed(seed))
 
 
 _DEMONSTRATOR = Rules(
@@ -62,15 +49,11 @@ _DEMONSTRATOR = Rules(
 
 
 def _demonstrate(
-    environment: ArenaVecEnv,
-    rules: Rules,
-    rounds: int,
-    *,
-    discount: float,
-    deviation: float,
-    noise: np.random.Generator,
-) -> _Demonstrations:
-    driver = RulesDriver(rules, car_of(environment.arena.world, environment.learner))
+    environment: ArenaVecEnv, rounds: int, *, discount: float, deviation: float, noise: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """What the demonstrator saw [N, SIZE] and did [N, 2], without the noise, in so many steps of every game, and its
+    returns [N]; NaN in games that had not ended."""
+    driver = RulesDriver(_DEMONSTRATOR, car_of(environment.arena.world, environment.learner))
     games = np.arange(environment.num_envs)
     driver.reset(games)
     observation = environment.reset()
@@ -85,11 +68,8 @@ def _demonstrate(
         ended.append(done)
         driver.reset(np.flatnonzero(done))
     environment.take_finished()  # they are not games of the training
-    return _Demonstrations(
-        observations=np.array(observations),
-        actions=np.array(actions),
-        returns=returns_of(np.array(payoffs), np.array(ended), discount),
-    )
+    returns = returns_of(np.array(payoffs), np.array(ended), discount)
+    return np.concatenate(observations), np.concatenate(actions), returns.ravel()
 
 
 def returns_of(payoffs: FloatArray, ended: BoolArray, discount: float) -> FloatArray:
@@ -108,12 +88,10 @@ def returns_of(payoffs: FloatArray, ended: BoolArray, discount: float) -> FloatA
     return returns
 
 
-def _fit(model: PPO, shown: list[_Demonstrations], order: torch.Generator) -> None:
-    """Fit actor and critic by Adam, with a step size that falls to zero. The training has an optimiser of its own."""
-    observations, actions, returns = (
-        torch.from_numpy(np.concatenate([getattr(each, name).reshape(-1, *shape) for each in shown])).float()
-        for name, shape in (("observations", shown[0].observations.shape[2:]), ("actions", (2,)), ("returns", ()))
-    )
+def _fit(model: PPO, *shown: FloatArray, order: torch.Generator) -> None:
+    """Fit actor and critic to observations, actions and returns by Adam, with a step size that falls to zero. The
+    training has an optimiser of its own."""
+    observations, actions, returns = (torch.from_numpy(each).float() for each in shown)
     known = torch.isfinite(returns)
     returns = torch.where(known, returns, 0.0)
     policy = model.policy

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
@@ -19,14 +18,6 @@ from harness.game.outcome import Outcome
 from harness.game.roles import EGO
 from harness.game.seeding import generator_of, seed_of
 from harness.road.scene.open_scene import OpenScene
-
-
-@dataclass(frozen=True, kw_only=True)
-class RolloutTotals:
-    """Results of a driver's games: payoff [N], and whether the ego failed [N]."""
-
-    payoff: FloatArray
-    failed: FloatArray
 
 
 class PairedRollouts:
@@ -58,15 +49,15 @@ class PairedRollouts:
         seats = [(Seat(self._ego, persona.payoff),), *(seats_of(each, paid=False) for each in people)]
         self._arena = Arena(scene, self._tiles, seats)
 
-    def play(self, driver: Driver) -> RolloutTotals:
-        """Play all games with this ego, each until the ego's part in it ends.
+    def play(self, driver: Driver) -> tuple[FloatArray, FloatArray]:
+        """The payoff [N] of this ego in all games, each played until its part in it ends, and whether it failed [N].
 
         Raises the exceptions of the driver and those of `Arena.step`. They have no effect on later calls.
         """
         self._ego.driver = driver
         played = [self._play(load) for load in range(self._loads)]  # games that only fill the last load are dropped
         payoff, failed = (np.concatenate(each)[: self._games] for each in zip(*played, strict=True))
-        return RolloutTotals(payoff=payoff, failed=failed)
+        return payoff, failed
 
     def close(self) -> None:
         """Close the SUMO simulation."""
@@ -89,16 +80,12 @@ class _CurrentDriver:
     """The driver of the ego's seat: it calls `driver`, which `play` sets."""
 
     takes_over = True
-
-    def __init__(self) -> None:
-        self.driver: Driver | None = None
+    driver: Driver
 
     def reset(self, games: IntArray) -> None:
         """Reset games [N] of the current driver."""
-        assert self.driver is not None, "play sets the driver"
         self.driver.reset(games)
 
     def decide(self, games: IntArray, observation: FloatArray, noise: FloatArray) -> FloatArray:
         """The decisions of the current driver."""
-        assert self.driver is not None, "play sets the driver"
         return self.driver.decide(games, observation, noise)

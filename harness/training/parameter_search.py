@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import optuna
+from optuna.trial import TrialState, create_trial
 
 from harness.config.persona import Persona
 from harness.config.training import Reconfiguration
@@ -75,17 +76,16 @@ def run_search(
     on_progress(len(trials), total)
     if len(trials) == total:
         return trials
-    with closing(
-        PairedRollouts(
-            search.scene,
-            persona=search.persona,
-            people=search.people,
-            games=settings.games,
-            at_once=settings.games_at_once,
-            alone_share=settings.alone_share,
-            parts=(*search.parts, "games"),
-        )
-    ) as games:
+    games = PairedRollouts(
+        search.scene,
+        persona=search.persona,
+        people=search.people,
+        games=settings.games,
+        at_once=settings.games_at_once,
+        alone_share=settings.alone_share,
+        parts=(*search.parts, "games"),
+    )
+    with closing(games):
         while len(trials) < total:
             on_start(len(trials))
             values = propose(search.driver.searched, trials, *search.parts) if trials else search.driver.numbers
@@ -110,12 +110,8 @@ def propose(tunable: Sequence[Tunable], trials: Sequence[Trial], *parts: str | i
     seed = seed_of(*parts, "trial", len(trials)) % 2**32
     study = optuna.create_study(direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed))
     for trial in trials:
-        state = optuna.trial.TrialState.FAIL if trial.mean_payoff is None else optuna.trial.TrialState.COMPLETE
-        study.add_trial(
-            optuna.trial.create_trial(
-                state=state, params=dict(trial.values), distributions=ranges, value=trial.mean_payoff
-            )
-        )
+        state, values = TrialState.FAIL if trial.mean_payoff is None else TrialState.COMPLETE, dict(trial.values)
+        study.add_trial(create_trial(state=state, params=values, distributions=ranges, value=trial.mean_payoff))
     return dict(study.ask(ranges).params)
 
 
@@ -125,8 +121,8 @@ def _run_trial(search: SearchSpec, games: PairedRollouts, values: Mapping[str, f
     try:
         external = search.driver if values == search.driver.numbers else search.driver.tuned(values)
         driver = external.make(car_of(search.scene.world, EGO), sampled)
-        totals = games.play(driver)
-        return Trial(values=values, mean_payoff=float(totals.payoff.mean()), failure_rate=float(totals.failed.mean()))
+        payoff, failed = games.play(driver)
+        return Trial(values=values, mean_payoff=float(payoff.mean()), failure_rate=float(failed.mean()))
     except (SimulationError, OSError):
         raise
     except Exception as error:  # a driver may raise any exception: the search continues

@@ -24,11 +24,11 @@ from harness.game.observation_layout import OF_OTHERS
 from harness.game.outcome import Outcome
 from harness.game.seeding import seed_of
 from harness.training.callbacks import CurveRecorder, DeviationBound
-from harness.training.checkpoint import Progress, policy_of, put_policy, read_checkpoint, write_checkpoint
+from harness.training.checkpoint import Progress, read_checkpoint, write_checkpoint
 from harness.training.compiled_ppo import CompiledPPO
 from harness.training.early_stopping import Narrowing, has_converged, still_fails
 from harness.training.imitation import imitate
-from harness.training.torch_without_compiler import leave_out_compiler
+from harness.training.policy_arrays import layers_of, policy_of, put_policy
 from harness.training.training_games import TrainingSpec, attentive_steps, open_games, sample
 
 _GAE_LAMBDA = 0.95
@@ -70,7 +70,8 @@ def train(
         progress = read_checkpoint(model, key, checkpoint)
         if progress is None:
             progress = Progress(segments=0, steps=0, segment_payoffs=[], curve=[], alone_games=[], alone_failures=[])
-            _imitate(spec, model, environment)
+            if spec.initial is None:
+                _imitate(spec, model, environment)
         while (stopped := _stop_reason(spec, progress)) is None:
             on_start(progress.segments)
             progress = _segment(spec, model, environment, progress=progress, on_progress=on_progress)
@@ -101,7 +102,7 @@ def _converged_at(spec: TrainingSpec, progress: Progress) -> int | None:
 def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | None) -> PPO:
     settings = spec.settings
     set_random_seed(seed_of(*spec.parts, "parameters") % 2**32)
-    leave_out_compiler()
+    _leave_out_compiler()
     model = _ALGORITHMS[settings.learner](
         "MlpPolicy",
         environment,
@@ -113,17 +114,16 @@ def _learner(spec: TrainingSpec, environment: JoinedVecEnv, tensorboard: Path | 
         gae_lambda=_GAE_LAMBDA,
         clip_range=settings.clip,
         ent_coef=settings.entropy_coefficient,
-        policy_kwargs={
-            "net_arch": list(settings.network),
-            "log_std_init": float(np.log(_initial_deviation(spec))),
-        },
+        policy_kwargs={"net_arch": list(settings.network), "log_std_init": float(np.log(_initial_deviation(spec)))},
         device="cpu",
     )
     model.set_logger(configure(str(tensorboard), ["tensorboard"]) if tensorboard else configure(None, []))
     if spec.initial is not None:
         put_policy(model, spec.initial, _initial_deviation(spec))
-    else:
-        _zero_other_weights(model)
+        return model
+    with torch.no_grad():  # a learner that is always alone ignores other road users
+        for layers in layers_of(model.policy).values():
+            layers[0].weight[:, torch.as_tensor(OF_OTHERS)] = 0.0
     return model
 
 
@@ -134,27 +134,26 @@ def _initial_deviation(spec: TrainingSpec) -> float:
 
 
 def _imitate(spec: TrainingSpec, model: PPO, environment: JoinedVecEnv) -> None:
-    """Let a policy without a past imitate the demonstrator."""
-    settings = spec.settings
-    if spec.initial is None:
-        try:
-            imitate(
-                model,
-                environment,
-                steps=min(settings.demonstration_steps, settings.steps // 5),
-                deviation=_initial_deviation(spec),
-                seed=seed_of(*spec.parts, "demonstration") % 2**31,
-            )
-        except FloatingPointError as error:
-            raise FloatingPointError(f"{error}, in a demonstration") from error
+    """Let a new policy imitate the demonstrator."""
+    steps = min(spec.settings.demonstration_steps, spec.settings.steps // 5)
+    seed = seed_of(*spec.parts, "demonstration") % 2**31
+    try:
+        imitate(model, environment, steps=steps, deviation=_initial_deviation(spec), seed=seed)
+    except FloatingPointError as error:
+        raise FloatingPointError(f"{error}, in a demonstration") from error
 
 
-def _zero_other_weights(model: PPO) -> None:
-    """Set the weights of the entries of other road users to zero: a learner that is always alone ignores them."""
-    extractor: Any = model.policy.mlp_extractor
-    with torch.no_grad():
-        for network in (extractor.policy_net, extractor.value_net):
-            network[0].weight[:, torch.as_tensor(OF_OTHERS)] = 0.0
+def _leave_out_compiler() -> None:
+    """Let optimisers be made without importing PyTorch's compiler, which takes more than a second in each process that
+    trains, and nothing is compiled here.
+
+    PyTorch looks up the form of a method that is not compiled in this attribute: it is the method itself. A version of
+    PyTorch that does not look it up imports its compiler as before.
+    """
+    for name in ("add_param_group", "state_dict", "load_state_dict", "zero_grad"):
+        plain = getattr(getattr(torch.optim.Optimizer, name), "__wrapped__", None)
+        if plain is not None:
+            setattr(plain, "__dynamo_disable", plain)
 
 
 def _segment(

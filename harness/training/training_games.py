@@ -56,26 +56,22 @@ class TrainingSpec:
 
 def open_games(spec: TrainingSpec) -> JoinedVecEnv:
     """The games of a training; each of its places has an arena of its own. Raises SimulationError if SUMO fails."""
-    games = spec.settings.games
+    games, places = spec.settings.games, len(spec.places)
     environments: list[ArenaVecEnv] = []
     try:
-        for number in range(len(spec.places)):
-            own_games = games // len(spec.places) + (number < games % len(spec.places))
-            environments.append(_environment_of(spec, number, own_games))
+        for number, place in enumerate(spec.places):
+            seats = [seats_of(each, paid=False) for each in place.drivers]
+            seats[place.player] = (Seat(None, spec.persona.payoff),)
+            own_games = games // places + (number < games % places)
+            arena = Arena(spec.scene, own_games, seats, seed=seed_of(*spec.parts, "sumo") % 2**31)
+            starts, parts = _start_distribution(spec, place, 0), _parts_of(number, *spec.parts)
+            scale = spec.settings.payoff_scale
+            environments.append(ArenaVecEnv(arena, place.player, starts, *parts, payoff_scale=scale))
     except BaseException:
         for each in environments:
             each.close()
         raise
     return JoinedVecEnv(environments)
-
-
-def _environment_of(spec: TrainingSpec, number: int, games: int) -> ArenaVecEnv:
-    place = spec.places[number]
-    seats = [seats_of(each, paid=False) for each in place.drivers]
-    seats[place.player] = (Seat(None, spec.persona.payoff),)
-    arena = Arena(spec.scene, games, seats, seed=seed_of(*spec.parts, "sumo") % 2**31)
-    scale, parts = spec.settings.payoff_scale, _parts_of(number, *spec.parts)
-    return ArenaVecEnv(arena, place.player, _start_distribution(spec, place, 0), *parts, payoff_scale=scale)
 
 
 def _parts_of(number: int, *parts: str | int) -> tuple[str | int, ...]:

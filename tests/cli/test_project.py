@@ -22,7 +22,7 @@ def test_create_project__its_campaign_is_in_order_and_uses_its_own_documents(tmp
 
 
 @pytest.mark.parametrize(
-    ("name", "message"), [("my lab", "the folder's name is that of the campaign"), ("x/lab", "there is no folder")]
+    ("name", "message"), [("my lab", "can't be the name of a campaign"), ("x/lab", "there is no folder")]
 )
 def test_create_project__a_bad_folder_is_refused(name: str, message: str, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=message):

@@ -16,7 +16,7 @@ from harness.drivers.protocol import Driver
 from harness.drivers.sumo import SumoDriver
 from harness.environments.vector_env import ACTION_SPACE, OBSERVATION_SPACE
 from harness.game.observation_layout import SIZE
-from harness.training.checkpoint import policy_of, put_policy
+from harness.training.policy_arrays import policy_of, put_policy
 from tests.support.policies import some_policy
 
 GAMES = np.arange(300)

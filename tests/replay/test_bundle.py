@@ -11,8 +11,7 @@ import pytest
 from defusedxml import ElementTree
 
 from harness.evaluation.worst_first import worst_first
-from harness.replay import choose_games, names_in_pictures, open_in_sumo_gui
-from harness.replay import sumo_gui as sumo_gui_module
+from harness.replay import choose_games, names_in_pictures
 from harness.replay.contacts import contacts
 from harness.replay.floating_car_data import Lanes
 from harness.replay.gui_settings import choose_view
@@ -233,22 +232,6 @@ def test_worst_first__by_failure_then_time_to_collision_then_name() -> None:
     assert key(worst_first(episodes())) == expected
     assert key(worst_first(episodes().sample(frac=1.0, random_state=5))) == expected
     assert list(worst_first(episodes()).columns) == list(episodes().columns)
-
-
-def test_open__starts_sumo_gui_on_the_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    program = tmp_path / "sumo" / "bin" / "sumo-gui"
-    program.parent.mkdir(parents=True)
-    (tmp_path / "sumo" / "data").mkdir()
-    program.write_text('#!/bin/sh\necho "$SUMO_HOME|$1|$2" > "$(dirname "$2")/called"\n')
-    program.chmod(0o755)
-    (tmp_path / "game").mkdir()
-    (tmp_path / "game" / "scene.sumocfg").write_text("<configuration/>")
-    monkeypatch.setenv("DISPLAY", ":1")
-    monkeypatch.setattr(sumo_gui_module, "find_sumo_gui", lambda: program)
-    assert open_in_sumo_gui(tmp_path / "game").wait(timeout=300) == 0
-    home, option, file = (tmp_path / "game" / "called").read_text().strip().split("|")
-    assert (Path(home), option) == ((tmp_path / "sumo").resolve(), "-c")
-    assert Path(file) == tmp_path / "game" / "scene.sumocfg"
 
 
 def test_types__a_walker_and_a_cyclist_look_like_what_they_are() -> None:

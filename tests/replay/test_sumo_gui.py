@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 from PIL import Image, ImageGrab
 
-from harness.replay import follow_in_sumo_gui, open_in_sumo_gui, sumo_gui
+from harness.replay import follow_in_sumo_gui, sumo_gui
 from harness.replay.contacts import contacts
 from harness.replay.gui_settings import choose_view
 from harness.replay.sumo_gui import find_sumo_gui, find_xvfb, virtual_screen
@@ -132,16 +132,15 @@ def test_gui__follows_the_ego_and_halts_at_the_contact(
     assert apart == pytest.approx(expected.loc["non_ego", "x_m"] - expected.loc["ego", "x_m"], abs=0.8)
 
 
-def test_gui__asks_no_question_in_front_of_the_last_picture(
-    screen: str, merge_net: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_gui__asks_no_question_in_front_of_the_last_picture(screen: str, merge_net: Path, tmp_path: Path) -> None:
     folder = write(collision_game(), merge_net, tmp_path / "replay")
     settings = (folder / "view.xml").read_text()
     settings = re.sub(r"<delay [^>]*>", '<delay value="20"/>', settings)
     settings = settings.replace('<breakpoint time="3.300" />', "")  # of the contact: the halt at the end is left
     (folder / "view.xml").write_text(settings)
-    monkeypatch.setenv("DISPLAY", screen)
-    gui = open_in_sumo_gui(folder)
+    gui = subprocess.Popen(
+        [str(find_sumo_gui()), "-c", "scene.sumocfg"], cwd=folder, env=os.environ | {"DISPLAY": screen}
+    )
     try:
         picture = settled(screen)
     finally:

@@ -95,19 +95,17 @@ def play(scene: OpenScene, driver: Driver, other: Mixture | None = None, **chang
 def test_games__have_the_given_number_and_are_reproducible(scene: OpenScene) -> None:
     recording = Recording(scene)
     once, again = play(scene, recording)
-    assert once.payoff.shape == once.failed.shape == (7,)
-    np.testing.assert_array_equal(once.payoff, again.payoff)
-    np.testing.assert_array_equal(once.failed, again.failed)
-    np.testing.assert_array_equal(
-        recording.first[:9], recording.first[9:]
-    )  # three loads of three games; two are dropped
+    (payoff, failed) = once
+    assert payoff.shape == failed.shape == (7,)
+    np.testing.assert_array_equal(once, again)
+    # three loads of three games; two are dropped
+    np.testing.assert_array_equal(recording.first[:9], recording.first[9:])
     assert len(np.unique(np.array(recording.first[:7]), axis=0)) == 7  # all different
 
 
 def test_games__do_not_depend_on_the_number_at_once(scene: OpenScene) -> None:
     alone, together = (play(scene, Recording(scene), at_once=at_once)[0] for at_once in (1, 7))
-    np.testing.assert_allclose(alone.payoff, together.payoff, atol=1e-4)
-    np.testing.assert_array_equal(alone.failed, together.failed)
+    np.testing.assert_allclose(alone, together, atol=1e-4)
 
 
 @pytest.mark.parametrize(("share", "opponents"), [(0.0, range(20, 21)), (1.0, range(1)), (0.5, range(4, 17))])

@@ -8,9 +8,9 @@ import sys
 PROGRAM = """
 import sys
 import torch
-from harness.training.torch_without_compiler import leave_out_compiler
+from harness.training.ppo import _leave_out_compiler
 
-leave_out_compiler()
+_leave_out_compiler()
 layer = torch.nn.Linear(2, 1)
 adam = torch.optim.Adam(layer.parameters(), lr=0.5)
 adam.load_state_dict(adam.state_dict())
